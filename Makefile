@@ -1,0 +1,59 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+METADATA := pyproject.toml setup.py setup.cfg embedded_ros/pyproject.toml
+
+.PHONY: help install demo test lint format clean
+
+help:  ## Show what can be made
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
+
+install: $(VENV)/.installed  ## Make .venv with everything that running needs
+
+$(VENV)/.installed: $(METADATA)
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13))' || \
+	  { echo "slap_ros needs Python 3.11 or 3.12; try: make $(MAKECMDGOALS) PYTHON=python3.12" >&2; exit 1; }
+	$(PYTHON) -m venv $(VENV) || \
+	  { echo "no venv module; on Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
+	$(BIN)/pip install --quiet --disable-pip-version-check -e ./embedded_ros -e '.[physics]'
+	@touch $@
+
+$(VENV)/.tested: $(VENV)/.installed
+	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[test]'
+	@touch $@
+
+demo: install  ## Run the whole ensemble, record bags, replay them, measure
+	@set -e; export PATH="$(abspath $(BIN)):$$PATH"; bag=runs/demo-$$(date +%Y%m%d-%H%M%S); \
+	echo "== one task, every node a process"; \
+	slap run obstacle2d --seed 3 --record $$bag; \
+	slap plan obstacle2d --seed 3 --output $$bag-plan; \
+	echo "== the same numbers from the bag alone"; \
+	slap bag evaluate $$bag; \
+	echo "== the recorded commands in a fresh world"; \
+	slap bag replay $$bag; \
+	echo "== many tasks, and the start states of the paper"; \
+	slap evaluate obstacle2d --tasks 10 --seeds 5; \
+	slap evaluate obstacle2d --tasks 10 --seeds 5 --preset paper; \
+	echo "== a Panda takes a tower apart"; \
+	slap run obstacle_tower --seed 1 --record $$bag-tower --render $$bag-tower.gif; \
+	slap bag replay $$bag-tower; \
+	echo "bag: $$bag   abstract graph: $$bag-plan/graph.svg   animation: $$bag-tower.gif"
+
+test: $(VENV)/.tested lint  ## Run every test
+	$(BIN)/pytest -q -n 2 --dist worksteal
+	cd embedded_ros && $(abspath $(BIN))/pytest -q -n 2 --dist worksteal
+
+lint: $(VENV)/.tested  ## Check style and types
+	$(BIN)/ruff check . embedded_ros
+	$(BIN)/ruff format --check . embedded_ros
+	$(BIN)/mypy
+	cd embedded_ros && $(abspath $(BIN))/mypy
+
+format: $(VENV)/.tested  ## Format the code
+	$(BIN)/ruff format . embedded_ros
+	$(BIN)/ruff check --fix . embedded_ros
+
+clean:  ## Remove what was made
+	rm -rf $(VENV) build install log *.egg-info

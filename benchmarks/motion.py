@@ -1,0 +1,209 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Motion around a tower of three blocks: ``python -m benchmarks.motion [--queries N] [--json]``.
+
+Lengths are control steps; ``straight`` is the bound that the joint limits set, obstacles or not,
+and ``in tens`` the timing of the preset ``paper`` on the same paths.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable, Iterator
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.printing import show
+from slap_ros.motion import (
+    Box,
+    CollisionChecker,
+    Joints,
+    MotionPlanningError,
+    control_steps,
+    inverse_kinematics,
+    linear_motion,
+    plan_path,
+    retime,
+    retime_in_tens,
+    shifted,
+)
+from slap_ros.physics.panda import HOME, JOINT_HIGH, JOINT_LOW, Pose, grasp_pose
+
+HALF = (0.025, 0.025, 0.025)  # m, of a block
+TABLE = Box(Pose((0.5, 0.0, -0.175)), (0.25, 0.4, 0.25))
+ON_TABLE = 0.1  # m, the height of a block's centre
+APPROACH = 0.05  # m
+LIFT = 0.005  # m, of a held block over the table where its carriage ends
+START = np.array(HOME)
+
+Figures = dict[str, dict[str, float]]
+
+
+class Scene(NamedTuple):
+    """A tower and where a block is taken from and carried to, past the tower."""
+
+    tower: list[Box]
+    block: Box
+    place: tuple[float, float]  # m
+
+
+def block(x: float, y: float, z: float = ON_TABLE) -> Box:
+    """A block, its centre in m."""
+    return Box(Pose((x, y, z)), HALF)
+
+
+def top_down(x: float, y: float, z: float, yaw: float = 0.0) -> Pose:
+    """A grasp from above."""
+    return Pose((x, y, z), (math.cos(yaw / 2), math.sin(yaw / 2), 0.0, 0.0))
+
+
+def scenes(count: int) -> Iterator[Scene]:
+    """Towers with a block on one side and its place on the other."""
+    rng = np.random.default_rng(0)
+    while count:
+        tower = rng.uniform((0.42, -0.12), (0.58, 0.12))
+        offset = rng.uniform((-0.08, 0.13), (0.08, 0.2)) * rng.choice((-1.0, 1.0))
+        (x, y), (px, py) = (tower + offset).tolist(), (tower - offset).tolist()
+        blocks = [block(*tower.tolist(), ON_TABLE + 0.05 * i) for i in range(3)]
+        yield Scene(blocks, block(x, y), (px, py))
+        count -= 1
+
+
+def microseconds(call: Callable[[], object], repetitions: int = 300) -> float:
+    """Time of a call."""
+    start = perf_counter()
+    for _ in range(repetitions):
+        call()
+    return (perf_counter() - start) / repetitions * 1e6
+
+
+def measure_inverse_kinematics(queries: int) -> dict[str, float]:
+    """Of grasps from above over the table, at any yaw."""
+    rng = np.random.default_rng(1)
+    times, found = [], 0
+    for _ in range(queries):
+        position = rng.uniform((0.3, -0.35, 0.1), (0.7, 0.35, 0.5))
+        pose = top_down(*position.tolist(), rng.uniform(-math.pi, math.pi))
+        start = perf_counter()
+        found += inverse_kinematics(pose, START) is not None
+        times.append(perf_counter() - start)
+    beyond = top_down(2.0, 0.0, 0.5)
+    return {
+        "median_us": float(np.median(times)) * 1e6,
+        "out_of_reach_us": microseconds(lambda: inverse_kinematics(beyond, START)),
+        "found": found / queries,
+    }
+
+
+def measure_collisions() -> dict[str, float]:
+    """Of queries against six boxes, the hand far from them and among them."""
+    tower = [block(0.5, 0.0, ON_TABLE + 0.05 * i) for i in range(3)]
+    free = CollisionChecker([TABLE, *tower, block(0.375, -0.2), block(0.5, 0.2)])
+    rng = np.random.default_rng(2)
+    beside = inverse_kinematics(top_down(0.45, -0.06, 0.2), START)
+    assert beside is not None
+    nearby = beside + rng.normal(0.0, 0.05, (256, 7))
+    anywhere = rng.uniform(JOINT_LOW, JOINT_HIGH, (256, 7))
+    return {
+        "single_far_us": microseconds(lambda: free(START)),
+        "single_near_us": microseconds(lambda: free(beside)),
+        "in_256_near_us": microseconds(lambda: free(nearby), 20) / 256,
+        "in_256_random_us": microseconds(lambda: free(anywhere), 20) / 256,
+    }
+
+
+def measure_plans(queries: int) -> Figures:
+    """Of reaching over a block, coming down on it, and carrying it past the tower."""
+    rows: dict[str, list[dict[str, float]]] = {"reach": [], "approach": [], "carry": []}
+    failed = dict.fromkeys(rows, 0)
+    for seed, scene in enumerate(scenes(queries)):
+        x, y, z = scene.block.pose.position
+        around = CollisionChecker([TABLE, *scene.tower, scene.block])
+        above = _plan(rows["reach"], START, top_down(x, y, z + APPROACH), around, seed)
+        if above is None:
+            failed["reach"] += 1
+            continue
+        grasp = _approach(rows["approach"], above, CollisionChecker([TABLE, *scene.tower]))
+        if grasp is None:
+            failed["approach"] += 1
+            continue
+        carrying = CollisionChecker([TABLE, *scene.tower], held=Box(Pose(), HALF))
+        place = top_down(*scene.place, ON_TABLE + LIFT)
+        failed["carry"] += _plan(rows["carry"], grasp, place, carrying, seed) is None
+    return {
+        kind: {**_summary(found), "failed": failed[kind] / (failed[kind] + len(found))}
+        for kind, found in rows.items()
+    }
+
+
+def _plan(
+    rows: list[dict[str, float]], q: Joints, pose: Pose, free: CollisionChecker, seed: int
+) -> Joints | None:
+    """Plan to a pose and note the figures; where the arm is then."""
+    start = perf_counter()
+    goal = inverse_kinematics(pose, q, free=free)
+    if goal is None:
+        return None
+    try:
+        path = plan_path(q, goal, free, seed=seed)
+    except MotionPlanningError:
+        return None
+    motion = retime(path, free=free)
+    rows.append(
+        {
+            "ms": (perf_counter() - start) * 1e3,
+            "steps": len(motion),
+            "straight": math.ceil(control_steps(q, goal) - 1e-9),
+            "in tens": len(retime_in_tens(path)),
+        }
+    )
+    return goal
+
+
+def _approach(rows: list[dict[str, float]], q: Joints, free: CollisionChecker) -> Joints | None:
+    """Come down on the block and note the figures; where the arm is then."""
+    start = perf_counter()
+    path = linear_motion(q, shifted(grasp_pose(q), (0.0, 0.0, -APPROACH)), free=free)
+    if path is None:
+        return None
+    rows.append(
+        {
+            "ms": (perf_counter() - start) * 1e3,
+            "steps": len(retime(path)),
+            "straight": math.ceil(control_steps(path[0], path[-1]) - 1e-9),
+            "in tens": len(retime_in_tens(path[[0, -1]])),
+        }
+    )
+    return np.asarray(path[-1])
+
+
+def _summary(rows: list[dict[str, float]]) -> dict[str, float]:
+    if not rows:
+        return {}
+    times = [row["ms"] for row in rows]
+    lengths = {
+        name: float(np.mean([row[name] for row in rows]))
+        for name in ("steps", "straight", "in tens")
+    }
+    return {"median_ms": float(np.median(times)), "most_ms": max(times), **lengths}
+
+
+def main() -> None:
+    """Print the figures."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--queries", type=int, default=100)
+    parser.add_argument("--json", action="store_true")
+    arguments = parser.parse_args()
+    figures = {
+        "inverse kinematics": measure_inverse_kinematics(arguments.queries),
+        "collisions": measure_collisions(),
+        **measure_plans(arguments.queries),
+    }
+    show(figures, arguments.json)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,195 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Actions between processes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import pytest
+import rclpy
+from action_msgs.msg import GoalStatus
+from action_msgs.srv import CancelGoal
+from example_interfaces.action import Fibonacci
+from rclpy.action import (
+    ActionClient,
+    ActionServer,
+    CancelResponse,
+    GoalResponse,
+    get_action_names_and_types,
+)
+from rclpy.action.goal_state import InvalidTransitionError
+from rclpy.node import Node
+
+from conftest import Process, complete, spin_until
+from peers import FAILING_ORDER, LONG_ORDER, REJECTED_ORDER
+
+Run = Callable[..., Process]
+
+
+@pytest.fixture
+def client(node: Node, run: Run) -> ActionClient:
+    run("counter")
+    client = ActionClient(node, Fibonacci, "fibonacci")
+    assert client.wait_for_server(10)
+    return client
+
+
+def test_a_goal_succeeds_with_feedback(node: Node, client: ActionClient) -> None:
+    feedback: list[list[int]] = []
+    goal = complete(
+        node,
+        client.send_goal_async(
+            Fibonacci.Goal(order=6), lambda m: feedback.append(list(m.feedback.sequence))
+        ),
+    )
+    assert goal.accepted
+    assert goal.stamp.sec > 0
+    response = complete(node, goal.get_result_async())
+    assert response.status == GoalStatus.STATUS_SUCCEEDED == goal.status
+    assert list(response.result.sequence) == [0, 1, 1, 2, 3, 5, 8]
+    assert feedback[0] == [0, 1, 1]
+    assert len(feedback) == 5
+
+
+def test_a_goal_is_cancelled_halfway(node: Node, client: ActionClient) -> None:
+    goal = complete(node, client.send_goal_async(Fibonacci.Goal(order=LONG_ORDER)))
+    result = goal.get_result_async()
+    spin_until(node, lambda: False, 0.2)
+    assert goal.status == GoalStatus.STATUS_EXECUTING
+    answer = complete(node, goal.cancel_goal_async())
+    assert answer.return_code == CancelGoal.Response.ERROR_NONE
+    assert [info.goal_id for info in answer.goals_canceling] == [goal.goal_id]
+    response = complete(node, result)
+    assert response.status == GoalStatus.STATUS_CANCELED
+    assert 2 < len(response.result.sequence) < LONG_ORDER
+    again = complete(node, goal.cancel_goal_async())
+    assert again.return_code == CancelGoal.Response.ERROR_GOAL_TERMINATED
+
+
+def test_goals_are_rejected_and_aborted(node: Node, client: ActionClient) -> None:
+    rejected = complete(node, client.send_goal_async(Fibonacci.Goal(order=REJECTED_ORDER)))
+    assert not rejected.accepted
+    failing = complete(node, client.send_goal_async(Fibonacci.Goal(order=FAILING_ORDER)))
+    response = complete(node, failing.get_result_async())
+    assert response.status == GoalStatus.STATUS_ABORTED
+    assert response.result == Fibonacci.Result()
+
+
+def test_results_expire(node: Node, client: ActionClient) -> None:
+    goal = complete(node, client.send_goal_async(Fibonacci.Goal(order=2)))
+    assert complete(node, goal.get_result_async()).status == GoalStatus.STATUS_SUCCEEDED
+    assert complete(node, goal.get_result_async()).status == GoalStatus.STATUS_SUCCEEDED
+    time.sleep(2.2)  # the peer keeps results for 1 s
+    assert complete(node, goal.get_result_async()).status == GoalStatus.STATUS_UNKNOWN
+
+
+def test_several_goals_at_once(node: Node, client: ActionClient) -> None:
+    goals = [
+        complete(node, client.send_goal_async(Fibonacci.Goal(order=order))) for order in (4, 5, 6)
+    ]
+    results = [complete(node, goal.get_result_async()).result for goal in goals]
+    assert [len(result.sequence) for result in results] == [5, 6, 7]
+
+
+def test_actions_are_listed(node: Node, client: ActionClient) -> None:
+    assert get_action_names_and_types(node) == [
+        ("/fibonacci", ["example_interfaces/action/Fibonacci"])
+    ]
+
+
+def test_a_server_that_dies_is_noticed(node: Node, run: Run) -> None:
+    process = run("counter")
+    client = ActionClient(node, Fibonacci, "fibonacci")
+    assert client.wait_for_server(10)
+    assert node.count_publishers("/fibonacci/_action/feedback") == 1
+    process.kill()
+    began = time.monotonic()
+    assert spin_until(node, lambda: not client.server_is_ready())
+    assert spin_until(node, lambda: node.count_publishers("/fibonacci/_action/feedback") == 0)
+    assert time.monotonic() - began < 8  # a lease of 4 s
+    assert "counter" not in node.get_node_names()
+
+
+def test_an_asynchronous_server_in_one_thread(node: Node) -> None:
+    """Goal, cancel and execution on the very executor that also runs the client."""
+    handles = []
+
+    async def execute(handle):
+        handles.append(handle)
+        with pytest.raises(InvalidTransitionError, match=r"EXECUTING cannot take .* CANCELED"):
+            handle.canceled()
+        released = rclpy.Future()
+
+        def release() -> None:
+            if handle.is_cancel_requested:
+                released.set_result(None)
+
+        timer = node.create_timer(0.01, release)
+        await released
+        node.destroy_timer(timer)
+        handle.canceled()
+        with pytest.raises(InvalidTransitionError):
+            handle.succeed()
+        return Fibonacci.Result(sequence=[1])
+
+    server = ActionServer(
+        node,
+        Fibonacci,
+        "fibonacci",
+        execute,
+        goal_callback=lambda goal: GoalResponse.ACCEPT,
+        cancel_callback=lambda handle: CancelResponse.ACCEPT,
+    )
+    client = ActionClient(node, Fibonacci, "fibonacci")
+    assert client.wait_for_server(5)
+    goal = complete(node, client.send_goal_async(Fibonacci.Goal(order=1)))
+    result = goal.get_result_async()
+    spin_until(node, lambda: bool(handles))
+    complete(node, goal.cancel_goal_async())
+    response = complete(node, result)
+    assert response.status == GoalStatus.STATUS_CANCELED
+    assert list(response.result.sequence) == [1]
+    with pytest.raises(TypeError, match="expected example_interfaces/action/Fibonacci_Feedback"):
+        handles[0].publish_feedback(Fibonacci.Result())
+    server.destroy()
+    server.destroy()
+    client.destroy()
+    assert get_action_names_and_types(node) == []
+
+
+def test_a_deferred_goal_executes_when_told(node: Node) -> None:
+    waiting = []
+    server = ActionServer(
+        node,
+        Fibonacci,
+        "fibonacci",
+        lambda handle: (handle.succeed(), Fibonacci.Result())[1],
+        handle_accepted_callback=waiting.append,
+    )
+    client = ActionClient(node, Fibonacci, "fibonacci")
+    assert client.wait_for_server(5)
+    goal = complete(node, client.send_goal_async(Fibonacci.Goal()))
+    result = goal.get_result_async()
+    spin_until(node, lambda: bool(waiting))
+    spin_until(node, lambda: False, 0.1)
+    assert not result.done()
+    assert waiting[0].status == GoalStatus.STATUS_ACCEPTED
+    waiting[0].execute()
+    assert complete(node, result).status == GoalStatus.STATUS_SUCCEEDED
+    refused = complete(node, goal.cancel_goal_async())
+    assert refused.return_code == CancelGoal.Response.ERROR_GOAL_TERMINATED
+    server.destroy()
+
+
+def test_a_destroyed_server_says_that_its_goals_are_aborted(node: Node) -> None:
+    server = ActionServer(
+        node, Fibonacci, "fibonacci", lambda handle: None, handle_accepted_callback=lambda h: None
+    )
+    client = ActionClient(node, Fibonacci, "fibonacci")
+    assert client.wait_for_server(5)
+    goal = complete(node, client.send_goal_async(Fibonacci.Goal()))
+    server.destroy()
+    assert spin_until(node, lambda: goal.status == GoalStatus.STATUS_ABORTED)
+    assert not client.server_is_ready()

@@ -1,0 +1,89 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The user's side of a run: asks for the task to be solved and follows what happens."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from typing import Any
+
+from rclpy.action import ActionClient
+from rclpy.node import Node
+from rclpy.task import Future
+from slap_msgs.action import SolveTask
+
+from ensemble import encode
+from ensemble.interfaces import (
+    ATOMS,
+    CLOSE_BAG,
+    DOMAIN,
+    EXECUTE_SKILL,
+    PLAN,
+    PLAN_EVENTS,
+    SKILL_EVENTS,
+    SOLVE_TASK,
+    STATE,
+    TASK,
+    Topic,
+)
+from slap_ros.evaluation.metrics import RunLog
+from slap_ros.relational import GroundAtom
+
+FOLLOWED = (DOMAIN, TASK, STATE, ATOMS, PLAN, PLAN_EVENTS, SKILL_EVENTS)
+OnMessage = Callable[[str, Any], None]  # message type, message
+
+
+class RunClient(Node):
+    """Follows a run; ``log`` has its metrics."""
+
+    def __init__(self, on_message: OnMessage, **kwargs: Any) -> None:
+        """``on_message`` is called for every message followed, after the log has it."""
+        super().__init__("slap_run", **kwargs)
+        self.log = RunLog()
+        self._on_message = on_message
+        for topic in FOLLOWED:
+            self._follow(topic)
+        self._solve = ActionClient(self, SOLVE_TASK.type, SOLVE_TASK.name)
+        self._skills = ActionClient(self, EXECUTE_SKILL.type, EXECUTE_SKILL.name)
+        self._close_bag = self.create_client(CLOSE_BAG.type, CLOSE_BAG.name)
+
+    def destroy_node(self) -> None:
+        """Destroy the action clients as well."""
+        self._solve.destroy()
+        self._skills.destroy()
+        super().destroy_node()
+
+    def _follow(self, topic: Topic) -> None:
+        def callback(message: Any) -> None:
+            self.log.add(topic.type_name, message)
+            self._on_message(topic.type_name, message)
+
+        self.create_subscription(topic.type, topic.name, callback, topic.qos)
+
+    def others(self) -> list[str]:
+        """Names of the other nodes in this namespace."""
+        here = self.get_namespace()
+        return [
+            name
+            for name, namespace in self.get_node_names_and_namespaces()
+            if namespace == here and name != self.get_name()
+        ]
+
+    def ready(self, recording: bool) -> bool:
+        """Whether everything that a run needs is there."""
+        return (
+            self._solve.server_is_ready()
+            and self._skills.server_is_ready()
+            and (not recording or self._close_bag.service_is_ready())
+        )
+
+    def send(self, goal: Collection[GroundAtom], step_limit: int, max_replans: int) -> Future:
+        """Ask for the task to be solved; the future's result is the goal handle."""
+        request = SolveTask.Goal(
+            goal=encode.goal(goal), step_limit=step_limit, max_replans=max_replans
+        )
+        return self._solve.send_goal_async(request)
+
+    def close_bag(self) -> Future:
+        """Ask the recorder to finish its bag."""
+        return self._close_bag.call_async(CLOSE_BAG.type.Request())

@@ -1,0 +1,146 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Core objects into slap_msgs messages. The way back is ``slap_ros.messages.decode``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import slap_msgs.msg as msgs
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import KeyValue
+from std_msgs.msg import Header
+
+from slap_ros.domains import Domain, Skill, Task
+from slap_ros.domains.domain import Action
+from slap_ros.planning.options import OptionKind
+from slap_ros.planning.plan import Plan, PlanEdge
+from slap_ros.relational import AtomSpace, GroundAtom, LiftedOperator, State
+from slap_ros.relational.pddl import write_domain
+from slap_ros.versions import versions
+
+FRAME = "world"
+
+
+def header(stamp: Time) -> Header:
+    """A header in the world frame."""
+    return Header(stamp=stamp, frame_id=FRAME)
+
+
+def domain_info(domain: Domain, stamp: Time) -> msgs.DomainInfo:
+    """What world runs."""
+    arm = domain.action_space.axes[:-1]
+    return msgs.DomainInfo(
+        header=header(stamp),
+        name=domain.name,
+        preset=domain.preset,
+        types=[
+            msgs.TypeInfo(
+                name=t.name,
+                parent=t.parent.name if t.parent else "",
+                feature_names=[feature.name for feature in t.features],
+                feature_units=[feature.unit for feature in t.features],
+            )
+            for t in domain.types
+        ],
+        predicates=[
+            msgs.PredicateInfo(name=p.name, parameters=[t.name for t in p.types])
+            for p in domain.predicates
+        ],
+        operators_pddl=write_domain(domain.name, domain.types, domain.predicates, domain.operators),
+        action_names=[axis.name for axis in arm],
+        action_units=[axis.unit for axis in arm],
+        control_period=domain.control_period_s,
+        configuration=key_values(domain.configuration),
+        versions=key_values(versions()),
+    )
+
+
+def key_values(values: Mapping[str, object]) -> list[KeyValue]:
+    """A mapping as key-value pairs."""
+    return [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+
+
+def state(value: State, episode: int, step: int, stamp: Time) -> msgs.ObjectCentricState:
+    """A state after a step."""
+    return msgs.ObjectCentricState(
+        header=header(stamp),
+        episode=episode,
+        step=step,
+        objects=[
+            msgs.ObjectState(name=obj.name, type=obj.type.name, features=value[obj].tolist())
+            for obj in value.objects
+        ],
+    )
+
+
+def atoms(ground_atoms: Iterable[GroundAtom]) -> list[msgs.GroundAtom]:
+    """Ground atoms, in the order given."""
+    return [
+        msgs.GroundAtom(predicate=atom.predicate.name, objects=[obj.name for obj in atom.objects])
+        for atom in ground_atoms
+    ]
+
+
+def goal(ground_atoms: Iterable[GroundAtom]) -> list[msgs.GroundAtom]:
+    """A goal, in a stable order."""
+    return atoms(sorted(ground_atoms, key=str))
+
+
+def task(
+    value: Task, domain: Domain, episode: int, seed: int, index: int, stamp: Time
+) -> msgs.Task:
+    """The task that opens an episode."""
+    return msgs.Task(
+        header=header(stamp),
+        episode=episode,
+        domain=domain.name,
+        seed=seed,
+        index=index,
+        initial_state=state(value.initial_state, episode, 0, stamp),
+        goal=goal(value.goal),
+        step_limit=value.step_limit,
+    )
+
+
+def command(action: Action, episode: int, step: int, stamp: Time) -> msgs.RobotCommand:
+    """What to do from the state of ``step``."""
+    *deltas, gripper = action.tolist()
+    return msgs.RobotCommand(
+        header=header(stamp), episode=episode, step=step, deltas=deltas, gripper=gripper
+    )
+
+
+def plan_edge(edge: PlanEdge, space: AtomSpace) -> msgs.PlanEdge:
+    """One edge of a plan."""
+    return msgs.PlanEdge(
+        kind=edge.option.kind.value,
+        name=edge.option.skill.name,
+        objects=[obj.name for obj in edge.option.objects],
+        expected_atoms=atoms(space.decode(edge.target)),
+        predicted_steps=edge.predicted_steps,
+    )
+
+
+def plan(
+    value: Plan, goal_mask: int, space: AtomSpace, episode: int, number: int, stamp: Time
+) -> msgs.Plan:
+    """The ``number``-th plan of a run."""
+    return msgs.Plan(
+        header=header(stamp),
+        episode=episode,
+        number=number,
+        goal=atoms(space.decode(goal_mask)),
+        edges=[plan_edge(edge, space) for edge in value.edges],
+        predicted_steps=value.predicted_steps,
+    )
+
+
+def skill_info(operator: LiftedOperator, skill: Skill) -> msgs.SkillInfo:
+    """A given option."""
+    return msgs.SkillInfo(
+        kind=OptionKind.OPERATOR.value,
+        name=operator.name,
+        parameters=[variable.type.name for variable in operator.parameters],
+        step_limit=skill.step_limit,
+    )

@@ -1,0 +1,38 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Every node's 1 Hz sign of life on ``/diagnostics``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.node import Node
+
+from ensemble import encode
+from ensemble.interfaces import DIAGNOSTICS
+
+PERIOD = 1.0  # s
+
+
+class Heartbeat:
+    """Publishes what a node counts."""
+
+    def __init__(self, node: Node, counts: Callable[[], Mapping[str, object]]) -> None:
+        """``counts`` is called for each heartbeat."""
+        self._node = node
+        self._counts = counts
+        self._publisher = node.create_publisher(DIAGNOSTICS.type, DIAGNOSTICS.name, DIAGNOSTICS.qos)
+        node.create_timer(PERIOD, self._beat)
+
+    def _beat(self) -> None:
+        name = self._node.get_fully_qualified_name()
+        status = DiagnosticStatus(
+            level=DiagnosticStatus.OK,
+            name=name,
+            message="running",
+            hardware_id=name,
+            values=encode.key_values(self._counts()),
+        )
+        stamp = self._node.get_clock().now().to_msg()
+        self._publisher.publish(DiagnosticArray(header=encode.header(stamp), status=[status]))

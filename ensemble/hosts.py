@@ -1,0 +1,171 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where an ensemble's nodes live: each in a process of its own, or all in this one."""
+
+from __future__ import annotations
+
+import ctypes
+import signal
+import subprocess
+import sys
+from collections.abc import Mapping
+from importlib import import_module
+from types import TracebackType
+from typing import Protocol, Self
+
+from rclpy.executors import Executor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from ensemble.nodes import CLASSES
+from slap_ros.errors import ErrorCode, NodeDiedError
+
+STOP_TIMEOUT = 5.0  # s, after which a node that was asked to stop is killed
+PR_SET_PDEATHSIG = 1  # <sys/prctl.h>
+
+LIBC = ctypes.CDLL(None)  # opened here: between fork and exec nothing may be loaded
+KNOWN_CODES = frozenset(int(code) for code in ErrorCode if code > ErrorCode.UNKNOWN)
+
+NodeParameters = Mapping[str, Mapping[str, str | int | float]]
+
+
+class Host(Protocol):
+    """Runs an ensemble from entering to leaving the context."""
+
+    def check(self) -> None:
+        """Look after the nodes.
+
+        Raises:
+            NodeDiedError: One has ended.
+        """
+        ...
+
+    def require(self, name: str) -> None:
+        """Look after one node.
+
+        Raises:
+            NodeDiedError: It has ended.
+        """
+        ...
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None: ...
+
+
+class ProcessHost:
+    """Each node a process. None outlives this one, however it ends."""
+
+    def __init__(self, nodes: NodeParameters) -> None:
+        """``nodes`` are the parameters by node."""
+        self._nodes = nodes
+        self.processes: dict[str, subprocess.Popen[bytes]] = {}
+
+    def __enter__(self) -> Self:
+        for name, parameters in self._nodes.items():
+            self.processes[name] = _start(name, parameters)
+        return self
+
+    def check(self) -> None:
+        """See :class:`Host`."""
+        for name in self.processes:
+            self.require(name)
+
+    def require(self, name: str) -> None:
+        """See :class:`Host`. The error's code is the one that the node ended with, if it is one."""
+        code = self.processes[name].poll()
+        if code is not None:
+            raise _died(name, code)
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        # SIGTERM rather than SIGINT: it also ends a node quietly that is still importing.
+        for process in self.processes.values():
+            process.terminate()
+        for process in self.processes.values():
+            try:
+                process.wait(STOP_TIMEOUT)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+
+
+def _start(name: str, parameters: Mapping[str, str | int | float]) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", name, "--ros-args", "--log-level", "warn"]
+    for key, value in parameters.items():
+        command += ["-p", f"{key}:={value}"]
+    # A session of its own keeps the terminal's Ctrl-C from the nodes, which are to be stopped in
+    # order. The parent's death signal keeps them from outliving a killed parent.
+    return subprocess.Popen(
+        command, stdout=sys.stderr, start_new_session=True, preexec_fn=_die_with_parent
+    )
+
+
+def _die_with_parent() -> None:
+    if sys.platform == "linux":
+        LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+def _died(name: str, code: int) -> NodeDiedError:
+    if code < 0:
+        return NodeDiedError(f"{name} was killed by {signal.Signals(-code).name}")
+    if code in KNOWN_CODES:
+        cause = ErrorCode(code)
+        return NodeDiedError(f"{name} ended: {cause.name}, see its message above", cause)
+    return NodeDiedError(f"{name} ended with exit code {code}, see its messages above")
+
+
+class InProcessHost:
+    """Every node in this process, on one executor."""
+
+    def __init__(self, nodes: NodeParameters, executor: Executor) -> None:
+        """``nodes`` are the parameters by node; ``executor`` is spun by somebody else."""
+        self._nodes = nodes
+        self._executor = executor
+        self._made: list[Node] = []
+
+    def __enter__(self) -> Self:
+        try:
+            for name, parameters in self._nodes.items():
+                self._made.append(_make(name, parameters))
+                self._executor.add_node(self._made[-1])
+        except BaseException:
+            self._destroy()
+            raise
+        return self
+
+    def check(self) -> None:
+        """Nothing to look after: errors of nodes come out of the executor."""
+
+    def require(self, name: str) -> None:
+        """Nothing to look after, as above."""
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._destroy()
+
+    def _destroy(self) -> None:
+        for node in self._made:
+            self._executor.remove_node(node)
+            node.destroy_node()
+        self._made.clear()
+
+
+def _make(name: str, parameters: Mapping[str, str | int | float]) -> Node:
+    overrides = [Parameter(key, value=value) for key, value in parameters.items()]
+    module = import_module(f"{name}.node")
+    node: Node = getattr(module, CLASSES[name])(parameter_overrides=overrides)
+    return node

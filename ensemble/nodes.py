@@ -1,0 +1,50 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Which nodes an ensemble has, and the parameters of each for a given run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+# A node's name is that of its package as well.
+CLASSES = {
+    "sim_node": "SimNode",
+    "perception_node": "PerceptionNode",
+    "skill_server": "SkillServer",
+    "planner_node": "PlannerNode",
+    "recorder_node": "RecorderNode",
+}
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """What is to be run."""
+
+    domain: str
+    preset: str
+    seed: int
+    index: int
+    planner: str
+    record: Path | None  # the bag's folder; None: no recorder
+    pace: float = 0.0  # environment steps a second; 0: as fast as commands come
+
+
+def node_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int | float]]:
+    """The ROS parameters of every node of the ensemble, by node name."""
+    nodes: dict[str, Mapping[str, str | int | float]] = {
+        "sim_node": {
+            "domain": settings.domain,
+            "preset": settings.preset,
+            "seed": settings.seed,
+            "index": settings.index,
+            "pace": settings.pace,
+        },
+        "perception_node": {},
+        "skill_server": {},
+        "planner_node": {"planner": settings.planner},
+    }
+    if settings.record is not None:
+        nodes["recorder_node"] = {"bag": str(settings.record)}
+    return nodes

@@ -1,0 +1,181 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""One run from start to end: bring the ensemble up, have the task solved, close the bag."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from time import monotonic
+from typing import Any
+
+import rclpy
+from rclpy.executors import Executor, SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+
+from ensemble.client import OnMessage, RunClient
+from ensemble.hosts import Host, InProcessHost, ProcessHost
+from ensemble.nodes import RunSettings, node_parameters
+from slap_ros.errors import (
+    AlreadyRunningError,
+    NodeDiedError,
+    NotReadyError,
+    RunTimeoutError,
+    SlapError,
+    error_from,
+)
+from slap_ros.evaluation.metrics import RunMetrics
+from slap_ros.relational import GroundAtom
+
+SPIN = 0.05  # s, the longest time between two looks at the nodes
+DISCOVERY = 0.3  # s, after which nodes that are there already are known
+READY_TIMEOUT = 30.0  # s, for all nodes to come up
+CANCEL_TIMEOUT = 5.0  # s, for the robot to hold after a cancel
+LOG_TIMEOUT = 5.0  # s, for the last messages of a run to arrive
+CLOSE_TIMEOUT = 10.0  # s, for the recorder to finish
+
+
+@dataclass(frozen=True)
+class RunRequest:
+    """What to solve, and how long to try."""
+
+    settings: RunSettings
+    goal: Collection[GroundAtom] = ()  # empty: the task's own
+    step_limit: int = 0  # environment steps; 0: the task's own
+    max_replans: int = 5
+    timeout_s: float = 600.0
+    in_process: bool = False
+
+
+def run(request: RunRequest, on_message: OnMessage) -> RunMetrics:
+    """Run an ensemble until its task is solved or is not.
+
+    Args:
+        request: What to run.
+        on_message: Called for every message of the run.
+
+    Returns:
+        The metrics, from the messages of the run; failures are in their error code.
+
+    Raises:
+        AlreadyRunningError: Another ensemble would be disturbed.
+        NotReadyError: The nodes did not come up.
+        NodeDiedError: A node ended before the run began.
+        SlapError: The planner refused the task; the code says why.
+        KeyboardInterrupt: After the robot holds and the bag is closed.
+    """
+    with ExitStack() as stack:
+        # No handlers: after Ctrl-C the goal is still to be canceled and the bag to be closed.
+        rclpy.init(
+            args=["--ros-args", "--log-level", "warn"],
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
+        stack.callback(rclpy.try_shutdown)
+        executor = SingleThreadedExecutor()
+        stack.callback(executor.shutdown)
+        client = RunClient(on_message)
+        stack.callback(client.destroy_node)
+        executor.add_node(client)
+        spinner = Spinner(executor)
+        _refuse_company(client, spinner)
+        with _host(request, executor) as host:
+            return _drive(request, client, spinner, host)
+
+
+class Spinner:
+    """Spins an executor until something holds, looking after the nodes meanwhile."""
+
+    def __init__(self, executor: Executor) -> None:
+        self.check: Callable[[], None] = lambda: None
+        self._executor = executor
+
+    def until(self, condition: Callable[[], bool], timeout_s: float) -> bool:
+        """Whether the condition came to hold in time.
+
+        Raises:
+            NodeDiedError: A node ended meanwhile.
+        """
+        end = monotonic() + timeout_s
+        while not condition():
+            if monotonic() > end:
+                return False
+            self._executor.spin_once(timeout_sec=SPIN)
+            self.check()
+        return True
+
+
+def _host(request: RunRequest, executor: Executor) -> Host:
+    nodes = node_parameters(request.settings)
+    return InProcessHost(nodes, executor) if request.in_process else ProcessHost(nodes)
+
+
+def _refuse_company(client: RunClient, spinner: Spinner) -> None:
+    if spinner.until(lambda: bool(client.others()), DISCOVERY):
+        raise AlreadyRunningError(
+            f"{', '.join(sorted(client.others()))} already run on this network: stop them, or set "
+            "another ROS_DOMAIN_ID for this run"
+        )
+
+
+def _drive(request: RunRequest, client: RunClient, spinner: Spinner, host: Host) -> RunMetrics:
+    spinner.check = host.check
+    recording = request.settings.record is not None
+    if not spinner.until(lambda: client.ready(recording), READY_TIMEOUT):
+        raise NotReadyError(
+            f"the ensemble did not come up within {READY_TIMEOUT} s; try `slap doctor`"
+        )
+    failure: SlapError | None = None
+    try:
+        _solve(request, client, spinner)
+    except SlapError as error:
+        failure = error
+    finally:
+        if recording:
+            failure = _close_bag(client, spinner, host) or failure
+    runs = client.log.runs()
+    if not runs:
+        raise failure or NotReadyError("the planner ended the run without an event")
+    if failure is None:
+        return runs[-1]
+    return replace(runs[-1], error_code=failure.code, error_msg=str(failure))
+
+
+def _solve(request: RunRequest, client: RunClient, spinner: Spinner) -> None:
+    sent = client.send(request.goal, request.step_limit, request.max_replans)
+    end = monotonic() + request.timeout_s
+    try:
+        if not spinner.until(sent.done, end - monotonic()):
+            raise RunTimeoutError(f"the planner did not answer within {request.timeout_s} s")
+        result = sent.result().get_result_async()
+        if not spinner.until(result.done, end - monotonic()):
+            raise RunTimeoutError(f"the task was not done within {request.timeout_s} s")
+    except (KeyboardInterrupt, RunTimeoutError):
+        _cancel(sent, spinner)
+        raise
+    outcome = result.result().result
+    complete = spinner.until(lambda: client.log.complete, LOG_TIMEOUT)
+    if not complete and outcome.error_code:
+        raise error_from(outcome.error_code, outcome.error_msg)
+
+
+def _cancel(sent: Future, spinner: Spinner) -> None:
+    """Make the robot hold."""
+    if sent.done():
+        canceled: Any = sent.result().cancel_goal_async()
+        spinner.until(canceled.done, CANCEL_TIMEOUT)
+        ended = sent.result().get_result_async()
+        spinner.until(ended.done, CANCEL_TIMEOUT)
+
+
+def _close_bag(client: RunClient, spinner: Spinner, host: Host) -> SlapError | None:
+    """Have the bag finished; the error where the recorder is gone."""
+    spinner.check = lambda: host.require("recorder_node")  # who else is gone is known by now
+    closed = client.close_bag()
+    try:
+        if not spinner.until(closed.done, CLOSE_TIMEOUT):
+            return RunTimeoutError(f"the recorder did not finish its bag within {CLOSE_TIMEOUT} s")
+    except NodeDiedError as error:
+        return error
+    return None

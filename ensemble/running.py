@@ -1,0 +1,61 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How every node's ``main`` runs: one place for start, stop and exit codes."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+
+import rclpy
+from rclpy.exceptions import ParameterException
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+
+from slap_ros.errors import ErrorCode, SlapError
+
+
+def run_node(name: str, make: Callable[[], Node]) -> int:
+    """Make a node and spin it until SIGINT, SIGTERM or an error.
+
+    Returns:
+        Exit code: 0 after a signal, else the error's code, whose message went to stderr.
+    """
+    try:
+        rclpy.init()
+    except ValueError as error:  # of an environment variable, such as ROS_DOMAIN_ID
+        return _refuse(name, error, ErrorCode.INVALID_PARAMETER)
+    try:
+        return _run(name, make)
+    finally:
+        rclpy.try_shutdown()
+
+
+def _run(name: str, make: Callable[[], Node]) -> int:
+    try:
+        _spin(make)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        return 0
+    except SlapError as error:
+        return _refuse(name, error, error.code)
+    except ParameterException as error:
+        return _refuse(name, error, ErrorCode.INVALID_PARAMETER)
+    except Exception:
+        # A signal shuts the context down in the middle of whatever callback runs, which then
+        # cannot publish any more. That is no failure; anything else is.
+        if rclpy.ok():
+            raise
+    return 0
+
+
+def _spin(make: Callable[[], Node]) -> None:
+    node = make()
+    try:
+        rclpy.spin(node)
+    finally:
+        node.destroy_node()
+
+
+def _refuse(name: str, error: Exception, code: ErrorCode) -> int:
+    sys.stderr.write(f"{name}: {error}\n")
+    return int(code)

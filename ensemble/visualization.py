@@ -1,0 +1,102 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What RViz and Foxglove show: bodies as markers and frames, the arm as joint states."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from builtin_interfaces.msg import Duration, Time
+from geometry_msgs.msg import Point, Pose, Quaternion, Transform, TransformStamped, Vector3
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import ColorRGBA
+from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import Marker, MarkerArray
+
+from ensemble import encode
+from ensemble.interfaces import JOINT_STATES, MARKERS, TF
+from slap_ros.domains.domain import Domain, VisibleBody
+from slap_ros.relational import State
+
+JOINT_PREFIX = "panda_"  # of joint names in the robot description
+
+
+class Visualizer:
+    """Publishes each state for people to look at."""
+
+    def __init__(self, node: Node, domain: Domain) -> None:
+        """Publish as ``node``."""
+        self._domain = domain
+        self._markers = node.create_publisher(MARKERS.type, MARKERS.name, MARKERS.qos)
+        self._frames = node.create_publisher(TF.type, TF.name, TF.qos)
+        self._joints = node.create_publisher(JOINT_STATES.type, JOINT_STATES.name, JOINT_STATES.qos)
+
+    def show(self, state: State, stamp: Time) -> None:
+        """Publish a state."""
+        bodies = self._domain.bodies(state)
+        self._markers.publish(markers(bodies, stamp))
+        self._frames.publish(frames(bodies, stamp))
+        joints = joint_state(state, stamp)
+        if joints.name:
+            self._joints.publish(joints)
+
+
+def markers(bodies: Sequence[VisibleBody], stamp: Time) -> MarkerArray:
+    """A box for each body."""
+    return MarkerArray(
+        markers=[
+            Marker(
+                header=encode.header(stamp),
+                ns="bodies",
+                id=number,
+                type=Marker.CUBE,
+                action=Marker.ADD,
+                pose=Pose(position=Point(**_xyz(body.position)), orientation=_turn(body)),
+                scale=Vector3(**_xyz(body.size)),
+                color=ColorRGBA(**dict(zip("rgba", body.colour, strict=True))),
+                lifetime=Duration(),
+                text=body.name,
+            )
+            for number, body in enumerate(bodies)
+        ]
+    )
+
+
+def frames(bodies: Sequence[VisibleBody], stamp: Time) -> TFMessage:
+    """A frame for each body, in the world's."""
+    return TFMessage(
+        transforms=[
+            TransformStamped(
+                header=encode.header(stamp),
+                child_frame_id=body.name,
+                transform=Transform(
+                    translation=Vector3(**_xyz(body.position)), rotation=_turn(body)
+                ),
+            )
+            for body in bodies
+        ]
+    )
+
+
+def joint_state(state: State, stamp: Time) -> JointState:
+    """The angles of an arm's joints, rad; no names for a robot without joints."""
+    joints = [
+        (feature.name, float(state.get(obj, feature.name)))
+        for obj in state.objects
+        for feature in obj.type.features
+        if feature.name.startswith("joint") and feature.unit == "rad"
+    ]
+    return JointState(
+        header=encode.header(stamp),
+        name=[f"{JOINT_PREFIX}{name}" for name, _ in joints],
+        position=[angle for _, angle in joints],
+    )
+
+
+def _xyz(values: Sequence[float]) -> dict[str, float]:
+    return dict(zip("xyz", map(float, values), strict=True))
+
+
+def _turn(body: VisibleBody) -> Quaternion:
+    return Quaternion(**dict(zip("xyzw", map(float, body.quaternion), strict=True)))

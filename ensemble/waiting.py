@@ -1,0 +1,65 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Awaiting things in callbacks, without blocking the executor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from concurrent.futures import Future as Job
+from typing import TypeVar
+
+from rclpy.node import Node
+from rclpy.task import Future
+
+T = TypeVar("T")
+LOOK_PERIOD = 0.02  # s, how often a condition is looked at
+
+
+def seconds(node: Node) -> float:
+    """The node's time in s."""
+    return float(node.get_clock().now().nanoseconds) * 1e-9
+
+
+def submit(workers: Executor, function: Callable[[], T]) -> Future:
+    """Run something long in a worker thread; the future's result is the finished job."""
+    done = Future()
+    workers.submit(function).add_done_callback(done.set_result)
+    return done
+
+
+async def run_in(workers: Executor, function: Callable[[], T]) -> T:
+    """Run something long in a worker thread; what it raises is raised here."""
+    job: Job[T] = await submit(workers, function)
+    return job.result()
+
+
+async def first_of(node: Node, future: Future, condition: Callable[[], bool]) -> bool:
+    """Wait for a future or for a condition, looked at every ``LOOK_PERIOD``.
+
+    Returns:
+        Whether the future is done.
+    """
+    ended = Future()
+
+    def end(_: object = None) -> None:
+        if not ended.done():
+            ended.set_result(None)
+
+    def look() -> None:
+        if condition():
+            end()
+
+    future.add_done_callback(end)
+    timer = node.create_timer(LOOK_PERIOD, look)
+    try:
+        await ended
+    finally:
+        node.destroy_timer(timer)
+    return bool(future.done())
+
+
+async def until(node: Node, condition: Callable[[], bool]) -> None:
+    """Wait until a condition holds."""
+    if not condition():
+        await first_of(node, Future(), condition)

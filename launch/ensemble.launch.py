@@ -1,0 +1,68 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The whole ensemble: ``ros2 launch slap_ros ensemble.launch.py domain:=obstacle2d seed:=3``.
+
+It waits for a task to be asked for:
+``ros2 action send_goal /slap/solve_task slap_msgs/action/SolveTask '{max_replans: 5}'``
+"""
+
+from pathlib import Path
+
+from ament_index_python.packages import get_package_share_directory
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.conditions import LaunchConfigurationNotEquals
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+
+ARGUMENTS = {
+    "domain": ("obstacle2d", "which domain"),
+    "preset": ("fair", "fair: random tasks; paper: the paper's start states"),
+    "seed": ("0", "samples the task"),
+    "index": ("0", "which of the seed's tasks"),
+    "planner": ("lazy", "lazy, exhaustive or ff"),
+    "pace": ("0.0", "environment steps a second, for watching; 0: at full speed"),
+    "record": ("", "folder of the bag to record; empty: none"),
+    "namespace": ("", "of every node: /robot1 gives /robot1/slap/state"),
+}
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Describe the ensemble."""
+    config = Path(get_package_share_directory("slap_ros")) / "config" / "ensemble.yaml"
+
+    def value(name: str, kind: type) -> ParameterValue:
+        return ParameterValue(LaunchConfiguration(name), value_type=kind)
+
+    def node(name: str, parameters: dict[str, ParameterValue], **options: object) -> Node:
+        return Node(
+            package="slap_ros",
+            executable=name,
+            name=name,
+            namespace=LaunchConfiguration("namespace"),
+            parameters=[str(config), parameters],
+            output="screen",
+            **options,
+        )
+
+    task = {"domain": value("domain", str), "preset": value("preset", str)}
+    task |= {"seed": value("seed", int), "index": value("index", int)}
+    task |= {"pace": value("pace", float)}
+    return LaunchDescription(
+        [
+            *(
+                DeclareLaunchArgument(name, default_value=default, description=description)
+                for name, (default, description) in ARGUMENTS.items()
+            ),
+            node("sim_node", task),
+            node("perception_node", {}),
+            node("skill_server", {}),
+            node("planner_node", {"planner": value("planner", str)}),
+            node(
+                "recorder_node",
+                {"bag": value("record", str)},
+                condition=LaunchConfigurationNotEquals("record", ""),
+            ),
+        ]
+    )

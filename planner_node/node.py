@@ -1,0 +1,169 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Solves tasks: plans over the abstract graph, has the skill server execute, watches, replans.
+
+ROS Parameters:
+    planner (string, "lazy"): lazy, exhaustive or ff; see ``slap_ros.planning.planner``.
+    observation_timeout (double, 10.0): seconds to wait for a perceived state.
+    server_timeout (double, 5.0): seconds without a skill server after which a run fails.
+
+Publishers:
+    slap/plan (slap_msgs/Plan): the plan under execution; latched.
+    slap/plan_events (slap_msgs/PlanEvent): what happens to it.
+    /diagnostics (diagnostic_msgs/DiagnosticArray): tasks tried and solved; 1 Hz.
+
+Subscribers:
+    slap/domain, slap/task, slap/state, slap/atoms: see ``ensemble.observation``.
+
+Action servers:
+    slap/solve_task (slap_msgs/SolveTask): solve the current episode's task.
+
+Action clients:
+    slap/execute_skill (slap_msgs/ExecuteSkill): one goal for each edge of the plan.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.action import ActionClient, ActionServer, CancelResponse
+from rclpy.action.server import ServerGoalHandle
+from rclpy.node import Node
+from slap_msgs.action import SolveTask
+
+from ensemble.heartbeat import Heartbeat
+from ensemble.interfaces import EXECUTE_SKILL, SOLVE_TASK
+from ensemble.observation import Observation, Observer
+from ensemble.parameters import parameter, read_parameters
+from ensemble.running import run_node
+from ensemble.waiting import run_in, seconds
+from planner_node.reporting import Reporter
+from planner_node.solving import Solving
+from slap_ros.errors import (
+    BusyError,
+    InvalidParameterError,
+    NoTaskError,
+    SlapError,
+    TaskCanceledError,
+)
+from slap_ros.messages.decode import decode_goal
+from slap_ros.planning.planner import PLANNERS, make_planner
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """See the module's docstring."""
+
+    planner: str = parameter("lazy", "lazy, exhaustive or ff")
+    observation_timeout: float = parameter(10.0, "s to wait for a perceived state")
+    server_timeout: float = parameter(5.0, "s without a skill server until a run fails")
+
+
+class PlannerNode(Node):
+    """The planner."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__("planner_node", **kwargs)
+        self._settings = read_parameters(self, Parameters)
+        if self._settings.planner not in PLANNERS:
+            raise InvalidParameterError(
+                f"parameter planner must be one of {', '.join(PLANNERS)}, "
+                f"not {self._settings.planner!r}"
+            )
+        self._busy = False
+        self._counts = Counter(tried=0, solved=0)
+        self._workers = ThreadPoolExecutor(1, thread_name_prefix="planning")
+        self._observer = Observer(self, lambda _: None)
+        self._reporter = Reporter(self)
+        self._skills = ActionClient(self, EXECUTE_SKILL.type, EXECUTE_SKILL.name)
+        self._actions = ActionServer(
+            self,
+            SOLVE_TASK.type,
+            SOLVE_TASK.name,
+            self._execute,
+            cancel_callback=lambda _: CancelResponse.ACCEPT,
+        )
+        Heartbeat(self, lambda: self._counts)
+
+    def destroy_node(self) -> None:
+        """Stop the planning thread as well."""
+        self._workers.shutdown(wait=False, cancel_futures=True)
+        self._actions.destroy()
+        self._skills.destroy()
+        super().destroy_node()
+
+    async def _execute(self, goal: ServerGoalHandle) -> SolveTask.Result:
+        self._counts["tried"] += 1
+        try:
+            result = await self._solve(goal)
+        except SlapError as error:
+            result = SolveTask.Result(error_code=int(error.code), error_msg=str(error))
+        if result.success:
+            self._counts["solved"] += 1
+            goal.succeed()
+        elif result.error_code == TaskCanceledError.code:
+            goal.canceled()
+        else:
+            goal.abort()
+        return result
+
+    async def _solve(self, goal: ServerGoalHandle) -> SolveTask.Result:
+        if self._busy:
+            raise BusyError("another task is being solved; cancel it first")
+        self._busy = True
+        try:
+            start = await self._observe()
+            solving = await self._prepare(goal, start)
+            return await solving.run()
+        finally:
+            self._busy = False
+
+    async def _prepare(self, goal: ServerGoalHandle, start: Observation) -> Solving:
+        episode = start.episode
+        atoms = decode_goal(goal.request.goal, episode.space) or episode.task.goal
+        planner = await run_in(
+            self._workers,
+            lambda: make_planner(self._settings.planner, episode.domain, start.state),
+        )
+        return Solving(
+            self,
+            goal,
+            self._observer,
+            self._reporter,
+            self._skills,
+            self._skill_server_watch(),
+            self._workers,
+            planner,
+            episode.space.mask(atoms),
+            goal.request.step_limit or episode.task.step_limit,
+        )
+
+    async def _observe(self) -> Observation:
+        """The newest observation, waited for if there is none yet."""
+        latest = await self._observer.wait(0, self._settings.observation_timeout)
+        if latest is None:
+            raise NoTaskError(
+                f"no perceived state within {self._settings.observation_timeout} s: "
+                "are sim_node (or robot_bridge) and perception_node running?"
+            )
+        return latest
+
+    def _skill_server_watch(self) -> Any:
+        """A function that tells whether the skill server has been away for too long."""
+        last_seen = seconds(self)
+
+        def lost() -> bool:
+            nonlocal last_seen
+            if self._skills.server_is_ready():
+                last_seen = seconds(self)
+            return seconds(self) - last_seen > self._settings.server_timeout
+
+        return lost
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node("planner_node", PlannerNode)

@@ -1,0 +1,202 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""One run of the planner: plan, have each edge executed, watch, replan on divergence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+from rclpy.action import ActionClient
+from rclpy.action.server import ServerGoalHandle
+from rclpy.node import Node
+from rclpy.task import Future
+from slap_msgs.action import ExecuteSkill, SolveTask
+from slap_msgs.msg import PlanEvent
+
+from ensemble import encode
+from ensemble.observation import Observation, Observer
+from ensemble.waiting import first_of, submit, until
+from planner_node.reporting import Reporter, Tally
+from slap_ros.errors import (
+    EpisodeChangedError,
+    ErrorCode,
+    NodeDiedError,
+    SlapError,
+    TaskCanceledError,
+)
+from slap_ros.planning.options import Stopped
+from slap_ros.planning.plan import Plan, PlanEdge, PlanningResult
+from slap_ros.planning.planner import Planner
+
+# Outcomes of an edge after which a new plan from wherever the robot is now makes sense.
+DIVERGENCES = frozenset(
+    {
+        ErrorCode.SKILL_NOT_APPLICABLE,
+        ErrorCode.SKILL_STEP_LIMIT,
+        ErrorCode.SKILL_STOPPED_SHORT,
+        ErrorCode.INVALID_COMMAND,
+    }
+)
+
+
+@dataclass
+class Solving:
+    """A SolveTask goal under way.
+
+    Args:
+        node: Makes the timers.
+        goal: The goal.
+        observer: What is known of the world.
+        reporter: Tells what happens.
+        skills: Client of the skill server.
+        skill_server_lost: Whether the skill server has been away for too long.
+        workers: Where planning runs.
+        planner: Plans for the episode's objects.
+        goal_mask: What to reach.
+        step_limit: Environment steps.
+    """
+
+    node: Node
+    goal: ServerGoalHandle
+    observer: Observer
+    reporter: Reporter
+    skills: ActionClient
+    skill_server_lost: Callable[[], bool]
+    workers: Executor
+    planner: Planner
+    goal_mask: int
+    step_limit: int
+
+    def __post_init__(self) -> None:
+        self._start = self._latest
+        self._tally = Tally(self._start.step)
+
+    @property
+    def _latest(self) -> Observation:
+        assert self.observer.latest is not None  # a run begins with an observation
+        return self.observer.latest
+
+    async def run(self) -> SolveTask.Result:
+        """Solve, or say why not; every outcome is published as an event."""
+        while True:
+            try:
+                stopped = await self._attempt()
+            except SlapError as error:
+                stopped = Stopped(error.code, str(error))
+            if stopped.code not in DIVERGENCES:
+                break
+            if self._tally.plans > self.goal.request.max_replans:
+                limit = f"diverged again after {self.goal.request.max_replans} replans"
+                stopped = Stopped(ErrorCode.REPLANS_EXHAUSTED, f"{limit}: {stopped.reason}")
+                break
+        if stopped.reached:
+            self._event(PlanEvent.SOLVED)
+        else:
+            self._event(PlanEvent.FAILED, error_code=int(stopped.code), error_msg=stopped.reason)
+        return self._tally.result(self._latest.step, stopped)
+
+    async def _attempt(self) -> Stopped:
+        """One plan, as far as it goes."""
+        plan = await self._plan()
+        for number, edge in enumerate(plan.edges):
+            self._event(PlanEvent.EDGE_STARTED, edge=number)
+            stopped = await self._execute(edge)
+            if not stopped.reached:
+                if stopped.code in DIVERGENCES:
+                    code, reason = int(stopped.code), stopped.reason
+                    self._event(PlanEvent.DIVERGED, edge=number, error_code=code, error_msg=reason)
+                return stopped
+            self._event(PlanEvent.EDGE_REACHED, edge=number)
+        return Stopped(ErrorCode.NONE)
+
+    # -- planning -------------------------------------------------------------------------------
+
+    async def _plan(self) -> Plan:
+        state, number = self._latest.state, self._tally.plans
+        self._tally.plans += 1
+        self._feedback(SolveTask.Feedback.PLANNING)
+        started = self._event(PlanEvent.PLANNING_STARTED)
+        job = submit(self.workers, lambda: self.planner.plan(state, self.goal_mask))
+        await self._wait(job)
+        result: PlanningResult = job.result().result()
+        rolled_out = result.edges_rolled_out
+        done = self._event(PlanEvent.PLANNED, edges_rolled_out=rolled_out)
+        self._tally.planning_ns += done - started
+        self._tally.edges_rolled_out += rolled_out
+        self.reporter.plan(result.plan, self.goal_mask, number, self._latest)
+        self._feedback(
+            SolveTask.Feedback.EXECUTING,
+            graph_nodes=result.graph_nodes,
+            graph_edges=result.graph_edges,
+        )
+        return result.plan
+
+    # -- execution ------------------------------------------------------------------------------
+
+    async def _execute(self, edge: PlanEdge) -> Stopped:
+        start = self._latest
+        budget = self.step_limit - (start.step - self._start.step)
+        if budget <= 0:
+            return Stopped(
+                ErrorCode.STEP_LIMIT, f"the goal was not reached in {self.step_limit} steps"
+            )
+        request = ExecuteSkill.Goal(
+            episode=start.episode.number,
+            edge=encode.plan_edge(edge, start.episode.space),
+            step_budget=budget,
+        )
+        sent = self.skills.send_goal_async(request)
+        await self._wait(sent)
+        ended = sent.result().get_result_async()
+        try:
+            await self._wait(ended)
+        except TaskCanceledError:
+            sent.result().cancel_goal_async()
+            await first_of(self.node, ended, self.skill_server_lost)  # until the robot holds
+            raise
+        result = ended.result().result
+        await self._observe(start.step + result.steps)
+        return Stopped(ErrorCode(result.error_code), result.error_msg)
+
+    async def _observe(self, step: int) -> None:
+        """Wait until the state of a step is known here too, not only to the skill server."""
+        await until(
+            self.node,
+            lambda: self._latest.step >= step or self._latest.episode is not self._start.episode,
+        )
+
+    async def _wait(self, future: Future) -> None:
+        """Wait for a future unless the run is over before.
+
+        Raises:
+            TaskCanceledError: The goal was canceled.
+            NodeDiedError: The skill server is gone.
+            EpisodeChangedError: The simulator was reset.
+        """
+        await first_of(self.node, future, self._over)
+        if self.goal.is_cancel_requested:
+            raise TaskCanceledError("canceled")
+        if self._latest.episode is not self._start.episode:
+            raise EpisodeChangedError("the simulator was reset during the run")
+        if not future.done():
+            raise NodeDiedError("skill_server does not answer: it was stopped or died")
+
+    def _over(self) -> bool:
+        return (
+            self.goal.is_cancel_requested
+            or self._latest.episode is not self._start.episode
+            or self.skill_server_lost()
+        )
+
+    # -- telling --------------------------------------------------------------------------------
+
+    def _event(self, kind: int, **details: object) -> int:
+        number = max(self._tally.plans - 1, 0)
+        return self.reporter.event(kind, self._latest, plan_number=number, **details)
+
+    def _feedback(self, phase: int, **details: int) -> None:
+        self.goal.publish_feedback(
+            SolveTask.Feedback(phase=phase, step=self._latest.step, **details)
+        )

@@ -1,0 +1,152 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Records every topic of the ensemble as a rosbag2 bag (MCAP).
+
+The bag is begun when the domain and the task are known, because they go into its metadata; what
+arrives earlier is kept until then.
+
+ROS Parameters:
+    bag (string, no default): the folder to write; must not exist.
+
+Subscribers:
+    every topic of ``ensemble.interfaces.RECORDED``, as raw bytes.
+
+Services:
+    slap/close_bag (std_srvs/Trigger): finish the bag once nothing more arrives.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.node import Node
+from rclpy.serialization import deserialize_message
+from slap_msgs.msg import DomainInfo, Task
+from std_srvs.srv import Trigger
+
+from ensemble.interfaces import CLOSE_BAG, DIAGNOSTICS, DOMAIN, RECORDED, TASK, Topic
+from ensemble.parameters import parameter, read_parameters
+from ensemble.running import run_node
+from ensemble.waiting import until
+from slap_ros.bags.writer import BagWriter, require_new
+from slap_ros.errors import InvalidParameterError
+from slap_ros.versions import versions
+
+QUIET_NS = 200_000_000  # without a message for so long, nothing more is expected
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """See the module's docstring."""
+
+    bag: str = parameter("", "the folder to write; must not exist")
+
+
+@dataclass(frozen=True)
+class Record:
+    """A message as it arrived."""
+
+    topic: str  # fully qualified
+    type_name: str
+    stamp_ns: int  # time of arrival
+    raw: bytes  # CDR
+
+
+class RecorderNode(Node):
+    """The recorder."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__("recorder_node", **kwargs)
+        self._path = _new_folder(read_parameters(self, Parameters).bag)
+        self._metadata: dict[str, str] = {}
+        self._early: list[Record] = []  # before domain and task are known
+        self._writer: BagWriter | None = None
+        self._closed = False
+        self._heard_ns = 0
+        for topic in RECORDED:
+            self._subscribe(topic)
+        # A group of its own: while it waits for quiet it would keep its group's other callbacks
+        # from running, and with them what it waits for.
+        self.create_service(
+            CLOSE_BAG.type,
+            CLOSE_BAG.name,
+            self._on_close,
+            callback_group=MutuallyExclusiveCallbackGroup(),
+        )
+
+    def destroy_node(self) -> None:
+        """Finish the bag, also on a signal."""
+        self._close()
+        super().destroy_node()
+
+    def _subscribe(self, topic: Topic) -> None:
+        name = self.resolve_topic_name(topic.name)
+        callback = partial(self._on_message, topic, name)
+        self.create_subscription(topic.type, topic.name, callback, topic.qos, raw=True)
+
+    def _on_message(self, topic: Topic, name: str, raw: bytes) -> None:
+        if self._closed:
+            return
+        now_ns = self.get_clock().now().nanoseconds
+        if topic is not DIAGNOSTICS:  # these never stop
+            self._heard_ns = now_ns
+        record = Record(name, topic.type_name, now_ns, bytes(raw))
+        if self._writer is not None:
+            self._write(record)
+            return
+        self._early.append(record)
+        if topic is DOMAIN:
+            self._metadata |= _of_domain(deserialize_message(raw, DomainInfo))
+        elif topic is TASK:
+            self._metadata |= _of_task(deserialize_message(raw, Task))
+        if "domain" in self._metadata and "seed" in self._metadata:
+            self._begin()
+
+    def _begin(self) -> None:
+        self._writer = BagWriter(self._path, self._metadata | versions())
+        for record in self._early:
+            self._write(record)
+        self._early.clear()
+
+    def _write(self, record: Record) -> None:
+        assert self._writer is not None
+        self._writer.write(record.topic, record.type_name, record.stamp_ns, record.raw)
+
+    async def _on_close(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        await until(self, lambda: self.get_clock().now().nanoseconds - self._heard_ns > QUIET_NS)
+        response.success = self._writer is not None
+        response.message = str(self._path) if response.success else "nothing was recorded"
+        self._close()
+        return response
+
+    def _close(self) -> None:
+        self._closed = True
+        if self._writer is not None:
+            self._writer.close()
+            self._writer = None
+
+
+def _new_folder(name: str) -> Path:
+    if not name:
+        raise InvalidParameterError("parameter bag must name the folder to write")
+    path = Path(name)
+    require_new(path)
+    return path
+
+
+def _of_domain(message: DomainInfo) -> dict[str, str]:
+    configuration = {f"configuration.{item.key}": item.value for item in message.configuration}
+    return {"domain": message.name, "preset": message.preset, **configuration}
+
+
+def _of_task(message: Task) -> dict[str, str]:
+    return {"seed": str(message.seed), "index": str(message.index)}
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node("recorder_node", RecorderNode)

@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Metadata and contents, for pip and for colcon (ament_python) alike.
+
+Not in pyproject.toml: colcon's symlink installs run this file without it.
+"""
+
+import re
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+NAME = "slap_ros"
+PACKAGES = [
+    "slap_ros",
+    "ensemble",
+    "sim_node",
+    "perception_node",
+    "planner_node",
+    "skill_server",
+    "recorder_node",
+]
+NODES = [package for package in PACKAGES if package not in ("slap_ros", "ensemble")]
+
+RUNTIME = [
+    "numpy>=1.26,<3",
+    "rosbags>=0.11,<0.12",
+    "typer>=0.15",
+    "rich>=13",
+    "pyyaml>=6",
+    "psutil>=5.9",
+    "lz4>=4",
+    "backports.zstd>=1; python_version < '3.14'",
+]
+PHYSICS = [
+    # Upstream has wheels up to CPython 3.11; the fork is a drop-in with wheels for 3.12.
+    "pybullet>=3.2.6; python_version < '3.12'",
+    "pybullet-arm64>=3.2.6; python_version >= '3.12'",
+    "pillow>=10",
+]
+TRAIN = ["torch>=2.4", "stable-baselines3>=2.3"]
+TEST = [
+    "pytest>=8",
+    "pytest-timeout>=2.3",
+    "pytest-xdist>=3.6",
+    "hypothesis>=6.100",
+    "mcap>=1.2",
+    "setuptools>=68,<80",  # for colcon, as in pyproject.toml; what follows would raise it
+    "unified-planning>=1.1",
+    "up-aries>=0.4",
+    "colcon-common-extensions>=0.3",
+    "mypy>=1.13",
+    "ruff>=0.9",
+    "pre-commit>=4",
+    "types-PyYAML",
+    "types-psutil",
+]
+
+
+def version() -> str:
+    """The version that the package itself states."""
+    text = Path("slap_ros/__init__.py").read_text(encoding="utf-8")
+    return re.search(r'__version__ = "(.+)"', text)[1]
+
+
+def files(folder: str) -> list[str]:
+    """The files of a folder, for installation as data."""
+    return sorted(str(path) for path in Path(folder).iterdir() if path.is_file())
+
+
+setup(
+    name=NAME,
+    version=version(),
+    description=(
+        "Abstract planning with learned shortcuts (SLAP) and language-guided skills (LG-SAIL) "
+        "for ROS 2 Jazzy"
+    ),
+    author="The slap_ros authors",
+    maintainer="The slap_ros authors",
+    maintainer_email="maintainers@slap-ros.example.org",
+    license="Apache-2.0",
+    python_requires=">=3.11,<3.13",
+    # msg_schemas is a ROS package of its own; its text is needed to read bags without ROS.
+    packages=[
+        *find_packages(include=[pattern for p in PACKAGES for pattern in (p, f"{p}.*")]),
+        "msg_schemas",
+    ],
+    package_data={
+        "slap_ros": ["py.typed"],
+        "msg_schemas": ["msg/*.msg", "srv/*.srv", "action/*.action"],
+    },
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}/launch", files("launch")),
+        (f"share/{NAME}/config", files("config")),
+    ],
+    install_requires=RUNTIME,
+    extras_require={"physics": PHYSICS, "train": TRAIN, "test": TEST},
+    entry_points={
+        "console_scripts": [
+            "slap = slap_ros.cli:main",
+            *(f"{node} = {node}.node:main" for node in NODES),
+        ],
+        "embedded_ros.interfaces": ["slap_msgs = msg_schemas"],
+    },
+    zip_safe=False,
+)

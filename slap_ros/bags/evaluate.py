@@ -1,0 +1,87 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Offline evaluation: the metrics of a bag's runs, and perception put to the test."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from slap_ros.bags.reader import read_bag
+from slap_ros.bags.recording import Episode, Recording, initial_state
+from slap_ros.domains import Domain
+from slap_ros.evaluation.metrics import AtomNames, RunLog, RunMetrics
+from slap_ros.messages.decode import decode_state
+
+
+@dataclass(frozen=True)
+class AtomMismatch:
+    """A state in which the recorded atoms are not those that the domain's classifiers find."""
+
+    episode: int
+    step: int
+    missing: tuple[str, ...]  # atoms that hold and were not recorded
+    extra: tuple[str, ...]  # atoms that were recorded and do not hold
+
+
+@dataclass(frozen=True)
+class BagEvaluation:
+    """What a bag tells."""
+
+    runs: list[RunMetrics]
+    mismatches: list[AtomMismatch]
+    states: int  # distinct states recorded
+    compared: int  # of them, those whose recorded atoms were compared with recomputed ones
+    damage: str | None  # where reading had to stop and why
+
+
+def evaluate_bag(path: Path | str) -> BagEvaluation:
+    """Compute the metrics of every run in a bag and recompute the atoms of every state.
+
+    Raises:
+        DamagedBagError: Nothing in it can be read.
+        ForeignBagError: It is not of an ensemble, or of another version of one.
+        UnknownDomainError: Its domain is not known here.
+        InvalidStateError: It has a state that its domain cannot have.
+    """
+    bag, log, recording = read_bag(path), RunLog(), Recording()
+    for _, type_name, _, message in bag:
+        log.add(type_name, message)
+        recording.add(type_name, message)
+    domain = recording.domain()
+    episodes = recording.episodes
+    perceived = [(e, s) for e, episode in episodes.items() for s in episode.states]
+    comparable = [(e, s) for e, s in perceived if s in episodes[e].atoms]
+    return BagEvaluation(
+        runs=log.runs(),
+        mismatches=[
+            mismatch
+            for number, episode in episodes.items()
+            if domain is not None
+            for mismatch in _mismatches(number, episode, domain)
+        ],
+        states=len(perceived),
+        compared=len(comparable) if domain is not None else 0,
+        damage=bag.damage,
+    )
+
+
+def _mismatches(number: int, episode: Episode, domain: Domain) -> Iterator[AtomMismatch]:
+    start = initial_state(episode, domain)
+    if start is None:
+        return
+    space, types = domain.atom_space(start[1]), domain.types_by_name
+    for step in sorted(episode.states.keys() & episode.atoms.keys()):
+        mask = space.abstract(decode_state(episode.states[step], types))
+        holding = frozenset(
+            (atom.predicate.name, tuple(obj.name for obj in atom.objects))
+            for atom in space.decode(mask)
+        )
+        recorded = episode.atoms[step]
+        if recorded != holding:
+            yield AtomMismatch(number, step, _texts(holding - recorded), _texts(recorded - holding))
+
+
+def _texts(atoms: AtomNames) -> tuple[str, ...]:
+    return tuple(f"{predicate}({', '.join(objects)})" for predicate, objects in sorted(atoms))

@@ -1,0 +1,236 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Reading MCAP files from beginning to end, up to the first damage.
+
+The index at a file's end is not used: a file whose writer was killed has none.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+import lz4.frame  # type: ignore[import-untyped]
+from backports import zstd
+
+from slap_ros.bags.mcap_records import (
+    CHUNK,
+    FIRST_PRIVATE_OPCODE,
+    LIBRARY,
+    MAGIC,
+    MESSAGE,
+    RECORD,
+    SEQUENCE_MASK,
+    Fields,
+    MalformedRecordError,
+    Opcode,
+)
+from slap_ros.bags.raw import Channel, Definition, RawMessage, one_line
+from slap_ros.errors import DamagedBagError
+
+UNREADABLE = (MalformedRecordError, UnicodeDecodeError, OSError)
+IGNORED = (Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT, Opcode.METADATA)  # outside of chunks
+
+
+class _EndOfFileError(Exception):
+    """The file ends within a record; carries what there is of it."""
+
+    def __init__(self, opcode: int, content: bytes) -> None:
+        super().__init__()
+        self.opcode = opcode
+        self.content = content
+
+
+def read_mcap(path: Path) -> Iterator[RawMessage]:
+    """The messages, in the order in which they were written.
+
+    Raises:
+        DamagedBagError: After the last message that precedes the damage.
+    """
+    try:
+        with path.open("rb") as file:
+            yield from _McapScan(file, path.stat().st_size).messages()
+    except UNREADABLE as error:
+        raise DamagedBagError(f"{path} {_complaint(error)}") from error
+
+
+def read_mcap_metadata(path: Path, name: str) -> dict[str, str]:
+    """A metadata record from before the first message; empty where there is none to be read."""
+    try:
+        with path.open("rb") as file:
+            return _McapScan(file, path.stat().st_size).metadata(name)
+    except UNREADABLE:
+        return {}  # reading the messages tells what is wrong
+
+
+class _McapScan:
+    """One pass through a file."""
+
+    def __init__(self, file: BinaryIO, size: int) -> None:
+        self._file = file
+        self._size = size
+        self._position = 0
+        self._schemas: dict[int, tuple[str, Definition]] = {}
+        self._channels: dict[int, Channel] = {}
+        self._count = 0  # messages so far
+        self._numbered = False  # whether the file's messages are numbered throughout
+
+    def messages(self) -> Iterator[RawMessage]:
+        self._check_magic("is not an MCAP file" if self._size else "is empty")
+        while True:
+            start = self._position
+            try:
+                opcode, content = self._next_record()
+            except _EndOfFileError as end:
+                if end.opcode == Opcode.CHUNK:
+                    yield from self._truncated_chunk(end.content)
+                raise MalformedRecordError(
+                    f"ends early, at byte {self._size}: its recorder was killed or it was cut off"
+                ) from None
+            try:
+                if opcode == Opcode.DATA_END:
+                    return self._check_ending(content)
+                if opcode == Opcode.CHUNK:
+                    yield from self._records(self._chunk(content))
+                else:
+                    yield from self._top_level(opcode, content)
+            except (MalformedRecordError, UnicodeDecodeError) as error:
+                raise MalformedRecordError(
+                    f"is damaged in the record at byte {start}: {error}"
+                ) from None
+
+    def metadata(self, name: str) -> dict[str, str]:
+        self._check_magic("is not an MCAP file")
+        while True:
+            try:
+                opcode, content = self._next_record()
+            except _EndOfFileError:
+                return {}
+            if opcode == Opcode.METADATA:
+                fields = Fields(content)
+                if fields.string() == name:
+                    return fields.string_map()
+            elif opcode != Opcode.HEADER:
+                return {}
+
+    def _check_magic(self, complaint: str) -> None:
+        if self._read(len(MAGIC)) != MAGIC:
+            raise MalformedRecordError(complaint)
+
+    def _read(self, size: int) -> bytes:
+        """At most so many bytes; never more than the file has, whatever a record claims."""
+        data = self._file.read(min(size, self._size - self._position))
+        self._position += len(data)
+        return data
+
+    def _next_record(self) -> tuple[int, bytes]:
+        head = self._read(RECORD.size)
+        if len(head) < RECORD.size:
+            raise _EndOfFileError(0, b"")
+        opcode, length = RECORD.unpack(head)
+        content = self._read(length)
+        if len(content) < length:
+            raise _EndOfFileError(opcode, content)
+        return opcode, content
+
+    def _top_level(self, opcode: int, content: bytes) -> Iterator[RawMessage]:
+        if opcode == Opcode.HEADER:
+            fields = Fields(content)
+            fields.string()  # profile
+            self._numbered = fields.string().startswith(LIBRARY)
+        elif opcode not in IGNORED and opcode < FIRST_PRIVATE_OPCODE:
+            yield from self._record(opcode, memoryview(content))
+
+    def _chunk(self, content: bytes) -> memoryview:
+        """The records of a complete chunk, checked and uncompressed."""
+        fields = Fields(content)
+        _, _, size, crc = CHUNK.unpack(fields.take(CHUNK.size))
+        compression = fields.string()
+        if fields.u64() != fields.left:
+            raise MalformedRecordError("a chunk's length contradicts itself")
+        data = _decompress(compression, fields.rest(), size)
+        if len(data) != size:
+            raise MalformedRecordError(f"a chunk of {size} bytes has {len(data)}")
+        if crc and zlib.crc32(data) != crc:
+            raise MalformedRecordError("a chunk's checksum is wrong")
+        return data
+
+    def _truncated_chunk(self, content: bytes) -> Iterator[RawMessage]:
+        """What can be read of a chunk that the file breaks off in."""
+        try:
+            fields = Fields(content)
+            fields.take(CHUNK.size)
+            compression, _ = fields.string(), fields.u64()
+            if not compression:
+                yield from self._records(fields.rest())
+        except (MalformedRecordError, UnicodeDecodeError):
+            return  # here the file ends, as the caller reports
+
+    def _records(self, data: memoryview) -> Iterator[RawMessage]:
+        fields = Fields(data)
+        while fields.left:
+            opcode, length = RECORD.unpack(fields.take(RECORD.size))
+            yield from self._record(opcode, fields.take(length))
+
+    def _record(self, opcode: int, content: memoryview) -> Iterator[RawMessage]:
+        if opcode == Opcode.MESSAGE:
+            yield self._message(content)
+        elif opcode == Opcode.SCHEMA:
+            fields = Fields(content)
+            number, name = fields.u16(), fields.string()
+            self._schemas[number] = (name, Definition(fields.string(), fields.string()))
+        elif opcode == Opcode.CHANNEL:
+            fields = Fields(content)
+            number, schema = fields.u16(), fields.u16()
+            type_name, definition = self._schemas.get(schema, ("", Definition()))
+            self._channels[number] = Channel(
+                fields.string(), type_name, fields.string(), definition
+            )
+        else:
+            raise MalformedRecordError(f"there is no record of kind {opcode:#04x}")
+
+    def _message(self, content: memoryview) -> RawMessage:
+        fields = Fields(content)
+        number, sequence, log_time, _ = MESSAGE.unpack(fields.take(MESSAGE.size))
+        if number not in self._channels:
+            raise MalformedRecordError(f"a message of the unknown channel {number}")
+        if self._numbered and sequence != self._count & SEQUENCE_MASK:
+            raise MalformedRecordError(f"messages from number {self._count} on are missing")
+        self._count += 1
+        return RawMessage(self._channels[number], log_time, fields.rest())
+
+    def _check_ending(self, data_end: bytes) -> None:
+        """Read the summary: it tells whether messages are missing."""
+        if len(data_end) < 4:
+            raise MalformedRecordError("the end of the data is no such record")
+        while True:
+            try:
+                opcode, content = self._next_record()
+            except _EndOfFileError:
+                raise MalformedRecordError("the index is incomplete") from None
+            if opcode == Opcode.STATISTICS and (told := Fields(content).u64()) != self._count:
+                raise MalformedRecordError(f"has {self._count} messages and claims {told}")
+            if opcode == Opcode.FOOTER:
+                return self._check_magic("the index is damaged")
+
+
+def _complaint(error: Exception) -> str:
+    return f"cannot be read: {error.strerror}" if isinstance(error, OSError) else str(error)
+
+
+def _decompress(compression: str, data: memoryview, size: int) -> memoryview:
+    """At most ``size`` bytes, whatever the compressed data claims."""
+    try:
+        match compression:
+            case "":
+                return data
+            case "zstd":
+                return memoryview(zstd.ZstdDecompressor().decompress(data, max_length=size))
+            case "lz4":
+                frame = lz4.frame.LZ4FrameDecompressor()
+                return memoryview(frame.decompress(data, max_length=size))
+    except (zstd.ZstdError, RuntimeError, EOFError, OverflowError, MemoryError) as error:
+        raise MalformedRecordError(f"a chunk cannot be uncompressed: {one_line(error)}") from error
+    raise MalformedRecordError(f"the compression {compression!r} is not known")

@@ -1,0 +1,118 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The episodes of a bag: what the simulator showed and was told, as core objects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from slap_ros.bags.reader import Bag
+from slap_ros.domains import Domain, get_domain
+from slap_ros.domains.domain import Action
+from slap_ros.errors import ForeignBagError
+from slap_ros.evaluation.metrics import AtomNames, atom_names
+from slap_ros.messages.decode import decode_command, decode_state
+from slap_ros.messages.interfaces import ATOMS, COMMAND, DOMAIN_INFO, STATE, TASK
+from slap_ros.messages.protocols import (
+    AtomsMessage,
+    CommandMessage,
+    DomainInfoMessage,
+    StateMessage,
+    TaskMessage,
+)
+from slap_ros.relational import State
+
+
+@dataclass
+class Episode:
+    """What is known of an episode; everything by step."""
+
+    task: TaskMessage | None = None
+    states: dict[int, StateMessage] = field(default_factory=dict)
+    atoms: dict[int, AtomNames] = field(default_factory=dict)
+    commands: dict[int, list[Action]] = field(default_factory=dict)  # in order of arrival
+
+
+class Recording:
+    """Collects the messages of an ensemble by episode."""
+
+    def __init__(self) -> None:
+        self.episodes: dict[int, Episode] = {}
+        self.domain_info: DomainInfoMessage | None = None
+        self._add: Mapping[str, Callable[[Any], None]] = {
+            DOMAIN_INFO: self._add_domain,
+            TASK: self._add_task,
+            STATE: self._add_state,
+            ATOMS: self._add_atoms,
+            COMMAND: self._add_command,
+        }
+
+    @classmethod
+    def of(cls, bag: Bag) -> Recording:
+        """Everything in a bag."""
+        recording = cls()
+        for _, type_name, _, message in bag:
+            recording.add(type_name, message)
+        return recording
+
+    def add(self, type_name: str, message: object) -> None:
+        """Take a message; types that tell nothing of an episode do not count."""
+        if type_name in self._add:
+            self._add[type_name](message)
+
+    def _episode(self, number: int) -> Episode:
+        return self.episodes.setdefault(number, Episode())
+
+    def _add_domain(self, msg: DomainInfoMessage) -> None:
+        self.domain_info = msg
+
+    def _add_task(self, msg: TaskMessage) -> None:
+        self._episode(msg.episode).task = msg
+
+    def _add_state(self, msg: StateMessage) -> None:
+        self._episode(msg.episode).states.setdefault(msg.step, msg)
+
+    def _add_atoms(self, msg: AtomsMessage) -> None:
+        self._episode(msg.episode).atoms.setdefault(msg.step, atom_names(msg.atoms))
+
+    def _add_command(self, msg: CommandMessage) -> None:
+        commands = self._episode(msg.episode).commands
+        commands.setdefault(msg.step, []).append(decode_command(msg))
+
+    def domain(self) -> Domain | None:
+        """The domain that was recorded; None where the bag breaks off before naming it.
+
+        Raises:
+            UnknownDomainError: It is not known here.
+            InvalidParameterError: Its preset is not known here.
+            ForeignBagError: It has other types or features here.
+        """
+        info = self.domain_info
+        if info is None:
+            return None
+        domain = get_domain(info.name, info.preset)
+        recorded = {t.name: [str(name) for name in t.feature_names] for t in info.types}
+        here = {t.name: [feature.name for feature in t.features] for t in domain.types}
+        if recorded != here:
+            raise ForeignBagError(
+                f"version mismatch: {info.name} was recorded with types {recorded} and has "
+                f"{here} here; read the bag with the version of slap_ros that wrote it"
+            )
+        return domain
+
+
+def initial_state(episode: Episode, domain: Domain) -> tuple[int, State] | None:
+    """The task's initial state, or else the first one recorded, with its step.
+
+    Raises:
+        InvalidStateError: It is no state of the domain.
+    """
+    types = domain.types_by_name
+    if episode.task is not None:
+        return 0, decode_state(episode.task.initial_state, types)
+    if episode.states:
+        first = min(episode.states)
+        return first, decode_state(episode.states[first], types)
+    return None

@@ -1,0 +1,54 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Reading rosbag2's sqlite3 files, the storage of older distributions."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+from slap_ros.bags.raw import Channel, Definition, RawMessage, one_line
+from slap_ros.errors import DamagedBagError
+
+
+def read_sqlite(path: Path) -> Iterator[RawMessage]:
+    """The messages, in the order in which they were written.
+
+    Raises:
+        DamagedBagError: After the last message that can be read.
+    """
+    uri = f"{path.absolute().as_uri()}?mode=ro"
+    try:
+        with closing(sqlite3.connect(uri, uri=True)) as database:
+            channels = _channels(database)
+            rows = database.execute("SELECT topic_id, timestamp, data FROM messages ORDER BY id")
+            for topic, stamp, data in rows:
+                if topic not in channels or type(stamp) is not int or type(data) is not bytes:
+                    raise DamagedBagError(f"{path} is damaged in the table of messages")
+                yield RawMessage(channels[topic], stamp, data)
+    except (sqlite3.Error, UnicodeDecodeError) as error:
+        raise DamagedBagError(f"{path} is damaged: {one_line(error)}") from error
+
+
+def _channels(database: sqlite3.Connection) -> dict[int, Channel]:
+    definitions = _definitions(database)
+    topics = database.execute("SELECT id, name, type, serialization_format FROM topics")
+    return {
+        number: Channel(
+            str(name), str(type_name), str(form), definitions.get(type_name, Definition())
+        )
+        for number, name, type_name, form in topics
+    }
+
+
+def _definitions(database: sqlite3.Connection) -> dict[str, Definition]:
+    """By type name; none in bags from before Iron."""
+    table = "SELECT name FROM sqlite_master WHERE name = 'message_definitions'"
+    if database.execute(table).fetchone() is None:
+        return {}
+    rows = database.execute(
+        "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
+    )
+    return {name: Definition(str(encoding), str(text)) for name, encoding, text in rows}

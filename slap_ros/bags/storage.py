@@ -1,0 +1,128 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Finding a bag's files and reading them one after the other."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from slap_ros.bags.mcap_reader import read_mcap, read_mcap_metadata
+from slap_ros.bags.raw import Channel, RawMessage
+from slap_ros.bags.rosbag2 import FILE_NAME, Extent, read_metadata
+from slap_ros.bags.sqlite_reader import read_sqlite
+from slap_ros.bags.writer import METADATA_NAME
+from slap_ros.errors import DamagedBagError
+
+READERS: Mapping[str, Callable[[Path], Iterator[RawMessage]]] = {
+    ".mcap": read_mcap,
+    ".db3": read_sqlite,
+}
+COMPRESSED = ".zstd"
+
+
+@dataclass(frozen=True)
+class Storage:
+    """The files of a bag, in order of recording."""
+
+    path: Path
+    files: tuple[Path, ...]
+
+    @property
+    def suffix(self) -> str:
+        """Of the files: ``.mcap`` or ``.db3``."""
+        return self.files[0].suffix
+
+    @property
+    def size_bytes(self) -> int:
+        """Of the files together."""
+        return sum(file.stat().st_size for file in self.files)
+
+    def messages(self) -> Iterator[RawMessage]:
+        """The messages, in the order in which they were written.
+
+        Raises:
+            DamagedBagError: After the last message that precedes any damage.
+        """
+        for file in self.files:
+            yield from READERS[self.suffix](file)
+        self._information()
+
+    def metadata(self) -> dict[str, str]:
+        """What the run was made with, as far as it can be read."""
+        if self.suffix == ".mcap" and (found := read_mcap_metadata(self.files[0], METADATA_NAME)):
+            return found
+        try:
+            custom = self._information().get("custom_data")
+        except DamagedBagError:
+            return {}  # :meth:`messages` reports it
+        return {str(k): str(v) for k, v in custom.items()} if isinstance(custom, dict) else {}
+
+    def _information(self) -> dict[str, object]:
+        """The bag's ``metadata.yaml``; empty for a single file.
+
+        Raises:
+            DamagedBagError: It is missing or is no such file.
+        """
+        if not self.path.is_dir():
+            return {}
+        try:
+            return read_metadata(self.path)
+        except (OSError, ValueError) as error:
+            raise DamagedBagError(
+                f"{self.path / FILE_NAME} cannot be read: {error}; "
+                "the messages can, and `ros2 bag reindex` writes it anew"
+            ) from error
+
+
+@dataclass
+class Survey:
+    """What a bag holds, counted."""
+
+    counts: dict[Channel, int] = field(default_factory=dict)
+    extent: Extent = field(default_factory=Extent)
+    damage: str | None = None
+
+
+def open_storage(path: Path | str) -> Storage:
+    """Find a bag's files.
+
+    Args:
+        path: The bag's folder, or a single ``.mcap`` or ``.db3`` file.
+
+    Raises:
+        DamagedBagError: There is no bag.
+    """
+    path = Path(path)
+    if path.is_file() and path.suffix in READERS:
+        return Storage(path, (path,))
+    if not path.exists():
+        raise DamagedBagError(f"there is no bag at {path}; check the path")
+    content = sorted(path.iterdir(), key=_recording_order) if path.is_dir() else [path]
+    for suffix in READERS:
+        if files := tuple(file for file in content if file.suffix == suffix):
+            return Storage(path, files)
+    if any(file.suffix == COMPRESSED for file in content):
+        raise DamagedBagError(f"the bag {path} is compressed; unpack it with `unzstd` first")
+    raise DamagedBagError(
+        f"{path} is not a bag: give a folder with {' or '.join(READERS)} files, or such a file"
+    )
+
+
+def survey(storage: Storage) -> Survey:
+    """Go through a bag once, without deserialising."""
+    result = Survey()
+    try:
+        for channel, stamp_ns, _ in storage.messages():
+            result.counts[channel] = result.counts.get(channel, 0) + 1
+            result.extent.include(stamp_ns)
+    except DamagedBagError as error:
+        result.damage = str(error)
+    return result
+
+
+def _recording_order(file: Path) -> list[tuple[int, str]]:
+    """Sorts ``run_10`` after ``run_9``."""
+    return [(int(digits or 0), text) for text, digits in re.findall(r"(\D*)(\d*)", file.name)]

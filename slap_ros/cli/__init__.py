@@ -1,0 +1,50 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The command line: ``slap``."""
+
+from __future__ import annotations
+
+import typer
+
+from slap_ros import __version__
+from slap_ros.cli import bag, domains, evaluate, plan, run
+from slap_ros.cli import doctor as doctor_command
+from slap_ros.cli.console import exits
+
+app = typer.Typer(
+    name="slap",
+    help="Task-and-motion planning with learned shortcuts: run it, measure it, look into it.",
+    epilog=(
+        "Exit codes: 0 done, 2 wrong usage, 130 interrupted; any other is an error code of "
+        "slap_msgs/ErrorCode. With --json, stdout has JSON and nothing else."
+    ),
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command("run")(exits(run.run))
+app.command("plan")(exits(plan.plan))
+app.command("evaluate")(exits(evaluate.evaluate))
+app.add_typer(bag.app, name="bag")
+app.command("domains")(exits(domains.domains))
+app.command("doctor")(exits(doctor_command.doctor))
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"slap_ros {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: bool = typer.Option(
+        False, "--version", callback=_show_version, is_eager=True, help="Show the version."
+    ),
+) -> None:
+    del version
+
+
+def main() -> None:
+    """Run a command."""
+    app()

@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``slap bag``: look into bags, without ROS 2 and without the ensemble."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from slap_ros.bags import BagEvaluation, bag_info, evaluate_bag, read_bag, replay_bag
+from slap_ros.bags.recording import Recording
+from slap_ros.cli.console import Json, console, exits, print_json
+from slap_ros.cli.render import check_renderable
+from slap_ros.cli.render import render as write_animation
+from slap_ros.errors import DamagedBagError, ErrorCode
+from slap_ros.evaluation.metrics import RunMetrics
+from slap_ros.messages.decode import decode_state
+
+app = typer.Typer(
+    help="Look into recorded runs: info, evaluate, replay, render.", no_args_is_help=True
+)
+
+BagPath = Annotated[Path, typer.Argument(help="A bag's folder, or one .mcap or .db3 file.")]
+
+
+@app.command("info")
+@exits
+def info(bag: BagPath, json: Json = False) -> int:
+    """Say what a bag holds."""
+    found = bag_info(bag)
+    if json:
+        print_json(asdict(found))
+    else:
+        table = Table("topic", "type", "messages", title=f"{bag}, {found.duration_s:.2f} s")
+        for topic in found.topics:
+            table.add_row(topic.name, topic.type_name, str(topic.message_count))
+        console.print(table)
+        for key, value in found.metadata.items():
+            console.print(f"{key}: {value}", highlight=False)
+    return _warn(found.damage)
+
+
+@app.command("evaluate")
+@exits
+def evaluate(bag: BagPath, json: Json = False) -> int:
+    """Recompute every number of a run, and the atoms of every state."""
+    found = evaluate_bag(bag)
+    for mismatch in found.mismatches:
+        console.print(
+            f"episode {mismatch.episode}, step {mismatch.step}: "
+            f"missing {list(mismatch.missing)}, extra {list(mismatch.extra)}",
+            highlight=False,
+            markup=False,
+        )
+    if json:
+        runs = [run.as_json() | _perception(found) for run in found.runs]
+        print_json(runs[0] if len(runs) == 1 else runs)
+    else:
+        for run in found.runs:
+            console.print(_table(run))
+        console.print(
+            f"{found.compared} of {found.states} states perceived again, "
+            f"{len(found.mismatches)} mismatches"
+        )
+    code = _warn(found.damage)
+    return int(ErrorCode.REPLAY_MISMATCH) if found.mismatches else code
+
+
+def _perception(found: BagEvaluation) -> dict[str, int]:
+    return {"states_compared": found.compared, "atom_mismatches": len(found.mismatches)}
+
+
+def _table(run: RunMetrics) -> Table:
+    outcome = "solved" if run.success else f"not solved: {run.error_msg}"
+    table = Table(
+        "option",
+        "steps",
+        "outcome",
+        title=(
+            f"{run.domain}, preset {run.preset}, seed {run.seed}: {outcome}\n"
+            f"{run.plan_length} steps, {run.planning_seconds:.3f} s planning, "
+            f"{run.replans} replans, {run.edges_rolled_out} edges rolled out"
+        ),
+    )
+    for option in run.options:
+        name = f"{option.name}({', '.join(option.objects)})"
+        table.add_row(name, str(option.steps), option.outcome)
+    return table
+
+
+@app.command("render")
+@exits
+def render(
+    bag: BagPath,
+    output: Annotated[Path, typer.Option(help="The GIF to write.")],
+) -> int:
+    """Write an animation of the recorded states."""
+    found = read_bag(bag)
+    recording = Recording.of(found)
+    domain = recording.domain()
+    if domain is None:
+        raise DamagedBagError(f"{bag} breaks off before it names its domain")
+    check_renderable(domain, output)
+    messages = [m for e in recording.episodes.values() for _, m in sorted(e.states.items())]
+    states = [decode_state(message, domain.types_by_name) for message in messages]
+    write_animation(domain, states, output)
+    return _warn(found.damage)
+
+
+@app.command("replay")
+@exits
+def replay(bag: BagPath, json: Json = False) -> int:
+    """Feed the recorded commands to a fresh world and compare every state, bit for bit."""
+    result = replay_bag(bag)
+    if json:
+        print_json(asdict(result) | {"identical": result.identical})
+    else:
+        console.print(f"{result.compared} states compared, {result.different} differ")
+        if result.unreached:
+            console.print(f"{result.unreached} states without the commands that lead to them")
+        if result.first is not None:
+            first = result.first
+            console.print(
+                f"first: episode {first.episode}, step {first.step}, {first.object}."
+                f"{first.feature}: recorded {first.recorded!r}, replayed {first.replayed!r}",
+                highlight=False,
+            )
+    code = _warn(result.damage)
+    return code if result.identical else int(ErrorCode.REPLAY_MISMATCH)
+
+
+def _warn(damage: str | None) -> int:
+    """Say where reading ended; the exit code."""
+    if damage is None:
+        return 0
+    console.print(f"[yellow]damaged[/]: {damage}", highlight=False)
+    return int(ErrorCode.DAMAGED_BAG)

@@ -1,0 +1,32 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``slap doctor``."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+from rich.markup import escape
+from rich.table import Table
+
+from slap_ros.cli.console import Json, console, print_json
+from slap_ros.doctor import diagnose
+from slap_ros.errors import ErrorCode
+
+STYLE = {"ok": "green", "warning": "yellow", "problem": "bold red"}
+
+
+def doctor(json: Json = False) -> int:
+    """Check ROS 2, DDS on this network, libraries and disk, and say what to do."""
+    with console.status("looking around"):
+        checks = diagnose()
+    if json:
+        print_json([asdict(check) for check in checks])
+    else:
+        table = Table("check", "", "found", "what to do")
+        for check in checks:
+            status = f"[{STYLE[check.status]}]{check.status}[/]"
+            table.add_row(check.name, status, escape(check.found), escape(check.advice))
+        console.print(table)
+    problem = any(check.status == "problem" for check in checks)
+    return int(ErrorCode.UNKNOWN) if problem else 0

@@ -1,0 +1,136 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``slap plan``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from slap_ros.cli.console import Goal, Index, Json, Planner, Preset, Seed, console, print_json
+from slap_ros.domains import Domain, Task, get_domain
+from slap_ros.drawing import draw_abstract_graph
+from slap_ros.errors import InvalidParameterError, StorageFullError
+from slap_ros.planning.abstract_graph import AbstractGraph, build_abstract_graph
+from slap_ros.planning.ff import find_operator_sequence
+from slap_ros.planning.plan import PlanningResult
+from slap_ros.planning.planner import Problem, make_planner
+from slap_ros.relational import AtomSpace, GroundAtom, ground_operators
+from slap_ros.relational.pddl import (
+    parse_domain,
+    parse_goal,
+    parse_problem,
+    write_domain,
+    write_problem,
+)
+
+
+def plan(
+    domain: Annotated[str, typer.Argument(help="One of `slap domains`, or a PDDL domain file.")],
+    problem: Annotated[
+        Path | None, typer.Argument(help="With a PDDL domain file: the PDDL problem file.")
+    ] = None,
+    seed: Seed = 0,
+    index: Index = 0,
+    preset: Preset = "fair",
+    goal: Goal = None,
+    planner: Planner = "lazy",
+    output: Annotated[
+        Path | None, typer.Option(help="Folder for domain.pddl, problem.pddl and graph.svg.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Plan one task without executing it; write its PDDL and draw its abstract graph.
+
+    With two PDDL files: plan symbolically, with the FF heuristic.
+    """
+    if problem is not None:
+        _plan_pddl(Path(domain), problem, json)
+        return
+    chosen = get_domain(domain, preset)
+    task = chosen.task(seed, index)
+    space = chosen.atom_space(task.initial_state)
+    atoms = parse_goal(goal, space) if goal else task.goal
+    result = make_planner(planner, chosen, task.initial_state).plan(
+        task.initial_state, space.mask(atoms)
+    )
+    _show(result, json)
+    if output is not None:
+        _write(output, chosen, task, atoms, result)
+
+
+def _show(result: PlanningResult, json: bool) -> None:
+    edges = [(str(edge), edge.predicted_steps) for edge in result.plan.edges]
+    if json:
+        print_json(
+            {
+                "plan": [{"option": option, "predicted_steps": steps} for option, steps in edges],
+                "predicted_steps": result.plan.predicted_steps,
+                "graph_nodes": result.graph_nodes,
+                "graph_edges": result.graph_edges,
+                "edges_rolled_out": result.edges_rolled_out,
+            }
+        )
+        return
+    for option, steps in edges:
+        console.print(f"{steps:5d}  {option}", highlight=False)
+    console.print(
+        f"{result.plan.predicted_steps:5d}  steps predicted; {result.graph_nodes} abstract states, "
+        f"{result.graph_edges} edges, {result.edges_rolled_out} rolled out",
+        highlight=False,
+    )
+
+
+def _write(
+    folder: Path, domain: Domain, task: Task, goal: frozenset[GroundAtom], result: PlanningResult
+) -> None:
+    space = domain.atom_space(task.initial_state)
+    start = space.abstract(task.initial_state)
+    graph = _graph(domain, task, space, goal)
+    files = {
+        "domain.pddl": write_domain(domain.name, domain.types, domain.predicates, domain.operators),
+        "problem.pddl": write_problem(
+            "task", domain.name, space.layout.objects, tuple(space.decode(start)), goal
+        ),
+        "graph.svg": draw_abstract_graph(graph, space, result.plan, f"{domain.name}: plan"),
+    }
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, text in files.items():
+            (folder / name).write_text(text, encoding="utf-8")
+            console.print(f"wrote {folder / name}", highlight=False)
+    except OSError as error:
+        raise StorageFullError(f"cannot write to {folder}: {error.strerror}") from error
+
+
+def _graph(
+    domain: Domain, task: Task, space: AtomSpace, goal: frozenset[GroundAtom]
+) -> AbstractGraph:
+    operators = Problem.of(domain, task.initial_state).operators
+    return build_abstract_graph(space.abstract(task.initial_state), space.mask(goal), operators)
+
+
+def _plan_pddl(domain_file: Path, problem_file: Path, json: bool) -> None:
+    domain = parse_domain(_read(domain_file), str(domain_file))
+    problem = parse_problem(_read(problem_file), domain, str(problem_file))
+    space = problem.atom_space(domain)
+    operators = ground_operators(domain.operators, space)
+    sequence = find_operator_sequence(
+        problem.initial_mask(space), problem.goal_mask(space), operators
+    )
+    names = [str(operators[number]) for number in sequence]
+    if json:
+        print_json({"plan": names})
+        return
+    for name in names:
+        console.print(name, highlight=False)
+    console.print(f"{len(names)} operators")
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidParameterError(f"cannot read {path}: {error}") from error

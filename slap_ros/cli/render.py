@@ -1,0 +1,42 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Animations of runs, for ``slap run --render`` and ``slap bag render``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from slap_ros.cli.console import console, progress
+from slap_ros.domains import Domain
+from slap_ros.errors import InvalidParameterError, StorageFullError
+from slap_ros.relational import State
+
+
+def check_renderable(domain: Domain, path: Path) -> None:
+    """Refuse what could not be rendered before anything is run.
+
+    Raises:
+        InvalidParameterError: The domain has no pictures, or the file would be no GIF.
+    """
+    if domain.animate is None:
+        raise InvalidParameterError(f"{domain.name} has no pictures; leave out rendering")
+    if path.suffix != ".gif":
+        raise InvalidParameterError(f"animations are GIFs: give {path.with_suffix('.gif')}")
+
+
+def render(domain: Domain, states: Sequence[State], path: Path) -> None:
+    """Write an animation.
+
+    Raises:
+        StorageFullError: It cannot be written.
+    """
+    if domain.animate is None:
+        raise InvalidParameterError(f"{domain.name} has no pictures")
+    with progress() as bar:
+        task = bar.add_task("rendering", total=len(states))
+        try:
+            domain.animate(path, states, lambda done: bar.update(task, completed=done))
+        except OSError as error:
+            raise StorageFullError(f"cannot write {path}: {error.strerror or error}") from error
+    console.print(f"animation: {path}", highlight=False)

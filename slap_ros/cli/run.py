@@ -1,0 +1,134 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``slap run``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from slap_ros.bags.writer import require_new
+from slap_ros.cli.console import (
+    Goal,
+    Index,
+    Json,
+    Planner,
+    Preset,
+    Seed,
+    console,
+    print_json,
+)
+from slap_ros.cli.render import check_renderable
+from slap_ros.cli.render import render as write_animation
+from slap_ros.domains import get_domain
+from slap_ros.evaluation.metrics import RunMetrics
+from slap_ros.messages.decode import decode_state
+from slap_ros.messages.events import PlanEventKind, SkillEventKind
+from slap_ros.messages.interfaces import PLAN, PLAN_EVENT, SKILL_EVENT, STATE
+from slap_ros.planning.execution import MAX_REPLANS
+from slap_ros.planning.planner import make_planner
+from slap_ros.relational.pddl import parse_goal
+
+
+def run(
+    domain: Annotated[str, typer.Argument(help="One of `slap domains`.")],
+    seed: Seed = 0,
+    index: Index = 0,
+    preset: Preset = "fair",
+    goal: Goal = None,
+    planner: Planner = "lazy",
+    max_replans: Annotated[int, typer.Option(min=0, help="Plans after the first.")] = MAX_REPLANS,
+    record: Annotated[
+        Path | None, typer.Option(help="Record a bag as a new folder with this name.")
+    ] = None,
+    in_process: Annotated[
+        bool, typer.Option("--in-process", help="All nodes in this process.")
+    ] = False,
+    pace: Annotated[
+        float, typer.Option(min=0.0, help="Steps a second, for watching; 0: at full speed.")
+    ] = 0.0,
+    timeout: Annotated[float, typer.Option(min=0.1, help="Give up after so many seconds.")] = 600.0,
+    render: Annotated[
+        Path | None, typer.Option(help="Write an animation of the run as this GIF.")
+    ] = None,
+    json: Json = False,
+) -> int:
+    """Run the whole ensemble on one task: simulator, perception, planner, skills, recorder."""
+    # Everything that can be refused is refused before a node is started.
+    chosen = get_domain(domain, preset)
+    task = chosen.task(seed, index)
+    atoms = parse_goal(goal, chosen.atom_space(task.initial_state)) if goal else frozenset()
+    make_planner(planner, chosen, task.initial_state)
+    if record is not None:
+        require_new(record)
+    if render is not None:
+        check_renderable(chosen, render)
+
+    # ROS is needed only here: every other command works without it.
+    from ensemble.nodes import RunSettings
+    from ensemble.run import RunRequest
+    from ensemble.run import run as run_ensemble
+
+    settings = RunSettings(domain, preset, seed, index, planner, record, pace)
+    request = RunRequest(settings, atoms, 0, max_replans, timeout, in_process)
+    narrator, states = Narrator(), []
+
+    def follow(type_name: str, message: Any) -> None:
+        narrator(type_name, message)
+        if type_name == STATE and render is not None:
+            states.append(message)
+
+    metrics = run_ensemble(request, follow)
+    if json:
+        print_json(metrics.as_json())
+    _conclude(metrics, record)
+    if render is not None:
+        decoded = [decode_state(message, chosen.types_by_name) for message in states]
+        write_animation(chosen, decoded, render)
+    return int(metrics.error_code)
+
+
+class Narrator:
+    """Tells the run as it goes, a line for each event."""
+
+    def __init__(self) -> None:
+        self._started = 0
+
+    def __call__(self, type_name: str, message: Any) -> None:
+        """Take a message of the run."""
+        if type_name == PLAN:
+            steps = [f"{edge.name} {edge.predicted_steps}" for edge in message.edges]
+            console.print(
+                f"plan {message.number}: {message.predicted_steps} steps ({', '.join(steps)})"
+            )
+        elif type_name == SKILL_EVENT:
+            self._skill(message)
+        elif type_name == PLAN_EVENT and message.kind == PlanEventKind.DIVERGED:
+            console.print(f"[yellow]diverged[/]: {message.error_msg}", highlight=False)
+        elif type_name == PLAN_EVENT and message.kind == PlanEventKind.FAILED:
+            console.print(f"[red]failed[/]: {message.error_msg}", highlight=False)
+
+    def _skill(self, message: Any) -> None:
+        if message.kind == SkillEventKind.STARTED:
+            self._started = message.step
+            return
+        name = f"{message.skill}({', '.join(message.objects)})"
+        outcome = SkillEventKind(message.kind).name.lower()
+        steps = message.step - self._started
+        console.print(f"{message.step:5d}  {name}: {outcome} after {steps} steps", highlight=False)
+
+
+def _conclude(metrics: RunMetrics, record: Path | None) -> None:
+    if metrics.success:
+        console.print(
+            f"[bold green]solved[/] in {metrics.plan_length} steps, {metrics.replans} replans, "
+            f"{metrics.planning_seconds:.3f} s of planning, "
+            f"{metrics.edges_rolled_out} edges rolled out",
+            highlight=False,
+        )
+    else:
+        console.print(f"[bold red]not solved[/]: {metrics.error_msg}", highlight=False)
+    if record is not None:
+        console.print(f"bag: {record}", highlight=False)

@@ -1,0 +1,40 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Can this machine run slap_ros, and what is missing for what?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from slap_ros.doctor import dds, libraries, machine, ros
+from slap_ros.doctor.check import Check, Status
+
+__all__ = ["Check", "Status", "diagnose"]
+
+RUNS = Path("runs")  # where runs are recorded unless told otherwise
+
+
+def diagnose(runs: Path = RUNS) -> list[Check]:
+    """Look at everything that runs depend on; nothing is changed, and nothing left running.
+
+    The checks come one after the other, so that none disturbs what another measures.
+
+    Args:
+        runs: The folder in which runs are to be recorded; it need not exist yet.
+    """
+    about = ros.About.ask()
+    return [
+        machine.python_version(),
+        ros.installation(about),
+        ros.middleware(about),
+        ros.interfaces(about),
+        ros.settings(),
+        dds.conversation(about),
+        libraries.rosbags(),
+        libraries.pybullet(),
+        libraries.training(),
+        machine.disk_space(runs),
+        machine.write_permission(runs),
+        machine.open_files(),
+        machine.processors_and_memory(),
+    ]

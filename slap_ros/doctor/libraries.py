@@ -1,0 +1,63 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Libraries, and what each is needed for."""
+
+from __future__ import annotations
+
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+
+from slap_ros.doctor.check import Check
+from slap_ros.doctor.processes import run_python
+
+IMPORT_LIMIT_S = 60.0  # torch takes its time when the disk is cold
+
+
+def rosbags() -> Check:
+    """Needed to record and evaluate runs."""
+    if find_spec("rosbags") is None:
+        return Check("rosbags", "problem", "not installed; runs are recorded with it", _pip(""))
+    return _imported("rosbags", ["rosbags.rosbag2"], ["rosbags"], _pip(""))
+
+
+def pybullet() -> Check:
+    """Needed by the domains with an arm."""
+    if find_spec("pybullet") is None:
+        found = "not installed; needed by the domains with an arm, not by obstacle2d"
+        return Check("PyBullet", "warning", found, _pip("physics"))
+    # Wheels for the newer Python come from a fork of the same module name.
+    return _imported("PyBullet", ["pybullet"], ["pybullet", "pybullet-arm64"], _pip("physics"))
+
+
+def training() -> Check:
+    """Needed to train shortcuts, not to use them."""
+    name, modules = "Training", ["torch", "stable_baselines3"]
+    missing = [module for module in modules if find_spec(module) is None]
+    if missing:
+        found = f"{' and '.join(missing)} not installed; needed to train, not to run or evaluate"
+        return Check(name, "ok", found, _pip("train"))
+    return _imported(name, modules, ["torch", "stable-baselines3"], _pip("train"))
+
+
+def _imported(name: str, modules: list[str], distributions: list[str], advice: str) -> Check:
+    """Import in another process: PyBullet prints, and a broken library may take Python down."""
+    outcome = run_python(["-c", f"import {', '.join(modules)}"], IMPORT_LIMIT_S)
+    versions = ", ".join(_versions(distributions))
+    if outcome.code != 0:
+        found = f"{versions or name} is installed but fails: {outcome.last_error}"
+        return Check(name, "problem", found, f"Install it anew: {advice}")
+    return Check(name, "ok", versions or "installed")
+
+
+def _versions(distributions: list[str]) -> list[str]:
+    found = []
+    for name in distributions:
+        try:
+            found.append(f"{name} {version(name)}")
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def _pip(extra: str) -> str:
+    return f'pip install "slap_ros[{extra}]"' if extra else "pip install slap_ros"

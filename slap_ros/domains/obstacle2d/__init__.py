@@ -1,0 +1,37 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Obstacle 2D: put the target block into an area that another block overlaps (SLAP §5).
+
+A side view of a table in the unit square. All lengths are in metres, x to the right, y up,
+positions are centres. Read on in this order: ``model`` (types, predicates, operators),
+``dynamics`` (the world), ``skills``, ``tasks``.
+"""
+
+from __future__ import annotations
+
+from slap_ros.domains.domain import Domain
+from slap_ros.domains.obstacle2d import model, skills, tasks
+from slap_ros.domains.obstacle2d.bodies import visible_bodies
+from slap_ros.domains.obstacle2d.dynamics import ACTION_SPACE, CONTROL_PERIOD, Obstacle2DWorld
+
+
+def make(preset: str) -> Domain:
+    """The domain: preset ``fair`` samples different tasks, ``paper`` the reference's three."""
+    settings = tasks.SETTINGS[preset]
+    return Domain(
+        name="obstacle2d",
+        preset=preset,
+        types=model.TYPES,
+        predicates=model.PREDICATES,
+        operators=model.OPERATORS,
+        skills={skill.name: skill for skill in skills.SKILLS},
+        action_space=ACTION_SPACE,
+        control_period_s=CONTROL_PERIOD,
+        sample_task=settings.sample,
+        make_world=Obstacle2DWorld,
+        default_goal=tasks.target_block_in_target_area,
+        step_limit=tasks.STEP_LIMIT,
+        unread_types=frozenset({model.ROBOT}),
+        bodies=visible_bodies,
+        configuration=settings.as_configuration(),
+    )

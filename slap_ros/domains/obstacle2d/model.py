@@ -1,0 +1,184 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Obstacle 2D: types, predicates, operators (SLAP Table 9)."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from slap_ros.relational import (
+    Column,
+    Feature,
+    Layout,
+    LiftedAtom,
+    LiftedOperator,
+    Predicate,
+    State,
+    Type,
+    Variable,
+)
+from slap_ros.relational.predicates import Bools
+from slap_ros.relational.state import Array
+
+BLOCK_SIZE = 0.2  # m, width and height of every block and of the robot's gripper
+OVERLAP_TOLERANCE = 1e-3  # m, how far a block may reach over an area's edge without overlapping it
+INSIDE_TOLERANCE = 0.01  # m, how far a block in the target area may reach over its edge
+RESTING_TOLERANCE = 1e-6  # m, height over the table at which a block still rests on it
+
+X, Y = Feature("x", "m"), Feature("y", "m")
+ROBOT = Type("robot", (X, Y))
+BLOCK = Type("block", (X, Y, Feature("held", "1")))
+SURFACE = Type("surface", (X, Feature("width", "m"), Feature("is_target", "1")))
+TYPES = (ROBOT, BLOCK, SURFACE)
+
+
+# -- predicates ---------------------------------------------------------------------------------
+
+
+def _always(state: State, column: Column) -> Bools:
+    return np.ones((*state.data.shape[:-1], len(column.objects)), dtype=bool)
+
+
+def _is_target(state: State, surface: Column) -> Bools:
+    return state.stack(surface, "is_target") > 0.5
+
+
+def _is_not_target(state: State, surface: Column) -> Bools:
+    return state.stack(surface, "is_target") < 0.5
+
+
+def _is_held(state: State, _: Column, block: Column) -> Bools:
+    return state.stack(block, "held") > 0.5
+
+
+def _reach(state: State, block: Column, surface: Column) -> Array:
+    """How far the block reaches over the surface in x; negative: the gap between them."""
+    distance = np.abs(state.stack(block, "x") - state.stack(surface, "x"))
+    reach: Array = (BLOCK_SIZE + state.stack(surface, "width")) / 2 - distance
+    return reach
+
+
+def _rest_margin(state: State, block: Column) -> Array:
+    """Positive where the block lies on the table: not held, bottom at the table's top."""
+    height = np.where(state.stack(block, "held") > 0.5, 1.0, state.stack(block, "y"))
+    margin: Array = RESTING_TOLERANCE - height
+    return margin
+
+
+def _overlap_margin(state: State, block: Column, surface: Column) -> Array:
+    """Only target areas can be overlapped; the table is simply what blocks lie on."""
+    reach = np.where(
+        _is_target(state, surface), _reach(state, block, surface) - OVERLAP_TOLERANCE, -1.0
+    )
+    return np.minimum(_rest_margin(state, block), reach)
+
+
+def _inside_margin(state: State, block: Column, surface: Column) -> Array:
+    distance = np.abs(state.stack(block, "x") - state.stack(surface, "x"))
+    slack = (state.stack(surface, "width") - BLOCK_SIZE) / 2 + INSIDE_TOLERANCE
+    return np.minimum(_rest_margin(state, block), slack - distance)
+
+
+def _each(state: State, kind: Type) -> list[Column]:
+    return _columns_of(state.layout, kind)
+
+
+@lru_cache(maxsize=256)
+def _columns_of(layout: Layout, kind: Type) -> list[Column]:
+    return [Column((obj,)) for obj in layout.of_type(kind)]
+
+
+def _on_margin(state: State, block: Column, surface: Column) -> Array:
+    """On a target area: inside it. On the table: at rest and off every target area."""
+    overlaps = [_overlap_margin(state, block, other) for other in _each(state, SURFACE)]
+    off_targets = _strictly(-np.max(overlaps, axis=0))
+    on_table = np.minimum(_rest_margin(state, block), off_targets)
+    inside = _inside_margin(state, block, surface)
+    return np.where(_is_target(state, surface), inside, on_table)
+
+
+def _clear_margin(state: State, surface: Column) -> Array:
+    overlaps = [_overlap_margin(state, block, surface) for block in _each(state, BLOCK)]
+    return _strictly(-np.max(overlaps, axis=0))
+
+
+def _strictly(margin: Array) -> Array:
+    """Make a negated margin false at 0, where the original still holds."""
+    return margin - np.finfo(np.float64).tiny
+
+
+def _gripper_empty(state: State, _: Column) -> Bools:
+    held = [state.stack(block, "held") for block in _each(state, BLOCK)]
+    empty: Bools = np.max(held, axis=0) < 0.5
+    return empty
+
+
+IS_ROBOT = Predicate("IsRobot", (ROBOT,), _always)
+IS_BLOCK = Predicate("IsBlock", (BLOCK,), _always)
+IS_SURFACE = Predicate("IsSurface", (SURFACE,), _always)
+IS_TARGET = Predicate("IsTarget", (SURFACE,), _is_target)
+NOT_IS_TARGET = Predicate("NotIsTarget", (SURFACE,), _is_not_target)
+ON = Predicate.threshold("On", (BLOCK, SURFACE), _on_margin)
+OVERLAP = Predicate.threshold("Overlap", (BLOCK, SURFACE), _overlap_margin)
+HOLDING = Predicate("Holding", (ROBOT, BLOCK), _is_held)
+GRIPPER_EMPTY = Predicate("GripperEmpty", (ROBOT,), _gripper_empty)
+CLEAR = Predicate.threshold("Clear", (SURFACE,), _clear_margin)
+PREDICATES = (
+    IS_ROBOT,
+    IS_BLOCK,
+    IS_SURFACE,
+    IS_TARGET,
+    NOT_IS_TARGET,
+    ON,
+    OVERLAP,
+    HOLDING,
+    GRIPPER_EMPTY,
+    CLEAR,
+)
+
+
+# -- operators ----------------------------------------------------------------------------------
+
+
+def _operators() -> tuple[LiftedOperator, ...]:
+    robot, block, surface = Variable("?r", ROBOT), Variable("?b", BLOCK), Variable("?s", SURFACE)
+    empty = LiftedAtom(GRIPPER_EMPTY, (robot,))
+    holding = LiftedAtom(HOLDING, (robot, block))
+    on = LiftedAtom(ON, (block, surface))
+    overlap = LiftedAtom(OVERLAP, (block, surface))
+    clear = LiftedAtom(CLEAR, (surface,))
+    kinds = {
+        LiftedAtom(IS_ROBOT, (robot,)),
+        LiftedAtom(IS_BLOCK, (block,)),
+        LiftedAtom(IS_SURFACE, (surface,)),
+    }
+    table = kinds | {LiftedAtom(NOT_IS_TARGET, (surface,))}
+    target = kinds | {LiftedAtom(IS_TARGET, (surface,))}
+
+    def operator(
+        name: str, pre: set[LiftedAtom], add: set[LiftedAtom], delete: set[LiftedAtom]
+    ) -> LiftedOperator:
+        parameters = (robot, block, surface)
+        return LiftedOperator(name, parameters, frozenset(pre), frozenset(add), frozenset(delete))
+
+    return (
+        operator("Pick", table | {empty, on}, add={holding}, delete={empty, on}),
+        operator(
+            "PickFromTarget",
+            target | {empty, overlap},
+            add={holding, clear},
+            delete={empty, overlap, on},
+        ),
+        operator("Place", table | {holding}, add={empty, on}, delete={holding}),
+        operator(
+            "PlaceInTarget",
+            target | {holding, clear},
+            add={empty, on, overlap},
+            delete={holding, clear},
+        ),
+    )
+
+
+OPERATORS = _operators()

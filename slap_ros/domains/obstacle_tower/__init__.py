@@ -1,0 +1,53 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Obstacle Tower: put a block on a target on which a tower of other blocks stands (SLAP §5).
+
+A Panda at the origin, a table before it; x to the front, z up, m and rad. Read on in this order:
+``model`` (types, predicates, operators), ``tasks``, ``skills``. The world is that of
+``slap_ros.physics``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+from slap_ros.domains.domain import ActionSpace, Domain
+from slap_ros.domains.obstacle_tower import model, skills, tasks
+from slap_ros.domains.obstacle_tower.scenery import animate, scene_of, visible_bodies
+from slap_ros.physics.features import ROBOT
+from slap_ros.physics.panda import CONTROL_PERIOD_S
+from slap_ros.physics.world import ACTION_SPACE, PandaWorld
+
+SETTINGS: Mapping[str, tasks.RandomTasks | tasks.PaperTasks] = {
+    "fair": tasks.RandomTasks(),
+    "paper": tasks.PaperTasks(),
+}
+# The reference has no limit to what its planned motions do in a step, and jumps by 3 rad.
+WHATEVER = replace(ACTION_SPACE, low=(*(-math.pi,) * 7, -1.0), high=(*(math.pi,) * 7, 1.0))
+ACTIONS: Mapping[str, ActionSpace] = {"fair": ACTION_SPACE, "paper": WHATEVER}
+TIMINGS: Mapping[str, skills.Timing] = {"fair": skills.AtSpeedLimit(), "paper": skills.InTens()}
+
+
+def make(preset: str) -> Domain:
+    """The domain: preset ``fair`` samples different tasks, ``paper`` has the reference's one."""
+    settings, actions = SETTINGS[preset], ACTIONS[preset]
+    return Domain(
+        name="obstacle_tower",
+        preset=preset,
+        types=model.TYPES,
+        predicates=model.PREDICATES,
+        operators=model.OPERATORS,
+        skills=skills.skills(TIMINGS[preset]),
+        action_space=actions,
+        control_period_s=CONTROL_PERIOD_S,
+        sample_task=settings.sample,
+        make_world=lambda state: PandaWorld(scene_of(state), state, actions=actions),
+        default_goal=tasks.target_block_on_target,
+        step_limit=tasks.STEP_LIMIT,
+        unread_types=frozenset({ROBOT}),
+        bodies=visible_bodies,
+        animate=animate,
+        configuration=settings.as_configuration(),
+    )

@@ -1,0 +1,97 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What stands around a drawn graph: title, facts, legend."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from slap_ros.drawing import text
+from slap_ros.drawing.cards import SMALL, Card, difference_colour
+from slap_ros.drawing.layout import Area, Waypoint
+from slap_ros.drawing.palette import BACK_PEN, CARD, GOAL, INK, MUTED, OPTION_PEN, PLAN_PEN
+from slap_ros.drawing.selection import Selection
+from slap_ros.drawing.svg import Curve, Shape, Text
+from slap_ros.drawing.words import ADDED, REMOVED, Words, counted
+from slap_ros.planning.abstract_graph import AbstractGraph
+from slap_ros.planning.plan import Plan
+
+PAGE_MARGIN_PX = 24.0
+TITLE_PX, FACT_PX, LEGEND_PX = 18.0, 12.5, 11.0  # font sizes
+PENS = {"plan": PLAN_PEN, "option": OPTION_PEN, "back": BACK_PEN}
+
+
+def state_facts(
+    graph: AbstractGraph, words: Words, plan: Plan | None, selection: Selection
+) -> list[str]:
+    """Sentences under the title."""
+    nodes, edges = counted(len(graph.nodes), "abstract state"), counted(len(graph.edges), "option")
+    facts = [
+        f"Goal: {', '.join(words.atoms(graph.goal)) or 'nothing'}.",
+        f"{nodes}, {edges} between them.",
+        _plan_fact(plan),
+    ]
+    if selection.hidden:
+        facts.append(f"{selection.hidden} states are not shown.")
+    return facts
+
+
+def _plan_fact(plan: Plan | None) -> str:
+    if plan is None:
+        return "There is no plan."
+    if not plan.edges:
+        return "The plan is empty: the goal holds at the start."
+    steps = counted(plan.predicted_steps, "step")
+    return f"Plan: {counted(len(plan.edges), 'option')}, {steps} predicted."
+
+
+def write_header(title: str, facts: Sequence[str], width: float) -> Iterator[Text]:
+    """The title and the facts below it, broken into lines."""
+    y = PAGE_MARGIN_PX
+    for line in text.wrap(title, TITLE_PX, width, bold=True):
+        yield Text(PAGE_MARGIN_PX, y + TITLE_PX * 0.8, line, TITLE_PX, INK, bold=True)
+        y += TITLE_PX * 1.35
+    for fact in facts:
+        for line in text.wrap(fact, FACT_PX, width):
+            yield Text(PAGE_MARGIN_PX, y + FACT_PX * 0.9, line, FACT_PX, MUTED)
+            y += FACT_PX * 1.4
+
+
+def draw_legend(
+    selection: Selection, plan: Plan | None, y: float, width: float
+) -> tuple[list[Shape], float]:
+    """What marks mean, of those that occur, in rows; and where the last row ends."""
+    shapes: list[Shape] = []
+    x, row_px, sample_px = PAGE_MARGIN_PX, 24.0, 30.0
+    for kind, meaning in _legend_entries(selection, plan):
+        needed = sample_px + 6 + text.width_px(meaning, LEGEND_PX)
+        if x > PAGE_MARGIN_PX and x + needed > PAGE_MARGIN_PX + width:
+            x, y = PAGE_MARGIN_PX, y + row_px
+        shapes += _sample(kind, Area(x, y, sample_px, 14.0))
+        shapes.append(Text(x + sample_px + 6, y + 11.0, meaning, LEGEND_PX, INK))
+        x += needed + 22
+    return shapes, y + row_px
+
+
+def _legend_entries(selection: Selection, plan: Plan | None) -> Iterator[tuple[str, str]]:
+    if any(node.number > 0 for node in selection.nodes):
+        yield ADDED, "holds, unlike at the start"
+        yield REMOVED, "held at the start"
+    if any(node.is_goal for node in selection.nodes):
+        yield "goal", "the goal holds"
+    if plan is not None and plan.edges:
+        yield "plan", "the plan, with predicted environment steps"
+    if any(edge.is_forward and edge.step is None for edge in selection.edges):
+        yield "option", "another option"
+    if any(not edge.is_forward for edge in selection.edges):
+        yield "back", "leads back; search does not follow it"
+
+
+def _sample(kind: str, area: Area) -> list[Shape]:
+    """A small picture of a mark."""
+    if kind in (ADDED, REMOVED):
+        return [Text(area.x + 10, area.y + 11, kind.strip(), 13.0, difference_colour(kind), True)]
+    if kind == "goal":
+        return Card((), SMALL, CARD, GOAL, 1.0, double=True).shapes(area)
+    ends = Waypoint(area.x, area.middle, 1), Waypoint(area.right, area.middle, 1)
+    return [Curve(ends, PENS[kind])]

@@ -1,0 +1,157 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Cards: what is said of a node or on an edge, in a frame."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from slap_ros.drawing import text
+from slap_ros.drawing.layout import Area, Size
+from slap_ros.drawing.palette import (
+    BACKGROUND,
+    BORDER,
+    CARD,
+    GAINED,
+    GOAL,
+    INK,
+    LOST,
+    MUTED,
+    PLAN,
+    PLAN_TINT,
+    START,
+)
+from slap_ros.drawing.selection import Selection, ShownEdge, ShownNode
+from slap_ros.drawing.svg import Rectangle, Shape, Text
+from slap_ros.drawing.words import ADDED, REMOVED, Words, counted
+
+
+@dataclass(frozen=True)
+class CardStyle:
+    """How large a card is and how much it says."""
+
+    text_px: float
+    padding_px: float
+    max_lines: int
+    max_text_px: float  # width
+
+    @property
+    def line_px(self) -> float:
+        """From one baseline to the next."""
+        return self.text_px * 1.4
+
+
+LARGE = CardStyle(text_px=11.5, padding_px=8.0, max_lines=14, max_text_px=260.0)
+SMALL = CardStyle(text_px=9.0, padding_px=4.0, max_lines=3, max_text_px=150.0)
+LABEL = CardStyle(text_px=10.5, padding_px=5.0, max_lines=4, max_text_px=220.0)
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line on a card."""
+
+    content: str
+    fill: str = INK
+    bold: bool = False
+
+
+@dataclass(frozen=True)
+class Card:
+    """Lines of text in a frame."""
+
+    lines: tuple[Line, ...]
+    style: CardStyle
+    fill: str
+    stroke: str
+    stroke_px: float
+    double: bool = False  # a second frame inside the first
+
+    @property
+    def size(self) -> Size:
+        """Room for the text."""
+        style = self.style
+        widths = (text.width_px(line.content, style.text_px, line.bold) for line in self.lines)
+        height = len(self.lines) * style.line_px
+        return Size(max(widths) + 2 * style.padding_px, height + 2 * style.padding_px)
+
+    def shapes(self, area: Area) -> list[Shape]:
+        """The card in its place, text to the left, a frame around the whole area."""
+        shapes: list[Shape] = [Rectangle(area, self.fill, self.stroke, self.stroke_px)]
+        if self.double:
+            inner = Area(area.x + 3, area.y + 3, area.width - 6, area.height - 6)
+            shapes.append(Rectangle(inner, "none", self.stroke, 1.0, 2.0))
+        return [*shapes, *self._text(area)]
+
+    def _text(self, area: Area) -> Iterator[Text]:
+        style = self.style
+        for i, line in enumerate(self.lines):
+            baseline = area.y + style.padding_px + i * style.line_px + style.text_px
+            x = area.x + style.padding_px
+            yield Text(x, baseline, line.content, style.text_px, line.fill, line.bold)
+
+
+def list_bodies(selection: Selection, words: Words, start: int) -> list[list[Line]]:
+    """What each card would list if it had room for it."""
+    return [
+        [Line(d, difference_colour(d)) for d in words.differences(start, node.atoms)]
+        if node.number > 0
+        else [Line(atom) for atom in words.atoms(node.atoms)]
+        for node in selection.nodes
+    ]
+
+
+def cut(lines: list[Line], limit: int, common: Counter[str]) -> list[Line]:
+    """The lines, or as many as there is room for of those on the fewest cards, which tell most."""
+    if len(lines) <= limit:
+        return lines
+    rarest = sorted(lines, key=lambda line: common[line.content])[: limit - 1]
+    kept = [line for line in lines if line in rarest]
+    return [*kept, Line(f"… {len(lines) - len(kept)} more", MUTED)]
+
+
+def make_card(node: ShownNode, body: Sequence[Line], style: CardStyle) -> Card:
+    """A node's card."""
+    heading, colour = _heading(node)
+    lines = [Line(heading, colour, bold=True), *body]
+    return Card(
+        tuple(_fitting(line, style) for line in lines),
+        style,
+        PLAN_TINT if node.on_plan else CARD,
+        PLAN if node.on_plan else GOAL if node.is_goal else BORDER,
+        2.0 if node.on_plan else 1.0,
+        double=node.is_goal,
+    )
+
+
+def _heading(node: ShownNode) -> tuple[str, str]:
+    roles = [role for role, has in (("START", node.number == 0), ("GOAL", node.is_goal)) if has]
+    colour = GOAL if node.is_goal else START if roles else MUTED
+    number = f"state {node.number}" if roles else f"State {node.number}"
+    return " · ".join([*roles, number]), colour
+
+
+def difference_colour(difference: str) -> str:
+    """Of what is there in addition, or no more."""
+    return {ADDED: GAINED, REMOVED: LOST}[difference[: len(ADDED)]]
+
+
+def _fitting(line: Line, style: CardStyle) -> Line:
+    content = text.shorten(line.content, style.text_px, style.max_text_px, line.bold)
+    return Line(content, line.fill, line.bold)
+
+
+def make_label(edge: ShownEdge, words: Words) -> Card:
+    """An edge's label; the plan's have their place in the plan and their steps as well."""
+    name, *rest = words.option(edge.option)
+    if edge.step is None:
+        lines = [Line(name), *(Line(line, MUTED) for line in rest)]
+        return _label_card(lines, BACKGROUND, BACKGROUND)
+    lines = [Line(f"{edge.step}. {name}", CARD, bold=True), *(Line(line, CARD) for line in rest)]
+    lines.append(Line(counted(edge.predicted_steps or 0, "step"), CARD, bold=True))
+    return _label_card(lines, PLAN, PLAN)
+
+
+def _label_card(lines: Sequence[Line], fill: str, stroke: str) -> Card:
+    return Card(tuple(_fitting(line, LABEL) for line in lines), LABEL, fill, stroke, 1.0)

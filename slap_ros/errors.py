@@ -1,0 +1,249 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Every way in which slap_ros refuses or fails: one code and one exception class a cause.
+
+The codes are the ones that ROS results carry (``slap_msgs/ErrorCode``) and the exit codes of
+``slap``. Each server has a range of its own.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class ErrorCode(IntEnum):
+    """Causes of failure. Values fit a process exit code."""
+
+    NONE = 0
+    UNKNOWN = 1
+
+    # 10-29: input, refused at the door
+    UNKNOWN_DOMAIN = 10
+    INVALID_DOMAIN = 11
+    MALFORMED_PDDL = 12
+    UNKNOWN_OBJECT = 13
+    UNKNOWN_PREDICATE = 14
+    INVALID_PARAMETER = 15
+    INVALID_STATE = 16
+    INVALID_LIBRARY = 17
+    MISMATCHED_ATOM = 18
+
+    # 30-49: planner
+    UNSOLVABLE = 30
+    PLANNING_LIMIT = 31
+    REPLANS_EXHAUSTED = 32
+    STEP_LIMIT = 33
+    GOAL_CANCELED = 34
+    EPISODE_CHANGED = 35
+    BUSY = 36
+    NO_TASK = 37
+
+    # 50-69: skill server
+    UNKNOWN_SKILL = 50
+    SKILL_NOT_APPLICABLE = 51
+    SKILL_STEP_LIMIT = 52
+    SKILL_STOPPED_SHORT = 53
+    SKILL_CANCELED = 54
+    NO_STATE = 55
+
+    # 70-89: simulator and robot bridge
+    INVALID_COMMAND = 70
+    STALE_COMMAND = 71
+
+    # 90-109: bags
+    DAMAGED_BAG = 90
+    FOREIGN_BAG = 91
+    STORAGE_FULL = 92
+    BAG_EXISTS = 93
+    REPLAY_MISMATCH = 94
+
+    # 110-129: the ensemble
+    NODE_DIED = 110
+    TIMEOUT = 111
+    NOT_READY = 112
+    ALREADY_RUNNING = 113
+
+
+class SlapError(Exception):
+    """Base of all errors; its message says what was wrong, where, and what to do."""
+
+    code = ErrorCode.UNKNOWN
+
+
+def error_from(code: int, message: str) -> SlapError:
+    """The error that a result with this code and message stands for."""
+    error = SlapError(message)
+    error.code = ErrorCode(code)
+    return error
+
+
+class UnknownDomainError(SlapError):
+    """No domain of that name is registered."""
+
+    code = ErrorCode.UNKNOWN_DOMAIN
+
+
+class InvalidDomainError(SlapError):
+    """A domain's parts do not fit together."""
+
+    code = ErrorCode.INVALID_DOMAIN
+
+
+class MalformedPddlError(SlapError):
+    """PDDL text that cannot be read."""
+
+    code = ErrorCode.MALFORMED_PDDL
+
+
+class UnknownObjectError(SlapError):
+    """An object that the task does not have."""
+
+    code = ErrorCode.UNKNOWN_OBJECT
+
+
+class UnknownPredicateError(SlapError):
+    """A predicate that the domain does not have."""
+
+    code = ErrorCode.UNKNOWN_PREDICATE
+
+
+class MismatchedAtomError(SlapError):
+    """A ground atom with the wrong number or types of objects."""
+
+    code = ErrorCode.MISMATCHED_ATOM
+
+
+class InvalidParameterError(SlapError):
+    """A parameter or option with a value it cannot take."""
+
+    code = ErrorCode.INVALID_PARAMETER
+
+
+class InvalidStateError(SlapError):
+    """A state that does not fit its objects, or a scene that cannot be."""
+
+    code = ErrorCode.INVALID_STATE
+
+
+class InvalidLibraryError(SlapError):
+    """A shortcut library that is missing, damaged or of another version."""
+
+    code = ErrorCode.INVALID_LIBRARY
+
+
+class UnsolvableError(SlapError):
+    """No sequence of options reaches the goal."""
+
+    code = ErrorCode.UNSOLVABLE
+
+
+class PlanningLimitError(SlapError):
+    """Planning was given up at one of its limits; the task may be solvable."""
+
+    code = ErrorCode.PLANNING_LIMIT
+
+
+class SkillNotApplicableError(SlapError):
+    """An option that cannot start from this state."""
+
+    code = ErrorCode.SKILL_NOT_APPLICABLE
+
+
+class TaskCanceledError(SlapError):
+    """A run was canceled by whoever asked for it."""
+
+    code = ErrorCode.GOAL_CANCELED
+
+
+class NoTaskError(SlapError):
+    """No task is known: nothing perceived yet."""
+
+    code = ErrorCode.NO_TASK
+
+
+class BusyError(SlapError):
+    """Only one of these can be under way at a time."""
+
+    code = ErrorCode.BUSY
+
+
+class EpisodeChangedError(SlapError):
+    """The simulator was reset while something was under way."""
+
+    code = ErrorCode.EPISODE_CHANGED
+
+
+class NoStateError(SlapError):
+    """No perceived state is known."""
+
+    code = ErrorCode.NO_STATE
+
+
+class UnknownSkillError(SlapError):
+    """An option that the domain does not have."""
+
+    code = ErrorCode.UNKNOWN_SKILL
+
+
+class InvalidCommandError(SlapError):
+    """A command that is not finite, has the wrong length or is out of range."""
+
+    code = ErrorCode.INVALID_COMMAND
+
+
+class StaleCommandError(SlapError):
+    """A command that answers another state than the current one."""
+
+    code = ErrorCode.STALE_COMMAND
+
+
+class DamagedBagError(SlapError):
+    """A bag that ends early or cannot be read."""
+
+    code = ErrorCode.DAMAGED_BAG
+
+
+class ForeignBagError(SlapError):
+    """A readable bag that no slap_ros run wrote."""
+
+    code = ErrorCode.FOREIGN_BAG
+
+
+class StorageFullError(SlapError):
+    """No room left where a bag is being written."""
+
+    code = ErrorCode.STORAGE_FULL
+
+
+class BagExistsError(SlapError):
+    """A bag would overwrite something."""
+
+    code = ErrorCode.BAG_EXISTS
+
+
+class NodeDiedError(SlapError):
+    """A node of the ensemble ended while a run was under way; its own code is kept, if any."""
+
+    code = ErrorCode.NODE_DIED
+
+    def __init__(self, message: str, code: ErrorCode = ErrorCode.NODE_DIED) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+class RunTimeoutError(SlapError):
+    """The ensemble did not answer in time."""
+
+    code = ErrorCode.TIMEOUT
+
+
+class NotReadyError(SlapError):
+    """The ensemble did not come up."""
+
+    code = ErrorCode.NOT_READY
+
+
+class AlreadyRunningError(SlapError):
+    """Another ensemble uses the same domain id and namespace."""
+
+    code = ErrorCode.ALREADY_RUNNING

@@ -1,0 +1,86 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""From slap_msgs messages to the objects of the core."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from slap_ros.domains.domain import Action
+from slap_ros.errors import InvalidStateError
+from slap_ros.messages.protocols import (
+    CommandMessage,
+    GroundAtomMessage,
+    Header,
+    ObjectStateMessage,
+    StateMessage,
+)
+from slap_ros.relational import AtomSpace, GroundAtom, Layout, Object, State, Type
+
+NANOSECONDS = 1_000_000_000  # in a second
+
+
+def stamp_ns(header: Header) -> int:
+    """The header's stamp in ns since the epoch."""
+    return header.stamp.sec * NANOSECONDS + header.stamp.nanosec
+
+
+def decode_state(msg: StateMessage, types: Mapping[str, Type]) -> State:
+    """The state that a message describes.
+
+    Args:
+        msg: An ``ObjectCentricState``.
+        types: The domain's types by name.
+
+    Raises:
+        InvalidStateError: An object of unknown type or named twice, a wrong number of features,
+            or a feature that is not finite.
+    """
+    layout = Layout.of(tuple(_decode_object(obj, types) for obj in msg.objects))
+    features = [np.asarray(obj.features, dtype=np.float64) for obj in msg.objects]
+    state = State(layout, np.concatenate(features) if features else np.empty(0))
+    state.require_finite()
+    return state
+
+
+def _decode_object(msg: ObjectStateMessage, types: Mapping[str, Type]) -> Object:
+    if msg.type not in types:
+        raise InvalidStateError(
+            f"{msg.name} is of unknown type {msg.type!r}; the domain has {', '.join(types)}"
+        )
+    obj = types[msg.type](msg.name)
+    if len(msg.features) != len(obj.type.features):
+        raise InvalidStateError(
+            f"{msg.name} is a {msg.type} with {len(obj.type.features)} features, "
+            f"got {len(msg.features)}"
+        )
+    return obj
+
+
+def decode_atoms(msgs: Iterable[GroundAtomMessage], space: AtomSpace) -> int:
+    """The abstract state, a mask, in which these atoms hold and no others.
+
+    Raises:
+        UnknownPredicateError: The domain has no such predicate.
+        UnknownObjectError: The task has no such object.
+        MismatchedAtomError: Number or types of the objects do not fit.
+    """
+    return space.mask(space.atom(msg.predicate, msg.objects) for msg in msgs)
+
+
+def decode_goal(msgs: Iterable[GroundAtomMessage], space: AtomSpace) -> frozenset[GroundAtom]:
+    """The goal of these atoms.
+
+    Raises:
+        UnknownPredicateError: The domain has no such predicate.
+        UnknownObjectError: The task has no such object.
+        MismatchedAtomError: Number or types of the objects do not fit.
+    """
+    return frozenset(space.atom(msg.predicate, msg.objects) for msg in msgs)
+
+
+def decode_command(msg: CommandMessage) -> Action:
+    """The action that a command asks for, the gripper last. Not checked: a world does that."""
+    return np.array([*msg.deltas, msg.gripper], dtype=np.float64)

@@ -1,0 +1,28 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The kinds of events, as slap_msgs numbers them."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class PlanEventKind(IntEnum):
+    """What happens to a plan: ``slap_msgs/PlanEvent.kind``."""
+
+    PLANNING_STARTED = 0
+    PLANNED = 1
+    EDGE_STARTED = 2
+    EDGE_REACHED = 3
+    DIVERGED = 4
+    SOLVED = 5
+    FAILED = 6
+
+
+class SkillEventKind(IntEnum):
+    """What happens to an option under execution: ``slap_msgs/SkillEvent.kind``."""
+
+    STARTED = 0
+    REACHED = 1
+    FAILED = 2
+    CANCELED = 3

@@ -1,0 +1,75 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Plans that were made before."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Sequence
+
+import numpy as np
+
+from slap_ros.motion.collision import CollisionChecker
+from slap_ros.motion.errors import MotionPlanningError
+from slap_ros.motion.joints import Joints, Path
+from slap_ros.motion.planning import ATTEMPTS, plan_path
+
+CAPACITY = 4096  # plans
+
+_Key = tuple[bytes, bytes, bytes, tuple[int, ...]]  # start, goal, everything that collides, seed
+
+
+class PlanCache:
+    """Remembers the paths, and the failures, that were asked for last."""
+
+    def __init__(self, capacity: int = CAPACITY, attempts: int = ATTEMPTS) -> None:
+        """Remember nothing yet.
+
+        Args:
+            capacity: Plans to keep; the one not asked for longest goes first.
+            attempts: Random paths to find for a plan.
+        """
+        self._capacity = capacity
+        self._attempts = attempts
+        self._plans: OrderedDict[_Key, Path | str] = OrderedDict()  # a failure as its message
+
+    def __len__(self) -> int:
+        return len(self._plans)
+
+    def clear(self) -> None:
+        """Forget every plan."""
+        self._plans.clear()
+
+    def plan_path(
+        self, start: Joints, goal: Joints, free: CollisionChecker, *, seed: int | Sequence[int]
+    ) -> Path:
+        """What :func:`slap_ros.motion.planning.plan_path` gives, read-only.
+
+        Raises:
+            MotionPlanningError: Now or before, there was no path.
+        """
+        numbers = (seed,) if isinstance(seed, int) else tuple(seed)
+        key = (_bytes(start), _bytes(goal), free.key, numbers)
+        if key not in self._plans:
+            self._plans[key] = self._plan(start, goal, free, numbers)
+            if len(self._plans) > self._capacity:
+                self._plans.popitem(last=False)
+        self._plans.move_to_end(key)
+        plan = self._plans[key]
+        if isinstance(plan, str):
+            raise MotionPlanningError(plan)
+        return plan
+
+    def _plan(
+        self, start: Joints, goal: Joints, free: CollisionChecker, seed: tuple[int, ...]
+    ) -> Path | str:
+        try:
+            path = plan_path(start, goal, free, seed=seed, attempts=self._attempts)
+        except MotionPlanningError as error:
+            return str(error)
+        path.flags.writeable = False
+        return path
+
+
+def _bytes(q: Joints) -> bytes:
+    return (np.asarray(q, dtype=np.float64) + 0.0).tobytes()  # -0.0 is 0.0

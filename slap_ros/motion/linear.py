@@ -1,0 +1,120 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Straight motion of the grasp point: approach and retract."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from slap_ros.motion.joints import (
+    RESOLUTION,
+    STEP,
+    Array,
+    Free,
+    Joints,
+    Path,
+    configuration,
+    control_steps,
+    path_configurations,
+    within_limits,
+)
+from slap_ros.physics.panda import Pose, grasp_pose, jacobian
+
+INCREMENT = 0.005  # m, between rows of the path
+TURN_INCREMENT = 0.05  # rad
+_ITERATIONS = 8  # of Newton's method, an increment; 2 or 3 are usual
+_CLOSE = 1e-7  # m and rad
+_DAMPING = 1e-4  # m and rad a control step, against singularities
+_LARGEST_JUMP = 2.0  # control steps an increment; more is another branch
+
+
+def shifted(pose: Pose, displacement: tuple[float, float, float]) -> Pose:
+    """The pose moved by a displacement in m, along the axes of the base."""
+    x, y, z = (a + b for a, b in zip(pose.position, displacement, strict=True))
+    return Pose((x, y, z), pose.quaternion)
+
+
+def linear_motion(
+    q: Joints,
+    target: Pose,
+    *,
+    free: Free | None = None,
+    increment: float = INCREMENT,
+    resolution: float = RESOLUTION,
+) -> Path | None:
+    """The path on which the grasp point goes straight to a pose, turning evenly.
+
+    Every increment continues from the one before along the Jacobian, by the fewest control steps,
+    so that the arm stays in its branch.
+
+    Args:
+        q: Where to start, rad, shape (7,).
+        target: Pose of the grasp point in the base's frame.
+        free: Which configurations are free of collisions; all, if None.
+        increment: Distance between rows, m.
+        resolution: Control steps between checked configurations.
+
+    Returns:
+        rad, shape (k, 7), beginning with ``q``; None if it would leave the joint limits, come to a
+        singularity, or collide.
+    """
+    q = configuration(q)
+    start = grasp_pose(q)
+    parts = (math.dist(start.position, target.position) / increment, _angle(start, target))
+    count = max(1, math.ceil(max(parts) - 1e-9))
+    path = [q]
+    for i in range(1, count + 1):
+        following = _follow(path[-1], _on_the_way(start, target, i / count))
+        if following is None:
+            return None
+        path.append(following)
+    rows = np.stack(path)
+    if free is not None and not free(path_configurations(rows, resolution)).all():
+        return None
+    return rows
+
+
+def _angle(start: Pose, target: Pose) -> float:
+    """The turn between two poses in increments."""
+    return start.angle_to(target) / TURN_INCREMENT
+
+
+def _on_the_way(start: Pose, target: Pose, fraction: float) -> Pose:
+    x, y, z = (a + fraction * (b - a) for a, b in zip(start.position, target.position, strict=True))
+    turn = fraction * _rotation_vector(start, target)
+    angle = float(np.linalg.norm(turn))
+    ax, ay, az = turn * (math.sin(0.5 * angle) / angle if angle else 0.5)
+    turned = Pose((0.0, 0.0, 0.0), (float(ax), float(ay), float(az), math.cos(0.5 * angle)))
+    return Pose((x, y, z), turned.compose(Pose((0.0, 0.0, 0.0), start.quaternion)).quaternion)
+
+
+def _rotation_vector(start: Pose, target: Pose) -> Array:
+    """The turn from one orientation to another, rad, along the axes of the base."""
+    turn = Pose((0.0, 0.0, 0.0), target.quaternion).compose(
+        Pose((0.0, 0.0, 0.0), start.quaternion).inverse()
+    )
+    *axis, w = turn.quaternion
+    sine = math.hypot(*axis)
+    if sine == 0.0:
+        return np.zeros(3)
+    # The shorter of the two ways round.
+    angle = 2.0 * math.atan2(sine, abs(w)) * (1.0 if w >= 0.0 else -1.0)
+    return np.array(axis) * (angle / sine)
+
+
+def _follow(q: Joints, target: Pose) -> Joints | None:
+    """The configuration at a nearby pose, by Newton's method in units of control steps."""
+    before = q
+    for _ in range(_ITERATIONS):
+        here = grasp_pose(q)
+        offset = np.subtract(target.position, here.position)
+        error = np.concatenate([offset, _rotation_vector(here, target)])
+        if np.abs(error).max() < _CLOSE:
+            close = control_steps(before, q) <= _LARGEST_JUMP
+            return q if close and within_limits(q) else None
+        scaled = jacobian(q) * STEP
+        damped = scaled @ scaled.T + _DAMPING**2 * np.eye(6)
+        q = q + STEP * (scaled.T @ np.linalg.solve(damped, error))
+    return None

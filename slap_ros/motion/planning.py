@@ -1,0 +1,98 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Collision-free paths. Budgets are counts and a seed fixes the result, on any machine's load."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from slap_ros.motion.errors import MotionPlanningError
+from slap_ros.motion.joints import (
+    RESOLUTION,
+    Free,
+    Joints,
+    Path,
+    between,
+    configuration,
+    control_steps,
+    path_steps,
+    within_limits,
+)
+from slap_ros.motion.rrt import connect
+from slap_ros.motion.shortcutting import shorten, straighten
+
+ATTEMPTS = 4  # paths, of which the one of fewest control steps is kept
+MAX_SAMPLES = 500  # of the joint space, an attempt
+SHORTCUTS = 40  # tries to shorten a path
+GOOD_ENOUGH = 1.05  # control steps over those of the straight way, at which no more paths are tried
+
+
+def plan_path(
+    start: Joints,
+    goal: Joints,
+    free: Free,
+    *,
+    seed: int | Sequence[int],
+    attempts: int = ATTEMPTS,
+    max_samples: int = MAX_SAMPLES,
+    shortcuts: int = SHORTCUTS,
+    resolution: float = RESOLUTION,
+) -> Path:
+    """A collision-free path: straight if that is free, else the best of a few random ones.
+
+    Args:
+        start: rad, shape (7,).
+        goal: rad, shape (7,).
+        free: Which configurations are free of collisions.
+        seed: Fixes the result.
+        attempts: Random paths to find, each shortened; fewer if one is nearly straight.
+        max_samples: Samples of the joint space after which an attempt fails.
+        shortcuts: Tries to shorten each path.
+        resolution: Control steps between checked configurations.
+
+    Returns:
+        rad, shape (k, 7): straight between rows, from exactly the start to exactly the goal. One
+        row if these are the same.
+
+    Raises:
+        MotionPlanningError: Start or goal collides or is out of limits, or the first attempt
+            failed.
+    """
+    start, goal = configuration(start), configuration(goal)
+    _check_end("start", start, free)
+    _check_end("goal", goal, free)
+    if np.array_equal(start, goal):
+        return start[None]
+    if free(between(start, goal, resolution)).all():
+        return np.stack([start, goal])
+
+    rng = np.random.default_rng(seed)
+    direct = float(control_steps(start, goal))
+    best: Path | None = None
+    for _ in range(attempts):
+        found = connect(start, goal, free, rng, max_samples=max_samples, resolution=resolution)
+        if found is None:
+            break
+        found = straighten(found, free, resolution=resolution)
+        found = shorten(found, free, rng, tries=shortcuts, resolution=resolution)
+        found = straighten(found, free, resolution=resolution)
+        if best is None or path_steps(found) < path_steps(best):
+            best = found
+        if path_steps(best) <= GOOD_ENOUGH * direct:
+            break
+    if best is None:
+        raise MotionPlanningError(
+            f"no collision-free path after {max_samples} samples; the goal may be out of reach "
+            "behind obstacles, or takes more samples"
+        )
+    return best
+
+
+def _check_end(name: str, q: Joints, free: Free) -> None:
+    where = f"the {name} {np.round(q, 3).tolist()} rad"
+    if not within_limits(q):
+        raise MotionPlanningError(f"{where} is not within the joint limits")
+    if not free(q[None]).all():
+        raise MotionPlanningError(f"{where} is in collision")

@@ -1,0 +1,77 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Make a path shorter by joining points on it straight."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from slap_ros.motion.joints import Array, Free, Joints, Path, between, control_steps, free_count
+
+_GAIN = 1e-6  # control steps; less is not shorter
+
+
+def shorten(
+    path: Path, free: Free, rng: np.random.Generator, *, tries: int, resolution: float
+) -> Path:
+    """The path with detours cut off where the straight way is free and takes fewer control steps.
+
+    Args:
+        path: rad, shape (k, 7).
+        free: Which configurations are free of collisions.
+        rng: Where the points come from.
+        tries: Pairs of points to try.
+        resolution: Control steps between checked configurations.
+    """
+    for _ in range(tries):
+        if len(path) < 3:
+            break
+        times = arrival_times(path)
+        begin, end = np.sort(rng.uniform(0.0, times[-1], 2))
+        first, last = np.searchsorted(times, (begin, end), side="right")
+        if first == last:  # on the same straight piece
+            continue
+        a, b = points_at(path, times, np.array((begin, end)))
+        line = between(a, b, resolution)
+        if control_steps(a, b) < end - begin - _GAIN and free_count(line, free) == len(line):
+            path = np.concatenate([path[:first], [a, b], path[last:]])
+    return without_repeats(path)
+
+
+def straighten(path: Path, free: Free, *, resolution: float) -> Path:
+    """The path without the rows that can be skipped, one after the other."""
+    rows = list(path)
+    i = 1
+    while i < len(rows) - 1:
+        line = between(rows[i - 1], rows[i + 1], resolution)
+        if free_count(line, free) == len(line):
+            del rows[i]
+            i = max(1, i - 1)  # the row before may now be skipped, too
+        else:
+            i += 1
+    return np.stack(rows)
+
+
+def arrival_times(path: Path) -> Array:
+    """Control steps, not rounded, until each row of a path is reached: shape (k,)."""
+    return np.concatenate([[0.0], np.cumsum(control_steps(path[:-1], path[1:]))])
+
+
+def points_at(path: Path, times: Array, at: Array) -> Joints:
+    """The configurations on a path at some times.
+
+    Args:
+        path: rad, shape (k, 7).
+        times: When its rows are reached, shape (k,), ascending.
+        at: Shape (n,).
+
+    Returns:
+        rad, shape (n, 7).
+    """
+    return np.stack([np.interp(at, times, joint) for joint in path.T], axis=1)
+
+
+def without_repeats(path: Path) -> Path:
+    """The path without rows that equal the one before."""
+    moved = (path[1:] != path[:-1]).any(1)
+    return np.concatenate([path[:1], path[1:][moved]])

@@ -1,0 +1,159 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The arm in one configuration and on its way to another: what it is near, what it hits.
+
+A held body is one more link on the hand.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from slap_ros.physics.boxes import OrientedBox
+from slap_ros.physics.links import LINK_SHAPES
+from slap_ros.physics.panda import HAND, link_poses
+from slap_ros.physics.pose import IDENTITY, Pose, Quaternion, Vector, conjugate, rotate
+from slap_ros.physics.scene import Body
+
+CLEARANCE = 0.01  # m, between a link and a body, at which they surely do not touch
+LINK_DEPTH = 0.01  # m, how far a link may reach into a fixed body
+HELD_DEPTH = 0.02  # m, how far a held body may
+SAMPLING = 0.02  # m, of a link's way between two looks at what it hits, at the finest
+
+_RADII = tuple(shape.radius for shape in LINK_SHAPES)
+
+
+@dataclass(frozen=True)
+class Arm:
+    """Where the links are, in the order of ``LINK_SHAPES``, then the held body."""
+
+    links: tuple[Pose, ...]
+    centres: tuple[Vector, ...]  # of the boxes around them
+    radii: tuple[float, ...]  # m, half the boxes' diagonals
+    held: Body | None
+
+    @classmethod
+    def at(
+        cls,
+        joints: Sequence[float],
+        finger: float,
+        held: Body | None = None,
+        grasp: Pose = IDENTITY,
+    ) -> Arm:
+        """The arm for joint positions in rad, finger position in m, and what is in the hand."""
+        poses = link_poses(joints, finger)
+        links = [poses[shape.link] for shape in LINK_SHAPES]
+        centres = [
+            link.apply(shape.frame.position) for link, shape in zip(links, LINK_SHAPES, strict=True)
+        ]
+        radii = _RADII
+        if held is not None:
+            links.append(poses[HAND].compose(grasp))
+            centres.append(links[-1].position)
+            radii = (*_RADII, math.hypot(*held.half_extents_m))
+        return cls(tuple(links), tuple(centres), radii, held)
+
+    @property
+    def held_pose(self) -> Pose:
+        """Pose of the held body; only where there is one."""
+        return self.links[len(LINK_SHAPES)]
+
+    def box(self, link: int) -> OrientedBox:
+        """The box around a link."""
+        return self.box_at(link, self.links[link])
+
+    def box_at(self, link: int, pose: Pose) -> OrientedBox:
+        """The box around a link, were the link at that pose."""
+        if link < len(LINK_SHAPES):
+            return LINK_SHAPES[link].at(pose)
+        if self.held is None:
+            raise IndexError("nothing is held")
+        return self.held.at(pose)
+
+
+class Obstacle(NamedTuple):
+    """A fixed body that the arm must not enter."""
+
+    box: OrientedBox
+    top: float  # m, height of its highest point
+
+    @classmethod
+    def of(cls, box: OrientedBox) -> Obstacle:
+        """An obstacle that fills a box."""
+        down = rotate(conjugate(box.pose.quaternion), (0.0, 0.0, 1.0))
+        height = sum(abs(a) * half for a, half in zip(down, box.half, strict=True))
+        return cls(box, box.pose.position[2] + height)
+
+
+class Sweep:
+    """The arm's way from one configuration to another in a control step."""
+
+    __slots__ = ("end", "start", "ways")
+
+    def __init__(self, start: Arm, end: Arm) -> None:
+        self.start, self.end = start, end
+        # How far any point of each link goes at most, in m.
+        self.ways = [
+            math.dist(a, b) + _angle(p.quaternion, q.quaternion) * radius
+            for a, b, p, q, radius in zip(
+                start.centres, end.centres, start.links, end.links, start.radii, strict=True
+            )
+        ]
+
+    def stays_clear(self, balls: Sequence[tuple[Vector, float]]) -> bool:
+        """Whether no link comes near any ball, given by centre and radius in m."""
+        return not any(self._comes_near(link, balls) for link in range(len(self.ways)))
+
+    def _comes_near(self, link: int, balls: Sequence[tuple[Vector, float]]) -> bool:
+        start, end = self.start, self.end
+        a, b = start.centres[link], end.centres[link]
+        # A point is never further than half of its way from where it starts or where it ends.
+        margin = CLEARANCE + 0.5 * self.ways[link]
+        reach = margin + start.radii[link]
+        for centre, radius in balls:
+            within = reach + radius
+            if math.dist(centre, a) < within and start.box(link).near(centre, margin + radius):
+                return True
+            if math.dist(centre, b) < within and end.box(link).near(centre, margin + radius):
+                return True
+        return False
+
+    def hits(self, obstacles: Sequence[Obstacle]) -> bool:
+        """Whether the arm enters an obstacle deeper than it may, at the end of its way.
+
+        Thin obstacles are looked for on the way too, lest the arm passes through them.
+        """
+        end = self.end
+        for link, (way, centre, radius) in enumerate(
+            zip(self.ways, end.centres, end.radii, strict=True)
+        ):
+            reach = radius + way
+            for box, top in obstacles:
+                if centre[2] - reach < top and box.near(centre, reach) and self._enters(link, box):
+                    return True
+        return False
+
+    def _enters(self, link: int, box: OrientedBox) -> bool:
+        core = box.shrunk(LINK_DEPTH if link < len(LINK_SHAPES) else HELD_DEPTH)
+        looks = math.ceil(self.ways[link] / max(2.0 * min(box.half), SAMPLING)) or 1
+        return any(core.overlaps(self._at(link, k / looks)) for k in range(1, looks + 1))
+
+    def _at(self, link: int, part: float) -> OrientedBox:
+        """The box around a link after a part of its way."""
+        if part == 1.0:
+            return self.end.box(link)
+        (p, q), (u, v) = self.start.links[link], self.end.links[link]
+        sign = math.copysign(1.0, sum(a * b for a, b in zip(q, v, strict=True)))
+        x, y, z, w = (a + part * (sign * b - a) for a, b in zip(q, v, strict=True))
+        length = math.hypot(x, y, z, w)
+        px, py, pz = (a + part * (b - a) for a, b in zip(p, u, strict=True))
+        pose = Pose((px, py, pz), (x / length, y / length, z / length, w / length))
+        return self.start.box_at(link, pose)
+
+
+def _angle(p: Quaternion, q: Quaternion) -> float:
+    """The angle between two orientations in rad, to 1e-8."""
+    return 2.0 * math.acos(min(1.0, abs(p[0] * q[0] + p[1] * q[1] + p[2] * q[2] + p[3] * q[3])))

@@ -1,0 +1,63 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The features that physics needs in a state, and nothing else that it remembers.
+
+A domain's robot is a :data:`ROBOT`; the types of its free bodies begin with
+:data:`BODY_FEATURES`, as in ``Type("block", BODY_FEATURES)``; fixed bodies whose place differs
+from task to task begin with :data:`POSE_FEATURES`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from slap_ros.physics.panda import FINGER_OPEN, JOINTS
+from slap_ros.physics.pose import IDENTITY, NO_TURN, ORIGIN, Pose, Vector
+from slap_ros.relational import Feature, Type
+
+POSE_FEATURES = (
+    *(Feature(axis, "m") for axis in ("x", "y", "z")),
+    *(Feature(f"q{axis}", "1") for axis in ("x", "y", "z", "w")),
+)
+VELOCITY_FEATURES = (
+    *(Feature(f"v{axis}", "m/s") for axis in ("x", "y", "z")),
+    *(Feature(f"w{axis}", "rad/s") for axis in ("x", "y", "z")),
+)
+BODY_FEATURES = (*POSE_FEATURES, *VELOCITY_FEATURES, Feature("held", "1"))
+
+JOINT_FEATURES = tuple(Feature(f"joint{i + 1}", "rad") for i in range(JOINTS))
+# The held body's pose in the hand's frame; no turn at the origin while nothing is held.
+GRASP_FEATURES = tuple(Feature(f"grasp_{f.name}", f.unit) for f in POSE_FEATURES)
+ROBOT = Type("robot", (*JOINT_FEATURES, Feature("finger", "m"), *GRASP_FEATURES))
+
+
+def robot_features(
+    joints: Sequence[float], finger: float = FINGER_OPEN, grasp: Pose = IDENTITY
+) -> Mapping[str, float]:
+    """A robot's features, for ``State.build``.
+
+    Args:
+        joints: Joint positions, rad.
+        finger: Distance of each finger from the middle, m.
+        grasp: The held body's pose in the hand's frame.
+    """
+    values = (*joints, finger, *grasp.position, *grasp.quaternion)
+    return dict(zip((f.name for f in ROBOT.features), values, strict=True))
+
+
+def pose_features(pose: Pose) -> Mapping[str, float]:
+    """A fixed body's features, for ``State.build``."""
+    values = (*pose.position, *pose.quaternion)
+    return dict(zip((f.name for f in POSE_FEATURES), values, strict=True))
+
+
+def body_features(
+    position: Vector,
+    quaternion: tuple[float, float, float, float] = NO_TURN,
+    velocity: Vector = ORIGIN,
+    spin: Vector = ORIGIN,
+    held: bool = False,
+) -> Mapping[str, float]:
+    """A free body's features, for ``State.build``: m, m/s and rad/s in the base's frame."""
+    values = (*position, *quaternion, *velocity, *spin, float(held))
+    return dict(zip((f.name for f in BODY_FEATURES), values, strict=True))

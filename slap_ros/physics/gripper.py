@@ -1,0 +1,65 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Grasping and releasing. A grasp is a rigid attachment of one body to the hand.
+
+The gripper acts at the beginning of a control step, before the arm moves, and at once. It closes
+only around something it can grasp, and otherwise stays open; the fingers then stand at the body's
+sides. A released body starts without velocity: the hand is taken to stand still between steps.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from slap_ros.physics.panda import FINGER_OPEN, grasp_pose, hand_pose
+from slap_ros.physics.pose import IDENTITY, Pose, conjugate, rotate
+from slap_ros.physics.scene import Body, Scene
+from slap_ros.physics.snapshot import Motion, Snapshot
+
+GRASP_REACH = 0.01  # m, between the grasp point and a body's centre
+CLOSE, OPEN = 0.5, -0.5  # gripper commands beyond which it closes or opens
+
+
+def grip(scene: Scene, snapshot: Snapshot, command: float) -> Snapshot:
+    """What the gripper command changes before the arm moves."""
+    if command > CLOSE and snapshot.held is None:
+        return _grasp(scene, snapshot)
+    if command < OPEN and snapshot.held is not None:
+        return _release(snapshot)
+    return snapshot
+
+
+def _grasp(scene: Scene, snapshot: Snapshot) -> Snapshot:
+    """Attach the free body nearest to the grasp point, if one is within reach."""
+    if not snapshot.bodies:
+        return snapshot
+    point = grasp_pose(snapshot.joints).position
+    distances = [math.dist(point, motion.pose.position) for motion in snapshot.bodies]
+    nearest = min(range(len(distances)), key=distances.__getitem__)
+    if distances[nearest] > GRASP_REACH:
+        return snapshot
+    pose = snapshot.bodies[nearest].pose
+    grasp = hand_pose(snapshot.joints).inverse().compose(pose)
+    grasp = Pose(grasp.position, _normalised(grasp.quaternion))
+    grasped = replace(
+        snapshot, held=nearest, grasp=grasp, finger=finger_around(scene.free[nearest], grasp)
+    )
+    return grasped.moved(nearest, Motion(pose))
+
+
+def _release(snapshot: Snapshot) -> Snapshot:
+    return replace(snapshot, held=None, grasp=IDENTITY, finger=FINGER_OPEN)
+
+
+def finger_around(body: Body, grasp: Pose) -> float:
+    """Where the fingers stand at a held body's sides, m from the middle."""
+    # The way the fingers move, seen from the body.
+    along = rotate(conjugate(grasp.quaternion), (0.0, 1.0, 0.0))
+    width = sum(abs(a) * half for a, half in zip(along, body.half_extents_m, strict=True))
+    return min(FINGER_OPEN, width + abs(grasp.position[1]))
+
+
+def _normalised(q: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+    length = math.hypot(*q)
+    return (q[0] / length, q[1] / length, q[2] / length, q[3] / length)

@@ -1,0 +1,146 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The Franka Emika Panda: limits and forward kinematics, without a simulator.
+
+All poses are in the frame of the base, which stands at the origin, x to the front, z up.
+Kinematics: the modified Denavit-Hartenberg parameters and joint limits of Franka's data sheet,
+https://frankaemika.github.io/docs/control_parameters.html
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slap_ros.physics.pose import NO_TURN, ORIGIN, Pose, Vector, multiply, rotate
+
+__all__ = [
+    "CONTROL_PERIOD_S",
+    "FINGER_CLOSED",
+    "FINGER_OPEN",
+    "GRASP_POINT",
+    "HAND",
+    "HOME",
+    "JOINTS",
+    "JOINT_HIGH",
+    "JOINT_LOW",
+    "LINKS",
+    "MAX_STEP",
+    "Pose",
+    "grasp_pose",
+    "hand_pose",
+    "jacobian",
+    "link_poses",
+]
+
+JOINTS = 7
+JOINT_LOW = (-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973)  # rad
+JOINT_HIGH = (2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973)  # rad
+MAX_STEP = (0.087, 0.053, 0.087, 0.045, 0.087, 0.057, 0.087)  # rad, either way in a control step
+CONTROL_PERIOD_S = 0.125
+
+FINGER_OPEN, FINGER_CLOSED = 0.04, 0.0  # m, distance of each finger from the middle
+GRASP_POINT = 0.1034  # m, from the hand's frame along its z to between the fingertips
+
+LINKS = (
+    *(f"link{i}" for i in range(8)),
+    "hand",
+    "left_finger",
+    "right_finger",
+)
+HAND = LINKS.index("hand")
+
+_HALF = math.sqrt(0.5)  # sine and cosine of an eighth turn, half of a quarter
+# Each joint's frame in the link before it: origin in m, and quarter turns about x.
+_JOINT_FRAMES: tuple[tuple[Vector, int], ...] = (
+    ((0.0, 0.0, 0.333), 0),
+    ((0.0, 0.0, 0.0), -1),
+    ((0.0, -0.316, 0.0), 1),
+    ((0.0825, 0.0, 0.0), 1),
+    ((-0.0825, 0.384, 0.0), -1),
+    ((0.0, 0.0, 0.0), 1),
+    ((0.088, 0.0, 0.0), 1),
+)
+_HAND_FRAME = Pose((0.0, 0.0, 0.107), (0.0, 0.0, -math.sin(math.pi / 8), math.cos(math.pi / 8)))
+_GRASP_FRAME = Pose((0.0, 0.0, GRASP_POINT))
+_FINGER_HEIGHT = 0.0584  # m, along the hand's z
+_HALF_TURN_Z = (0.0, 0.0, 1.0, 0.0)
+
+
+def _arm(q: Sequence[float] | NDArray[np.float64]) -> list[Pose]:
+    """Poses of link 0 to link 7."""
+    position, turn = ORIGIN, NO_TURN
+    poses = [Pose(position, turn)]
+    for angle, (origin, quarter) in zip(q, _JOINT_FRAMES, strict=True):
+        dx, dy, dz = rotate(turn, origin)
+        position = (position[0] + dx, position[1] + dy, position[2] + dz)
+        c, s = math.cos(0.5 * angle), math.sin(0.5 * angle)
+        if quarter:
+            joint = (quarter * _HALF * c, -quarter * _HALF * s, _HALF * s, _HALF * c)
+        else:
+            joint = (0.0, 0.0, s, c)
+        turn = multiply(turn, joint)
+        poses.append(Pose(position, turn))
+    return poses
+
+
+def hand_pose(q: Sequence[float] | NDArray[np.float64]) -> Pose:
+    """Pose of the hand for joint positions in rad; z points out of it, fingers move along y."""
+    return _arm(q)[-1].compose(_HAND_FRAME)
+
+
+def grasp_pose(q: Sequence[float] | NDArray[np.float64]) -> Pose:
+    """Pose of the point between the fingertips, oriented like the hand."""
+    return hand_pose(q).compose(_GRASP_FRAME)
+
+
+def link_poses(q: Sequence[float] | NDArray[np.float64], finger: float) -> list[Pose]:
+    """Poses of all links, in the order of :data:`LINKS`.
+
+    The right finger is the left one turned by half a turn about the hand's z, so that both have
+    the same shape in their own frames.
+
+    Args:
+        q: Joint positions, rad, shape (7,).
+        finger: Distance of each finger from the middle, m.
+    """
+    poses = _arm(q)
+    hand = poses[-1].compose(_HAND_FRAME)
+    left = Pose(hand.apply((0.0, finger, _FINGER_HEIGHT)), hand.quaternion)
+    right = Pose(
+        hand.apply((0.0, -finger, _FINGER_HEIGHT)), multiply(hand.quaternion, _HALF_TURN_Z)
+    )
+    poses += [hand, left, right]
+    return poses
+
+
+def jacobian(q: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
+    """Velocity of the grasp point per joint velocity, in the base's frame.
+
+    Returns:
+        Shape (6, 7): rows 0-2 linear in m/rad, rows 3-5 angular in rad/rad.
+    """
+    links = _arm(q)
+    gx, gy, gz = links[-1].compose(_HAND_FRAME).compose(_GRASP_FRAME).position
+    columns = np.empty((6, JOINTS))
+    for i, link in enumerate(links[1:]):
+        x, y, z = rotate(link.quaternion, (0.0, 0.0, 1.0))  # the joint's axis
+        px, py, pz = link.position
+        rx, ry, rz = gx - px, gy - py, gz - pz
+        columns[:, i] = (y * rz - z * ry, z * rx - x * rz, x * ry - y * rx, x, y, z)
+    return columns
+
+
+# The grasp point is at (0.5, 0, 0.5) m, the hand points straight down, the fingers move along y.
+HOME = (
+    0.0,
+    -0.18599447830531982,
+    0.0,
+    -1.836675282040641,
+    0.0,
+    1.650680803735321,  # joint 2 less joint 4: the hand is upright
+    math.pi / 4,
+)

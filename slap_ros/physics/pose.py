@@ -1,0 +1,74 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Rigid poses in plain floats: for a handful of bodies, numpy would cost more than it gives."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+Vector = tuple[float, float, float]  # x y z
+Quaternion = tuple[float, float, float, float]  # x y z w, of length 1
+
+ORIGIN: Vector = (0.0, 0.0, 0.0)
+NO_TURN: Quaternion = (0.0, 0.0, 0.0, 1.0)
+
+
+def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
+    """The rotation that turns by ``b`` first, then by ``a``."""
+    ax, ay, az, aw = a
+    bx, by, bz, bw = b
+    return (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
+
+
+def conjugate(q: Quaternion) -> Quaternion:
+    """The opposite rotation."""
+    return (-q[0], -q[1], -q[2], q[3])
+
+
+def rotate(q: Quaternion, v: Vector) -> Vector:
+    """The vector turned by the quaternion."""
+    x, y, z, w = q
+    a, b, c = v
+    tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
+    return (
+        a + w * tx + y * tz - z * ty,
+        b + w * ty + z * tx - x * tz,
+        c + w * tz + x * ty - y * tx,
+    )
+
+
+class Pose(NamedTuple):
+    """Where a frame is, seen from another: position in m and orientation."""
+
+    position: Vector = ORIGIN
+    quaternion: Quaternion = NO_TURN
+
+    def compose(self, inner: Pose) -> Pose:
+        """The pose, seen from outside, of a frame that is at ``inner`` seen from this one."""
+        return Pose(self.apply(inner.position), multiply(self.quaternion, inner.quaternion))
+
+    def inverse(self) -> Pose:
+        """The outer frame seen from this one."""
+        back = conjugate(self.quaternion)
+        x, y, z = rotate(back, self.position)
+        return Pose((-x, -y, -z), back)
+
+    def apply(self, point: Vector) -> Vector:
+        """A point of this frame, seen from outside."""
+        x, y, z = rotate(self.quaternion, point)
+        px, py, pz = self.position
+        return (px + x, py + y, pz + z)
+
+    def angle_to(self, other: Pose) -> float:
+        """The angle in rad, 0 to pi, between two orientations."""
+        x, y, z, w = multiply(other.quaternion, conjugate(self.quaternion))
+        return 2.0 * math.atan2(math.sqrt(x * x + y * y + z * z), abs(w))
+
+
+IDENTITY = Pose()

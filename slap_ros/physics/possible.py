@@ -1,0 +1,87 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Scenes that cannot be."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from slap_ros.errors import InvalidStateError
+from slap_ros.physics.arm import Arm, Obstacle, Sweep
+from slap_ros.physics.panda import FINGER_CLOSED, FINGER_OPEN, JOINT_HIGH, JOINT_LOW
+from slap_ros.physics.pose import Pose
+from slap_ros.physics.scene import Scene
+from slap_ros.physics.snapshot import Snapshot
+
+# Pressed together, bodies overlap for a while by as much as a few centimetres; what overlaps
+# by more than this was put there.
+OVERLAP = 0.025  # m
+UNIT_TOLERANCE = 1e-6  # 1, of a quaternion's length
+HELD_TOLERANCE = 1e-3  # m and rad, between a held body and where the hand has it
+LIMIT_TOLERANCE = 1e-9  # rad
+
+
+def require_possible(
+    scene: Scene, snapshot: Snapshot, arm: Arm, obstacles: Sequence[Obstacle]
+) -> None:
+    """Refuse scenes that cannot be.
+
+    Args:
+        scene: What there is.
+        snapshot: How it is; finite.
+        arm: The same arm.
+        obstacles: The fixed bodies that are solid.
+
+    Raises:
+        InvalidStateError: A quaternion that is not normalised, joints beyond their limits, the
+            arm or a body inside a fixed body, two bodies inside one another, or a held body that
+            is not in the hand.
+    """
+    _require_rotations(scene, snapshot)
+    for i, (low, q, high) in enumerate(zip(JOINT_LOW, snapshot.joints, JOINT_HIGH, strict=True)):
+        if not low - LIMIT_TOLERANCE <= q <= high + LIMIT_TOLERANCE:
+            raise InvalidStateError(f"joint {i + 1} = {q} rad is not within [{low}, {high}]")
+    if not FINGER_CLOSED <= snapshot.finger <= FINGER_OPEN:
+        raise InvalidStateError(f"finger = {snapshot.finger} m is not within [0, {FINGER_OPEN}]")
+    if snapshot.held is not None:
+        _require_in_hand(scene, snapshot, arm)
+    if Sweep(arm, arm).hits(obstacles):
+        raise InvalidStateError("the arm, or what it holds, is inside a fixed body")
+    _require_apart(scene, snapshot, obstacles)
+
+
+def _require_rotations(scene: Scene, snapshot: Snapshot) -> None:
+    quaternions = [(body.name, m.pose) for body, m in zip(scene.free, snapshot.bodies, strict=True)]
+    for name, pose in [*quaternions, ("the grasp", snapshot.grasp)]:
+        length = math.hypot(*pose.quaternion)
+        if abs(length - 1.0) > UNIT_TOLERANCE:
+            raise InvalidStateError(f"the quaternion of {name} has length {length}, not 1")
+
+
+def _require_in_hand(scene: Scene, snapshot: Snapshot, arm: Arm) -> None:
+    assert snapshot.held is not None
+    is_at: Pose = snapshot.bodies[snapshot.held].pose
+    wanted = arm.held_pose
+    off = max(math.dist(is_at.position, wanted.position), is_at.angle_to(wanted))
+    if off > HELD_TOLERANCE:
+        raise InvalidStateError(
+            f"{scene.free[snapshot.held].name} is held, but not where the hand has it"
+        )
+
+
+def _require_apart(scene: Scene, snapshot: Snapshot, obstacles: Sequence[Obstacle]) -> None:
+    placed = [
+        (body.name, body.at(motion.pose).shrunk(OVERLAP / 2), i == snapshot.held)
+        for i, (body, motion) in enumerate(zip(scene.free, snapshot.bodies, strict=True))
+    ]
+    for i, (name, box, held) in enumerate(placed):
+        for other, place, other_held in placed[:i]:
+            near = box.near(place.pose.position, place.radius)
+            if near and not (held or other_held) and box.overlaps(place):
+                raise InvalidStateError(f"{name} and {other} are inside one another")
+        if not held and any(
+            place.near(box.pose.position, box.radius) and place.shrunk(OVERLAP / 2).overlaps(box)
+            for place, _ in obstacles
+        ):
+            raise InvalidStateError(f"{name} is inside a fixed body")

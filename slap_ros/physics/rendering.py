@@ -1,0 +1,145 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures of states, drawn in software: no screen, no GPU."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+
+import numpy as np
+import pybullet
+from numpy.typing import NDArray
+from PIL import Image
+
+from slap_ros.physics.panda import CONTROL_PERIOD_S
+from slap_ros.physics.pose import Pose, Vector
+from slap_ros.physics.scene import Body, Scene
+from slap_ros.physics.simulation import PANDA
+from slap_ros.physics.snapshot import Reader
+from slap_ros.relational import State
+
+Picture = NDArray[np.uint8]  # (height, width, 3), red green blue
+
+ARM_JOINTS = range(7)  # indices in the URDF
+FINGER_JOINTS = (9, 10)
+STAND = Body("stand", (0.1, 0.1, 0.2125), pose=Pose((0.0, 0.0, -0.2125)))  # what the base is on
+UP: Vector = (0.0, 0.0, 1.0)
+NEAR, FAR = 0.05, 5.0  # m, what is closer or further is not drawn
+
+
+@dataclass(frozen=True)
+class View:
+    """Where the camera is and how it looks."""
+
+    eye: Vector = (1.45, -1.1, 0.85)  # m
+    target: Vector = (0.3, 0.0, 0.22)  # m
+    field_of_view: float = 42.0  # degrees, upright
+    width: int = 480  # pixels
+    height: int = 360
+
+
+class Camera:
+    """Draws states of a scene, in a client of its own; to be closed."""
+
+    def __init__(self, scene: Scene, view: View | None = None) -> None:
+        """Look at ``scene``; by default from the front right, from above the arm."""
+        view = view or View()
+        self._scene = scene
+        self._size = (view.width, view.height)
+        self.client: int = pybullet.connect(pybullet.DIRECT)
+        self._view = pybullet.computeViewMatrix(view.eye, view.target, UP)
+        self._projection = pybullet.computeProjectionMatrixFOV(
+            view.field_of_view, view.width / view.height, NEAR, FAR
+        )
+        self._robot: int = pybullet.loadURDF(
+            str(PANDA / "panda.urdf"), useFixedBase=True, physicsClientId=self.client
+        )
+        self._add(STAND)
+        self._free = [self._add(body) for body in scene.free]
+        self._fixed = [self._add(body) for body in scene.fixed]
+
+    def __enter__(self) -> Camera:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Give the client back."""
+        pybullet.disconnect(self.client)
+
+    def picture(self, state: State) -> Picture:
+        """What the camera sees of a state."""
+        self._place(state)
+        width, height = self._size
+        _, _, pixels, _, _ = pybullet.getCameraImage(
+            width,
+            height,
+            self._view,
+            self._projection,
+            lightDirection=(1.0, -1.0, 2.0),
+            shadow=True,
+            renderer=pybullet.ER_TINY_RENDERER,
+            physicsClientId=self.client,
+        )
+        return np.asarray(pixels, dtype=np.uint8).reshape(height, width, 4)[..., :3]
+
+    def _place(self, state: State) -> None:
+        reader = Reader.of(self._scene, state.layout)
+        snapshot = reader.read(state)
+        for joint, q in zip(ARM_JOINTS, snapshot.joints, strict=True):
+            pybullet.resetJointState(self._robot, joint, q, 0.0, self.client)
+        for joint in FINGER_JOINTS:
+            pybullet.resetJointState(self._robot, joint, snapshot.finger, 0.0, self.client)
+        poses = [motion.pose for motion in snapshot.bodies]
+        poses += reader.fixed_poses(self._scene, state)
+        for body, pose in zip([*self._free, *self._fixed], poses, strict=True):
+            pybullet.resetBasePositionAndOrientation(body, *pose, self.client)
+
+    def _add(self, body: Body) -> int:
+        shape = pybullet.createVisualShape(
+            pybullet.GEOM_BOX,
+            halfExtents=body.half_extents_m,
+            rgbaColor=body.colour,
+            physicsClientId=self.client,
+        )
+        added: int = pybullet.createMultiBody(
+            0.0, -1, shape, *body.pose, physicsClientId=self.client
+        )
+        return added
+
+
+def write_gif(
+    path: Path,
+    camera: Camera,
+    states: Iterable[State],
+    progress: Callable[[int], None] | None = None,
+) -> None:
+    """Write an animation in real time, one frame a control step, that repeats.
+
+    Args:
+        path: The file, to end in ``.gif``.
+        camera: Draws the frames.
+        states: One a control step; not empty.
+        progress: Told the number of frames drawn so far, after each.
+    """
+    frames = []
+    for done, state in enumerate(states, start=1):
+        frames.append(Image.fromarray(camera.picture(state)).quantize(128))
+        if progress is not None:
+            progress(done)
+    frames[0].save(
+        path,
+        save_all=True,
+        append_images=frames[1:],
+        duration=round(CONTROL_PERIOD_S * 1000),  # ms
+        loop=0,
+    )

@@ -1,0 +1,254 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""One control period of rigid-body dynamics in PyBullet, as a pure function.
+
+What comes out depends on what goes in, to the bit: not on earlier calls, not on the process.
+That takes bodies in maximal coordinates, the simple broadphase, and a *prime* before every period
+(``docs/physics.md``). Substeps are a power of two, so that the clock that PyBullet keeps, and does
+not tell, has no remainder to carry over.
+
+The arm is made of *driven* links: bodies too heavy to be stopped, that move with the velocity
+that carries them from where they are to where they shall be, and push as a real arm does. Moved
+without velocity, an arm only penetrates.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import NamedTuple
+
+import pybullet
+
+from slap_ros.physics.links import LINK_SHAPES
+from slap_ros.physics.panda import CONTROL_PERIOD_S
+from slap_ros.physics.pose import NO_TURN, ORIGIN, Pose, Vector, conjugate, multiply
+from slap_ros.physics.scene import Body, Scene
+from slap_ros.physics.snapshot import Motion
+
+GRAVITY = 9.81  # m/s², downwards
+DRIVEN_MASS = 1e4  # kg, against which nothing else weighs
+DRIVEN_INERTIA = (1e4, 1e4, 1e4)  # kg m², alike about all axes: it does not precess
+LIFT = (0.0, 0.0, GRAVITY * DRIVEN_MASS)  # N, cancels a driven body's weight
+ARM_FRICTION = 0.9  # 1
+FINGER_FRICTION = 1.0  # 1
+FREE, FIXED, ARM = 1, 2, 4  # collision groups: the arm meets free bodies only
+PANDA = Path(str(files("pybullet_data"))) / "franka_panda"
+DISTANCE = 8  # index of the distance in a contact that PyBullet reports, m
+MESHES = PANDA / "meshes" / "collision"
+
+
+@dataclass(frozen=True)
+class Stepping:
+    """How finely a control period is computed."""
+
+    substeps: int = 32  # a power of two: 1/256 s each, and exact
+    iterations: int = 20  # of the contact solver
+
+
+class Drive(NamedTuple):
+    """A driven body's way through a control period."""
+
+    start: Pose
+    velocity: Vector  # m/s
+    spin: Vector  # rad/s
+
+    @classmethod
+    def between(cls, start: Pose, end: Pose) -> Drive:
+        """From one pose to another at constant velocity, the shorter way round."""
+        (ax, ay, az), (bx, by, bz) = start.position, end.position
+        t = CONTROL_PERIOD_S
+        x, y, z, w = multiply(end.quaternion, conjugate(start.quaternion))
+        sine = math.sqrt(x * x + y * y + z * z)
+        rate = 0.0 if sine < 1e-12 else 2.0 * math.atan2(sine, abs(w)) / sine / t
+        rate = math.copysign(rate, w)
+        return cls(
+            start, ((bx - ax) / t, (by - ay) / t, (bz - az) / t), (x * rate, y * rate, z * rate)
+        )
+
+
+def _parking(index: int) -> Vector:
+    """A place of its own for each body, far away from everything, in m."""
+    return (20.0 + 3.0 * index, 20.0, 1.0)
+
+
+class Simulation:
+    """A PyBullet client with the bodies of a scene.
+
+    It remembers nothing that matters between calls but where the fixed bodies are.
+    """
+
+    def __init__(self, scene: Scene, stepping: Stepping) -> None:
+        self.scene = scene
+        self.stepping = stepping
+        self.client: int = pybullet.connect(pybullet.DIRECT)
+        self._fixed_poses: tuple[Pose, ...] = ()
+        pybullet.resetSimulation(pybullet.RESET_USE_SIMPLE_BROADPHASE, self.client)
+        pybullet.setGravity(0.0, 0.0, -GRAVITY, self.client)
+        pybullet.setPhysicsEngineParameter(
+            fixedTimeStep=CONTROL_PERIOD_S,
+            numSolverIterations=stepping.iterations,
+            deterministicOverlappingPairs=1,
+            collisionFilterMode=0,  # both bodies must want a contact, not either
+            physicsClientId=self.client,
+        )
+        self._parked = 0
+        self._fixed = [self._add_fixed(body) for body in scene.fixed]
+        self._free = [self._add_free(body) for body in scene.free]
+        self._links = [self._add_link(i) for i in range(len(LINK_SHAPES))]
+        # A held body is one more link. Bodies of one shape share it, as one is held at a time.
+        self._ghosts = {body.half_extents_m: -1 for body in scene.free}
+        for shape in self._ghosts:
+            self._ghosts[shape] = self._add_driven(self._box(shape), ARM_FRICTION)
+        self._driven = [*self._links, *self._ghosts.values()]
+        self._parking = {body: _parking(i) for i, body in enumerate([*self._free, *self._driven])}
+
+    def close(self) -> None:
+        """Give the client back."""
+        pybullet.disconnect(self.client)
+
+    def place_fixed(self, poses: tuple[Pose, ...]) -> None:
+        """Put the scene's fixed bodies there."""
+        if poses == self._fixed_poses:
+            return
+        self._fixed_poses = poses
+        for body, pose in zip(self._fixed, poses, strict=True):
+            if body is not None:
+                pybullet.resetBasePositionAndOrientation(body, *pose, self.client)
+
+    def run(
+        self,
+        bodies: Sequence[Motion],
+        held: int | None = None,
+        drives: Sequence[Drive] = (),
+    ) -> list[Motion]:
+        """One control period.
+
+        Args:
+            bodies: The scene's free bodies.
+            held: Which of them moves with the hand, if any; its motion is not computed.
+            drives: One for each of ``LINK_SHAPES``, then the held body's; none without an arm.
+
+        Returns:
+            The free bodies afterwards; the held one as it was.
+        """
+        self._prime(bodies)
+        client = self.client
+        for i, (body, motion) in enumerate(zip(self._free, bodies, strict=True)):
+            if i != held:
+                pybullet.resetBasePositionAndOrientation(body, *motion.pose, client)
+                pybullet.resetBaseVelocity(body, motion.velocity, motion.spin, client)
+        driven = self._links if held is None else [*self._links, self._ghost(held)]
+        for body, drive in zip(driven, drives, strict=False):
+            self._drive(body, drive)
+        self._advance(self.stepping.substeps)
+        return [
+            motion if i == held else self._motion(body)
+            for i, (body, motion) in enumerate(zip(self._free, bodies, strict=True))
+        ]
+
+    def deepest(self) -> float:
+        """How far bodies overlap at most at the end of the latest period, m; 0: not at all."""
+        contacts = pybullet.getContactPoints(physicsClientId=self.client)
+        return max((-contact[DISTANCE] for contact in contacts), default=0.0)
+
+    def _prime(self, bodies: Sequence[Motion]) -> None:
+        """Forget: park everything apart for a moment, free bodies oriented as they will be.
+
+        Contacts and their impulses go with the pairs, and the inertia in world axes, which
+        setting a pose leaves as it was, becomes a function of the orientation.
+        """
+        client = self.client
+        for body, motion in zip(self._free, bodies, strict=True):
+            pybullet.resetBasePositionAndOrientation(
+                body, self._parking[body], motion.pose.quaternion, client
+            )
+            pybullet.resetBaseVelocity(body, ORIGIN, ORIGIN, client)
+        for body in self._driven:
+            pybullet.resetBasePositionAndOrientation(body, self._parking[body], NO_TURN, client)
+            pybullet.resetBaseVelocity(body, ORIGIN, ORIGIN, client)
+        self._advance(0)
+
+    def _advance(self, substeps: int) -> None:
+        """Pass a control period in so many substeps; 0: in one step."""
+        pybullet.setPhysicsEngineParameter(numSubSteps=substeps, physicsClientId=self.client)
+        pybullet.stepSimulation(self.client)
+
+    def _drive(self, body: int, drive: Drive) -> None:
+        client = self.client
+        pybullet.resetBasePositionAndOrientation(body, *drive.start, client)
+        pybullet.resetBaseVelocity(body, drive.velocity, drive.spin, client)
+        # At the centre of mass; it lasts through all substeps.
+        pybullet.applyExternalForce(
+            body, -1, LIFT, drive.start.position, pybullet.WORLD_FRAME, client
+        )
+
+    def _motion(self, body: int) -> Motion:
+        pose = pybullet.getBasePositionAndOrientation(body, self.client)
+        velocity, spin = pybullet.getBaseVelocity(body, self.client)
+        return Motion(Pose(*pose), velocity, spin)
+
+    def _ghost(self, held: int) -> int:
+        return self._ghosts[self.scene.free[held].half_extents_m]
+
+    # -- building -------------------------------------------------------------------------------
+
+    def _box(self, half: Vector) -> int:
+        shape: int = pybullet.createCollisionShape(
+            pybullet.GEOM_BOX, halfExtents=half, physicsClientId=self.client
+        )
+        return shape
+
+    def _add(self, shape: int, mass: float, friction: float, group: int, meets: int) -> int:
+        body: int = pybullet.createMultiBody(
+            mass,
+            shape,
+            -1,
+            _parking(self._parked),
+            useMaximalCoordinates=True,
+            physicsClientId=self.client,
+        )
+        self._parked += 1
+        pybullet.changeDynamics(
+            body,
+            -1,
+            lateralFriction=friction,
+            activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING,
+            physicsClientId=self.client,
+        )
+        pybullet.setCollisionFilterGroupMask(body, -1, group, meets, self.client)
+        return body
+
+    def _add_fixed(self, body: Body) -> int | None:
+        if not body.solid:
+            return None
+        return self._add(self._box(body.half_extents_m), 0.0, body.friction, FIXED, FREE)
+
+    def _add_free(self, body: Body) -> int:
+        shape = self._box(body.half_extents_m)
+        return self._add(shape, body.mass_kg, body.friction, FREE, FREE | FIXED | ARM)
+
+    def _add_link(self, index: int) -> int:
+        link = LINK_SHAPES[index]
+        shape: int = pybullet.createCollisionShape(
+            pybullet.GEOM_MESH, fileName=str(MESHES / link.mesh), physicsClientId=self.client
+        )
+        friction = FINGER_FRICTION if link.mesh == "finger.obj" else ARM_FRICTION
+        return self._add_driven(shape, friction)
+
+    def _add_driven(self, shape: int, friction: float) -> int:
+        body = self._add(shape, DRIVEN_MASS, friction, ARM, FREE)
+        # Inertia and mass in one call: alone, the inertia makes the body massless.
+        pybullet.changeDynamics(
+            body,
+            -1,
+            mass=DRIVEN_MASS,
+            localInertiaDiagonal=DRIVEN_INERTIA,
+            linearDamping=0.0,
+            angularDamping=0.0,
+            physicsClientId=self.client,
+        )
+        return body

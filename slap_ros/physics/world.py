@@ -1,0 +1,239 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A Panda among rigid bodies, as a world to be stepped.
+
+A control step: the gripper acts, then the arm moves by the commanded joint displacements in one
+control period, pushing what is in its way. The next state is a function of the state and the
+action, bit for bit (``docs/physics.md`` says how, and what it costs).
+"""
+
+from __future__ import annotations
+
+import math
+import weakref
+from dataclasses import replace
+from types import TracebackType
+
+from slap_ros.domains.domain import Action, ActionSpace
+from slap_ros.errors import InvalidStateError
+from slap_ros.physics.arm import Arm, Obstacle, Sweep
+from slap_ros.physics.clients import borrow, give_back
+from slap_ros.physics.features import JOINT_FEATURES
+from slap_ros.physics.gripper import grip
+from slap_ros.physics.panda import JOINT_HIGH, JOINT_LOW, MAX_STEP
+from slap_ros.physics.possible import require_possible
+from slap_ros.physics.scene import Scene
+from slap_ros.physics.simulation import Drive, Stepping
+from slap_ros.physics.snapshot import Motion, Reader, Snapshot
+from slap_ros.relational import Feature, State
+
+ACTION_SPACE = ActionSpace(
+    axes=(*JOINT_FEATURES, Feature("gripper", "1")),
+    low=(*(-step for step in MAX_STEP), -1.0),
+    high=(*MAX_STEP, 1.0),
+)
+STEPPING = Stepping()
+
+# What moved less than this in a control period, and is slower than this after it, is at rest.
+REST_SPEED = 0.02  # m/s and rad/s, along each axis
+REST_SHIFT = 2e-4  # m, along each axis
+REST_TURN = 1e-3  # 1, of each component of the quaternion
+PRESSED = 0.006  # m, how far the arm may press bodies into one another; deeper, it stays
+JAMMED = 0.02  # m, where no body moves: between two immovable ones the solver has no answer
+MOST_REMEMBERED = 256  # arrangements of bodies known to stand or not
+
+
+class PandaWorld:
+    """One world. Closed, or no longer referred to, it gives its PyBullet client back."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        state: State,
+        stepping: Stepping = STEPPING,
+        actions: ActionSpace = ACTION_SPACE,
+    ) -> None:
+        """Begin in ``state``.
+
+        Args:
+            scene: What there is.
+            state: How it is: one robot, and an object for each free body of the scene.
+            stepping: How finely to compute; another one is another world.
+            actions: What may be commanded: the joints' speed limit, unless a domain has another.
+
+        Raises:
+            InvalidStateError: A scene that cannot be.
+        """
+        self._scene = scene
+        self._actions = actions
+        self._reader = Reader.of(scene, state.layout)
+        self._standing: dict[object, bool] = {}
+        self._solid = [i for i, body in enumerate(scene.fixed) if body.solid]
+        self._radii = [math.hypot(*body.half_extents_m) for body in scene.free]
+        self._adopt(state)
+        self._simulation = borrow(scene, stepping)
+        self._closing = weakref.finalize(self, give_back, self._simulation)
+        self._simulation.place_fixed(self._fixed_poses)
+
+    def __enter__(self) -> PandaWorld:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Give the client back; the world cannot be stepped any more."""
+        self._closing()
+
+    @property
+    def scene(self) -> Scene:
+        """What there is."""
+        return self._scene
+
+    @property
+    def state(self) -> State:
+        """The current state."""
+        return self._state
+
+    def reset(self, state: State) -> None:
+        """Continue from ``state``.
+
+        Raises:
+            InvalidStateError: A scene that cannot be, or other objects; the world stays as it is.
+        """
+        if state.layout is not self._reader.layout and state.layout != self._reader.layout:
+            raise InvalidStateError("a world is reset to states of its own objects only")
+        self._adopt(state)
+        self._simulation.place_fixed(self._fixed_poses)
+
+    def _adopt(self, state: State) -> None:
+        state.require_finite()
+        snapshot = self._reader.read(state)
+        poses = self._reader.fixed_poses(self._scene, state)
+        obstacles = [Obstacle.of(self._scene.fixed[i].at(poses[i])) for i in self._solid]
+        arm = self._arm(snapshot)
+        require_possible(self._scene, snapshot, arm, obstacles)
+        self._state, self._snapshot, self._posture = state, snapshot, arm
+        self._fixed_poses = poses
+        self._obstacles: list[Obstacle] = obstacles
+
+    def step(self, action: Action) -> State:
+        """Act for one control period.
+
+        A motion that would drive the arm into a fixed body, or press bodies into one another,
+        is not carried out: the arm stays, the bodies go on. Nor does the gripper act where its
+        fingers would enter a fixed body.
+
+        Raises:
+            InvalidCommandError: The action is not in the action space; nothing moved.
+            ValueError: The world is closed.
+        """
+        if not self._closing.alive:
+            raise ValueError("this world is closed")
+        self._actions.check(action)
+        *displacement, command = action.tolist()
+        gripped = self._gripped(command)
+        start = self._posture
+        if gripped is not self._snapshot:  # the fingers are still where they were
+            start = self._arm(replace(gripped, finger=self._snapshot.finger))
+        goal = replace(gripped, joints=_within_limits(gripped.joints, displacement))
+        self._snapshot, self._posture = self._after(gripped, goal, start)
+        self._state = self._reader.write(self._state, self._snapshot)
+        return self._state
+
+    def _gripped(self, command: float) -> Snapshot:
+        """How things are once the gripper acted, if it can."""
+        gripped = grip(self._scene, self._snapshot, command)
+        if gripped is not self._snapshot:
+            arm = self._arm(gripped)
+            if Sweep(arm, arm).hits(self._obstacles):
+                return self._snapshot
+        return gripped
+
+    def _after(self, now: Snapshot, goal: Snapshot, start: Arm) -> tuple[Snapshot, Arm]:
+        """Where everything is once the arm went to its goal, or stayed because it must not."""
+        sweep = Sweep(start, self._arm(goal))
+        if sweep.hits(self._obstacles):
+            goal, sweep = now, Sweep(start, self._arm(now))
+        bodies, depth = self._bodies_after(now, sweep)
+        if depth > PRESSED and goal is not now:
+            stay = Sweep(start, self._arm(now))
+            unpressed, less = self._bodies_after(now, stay)
+            if less < depth:
+                goal, sweep, bodies, depth = now, stay, unpressed, less
+        if depth > JAMMED:
+            bodies = self._frozen(now, sweep.end)
+        return replace(goal, bodies=bodies), sweep.end
+
+    def _arm(self, snapshot: Snapshot) -> Arm:
+        held = None if snapshot.held is None else self._scene.free[snapshot.held]
+        return Arm.at(snapshot.joints, snapshot.finger, held, snapshot.grasp)
+
+    def _bodies_after(self, now: Snapshot, sweep: Sweep) -> tuple[tuple[Motion, ...], float]:
+        """The free bodies after the arm's sweep, and how far any overlaps another, m."""
+        bodies, depth = list(now.bodies), 0.0
+        loose = [i for i in range(len(bodies)) if i != now.held]
+        if not self._undisturbed(now, loose, sweep):
+            ways = zip(sweep.start.links, sweep.end.links, strict=True)
+            drives = [Drive.between(start, end) for start, end in ways]
+            after = self._simulation.run(bodies, now.held, drives)
+            depth = self._simulation.deepest()
+            came_to_rest = all(_rests(bodies[i], after[i]) for i in loose)
+            for i in loose:
+                bodies[i] = Motion(bodies[i].pose) if came_to_rest else after[i]
+        if now.held is not None:
+            bodies[now.held] = Motion(sweep.end.held_pose)
+        return tuple(bodies), depth
+
+    def _frozen(self, now: Snapshot, end: Arm) -> tuple[Motion, ...]:
+        """The free bodies as they were, without velocity; the held one with the hand."""
+        return tuple(
+            Motion(end.held_pose if i == now.held else body.pose)
+            for i, body in enumerate(now.bodies)
+        )
+
+    def _undisturbed(self, now: Snapshot, loose: list[int], sweep: Sweep) -> bool:
+        """Whether the bodies stand and the arm stays clear of them: nothing needs computing."""
+        bodies = now.bodies
+        if not all(bodies[i].still for i in loose):
+            return False
+        balls = [(bodies[i].pose.position, self._radii[i]) for i in loose]
+        return sweep.stays_clear(balls) and self._stand(now, loose)
+
+    def _stand(self, now: Snapshot, loose: list[int]) -> bool:
+        """Whether bodies without velocity would stay where they are if there were no arm.
+
+        So they do where they came to rest by themselves. They do not in mid-air, over an edge,
+        or where they came to rest leaning on the arm.
+        """
+        key = (self._fixed_poses, now.held, tuple(now.bodies[i].pose for i in loose))
+        stands = self._standing.get(key)
+        if stands is None:
+            after = self._simulation.run(now.bodies, now.held)
+            stands = all(_rests(now.bodies[i], after[i]) for i in loose)
+            if len(self._standing) == MOST_REMEMBERED:
+                self._standing.clear()
+            self._standing[key] = stands
+        return stands
+
+
+def _within_limits(joints: tuple[float, ...], displacement: list[float]) -> tuple[float, ...]:
+    moved = (q + d for q, d in zip(joints, displacement, strict=True))
+    return tuple(
+        min(max(q, low), high) for low, q, high in zip(JOINT_LOW, moved, JOINT_HIGH, strict=True)
+    )
+
+
+def _rests(before: Motion, after: Motion) -> bool:
+    """Whether a body hardly moved in a control period and hardly moves now."""
+    (position, quaternion), (old_position, old_quaternion) = after.pose, before.pose
+    return (
+        all(abs(v) < REST_SPEED for v in (*after.velocity, *after.spin))
+        and all(abs(x - y) < REST_SHIFT for x, y in zip(position, old_position, strict=True))
+        and all(abs(x - y) < REST_TURN for x, y in zip(quaternion, old_quaternion, strict=True))
+    )

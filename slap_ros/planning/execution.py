@@ -1,0 +1,120 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Closed-loop execution of plans in a world: monitoring and bounded replanning.
+
+The ensemble does the same with one node per part; both use :class:`OptionExecution`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from time import perf_counter
+
+from slap_ros.domains import Domain, World
+from slap_ros.domains.domain import Action
+from slap_ros.errors import ErrorCode, PlanningLimitError, SkillNotApplicableError, UnsolvableError
+from slap_ros.planning.options import OptionExecution, Stopped
+from slap_ros.planning.plan import Plan, PlanEdge
+from slap_ros.planning.planner import Planner
+from slap_ros.relational import AtomSpace, State
+
+MAX_REPLANS = 5  # default; a deterministic world needs none
+
+
+@dataclass
+class Episode:
+    """What happened in one attempt at a task."""
+
+    success: bool = False
+    states: list[State] = field(default_factory=list)  # the first is the initial one
+    actions: list[Action] = field(default_factory=list)
+    replans: int = 0
+    planning_seconds: float = 0.0
+    edges_rolled_out: int = 0
+    error: Stopped = field(default_factory=lambda: Stopped(ErrorCode.NONE))
+
+    @property
+    def plan_length(self) -> int:
+        """Environment steps executed."""
+        return len(self.actions)
+
+
+@dataclass
+class Executor:
+    """Solves a task in a world: plan, execute, watch, replan on divergence.
+
+    Args:
+        domain: The task's domain.
+        planner: Has a model of its own, not this world.
+        world: Where it counts.
+        goal: Mask of the atoms to reach.
+        step_limit: Environment steps.
+        max_replans: How often a diverged plan may be replaced.
+    """
+
+    domain: Domain
+    planner: Planner
+    world: World
+    space: AtomSpace
+    goal: int
+    step_limit: int
+    max_replans: int = MAX_REPLANS
+
+    def run(self) -> Episode:
+        """Solve from the world's current state, or say why not."""
+        episode = Episode(states=[self.world.state])
+        while True:
+            try:
+                plan = self._plan(episode)
+            except (UnsolvableError, PlanningLimitError) as error:
+                episode.error = Stopped(error.code, str(error))
+                return episode
+            stopped = self._execute(plan, episode)
+            if stopped.reached:
+                episode.success = True
+                return episode
+            if stopped.code is ErrorCode.STEP_LIMIT:
+                episode.error = stopped
+                return episode
+            if episode.replans == self.max_replans:
+                episode.error = Stopped(
+                    ErrorCode.REPLANS_EXHAUSTED,
+                    f"diverged again after {self.max_replans} replans: {stopped.reason}",
+                )
+                return episode
+            episode.replans += 1
+
+    def _plan(self, episode: Episode) -> Plan:
+        started = perf_counter()
+        try:
+            result = self.planner.plan(self.world.state, self.goal)
+        finally:
+            episode.planning_seconds += perf_counter() - started
+        episode.edges_rolled_out += result.edges_rolled_out
+        return result.plan
+
+    def _execute(self, plan: Plan, episode: Episode) -> Stopped:
+        for edge in plan.edges:
+            stopped = self._execute_edge(edge, episode)
+            if not stopped.reached:
+                return stopped
+        return Stopped(ErrorCode.NONE)
+
+    def _execute_edge(self, edge: PlanEdge, episode: Episode) -> Stopped:
+        try:
+            execution = OptionExecution(
+                edge.option, edge.target, self.domain.action_space, self.world.state
+            )
+        except SkillNotApplicableError as error:
+            return Stopped(error.code, str(error))
+        while True:
+            state = self.world.state
+            action = execution.advance(state, self.space.abstract(state))
+            if isinstance(action, Stopped):
+                return action
+            if episode.plan_length == self.step_limit:
+                return Stopped(
+                    ErrorCode.STEP_LIMIT, f"the goal was not reached in {self.step_limit} steps"
+                )
+            episode.actions.append(action)
+            episode.states.append(self.world.step(action))

@@ -1,0 +1,138 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Symbolic planning alone: greedy best-first search with the FF heuristic.
+
+Where a task is too large for its abstract graph to be built layer by layer, this finds some
+sequence of operators fast; it need not be the shortest. The heuristic is that of Hoffmann and
+Nebel, "The FF Planning System" (JAIR 14, 2001): the length of a plan for the relaxed task, in
+which operators delete nothing. What such a plan needs after its first layer tells which operators
+are helpful now.
+
+Evaluation is deferred: a state is evaluated when it is expanded, and waits in the queue with the
+estimate of the state before it, after all states that helpful operators led to.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+from slap_ros.errors import PlanningLimitError, UnsolvableError
+from slap_ros.relational import GroundOperator
+
+MAX_EXPANSIONS = 100_000  # abstract states; some ten seconds with two hundred operators
+
+
+def find_operator_sequence(
+    start: int,
+    goal: int,
+    operators: Sequence[GroundOperator],
+    forbidden: Collection[tuple[int, int]] = (),
+    max_expansions: int = MAX_EXPANSIONS,
+) -> list[int]:
+    """A sequence of operators that leads from an abstract state to the goal.
+
+    The same arguments give the same sequence.
+
+    Args:
+        start: The abstract state to start from.
+        goal: Mask of atoms that must hold.
+        operators: Ground operators over the same atom space.
+        forbidden: Pairs of an abstract state and the index of an operator that must not be
+            applied there, because it is known that it cannot be carried out.
+        max_expansions: Abstract states to expand before giving up.
+
+    Returns:
+        Indices into ``operators``; none where the goal holds already.
+
+    Raises:
+        UnsolvableError: No sequence leads to the goal.
+        PlanningLimitError: None was found within ``max_expansions``.
+    """
+    heuristic = _Heuristic(goal, operators)
+    if heuristic.relaxed_plan(start) is None:
+        raise UnsolvableError("the goal is out of reach, even if operators deleted nothing")
+    barred = frozenset(forbidden)
+    arrivals: dict[int, tuple[int, int] | None] = {start: None}  # previous state, operator
+    queue = [(False, 0, 0, start)]  # unhelpful, estimate, order of discovery, state
+    expansions = 0
+    while queue:
+        *_, state = heapq.heappop(queue)
+        if state & goal == goal:
+            return _trace(arrivals, state)
+        if expansions >= max_expansions:
+            raise PlanningLimitError(
+                f"no plan within {max_expansions} expansions of abstract states; raise the limit "
+                "or give a goal nearer by"
+            )
+        expansions += 1
+        plan = heuristic.relaxed_plan(state)
+        if plan is None:
+            continue
+        for index, operator in enumerate(operators):
+            if not operator.applicable(state):
+                continue
+            successor = operator.apply(state)
+            if successor in arrivals or (state, index) in barred:
+                continue
+            arrivals[successor] = state, index
+            unhelpful = not operator.add_effects & plan.subgoals
+            heapq.heappush(queue, (unhelpful, plan.length, len(arrivals), successor))
+    raise UnsolvableError(
+        f"none of the {len(arrivals)} abstract states that can be reached leads to the goal"
+    )
+
+
+def _trace(arrivals: dict[int, tuple[int, int] | None], state: int) -> list[int]:
+    """The operators on the way to a state."""
+    sequence = []
+    while (arrival := arrivals[state]) is not None:
+        state, index = arrival
+        sequence.append(index)
+    return sequence[::-1]
+
+
+@dataclass(frozen=True, slots=True)
+class _RelaxedPlan:
+    """What it takes to reach the goal when nothing is deleted."""
+
+    length: int  # operators
+    subgoals: int  # mask: what it needs that one operator can add at once
+
+
+class _Heuristic:
+    """The FF heuristic, on bit masks."""
+
+    def __init__(self, goal: int, operators: Sequence[GroundOperator]) -> None:
+        self._goal = goal
+        self._operators = [(op.preconditions, op.add_effects) for op in operators]
+
+    def relaxed_plan(self, state: int) -> _RelaxedPlan | None:
+        """A plan for the relaxed task; None where there is none, hence none for the task either.
+
+        Each atom is supported by the first operator, in order, of the first layer that adds it.
+        """
+        supports: list[tuple[int, int]] = []  # atoms first added by an operator, what it needs
+        missing, waiting, first_layer = ~state, self._operators, 0
+        while self._goal & missing:
+            layer = 0
+            for preconditions, add_effects in waiting:
+                if not preconditions & missing and (fresh := add_effects & missing & ~layer):
+                    layer |= fresh
+                    supports.append((fresh, preconditions))
+            if not layer:
+                return None
+            first_layer = first_layer or layer
+            missing &= ~layer
+            waiting = [operator for operator in waiting if operator[1] & missing]
+        return self._extract(supports, first_layer)
+
+    def _extract(self, supports: list[tuple[int, int]], first_layer: int) -> _RelaxedPlan:
+        # What an operator needs was added before it, so that one pass backwards finds everything.
+        needed, length = self._goal, 0
+        for added, preconditions in reversed(supports):
+            if needed & added:
+                needed |= preconditions
+                length += 1
+        return _RelaxedPlan(length, needed & first_layer)

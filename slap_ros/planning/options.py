@@ -1,0 +1,115 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Options: skills applied to objects, and their execution against an expected abstract state."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+
+from slap_ros.domains import ActionSpace, Domain, Policy, Skill
+from slap_ros.domains.domain import Action
+from slap_ros.errors import ErrorCode, InvalidCommandError, UnknownSkillError
+from slap_ros.relational import Object, State
+
+
+class OptionKind(Enum):
+    """Where an option comes from; the values are ``slap_msgs/PlanEdge.kind``."""
+
+    OPERATOR = 0  # given with the domain
+    SHORTCUT = 1  # learned
+
+
+@dataclass(frozen=True)
+class Option:
+    """A skill applied to objects."""
+
+    kind: OptionKind
+    skill: Skill
+    objects: tuple[Object, ...]
+
+    def __str__(self) -> str:
+        return f"{self.skill.name}({', '.join(obj.name for obj in self.objects)})"
+
+
+def given_option(domain: Domain, name: str, objects: Sequence[Object]) -> Option:
+    """The option that carries out a domain's operator on objects.
+
+    Raises:
+        UnknownSkillError: There is no such operator, or not for such objects.
+    """
+    parameters = {o.name: o.parameters for o in domain.operators}.get(name)
+    if parameters is None:
+        raise UnknownSkillError(
+            f"unknown skill {name!r}; {domain.name} has {', '.join(domain.skills)}"
+        )
+    wanted = [variable.type for variable in parameters]
+    if len(wanted) != len(objects) or not all(
+        obj.type.is_a(t) for obj, t in zip(objects, wanted, strict=True)
+    ):
+        raise UnknownSkillError(
+            f"{name} takes ({', '.join(map(str, wanted))}), got "
+            f"({', '.join(f'{obj}: {obj.type}' for obj in objects)})"
+        )
+    return Option(OptionKind.OPERATOR, domain.skills[name], tuple(objects))
+
+
+@dataclass(frozen=True)
+class Stopped:
+    """Why an execution is over: NONE where the target was reached."""
+
+    code: ErrorCode
+    reason: str = ""
+
+    @property
+    def reached(self) -> bool:
+        """Whether the target abstract state was reached."""
+        return self.code is ErrorCode.NONE
+
+
+@dataclass
+class OptionExecution:
+    """An option under way. The same code runs it in the planner's model and on the robot.
+
+    Args:
+        option: What runs.
+        target: The abstract state in which it ends.
+        actions: What the robot can do; anything else that the policy wants stops the option.
+        state: Where it starts.
+
+    Raises:
+        SkillNotApplicableError: The skill cannot start in this state.
+    """
+
+    option: Option
+    target: int
+    actions: ActionSpace
+    state: State
+    steps: int = 0  # environment steps commanded so far
+    _policy: Policy = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        self._policy = self.option.skill.start(self.state, self.option.objects)
+
+    def advance(self, state: State, abstract: int) -> Action | Stopped:
+        """The next action from the newest state, or why there is none."""
+        if abstract == self.target and self.steps > 0:
+            return Stopped(ErrorCode.NONE)
+        if self.steps >= self.option.skill.step_limit:
+            return Stopped(
+                ErrorCode.SKILL_STEP_LIMIT,
+                f"{self.option} did not end within {self.option.skill.step_limit} steps",
+            )
+        action = self._policy(state)
+        if action is None:
+            return Stopped(
+                ErrorCode.SKILL_STOPPED_SHORT,
+                f"{self.option} ended in another abstract state than expected",
+            )
+        try:
+            self.actions.check(action)
+        except InvalidCommandError as error:
+            return Stopped(error.code, f"{self.option}: {error}")
+        self.steps += 1
+        return action

@@ -1,0 +1,43 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Plans: edges to be executed one after the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from slap_ros.planning.options import Option
+
+
+@dataclass(frozen=True)
+class PlanEdge:
+    """One edge: an option and the abstract state in which it shall end."""
+
+    option: Option
+    target: int  # abstract state
+    predicted_steps: int  # environment steps in the planner's model
+
+    def __str__(self) -> str:
+        return str(self.option)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Edges in order of execution; empty where the goal already holds."""
+
+    edges: tuple[PlanEdge, ...]
+
+    @property
+    def predicted_steps(self) -> int:
+        """Environment steps in the planner's model."""
+        return sum(edge.predicted_steps for edge in self.edges)
+
+
+@dataclass(frozen=True)
+class PlanningResult:
+    """A plan and what it took to find it."""
+
+    plan: Plan
+    graph_nodes: int  # abstract states considered
+    graph_edges: int
+    edges_rolled_out: int  # options simulated

@@ -1,0 +1,151 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Planners: from a state and a goal to a plan."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from slap_ros.domains import Domain
+from slap_ros.errors import InvalidParameterError, PlanningLimitError, UnsolvableError
+from slap_ros.planning.abstract_graph import AbstractGraph, build_abstract_graph
+from slap_ros.planning.ff import find_operator_sequence
+from slap_ros.planning.model import Model
+from slap_ros.planning.options import Option, given_option
+from slap_ros.planning.plan import Plan, PlanEdge, PlanningResult
+from slap_ros.planning.search import search_exhaustively, search_lazily
+from slap_ros.relational import GroundOperator, State
+
+Search = Callable[[AbstractGraph, State, Model], Plan]
+
+
+class Planner(Protocol):
+    """Plans for tasks over one set of objects."""
+
+    def plan(self, state: State, goal: int) -> PlanningResult:
+        """A plan from ``state`` to where the atoms of ``goal``, a mask, hold.
+
+        Raises:
+            UnsolvableError: There is no plan.
+            PlanningLimitError: A limit was reached first.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A domain over one set of objects: what planners share."""
+
+    model: Model
+    operators: tuple[tuple[GroundOperator, Option], ...]
+
+    @classmethod
+    def of(cls, domain: Domain, initial: State) -> Problem:
+        """The problem over the objects of ``initial``."""
+        model = Model.of(domain, initial)
+        return cls(
+            model,
+            tuple(
+                (ground, given_option(domain, ground.operator.name, ground.objects))
+                for ground in domain.ground(model.space)
+            ),
+        )
+
+
+@dataclass(frozen=True)
+class GraphPlanner:
+    """The abstract planning graph, then a shortest path through it (SLAP §4.1).
+
+    Where no path can be executed, the graph is deepened beyond the paper's: by one layer, up to
+    ``max_extra_depth``.
+    """
+
+    problem: Problem
+    search: Search = search_lazily
+    max_extra_depth: int = 2  # operators
+
+    def plan(self, state: State, goal: int) -> PlanningResult:
+        """See :class:`Planner`."""
+        model = self.problem.model
+        before, start = model.executed, model.space.abstract(state)
+        for extra_depth in range(self.max_extra_depth + 1):
+            graph = build_abstract_graph(start, goal, self.problem.operators, extra_depth)
+            try:
+                plan = self.search(graph, state, model)
+            except UnsolvableError:
+                if extra_depth == self.max_extra_depth:
+                    raise
+                continue
+            return PlanningResult(plan, len(graph.nodes), len(graph.edges), model.executed - before)
+        raise InvalidParameterError(f"max_extra_depth must not be negative: {self}")
+
+
+@dataclass(frozen=True)
+class FFPlanner:
+    """Greedy best-first search with the FF heuristic, then roll-outs (SLAP D.2).
+
+    An edge that cannot be executed is forbidden and the search repeated.
+    """
+
+    problem: Problem
+    max_attempts: int = 100  # abstract plans tried
+
+    def plan(self, state: State, goal: int) -> PlanningResult:
+        """See :class:`Planner`."""
+        model = self.problem.model
+        before, start = model.executed, model.space.abstract(state)
+        grounds = [ground for ground, _ in self.problem.operators]
+        forbidden: set[tuple[int, int]] = set()
+        for _ in range(self.max_attempts):
+            sequence = find_operator_sequence(start, goal, grounds, forbidden)
+            edges, failed = self._refine(state, start, sequence)
+            if failed is None:
+                return PlanningResult(
+                    Plan(tuple(edges)),
+                    len(sequence) + 1,
+                    len(sequence),
+                    model.executed - before,
+                )
+            forbidden.add(failed)
+        raise PlanningLimitError(
+            f"none of {self.max_attempts} abstract plans could be executed; raise max_attempts"
+        )
+
+    def _refine(
+        self, state: State, abstract: int, sequence: list[int]
+    ) -> tuple[list[PlanEdge], tuple[int, int] | None]:
+        """Roll the operators out one after the other; second, the one that failed."""
+        edges: list[PlanEdge] = []
+        for number in sequence:
+            ground, option = self.problem.operators[number]
+            target = ground.apply(abstract)
+            rollout = self.problem.model.roll_out(option, state, target)
+            if not rollout.reached:
+                return edges, (abstract, number)
+            edges.append(PlanEdge(option, target, rollout.steps))
+            state, abstract = rollout.final, target
+        return edges, None
+
+
+def _exhaustive(problem: Problem) -> Planner:
+    return GraphPlanner(problem, search_exhaustively)
+
+
+PLANNERS: Mapping[str, Callable[[Problem], Planner]] = {
+    "lazy": GraphPlanner,
+    "exhaustive": _exhaustive,
+    "ff": FFPlanner,
+}
+
+
+def make_planner(name: str, domain: Domain, initial: State) -> Planner:
+    """A planner by name, for tasks over the objects of ``initial``.
+
+    Raises:
+        InvalidParameterError: No planner of that name.
+    """
+    if name not in PLANNERS:
+        raise InvalidParameterError(f"unknown planner {name!r}; there are {', '.join(PLANNERS)}")
+    return PLANNERS[name](Problem.of(domain, initial))

@@ -1,0 +1,178 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Shortest paths through the abstract graph when edge costs depend on the path (SLAP §4.1, A.1).
+
+What an option costs depends on the low-level state that it starts from, hence on the path so
+far. Vertices of the search are therefore (node, low-level state) pairs, and a node is expanded
+anew for each low-level state in which it is reached.
+
+:func:`search_exhaustively` rolls out every forward edge from every such vertex first and runs
+Dijkstra's algorithm on the result, as the paper does. :func:`search_lazily` rolls out an edge
+only when it lies on what is, by admissible lower bounds, the cheapest path. Both find the same
+cost.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import count
+
+from slap_ros.errors import UnsolvableError
+from slap_ros.planning.abstract_graph import AbstractGraph, Edge
+from slap_ros.planning.model import Model
+from slap_ros.planning.plan import Plan, PlanEdge
+from slap_ros.relational import State
+
+
+@dataclass(frozen=True)
+class Vertex:
+    """A node reached in a low-level state, and how."""
+
+    node: int
+    state: State
+    cost: int  # environment steps from the start
+    parent: Vertex | None = None
+    edge: Edge | None = None
+
+    @property
+    def key(self) -> tuple[int, bytes]:
+        """Vertices with equal keys have equal futures."""
+        return self.node, self.state.key
+
+
+@dataclass
+class LowLevelGraph:
+    """The bottom level: every way in which the forward edges can be run from the start."""
+
+    start: Vertex
+    successors: dict[tuple[int, bytes], list[tuple[Edge, int, Vertex]]] = field(
+        default_factory=dict
+    )  # of each vertex: edge, steps, and the vertex reached (its cost is not used)
+
+
+def build_bottom_level(graph: AbstractGraph, state: State, model: Model) -> LowLevelGraph:
+    """Roll out every forward edge from every low-level state in which its source is reached.
+
+    Nodes are taken in order of discovery, which forward edges follow, so that each node's
+    low-level states are complete when its turn comes.
+    """
+    bottom = LowLevelGraph(Vertex(0, state, 0))
+    forward, goals = graph.forward_edges(), set(graph.goal_nodes)
+    reached: list[dict[tuple[int, bytes], Vertex]] = [{} for _ in graph.nodes]
+    reached[0][bottom.start.key] = bottom.start
+    for node, vertices in enumerate(reached):
+        if node in goals:
+            continue
+        for vertex in vertices.values():
+            found = bottom.successors.setdefault(vertex.key, [])
+            for edge in forward[node]:
+                rollout = model.roll_out(edge.option, vertex.state, graph.nodes[edge.target])
+                if rollout.reached:
+                    successor = Vertex(edge.target, rollout.final, 0)
+                    reached[edge.target].setdefault(successor.key, successor)
+                    found.append((edge, rollout.steps, successor))
+    return bottom
+
+
+def search_exhaustively(graph: AbstractGraph, state: State, model: Model) -> Plan:
+    """Build the whole bottom level, then Dijkstra; stop when the best goal vertex is closed.
+
+    Raises:
+        UnsolvableError: No path of the graph can be executed from ``state``.
+    """
+    bottom, goals = build_bottom_level(graph, state, model), set(graph.goal_nodes)
+    tie = count()
+    queue = [(0, next(tie), bottom.start)]
+    closed: set[tuple[int, bytes]] = set()
+    while queue:
+        cost, _, vertex = heapq.heappop(queue)
+        if vertex.node in goals:
+            return _plan(graph, vertex)
+        if vertex.key in closed:
+            continue
+        closed.add(vertex.key)
+        for edge, steps, successor in bottom.successors[vertex.key]:
+            reached = Vertex(successor.node, successor.state, cost + steps, vertex, edge)
+            heapq.heappush(queue, (reached.cost, next(tie), reached))
+    raise _infeasible(graph)
+
+
+def search_lazily(graph: AbstractGraph, state: State, model: Model) -> Plan:
+    """Best first by cost so far plus lower bounds of what is to come, rolling out on demand.
+
+    The queue holds vertices, and edges not yet rolled out with the bound of their skill from the
+    state at their source; an edge is rolled out when it comes to the front. Bounds never exceed
+    the true steps, so the first goal vertex at the front is the cheapest.
+
+    Raises:
+        UnsolvableError: No path of the graph can be executed from ``state``.
+    """
+    forward, goals = graph.forward_edges(), set(graph.goal_nodes)
+    to_go = _steps_to_go(graph, forward)
+    tie = count()
+    start = Vertex(0, state, 0)
+    queue: list[tuple[int, int, Vertex, Edge | None]] = []
+    cheapest = {start.key: 0}
+
+    def push(vertex: Vertex, edge: Edge | None, bound: int, node: int) -> None:
+        rest = to_go[node]
+        if rest is not None:  # a goal can be reached from here
+            # Deeper first among equals: they are nearer to the goal.
+            heapq.heappush(queue, (vertex.cost + bound + rest, -next(tie), vertex, edge))
+
+    push(start, None, 0, 0)
+    while queue:
+        _, _, vertex, edge = heapq.heappop(queue)
+        if edge is not None:
+            rollout = model.roll_out(edge.option, vertex.state, graph.nodes[edge.target])
+            if rollout.reached:
+                cost = vertex.cost + rollout.steps
+                reached = Vertex(edge.target, rollout.final, cost, vertex, edge)
+                if cost < cheapest.get(reached.key, cost + 1):
+                    cheapest[reached.key] = cost
+                    push(reached, None, 0, reached.node)
+        elif vertex.node in goals:
+            return _plan(graph, vertex)
+        elif vertex.cost == cheapest[vertex.key]:
+            for out in forward[vertex.node]:
+                skill = out.option.skill
+                bound = max(skill.least_steps, skill.lower_bound(vertex.state, out.option.objects))
+                push(vertex, out, bound, out.target)
+    raise _infeasible(graph)
+
+
+def _steps_to_go(graph: AbstractGraph, forward: list[list[Edge]]) -> list[int | None]:
+    """Lower bound of the steps from each node to a goal; None where there is no way."""
+    steps: list[int | None] = [None] * len(graph.nodes)
+    for goal in graph.goal_nodes:
+        steps[goal] = 0
+    for node in reversed(range(len(graph.nodes))):  # forward edges lead to later nodes
+        for edge in forward[node]:
+            rest = steps[edge.target]
+            if rest is not None:
+                through = edge.option.skill.least_steps + rest
+                known = steps[node]
+                steps[node] = through if known is None else min(known, through)
+    return steps
+
+
+def _plan(graph: AbstractGraph, goal: Vertex) -> Plan:
+    edges = [
+        PlanEdge(edge.option, graph.nodes[edge.target], vertex.cost - parent.cost)
+        for vertex, parent, edge in _path(goal)
+    ]
+    return Plan(tuple(reversed(edges)))
+
+
+def _path(vertex: Vertex) -> Iterator[tuple[Vertex, Vertex, Edge]]:
+    while vertex.parent is not None and vertex.edge is not None:
+        yield vertex, vertex.parent, vertex.edge
+        vertex = vertex.parent
+
+
+def _infeasible(graph: AbstractGraph) -> UnsolvableError:
+    return UnsolvableError(
+        f"no path through the {len(graph.nodes)} abstract states can be executed from here"
+    )

@@ -1,0 +1,34 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The relational layer: typed objects, states, predicates, atoms as bits, operators, PDDL."""
+
+from slap_ros.relational.atom_space import AtomSpace
+from slap_ros.relational.grounding import ground_operators
+from slap_ros.relational.objects import Column, Feature, Object, Type
+from slap_ros.relational.operators import (
+    GroundOperator,
+    LiftedAtom,
+    LiftedOperator,
+    Variable,
+    static_predicates,
+)
+from slap_ros.relational.predicates import GroundAtom, Predicate
+from slap_ros.relational.state import Layout, State
+
+__all__ = [
+    "AtomSpace",
+    "Column",
+    "Feature",
+    "GroundAtom",
+    "GroundOperator",
+    "Layout",
+    "LiftedAtom",
+    "LiftedOperator",
+    "Object",
+    "Predicate",
+    "State",
+    "Type",
+    "Variable",
+    "ground_operators",
+    "static_predicates",
+]

@@ -1,0 +1,179 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Abstract states as bit masks over a task's ground atoms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slap_ros.errors import MismatchedAtomError, UnknownPredicateError
+from slap_ros.relational.objects import Column, Object, Type
+from slap_ros.relational.predicates import Classifier, GroundAtom, Predicate
+from slap_ros.relational.state import Layout, State
+
+MOST_REMEMBERED = 1024  # states perceived
+
+
+class AtomSpace:
+    """The ground atoms of a task, each with a bit.
+
+    An abstract state is an ``int`` with the bits of the atoms that hold. The space has every
+    atom whose objects have the right types and are pairwise different. Atoms of static
+    predicates (those that no operator changes) are evaluated once.
+    """
+
+    def __init__(
+        self,
+        predicates: Sequence[Predicate],
+        static: Collection[Predicate],
+        layout: Layout,
+        holds: Callable[[GroundAtom], bool],
+        unread: Collection[Type] = (),
+    ) -> None:
+        """Enumerate the atoms over the objects of ``layout``.
+
+        Args:
+            predicates: The domain's.
+            static: Those that no operator changes.
+            layout: The task's objects.
+            holds: Whether an atom of a static predicate holds.
+            unread: Types of objects whose features no predicate reads, the robot as a rule:
+                states that differ only there are perceived once.
+        """
+        self.layout = layout
+        self.predicates = {predicate.name: predicate for predicate in predicates}
+        self.atoms = tuple(
+            predicate(*objects)
+            for predicate in predicates
+            for objects in _type_consistent(predicate, layout.objects)
+        )
+        self._bits = {atom: 1 << i for i, atom in enumerate(self.atoms)}
+        self.static_predicates = frozenset(static)
+        statics = {atom: bit for atom, bit in self._bits.items() if atom.predicate in static}
+        self.static = sum(statics.values())
+        self.static_truth = sum(bit for atom, bit in statics.items() if holds(atom))
+        self._fluents = [
+            _Block.of(predicate, self.atoms)
+            for predicate in predicates
+            if predicate not in self.static_predicates
+        ]
+        self._read = np.concatenate(
+            [
+                np.arange(part.start, part.stop)
+                for obj, part in layout.slices.items()
+                if obj.type not in unread
+            ]
+            or [np.empty(0, np.intp)]
+        )
+        self._perceived: dict[bytes, int] = {}
+        self._truth = np.array([bool(statics.get(a, 0) & self.static_truth) for a in self.atoms])
+
+    @classmethod
+    def of_state(
+        cls,
+        predicates: Sequence[Predicate],
+        static: Collection[Predicate],
+        state: State,
+        unread: Collection[Type] = (),
+    ) -> AtomSpace:
+        """The space over a state's objects, static atoms as they are in that state."""
+        return cls(predicates, static, state.layout, lambda atom: atom.holds(state), unread)
+
+    def abstract(self, state: State) -> int:
+        """The abstract state of a single state."""
+        read = state.data[self._read].tobytes()
+        mask = self._perceived.get(read)
+        if mask is None:
+            packed = np.packbits(self.truth(state), bitorder="little")
+            mask = int.from_bytes(packed.tobytes(), "little")
+            if len(self._perceived) == MOST_REMEMBERED:
+                self._perceived.clear()
+            self._perceived[read] = mask
+        return mask
+
+    def truth(self, state: State) -> NDArray[np.bool_]:
+        """Whether each atom holds, for a state or a batch of states, shape (..., atoms)."""
+        shape = (*state.data.shape[:-1], len(self.atoms))
+        truth = np.broadcast_to(self._truth, shape).copy()
+        for block in self._fluents:
+            truth[..., block.where] = block.classifier(state, *block.columns)
+        return truth
+
+    def bit(self, atom: GroundAtom) -> int:
+        """The atom's bit.
+
+        Raises:
+            MismatchedAtomError: The atom relates an object to itself, or objects of another task.
+        """
+        try:
+            return self._bits[atom]
+        except KeyError:
+            raise MismatchedAtomError(
+                f"{atom} is not an atom of this task: atoms relate different objects of the task"
+            ) from None
+
+    def mask(self, atoms: Iterable[GroundAtom]) -> int:
+        """The bits of several atoms."""
+        mask = 0
+        for atom in atoms:
+            mask |= self.bit(atom)
+        return mask
+
+    def decode(self, mask: int) -> Iterator[GroundAtom]:
+        """The atoms of a mask, in the space's order."""
+        while mask:
+            low = mask & -mask
+            yield self.atoms[low.bit_length() - 1]
+            mask ^= low
+
+    def atom(self, predicate: str, objects: Sequence[str]) -> GroundAtom:
+        """The atom with these names.
+
+        Raises:
+            UnknownPredicateError: The domain has no such predicate.
+            UnknownObjectError: The task has no such object.
+            MismatchedAtomError: Number or types of the objects do not fit.
+        """
+        if predicate not in self.predicates:
+            raise UnknownPredicateError(
+                f"unknown predicate {predicate!r}; the domain has "
+                f"{', '.join(sorted(self.predicates))}"
+            )
+        return self.predicates[predicate](*(self.layout.object(name) for name in objects))
+
+    def describe(self, mask: int) -> str:
+        """The fluent atoms of a mask, for people."""
+        return ", ".join(str(atom) for atom in self.decode(mask & ~self.static))
+
+
+@dataclass(frozen=True)
+class _Block:
+    """The atoms of one predicate."""
+
+    classifier: Classifier
+    columns: tuple[Column, ...]
+    where: slice  # of the space's atoms
+
+    @classmethod
+    def of(cls, predicate: Predicate, atoms: Sequence[GroundAtom]) -> _Block:
+        numbers = [i for i, atom in enumerate(atoms) if atom.predicate == predicate]
+        start = numbers[0] if numbers else 0
+        columns = zip(*(atoms[i].objects for i in numbers), strict=True)
+        return cls(
+            predicate.classifier,
+            tuple(Column(objects) for objects in columns),
+            slice(start, start + len(numbers)),
+        )
+
+
+def _type_consistent(
+    predicate: Predicate, objects: tuple[Object, ...]
+) -> Iterator[tuple[Object, ...]]:
+    for chosen in permutations(objects, len(predicate.types)):
+        if all(obj.type.is_a(t) for obj, t in zip(chosen, predicate.types, strict=True)):
+            yield chosen

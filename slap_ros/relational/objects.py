@@ -1,0 +1,63 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Types and the objects that have them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+
+@dataclass(frozen=True)
+class Feature:
+    """One entry of a feature vector."""
+
+    name: str
+    unit: str  # SI: m, rad, m/s, ...; "1" for a pure number
+
+
+@dataclass(frozen=True)
+class Type:
+    """A type of object; it lays out the feature vector of its objects."""
+
+    name: str
+    features: tuple[Feature, ...] = ()
+    parent: Type | None = None
+
+    @cached_property
+    def column(self) -> dict[str, int]:
+        """Position of each feature in the vector, by name."""
+        return {feature.name: i for i, feature in enumerate(self.features)}
+
+    def is_a(self, other: Type) -> bool:
+        """Whether this type is ``other`` or descends from it."""
+        return self == other or (self.parent is not None and self.parent.is_a(other))
+
+    def __call__(self, name: str) -> Object:
+        """An object of this type."""
+        return Object(name, self)
+
+    def __str__(self) -> str:
+        return self.name
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """Objects side by side, for asking the same of all of them at once."""
+
+    objects: tuple[Object, ...]
+
+
+@dataclass(frozen=True)
+class Object:
+    """A named thing; names are unique within a task."""
+
+    name: str
+    type: Type
+
+    def __hash__(self) -> int:
+        # The name tells the objects of a task apart; hashing the type too would only cost time.
+        return hash(self.name)
+
+    def __str__(self) -> str:
+        return self.name

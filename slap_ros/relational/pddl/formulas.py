@@ -1,0 +1,76 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Conjunctions of atoms: preconditions, effects and goals before their names are looked up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from slap_ros.errors import MalformedPddlError
+from slap_ros.relational.pddl.names import UNSUPPORTED
+from slap_ros.relational.pddl.sexpr import Group, Node, Word, expect_group, expect_word
+from slap_ros.relational.pddl.tokens import Position
+
+
+@dataclass(frozen=True)
+class Formula:
+    """An atom as it is written: the names of a predicate and of its arguments."""
+
+    predicate: Word
+    arguments: tuple[Word, ...]
+
+    @property
+    def position(self) -> Position:
+        """Where it is written."""
+        return self.predicate.position
+
+
+def read_formula(node: Node) -> Formula:
+    """An atom.
+
+    Raises:
+        MalformedPddlError: Anything else.
+    """
+    group = expect_group(node, "an atom")
+    if group.head in UNSUPPORTED:
+        raise MalformedPddlError(f"{group.position}: {UNSUPPORTED[group.head]} are not supported")
+    if not group.items:
+        raise MalformedPddlError(f"{group.position}: expected an atom, found an empty list")
+    predicate = expect_word(group.items[0], "the name of a predicate")
+    return Formula(predicate, tuple(expect_word(n, "an argument") for n in group.items[1:]))
+
+
+def read_conjunction(node: Node) -> list[Formula]:
+    """An atom, or atoms joined by ``and``, however nested; none for ``()`` and ``(and)``.
+
+    Raises:
+        MalformedPddlError: Anything else.
+    """
+    return [read_formula(group) for group in _conjuncts(node)]
+
+
+def read_effect(node: Node) -> tuple[list[Formula], list[Formula]]:
+    """The atoms that a conjunction of atoms and negated atoms adds, and those it deletes.
+
+    Raises:
+        MalformedPddlError: Anything else.
+    """
+    added, deleted = [], []
+    for group in _conjuncts(node):
+        if group.head != "not":
+            added.append(read_formula(group))
+        elif len(group.items) == 2:
+            deleted.append(read_formula(group.items[1]))
+        else:
+            raise MalformedPddlError(f"{group.position}: 'not' takes one atom")
+    return added, deleted
+
+
+def _conjuncts(node: Node) -> Iterator[Group]:
+    group = expect_group(node, "an atom or a conjunction")
+    if group.head == "and":
+        for item in group.items[1:]:
+            yield from _conjuncts(item)
+    elif group.items:
+        yield group

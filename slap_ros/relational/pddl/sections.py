@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The frame that PDDL domains and problems share: ``(define (KIND NAME) (:section ...) ...)``."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+
+from slap_ros.errors import MalformedPddlError
+from slap_ros.relational.pddl.names import check_name
+from slap_ros.relational.pddl.sexpr import Group, Node, Word, expect_group, expect_word, read_group
+from slap_ros.relational.pddl.tokens import located
+
+REQUIREMENTS = (":strips", ":typing")
+_UNSUPPORTED = {
+    ":constants": "constants",
+    ":functions": "numeric fluents",
+    ":derived": "derived predicates",
+    ":durative-action": "durative actions",
+    ":constraints": "constraints",
+    ":metric": "plan metrics",
+}
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A domain or a problem, cut into its sections."""
+
+    name: Word
+    sections: dict[str, list[Group]]  # by keyword, in the order of the text
+
+    def optional(self, keyword: str) -> tuple[Node, ...]:
+        """What follows the keyword of a section that may be missing.
+
+        Raises:
+            MalformedPddlError: There is more than one such section.
+        """
+        sections = self.sections.get(keyword, [])
+        if len(sections) > 1:
+            raise MalformedPddlError(f"{sections[1].position}: a second {keyword}")
+        return sections[0].items[1:] if sections else ()
+
+    def single(self, keyword: str) -> Node:
+        """The one entry of a section that may not be missing.
+
+        Raises:
+            MalformedPddlError: There is no or more than one such section, or entry in it.
+        """
+        entries = self.optional(keyword)
+        if len(entries) != 1:
+            place = self.sections.get(keyword, [self.name])[0].position
+            raise MalformedPddlError(
+                f"{place}: {self.name.text} needs one entry in {keyword}, found {len(entries)}"
+            )
+        return entries[0]
+
+
+def read_definition(text: str, source: str, kind: str, keywords: Collection[str]) -> Definition:
+    """Cut a text into sections.
+
+    Args:
+        text: PDDL.
+        source: Where the text comes from, for messages.
+        kind: ``domain`` or ``problem``.
+        keywords: Of the sections that such a text may have.
+
+    Raises:
+        MalformedPddlError: No such definition, or with a section or requirement unknown to us.
+    """
+    group = read_group(text, source)
+    title = group.items[1] if len(group.items) > 1 else None
+    if group.head != "define" or not isinstance(title, Group) or title.head != kind:
+        raise MalformedPddlError(f"{group.position}: expected (define ({kind} NAME) ...)")
+    if len(title.items) != 2:
+        raise MalformedPddlError(f"{title.position}: expected ({kind} NAME)")
+    name = expect_word(title.items[1], f"the name of the {kind}")
+    with located(name.position):
+        check_name(kind, name.text)
+    sections: dict[str, list[Group]] = {}
+    for node in group.items[2:]:
+        section = expect_group(node, "a section")
+        _check_section(section, keywords)
+        sections.setdefault(section.head, []).append(section)
+    definition = Definition(name, sections)
+    _check_requirements(definition.optional(":requirements"))
+    return definition
+
+
+def _check_section(section: Group, keywords: Collection[str]) -> None:
+    if section.head in _UNSUPPORTED:
+        what = _UNSUPPORTED[section.head]
+        raise MalformedPddlError(f"{section.position}: {what} ({section.head}) are not supported")
+    if section.head not in keywords:
+        raise MalformedPddlError(
+            f"{section.position}: unknown section {section.head!r}; there are {', '.join(keywords)}"
+        )
+
+
+def _check_requirements(nodes: Iterable[Node]) -> None:
+    for node in nodes:
+        word = expect_word(node, "a requirement")
+        if word.keyword not in REQUIREMENTS:
+            raise MalformedPddlError(
+                f"{word.position}: requirement {word.text} is not supported; "
+                f"there are {' '.join(REQUIREMENTS)}"
+            )

@@ -1,0 +1,104 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Tokens nested as the parentheses say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from slap_ros.errors import MalformedPddlError
+from slap_ros.relational.pddl.tokens import Position, tokenise
+
+MAX_DEPTH = 100  # levels of nesting; what is deeper is no PDDL and would exhaust the stack
+
+
+@dataclass(frozen=True)
+class Word:
+    """A name, a variable, a keyword or a dash."""
+
+    text: str
+    position: Position
+
+    @property
+    def keyword(self) -> str:
+        """The word in lower case, to be compared with PDDL's own words."""
+        return self.text.lower()
+
+    def __str__(self) -> str:
+        return repr(self.text)
+
+
+@dataclass(frozen=True)
+class Group:
+    """What stands between two parentheses."""
+
+    items: tuple[Node, ...]
+    position: Position  # of the opening parenthesis
+
+    @property
+    def head(self) -> str:
+        """The first word in lower case; empty where the group does not begin with a word."""
+        first = self.items[0] if self.items else None
+        return first.keyword if isinstance(first, Word) else ""
+
+    def __str__(self) -> str:
+        return "a list"
+
+
+Node = Word | Group
+
+
+def read_group(text: str, source: str) -> Group:
+    """The one group that a text consists of.
+
+    Raises:
+        MalformedPddlError: Parentheses do not match, or there is nothing or more than one group.
+    """
+    starts: list[Position] = []  # of the groups that are still open
+    levels: list[list[Node]] = [[]]  # what they hold so far; the text itself is the outermost
+    for token in tokenise(text, source):
+        if token.text == "(":
+            starts.append(token.position)
+            levels.append([])
+            if len(starts) > MAX_DEPTH:
+                raise MalformedPddlError(f"{token.position}: more than {MAX_DEPTH} lists nested")
+        elif token.text == ")":
+            if not starts:
+                raise MalformedPddlError(f"{token.position}: ')' closes nothing")
+            items = tuple(levels.pop())
+            levels[-1].append(Group(items, starts.pop()))
+        else:
+            levels[-1].append(Word(token.text, token.position))
+    if starts:
+        raise MalformedPddlError(f"{starts[-1]}: '(' is never closed")
+    return _only(levels[0], Position(source, 1, 1))
+
+
+def _only(nodes: list[Node], start: Position) -> Group:
+    if not nodes:
+        raise MalformedPddlError(f"{start}: there is nothing but blanks and comments")
+    if len(nodes) > 1 and isinstance(nodes[0], Group):
+        raise MalformedPddlError(f"{nodes[1].position}: the text should end before {nodes[1]}")
+    return expect_group(nodes[0], "'('")
+
+
+def expect_word(node: Node, what: str) -> Word:
+    """The node, which must be a word.
+
+    Raises:
+        MalformedPddlError: It is a group.
+    """
+    if isinstance(node, Group):
+        raise MalformedPddlError(f"{node.position}: expected {what}, found {node}")
+    return node
+
+
+def expect_group(node: Node, what: str) -> Group:
+    """The node, which must be a group.
+
+    Raises:
+        MalformedPddlError: It is a word.
+    """
+    if isinstance(node, Word):
+        raise MalformedPddlError(f"{node.position}: expected {what}, found {node}")
+    return node

@@ -1,0 +1,74 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""PDDL's typed lists: ``block1 block2 - block table``, where the table has no type of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from slap_ros.errors import MalformedPddlError
+from slap_ros.relational.pddl.names import OBJECT, UNSUPPORTED, bare_variable, check_words
+from slap_ros.relational.pddl.sexpr import Group, Node, Word, expect_word
+from slap_ros.relational.pddl.tokens import located
+
+
+@dataclass(frozen=True)
+class Typed:
+    """A name and the name of its type."""
+
+    word: Word
+    type: Word  # OBJECT where the text says nothing
+
+
+def read_names(kind: str, nodes: Iterable[Node]) -> list[Typed]:
+    """A typed list of names, no two of them alike.
+
+    Raises:
+        MalformedPddlError: With the position of the word at fault.
+    """
+    found = _read(kind, nodes)
+    check_words(kind, (entry.word for entry in found))
+    return found
+
+
+def read_variables(nodes: Iterable[Node]) -> list[Typed]:
+    """A typed list of variables, no two of them alike.
+
+    Raises:
+        MalformedPddlError: With the position of the word at fault.
+    """
+    found = _read("variable", nodes)
+    check_words("variable", (_bare(entry.word) for entry in found))
+    return found
+
+
+def _bare(word: Word) -> Word:
+    with located(word.position):
+        return Word(bare_variable(word.text), word.position)
+
+
+def _read(kind: str, nodes: Iterable[Node]) -> list[Typed]:
+    found: list[Typed] = []
+    untyped = 0  # how many at the end of `found` wait for their type
+    remaining = iter(nodes)
+    for node in remaining:
+        word = expect_word(node, f"the name of a {kind}")
+        if word.text != "-":
+            found.append(Typed(word, Word(OBJECT, word.position)))
+            untyped += 1
+            continue
+        if not untyped:
+            raise MalformedPddlError(f"{word.position}: nothing stands before '-'")
+        type_word = _type_name(next(remaining, None), word)
+        found[-untyped:] = [replace(entry, type=type_word) for entry in found[-untyped:]]
+        untyped = 0
+    return found
+
+
+def _type_name(node: Node | None, dash: Word) -> Word:
+    if node is None:
+        raise MalformedPddlError(f"{dash.position}: the name of a type is missing after '-'")
+    if isinstance(node, Group) and node.head in UNSUPPORTED:
+        raise MalformedPddlError(f"{node.position}: {UNSUPPORTED[node.head]} are not supported")
+    return expect_word(node, "the name of a type")

@@ -1,0 +1,81 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Predicates and ground atoms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slap_ros.errors import MismatchedAtomError
+from slap_ros.relational.objects import Column, Object, Type
+from slap_ros.relational.state import Array, State
+
+Bools = NDArray[np.bool_]
+Classifier = Callable[..., Bools]  # (state, *columns) -> truth, shape (..., atoms)
+Margin = Callable[..., Array]  # (state, *columns) -> signed distance to the threshold, (..., atoms)
+
+
+@dataclass(frozen=True)
+class Predicate:
+    """A named relation between objects that holds or not in a state.
+
+    Both functions answer for many atoms at once, and for a batch of states as well: they take a
+    state and one column of objects per type, all equally long, and answer with shape
+    (..., atoms). One call for all atoms of a predicate is what makes perception fast. The margin
+    says how far the state is from the threshold (positive where
+    the predicate holds), in the unit of the metric behind it; it is None where no metric is.
+    """
+
+    name: str
+    types: tuple[Type, ...]
+    classifier: Classifier = field(compare=False, repr=False)
+    margin: Margin | None = field(default=None, compare=False, repr=False)
+
+    @classmethod
+    def threshold(cls, name: str, types: tuple[Type, ...], margin: Margin) -> Predicate:
+        """A predicate that holds where its margin is at least 0."""
+
+        def classifier(state: State, *columns: Column) -> Bools:
+            return margin(state, *columns) >= 0.0
+
+        return cls(name, types, classifier, margin)
+
+    def __call__(self, *objects: Object) -> GroundAtom:
+        """The atom that applies this predicate to objects.
+
+        Raises:
+            MismatchedAtomError: Their number or types do not fit.
+        """
+        if len(objects) != len(self.types):
+            raise MismatchedAtomError(
+                f"{self.name} takes {len(self.types)} objects, got {len(objects)}"
+            )
+        for obj, wanted in zip(objects, self.types, strict=True):
+            if not obj.type.is_a(wanted):
+                raise MismatchedAtomError(
+                    f"{self.name} wants a {wanted}, but {obj.name} is a {obj.type}"
+                )
+        return GroundAtom(self, objects)
+
+    def __str__(self) -> str:
+        return self.name
+
+
+@dataclass(frozen=True)
+class GroundAtom:
+    """A predicate applied to objects."""
+
+    predicate: Predicate
+    objects: tuple[Object, ...]
+
+    def holds(self, state: State) -> bool:
+        """Whether it holds in a single state."""
+        columns = [Column((obj,)) for obj in self.objects]
+        return bool(self.predicate.classifier(state, *columns).all())
+
+    def __str__(self) -> str:
+        return f"{self.predicate.name}({', '.join(obj.name for obj in self.objects)})"

@@ -1,0 +1,28 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))  # for the helpers of these tests
+
+from truthful_run import Script, record
+
+
+@pytest.fixture(scope="session")
+def script() -> Script:
+    """A run of one episode. Shared: not to be changed."""
+    script = Script(seed=7)
+    script.run()
+    return script
+
+
+@pytest.fixture(scope="session")
+def honest_bag(script: Script, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """It, recorded. Shared: not to be changed."""
+    path = tmp_path_factory.mktemp("bags") / "honest"
+    record(path, script.messages)
+    return path

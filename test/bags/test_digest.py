@@ -1,0 +1,60 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import copy
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+from truthful_run import Script, record, without
+
+from slap_ros.bags import bag_digest
+from slap_ros.messages.interfaces import STATE
+
+HERE = Path(__file__).parent
+
+
+def record_in_a_process(path: Path, clock_ns: int) -> None:
+    environment = os.environ | {
+        "PYTHONPATH": str(HERE.parent.parent),
+        "PYTHONHASHSEED": str(clock_ns % 100),
+    }
+    subprocess.run(
+        [sys.executable, str(HERE / "truthful_run.py"), str(path), "7", str(clock_ns)],
+        check=True,
+        env=environment,
+    )
+
+
+def test_runs_in_two_processes_have_one_digest(honest_bag: Path, tmp_path: Path) -> None:
+    record_in_a_process(tmp_path / "one", 1_600_000_000_123_456_789)
+    record_in_a_process(tmp_path / "two", 1_650_000_000_987_654_321)
+    digests = {bag_digest(path) for path in (tmp_path / "one", tmp_path / "two", honest_bag)}
+    assert len(digests) == 1
+    assert len(digests.pop()) == 64
+
+
+def test_a_changed_state_changes_it(script: Script, honest_bag: Path, tmp_path: Path) -> None:
+    messages = copy.deepcopy(script.messages)
+    state = next(m.message for m in messages if m.type_name == STATE and m.message.step == 9)
+    state.objects[1].features.view(np.uint64)[0] ^= np.uint64(1)
+    record(tmp_path / "bag", messages)
+    assert bag_digest(tmp_path / "bag") != bag_digest(honest_bag)
+
+
+def test_order_within_a_topic_counts_and_between_topics_does_not(
+    script: Script, honest_bag: Path, tmp_path: Path
+) -> None:
+    by_topic = sorted(script.messages, key=lambda m: m.topic)
+    record(tmp_path / "sorted", by_topic)
+    assert bag_digest(tmp_path / "sorted") == bag_digest(honest_bag)
+    record(tmp_path / "reversed", reversed(by_topic))
+    assert bag_digest(tmp_path / "reversed") != bag_digest(honest_bag)
+
+
+def test_diagnostics_do_not_count(script: Script, honest_bag: Path, tmp_path: Path) -> None:
+    record(tmp_path / "bag", without(script.messages, "/diagnostics"))
+    assert bag_digest(tmp_path / "bag") == bag_digest(honest_bag)

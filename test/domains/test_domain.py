@@ -1,0 +1,66 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A domain whose parts do not fit is refused when it is made."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from slap_ros.domains import get_domain
+from slap_ros.errors import InvalidDomainError
+from slap_ros.relational import LiftedAtom, LiftedOperator, Predicate, State, Type, Variable
+
+DOMAIN = get_domain("obstacle2d")
+
+
+def operator_with(predicate, kind):
+    variable = Variable("?x", kind)
+    return LiftedOperator(
+        "Shine", (variable,), frozenset({LiftedAtom(predicate, (variable,))}), frozenset(),
+        frozenset(),
+    )  # fmt: skip
+
+
+def test_an_operator_with_an_unknown_predicate():
+    block = DOMAIN.types[1]
+    shiny = Predicate("Shiny", (block,), lambda state, column: None)
+    with pytest.raises(InvalidDomainError, match=r"operator Shine: unknown predicate 'Shiny'"):
+        replace(DOMAIN, operators=(*DOMAIN.operators, operator_with(shiny, block)))
+
+
+def test_an_operator_with_an_unknown_type():
+    with pytest.raises(InvalidDomainError, match="unknown type 'ghost'"):
+        ghost = Type("ghost", parent=DOMAIN.types[1])
+        is_block = next(p for p in DOMAIN.predicates if p.name == "IsBlock")
+        replace(DOMAIN, operators=(*DOMAIN.operators, operator_with(is_block, ghost)))
+
+
+def test_an_operator_without_a_skill():
+    with pytest.raises(InvalidDomainError, match="operator Pick: no skill"):
+        replace(DOMAIN, skills={})
+
+
+def test_names_that_occur_twice():
+    with pytest.raises(InvalidDomainError, match="two operators named Pick"):
+        replace(DOMAIN, operators=(*DOMAIN.operators, DOMAIN.operators[0]))
+
+
+def test_a_type_whose_parent_is_missing():
+    with pytest.raises(InvalidDomainError, match="type cup descends from vessel"):
+        replace(DOMAIN, types=(*DOMAIN.types, Type("cup", parent=Type("vessel"))))
+
+
+@pytest.mark.parametrize("name", ["obstacle2d", "obstacle_tower"])
+def test_what_is_said_to_be_unread_changes_no_atom(name):
+    domain = get_domain(name)
+    initial = domain.task(0).initial_state
+    space = domain.atom_space(initial)
+    rng = np.random.default_rng(0)
+    data = np.repeat(initial.data[None], 200, axis=0)
+    for obj in initial.objects:
+        if obj.type in domain.unread_types:
+            part = initial.layout.slices[obj]
+            data[:, part] = rng.uniform(-3, 3, data[:, part].shape)
+    truth = space.truth(State(initial.layout, data))
+    assert (truth == truth[0]).all()

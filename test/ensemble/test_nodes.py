@@ -1,0 +1,331 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Nodes as processes: start in any order, stop cleanly, come back, refuse, survive a kill."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+
+import pytest
+import rclpy
+from rcl_interfaces.srv import GetParameters
+from rclpy.executors import SingleThreadedExecutor
+from slap_msgs.msg import RobotCommand
+from slap_msgs.srv import ListSkills, ResetTask
+
+from benchmarks.control_loop import state_command_state
+from ensemble.client import RunClient
+from ensemble.hosts import ProcessHost
+from ensemble.interfaces import COMMAND, LIST_SKILLS, RESET_TASK
+from ensemble.nodes import RunSettings, node_parameters
+from ensemble.observation import Observer
+from ensemble.run import Spinner
+from slap_ros.bags import evaluate_bag
+from slap_ros.messages.interfaces import STATE
+
+ALL = ("sim_node", "perception_node", "skill_server", "planner_node", "recorder_node")
+LIMIT = 15.0  # s, in which a killed node must have ended the run
+
+
+@contextmanager
+def spinning():
+    """A client node and a way to spin it."""
+    rclpy.init()
+    executor = SingleThreadedExecutor()
+    heard = []
+    client = RunClient(lambda type_name, message: heard.append((type_name, message)))
+    client.heard = heard
+    executor.add_node(client)
+    try:
+        yield client, Spinner(executor)
+    finally:
+        client.destroy_node()
+        executor.shutdown()
+        rclpy.shutdown()
+
+
+def parameters(record=None, seed=3, pace=0.0):
+    return node_parameters(RunSettings("obstacle2d", "fair", seed, 0, "lazy", record, pace))
+
+
+def start(name, *arguments):
+    return subprocess.Popen(
+        [sys.executable, "-m", name, "--ros-args", "--log-level", "warn", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def solve(client, spinner, **limits):
+    """Ask for the task to be solved; the action's result."""
+    sent = client.send((), limits.get("step_limit", 0), limits.get("max_replans", 5))
+    assert spinner.until(sent.done, 10)
+    result = sent.result().get_result_async()
+    assert spinner.until(result.done, 30)
+    return result.result().result
+
+
+def states(client):
+    return [message for type_name, message in client.heard if type_name == STATE]
+
+
+@pytest.mark.parametrize("order", [ALL, ALL[::-1]], ids=["sim first", "recorder first"])
+def test_any_order_of_start_gives_the_same_complete_bag(network, tmp_path, order):
+    nodes = parameters(tmp_path / "bag")
+    with spinning() as (client, spinner):
+        running = []
+        for name in order:
+            host = ProcessHost({name: nodes[name]})
+            running.append(host.__enter__())
+            time.sleep(1.0)
+        assert spinner.until(lambda: client.ready(True), 20)
+        assert solve(client, spinner).success
+        closed = client.close_bag()
+        assert spinner.until(closed.done, 10)
+        for host in running:
+            host.__exit__(None, None, None)
+    found = evaluate_bag(tmp_path / "bag")
+    assert found.runs[0].success
+    assert found.states == found.compared == found.runs[0].plan_length + 1
+
+
+@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+def test_a_node_stops_cleanly(network, tmp_path, name, stop):
+    bag = ["-p", f"bag:={tmp_path / 'bag'}"] if name == "recorder_node" else []
+    process = start(name, *bag)
+    with spinning() as (client, spinner):
+        assert spinner.until(lambda: name in client.others(), 15)
+        time.sleep(0.2)
+    process.send_signal(stop)
+    out, err = process.communicate(timeout=10)
+    assert process.returncode == 0, err
+    assert "Traceback" not in out + err
+
+
+@pytest.mark.parametrize("victim", ["perception_node", "skill_server", "planner_node"])
+def test_a_node_that_comes_back_is_taken_up_again(network, victim):
+    nodes = parameters()
+    others = {name: p for name, p in nodes.items() if name != victim}
+    with spinning() as (client, spinner), ProcessHost(others):
+        with ProcessHost({victim: nodes[victim]}) as first:
+            assert spinner.until(lambda: client.ready(False), 20)
+            assert solve(client, spinner).success
+            first.processes[victim].kill()
+            first.processes[victim].wait()
+        assert spinner.until(lambda: victim not in client.others(), LIMIT)
+        with ProcessHost({victim: nodes[victim]}):
+            assert spinner.until(lambda: client.ready(False), 20)
+            reset(client, spinner, seed=4)
+            assert solve(client, spinner).success
+
+
+def test_a_simulator_that_comes_back_opens_a_new_episode(network):
+    nodes = parameters()
+    others = {name: p for name, p in nodes.items() if name != "sim_node"}
+    with spinning() as (client, spinner), ProcessHost(others):
+        for _ in range(2):
+            with ProcessHost({"sim_node": nodes["sim_node"]}):
+                client.heard.clear()
+                assert spinner.until(lambda: client.ready(False) and states(client), 20)
+                assert solve(client, spinner).success
+            assert spinner.until(lambda: "sim_node" not in client.others(), LIMIT)
+
+
+def reset(client, spinner, **request):
+    service = client.create_client(RESET_TASK.type, RESET_TASK.name)
+    assert spinner.until(service.service_is_ready, 10)
+    answer = service.call_async(ResetTask.Request(**request))
+    assert spinner.until(answer.done, 10)
+    client.destroy_client(service)
+    return answer.result()
+
+
+def test_commands_that_are_stale_or_impossible_move_nothing(network):
+    only = {"sim_node": parameters()["sim_node"]}
+    with spinning() as (client, spinner), ProcessHost(only):
+        assert spinner.until(lambda: states(client), 15)
+        publisher = client.create_publisher(COMMAND.type, COMMAND.name, COMMAND.qos)
+        assert spinner.until(lambda: publisher.get_subscription_count() == 1, 10)
+        refused = [
+            RobotCommand(episode=1, step=7, deltas=[0.0, 0.01], gripper=0.0),  # not now
+            RobotCommand(episode=2, step=0, deltas=[0.0, 0.01], gripper=0.0),  # another episode
+            RobotCommand(episode=1, step=0, deltas=[float("nan"), 0.0], gripper=0.0),
+            RobotCommand(episode=1, step=0, deltas=[0.0, 0.5], gripper=0.0),  # too far
+            RobotCommand(episode=1, step=0, deltas=[0.0], gripper=0.0),  # too few
+        ]
+        for command in refused:
+            publisher.publish(command)
+        publisher.publish(RobotCommand(episode=1, step=0, deltas=[0.0, -0.01], gripper=0.0))
+        publisher.publish(RobotCommand(episode=1, step=0, deltas=[0.0, -0.01], gripper=0.0))
+        assert spinner.until(lambda: len(states(client)) == 2, 10)
+        spinner.until(lambda: False, 0.5)
+        assert [state.step for state in states(client)] == [0, 1]
+        before, after = (state.objects[0].features for state in states(client))
+        assert after[1] == before[1] - 0.01
+
+
+def test_resets_are_checked_at_the_door(network):
+    only = {"sim_node": parameters()["sim_node"]}
+    with spinning() as (client, spinner), ProcessHost(only):
+        assert spinner.until(lambda: states(client), 15)
+        explicit = states(client)[0]
+        answer = reset(client, spinner, seed=9)
+        assert (answer.error_code, answer.episode) == (0, 2)
+        assert (reset(client, spinner, initial_state=explicit).episode) == 3
+        assert spinner.until(lambda: len(states(client)) == 3, 10)
+        assert states(client)[2].objects == explicit.objects
+        explicit.objects[0].features[0] = float("nan")
+        answer = reset(client, spinner, initial_state=explicit)
+        assert (answer.error_code, answer.episode) == (16, 3)
+        assert "features of robot are not finite" in answer.error_msg
+
+
+def test_cancelling_makes_the_robot_hold(network):
+    with spinning() as (client, spinner), ProcessHost(parameters(pace=20.0)):
+        assert spinner.until(lambda: client.ready(False), 20)
+        sent = client.send((), 0, 5)
+        assert spinner.until(sent.done, 10)
+        assert spinner.until(lambda: len(states(client)) > 5, 20)
+        canceled = sent.result().cancel_goal_async()
+        assert spinner.until(canceled.done, 10)
+        result = sent.result().get_result_async()
+        assert spinner.until(result.done, 10)
+        assert result.result().result.error_code == 34
+        spinner.until(lambda: False, 0.5)
+        seen = states(client)
+        assert len(seen) < 20  # mid-way
+        assert seen[-1].objects[0].features == seen[-2].objects[0].features  # it held
+        spinner.until(lambda: False, 0.5)
+        assert len(states(client)) == len(seen)  # and nothing more was commanded
+
+
+def test_skills_are_listed_with_their_signatures(network):
+    with spinning() as (client, spinner), ProcessHost(parameters()):
+        service = client.create_client(LIST_SKILLS.type, LIST_SKILLS.name)
+        assert spinner.until(lambda: client.ready(False) and states(client), 20)
+        spinner.until(lambda: False, 0.5)
+        answer = service.call_async(ListSkills.Request())
+        assert spinner.until(answer.done, 10)
+        skills = {s.name: list(s.parameters) for s in answer.result().skills}
+        assert skills["PlaceInTarget"] == ["robot", "block", "surface"]
+        assert len(skills) == 4
+
+
+@pytest.mark.parametrize("victim", ALL)
+def test_a_killed_node_ends_the_run_with_a_code_and_a_readable_bag(network, tmp_path, victim):
+    bag = tmp_path / "bag"
+    runner = subprocess.Popen(
+        [sys.executable, "-m", "slap_ros.cli", "run", "obstacle2d", "--seed", "3",
+         "--pace", "30", "--record", str(bag)],
+        stderr=subprocess.PIPE,
+        text=True,
+    )  # fmt: skip
+    pid = victim_of(runner.pid, victim, bag)
+    os.kill(pid, signal.SIGKILL)
+    killed = time.monotonic()
+    _, err = runner.communicate(timeout=LIMIT)
+    assert time.monotonic() - killed < LIMIT
+    assert runner.returncode == 110, err
+    assert f"{victim} was killed by SIGKILL" in err
+    assert "Traceback" not in err
+    assert evaluate_bag(bag).states > 0
+
+
+def victim_of(runner, victim, bag):
+    """Wait until the run is under way and recorded; the victim's process id."""
+    import psutil
+
+    end = time.monotonic() + 30
+    while time.monotonic() < end:
+        children = psutil.Process(runner).children()
+        pids = [child.pid for child in children if victim in child.cmdline()]
+        recorded = sum(f.stat().st_size for f in bag.glob("*.mcap")) if bag.exists() else 0
+        if pids and recorded > 60_000:
+            return pids[0]
+        time.sleep(0.002)
+    raise AssertionError("the run did not get under way")
+
+
+def test_a_full_disk_ends_the_run_and_keeps_what_was_recorded(network, tmp_path):
+    import resource
+
+    bag = tmp_path / "bag"
+    result = subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "slap_ros.cli",
+            "run",
+            "obstacle2d",
+            "--pace",
+            "30",
+            "--record",
+            str(bag),
+        ],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (80_000, 80_000)),
+    )
+    assert result.returncode == 92, result.stderr
+    assert "no room left" in result.stderr
+    assert "Traceback" not in result.stderr
+    assert evaluate_bag(bag).states > 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["sim_node", "-p", "seed:=three"], 15, "seed"),
+        (["sim_node", "-p", "domain:=moon"], 10, "unknown domain 'moon'"),
+        (["sim_node", "-p", "preset:=easy"], 15, "unknown preset 'easy'"),
+        (["planner_node", "-p", "planner:=best"], 15, "planner must be one of"),
+        (["recorder_node"], 15, "must name the folder"),
+        (["recorder_node", "-p", "bag:=/tmp"], 93, "/tmp exists"),
+    ],
+)
+def test_a_wrong_parameter_is_refused_in_one_line(network, arguments, code, words):
+    process = start(*arguments)
+    _, err = process.communicate(timeout=20)
+    assert process.returncode == code, err
+    (line,) = err.strip().splitlines()
+    assert line.startswith(f"{arguments[0]}: ")
+    assert words in line
+
+
+def test_parameters_can_be_read_from_outside(network):
+    with spinning() as (client, spinner), ProcessHost(parameters()):
+        service = client.create_client(GetParameters, "planner_node/get_parameters")
+        assert spinner.until(service.service_is_ready, 20)
+        answer = service.call_async(GetParameters.Request(names=["planner", "server_timeout"]))
+        assert spinner.until(answer.done, 10)
+        planner, timeout = answer.result().values
+        assert (planner.string_value, timeout.double_value) == ("lazy", 5.0)
+
+
+def test_a_thousand_steps_are_answered_one_by_one(network):
+    """Sent and received between two processes: none lost, none twice."""
+    milliseconds = state_command_state(1000)
+    assert len(milliseconds) == 1000
+
+
+def test_observer_ignores_states_of_an_episode_that_is_over(network):
+    """A message of the old episode that comes late must not look like news."""
+    with (
+        spinning() as (client, spinner),
+        ProcessHost(
+            {name: p for name, p in parameters().items() if name in ("sim_node", "perception_node")}
+        ),
+    ):
+        observations = []
+        observer = Observer(client, observations.append)
+        assert spinner.until(lambda: observer.latest is not None, 15)
+        reset(client, spinner, seed=8)
+        assert spinner.until(lambda: observer.latest.episode.number == 2, 10)
+        assert [o.episode.number for o in observations] == [1, 2]
+        assert observer.latest.step == 0

@@ -1,0 +1,143 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Whole runs: live, recorded and in one process tell the same; the same seed gives the same bag."""
+
+import json
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import psutil
+import pytest
+
+from ensemble.nodes import RunSettings
+from ensemble.run import RunRequest, run
+from slap_ros.bags import bag_digest, bag_info, evaluate_bag, read_bag, replay_bag
+from slap_ros.cli.run import Narrator
+from slap_ros.domains import get_domain
+from slap_ros.evaluation.experiment import Experiment
+from slap_ros.messages.interfaces import ATOMS
+
+# Of `slap run obstacle2d --seed 3`, whatever the machine, the Python and the numpy.
+DIGEST_OF_SEED_3 = "3aa81c2d069853db88d41ff88f7136f2ec480db2b1e6ef3c10302d129b8b61f2"
+
+
+def ignore(type_name, message):
+    pass
+
+
+def request(record=None, seed=3, in_process=True, **options):
+    settings = RunSettings("obstacle2d", "fair", seed, 0, "lazy", record)
+    return RunRequest(settings, timeout_s=60, in_process=in_process, **options)
+
+
+def slap(*arguments, **options):
+    command = [sys.executable, "-m", "slap_ros.cli", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=90, **options)
+
+
+def atoms_by_step(bag):
+    return {
+        message.step: {(a.predicate, tuple(a.objects)) for a in message.atoms}
+        for _, type_name, _, message in read_bag(bag)
+        if type_name == ATOMS
+    }
+
+
+def test_live_bag_in_process_and_offline_agree_to_the_digit(network, tmp_path):
+    live = slap("run", "obstacle2d", "--seed", "3", "--record", str(tmp_path / "a"), "--json")
+    assert live.returncode == 0, live.stderr
+    from_bag = slap("bag", "evaluate", str(tmp_path / "a"), "--json")
+    assert from_bag.returncode == 0, from_bag.stderr
+    live_numbers, bag_numbers = json.loads(live.stdout), json.loads(from_bag.stdout)
+    assert bag_numbers["atom_mismatches"] == 0
+    assert {key: bag_numbers[key] for key in live_numbers} == live_numbers
+    assert live_numbers["success"]
+
+    in_process = run(request(tmp_path / "b"), ignore)
+    assert in_process.plan_length == live_numbers["plan_length"]
+    assert [o.steps for o in in_process.options] == [o["steps"] for o in live_numbers["options"]]
+    assert atoms_by_step(tmp_path / "a") == atoms_by_step(tmp_path / "b")
+    assert bag_digest(tmp_path / "a") == bag_digest(tmp_path / "b") == DIGEST_OF_SEED_3
+
+    domain = get_domain("obstacle2d")
+    offline = Experiment(domain, tasks=1, seeds=1, first_seed=3).run(3, 0)
+    assert offline.plan_length == live_numbers["plan_length"]
+    assert offline.edges_rolled_out == live_numbers["edges_rolled_out"]
+
+
+def test_a_bag_replays_bit_for_bit_and_says_what_made_it(network, tmp_path):
+    run(request(tmp_path / "bag", seed=5), ignore)
+    result = replay_bag(tmp_path / "bag")
+    assert result.identical
+    assert result.compared == evaluate_bag(tmp_path / "bag").states
+    metadata = bag_info(tmp_path / "bag").metadata
+    assert metadata["domain"] == "obstacle2d"
+    assert metadata["seed"] == "5"
+    assert {"python", "numpy", "slap_ros", "revision", "configuration.bystanders"} <= set(metadata)
+
+
+def test_a_goal_of_ones_own_is_reached_and_recognised(network, tmp_path):
+    domain = get_domain("obstacle2d")
+    space = domain.atom_space(domain.task(3).initial_state)
+    goal = [space.atom("Holding", ["robot", "block2"])]
+    live = run(request(tmp_path / "bag", goal=goal), ignore)
+    assert live.success
+    assert [option.name for option in live.options] == ["PickFromTarget"]
+    (recorded,) = evaluate_bag(tmp_path / "bag").runs
+    assert recorded == live
+
+
+def test_an_unsolvable_goal_says_so_live_and_in_the_bag(network, tmp_path):
+    goal = "(and (Holding robot block1) (Holding robot block2))"
+    live = slap(
+        "run", "obstacle2d", "--goal", goal, "--record", str(tmp_path / "bag"), "--in-process"
+    )
+    assert live.returncode == 30, live.stderr
+    assert "the goal holds in none of" in live.stderr
+    (recorded,) = evaluate_bag(tmp_path / "bag").runs
+    assert recorded.error_code == 30
+
+
+def test_running_out_of_steps_says_so(network):
+    metrics = run(request(step_limit=10), ignore)
+    assert not metrics.success
+    assert metrics.error_code == 33
+    assert metrics.plan_length == 10
+
+
+def test_the_story_of_a_run_is_told(network, capsys):
+    assert run(request(), Narrator()).success
+    told = capsys.readouterr().err
+    assert "plan 0:" in told
+    assert "PlaceInTarget(robot, block1, target): reached" in told
+
+
+@pytest.mark.timeout(300)
+def test_100_runs_leave_no_thread_no_file_and_no_process(network, tmp_path):
+    def left():
+        return (
+            threading.active_count(),
+            sum(1 for _ in Path("/proc/self/fd").iterdir()),
+            sum(1 for _ in Path("/proc/self/task").iterdir()),
+        )
+
+    run(request(tmp_path / "first"), ignore)
+    before = left()
+    for number in range(100):
+        bag = tmp_path / str(number) if number % 10 == 0 else None
+        assert run(request(bag, seed=number), ignore).success
+    after = left()
+    assert all(b <= a for b, a in zip(after, before, strict=True)), (before, after)
+    assert psutil.Process().children() == []
+
+
+def test_a_tower_is_taken_apart_by_the_ensemble_and_replayed_bit_for_bit(network, tmp_path):
+    settings = RunSettings("obstacle_tower", "fair", 1, 0, "lazy", tmp_path / "bag")
+    live = run(RunRequest(settings, timeout_s=100), ignore)
+    assert live.success, live.error_msg
+    assert replay_bag(tmp_path / "bag").identical
+    found = evaluate_bag(tmp_path / "bag")
+    assert found.mismatches == []
+    assert found.runs == [live]

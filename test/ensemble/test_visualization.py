@@ -1,0 +1,42 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What is shown is what is: poses, sizes and joints as in the state."""
+
+import numpy as np
+import pytest
+from builtin_interfaces.msg import Time
+
+from ensemble.visualization import frames, joint_state, markers
+from slap_ros.domains import get_domain
+
+STAMP = Time(sec=1, nanosec=2)
+
+
+@pytest.mark.parametrize("name", ["obstacle2d", "obstacle_tower"])
+def test_every_object_but_the_arm_is_a_marker_and_a_frame(name):
+    domain = get_domain(name)
+    state = domain.task(0).initial_state
+    bodies = domain.bodies(state)
+    shown = {marker.text for marker in markers(bodies, STAMP).markers}
+    framed = {frame.child_frame_id for frame in frames(bodies, STAMP).transforms}
+    everything = {obj.name for obj in state.objects}
+    assert shown == framed
+    assert everything - shown <= {"robot"}
+
+
+def test_blocks_of_the_tower_are_where_they_are_and_as_large():
+    domain = get_domain("obstacle_tower")
+    state = domain.task(0).initial_state
+    for marker in markers(domain.bodies(state), STAMP).markers:
+        obj = state.layout.object(marker.text)
+        position = [marker.pose.position.x, marker.pose.position.y, marker.pose.position.z]
+        assert np.array_equal(position, state[obj][:3])
+        assert marker.scale.z == pytest.approx(2 * float(state.get(obj, "half_z")))
+
+
+def test_joint_states_are_those_of_the_arm_and_only_of_an_arm():
+    tower = get_domain("obstacle_tower").task(0).initial_state
+    message = joint_state(tower, STAMP)
+    assert list(message.name) == [f"panda_joint{i}" for i in range(1, 8)]
+    assert np.array_equal(message.position, tower.data[:7])
+    assert joint_state(get_domain("obstacle2d").task(0).initial_state, STAMP).name == []

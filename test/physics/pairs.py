@@ -1,0 +1,120 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""States in the thick of it, what was done in them, and what came of it.
+
+``python pairs.py FILE`` replays recorded pairs and prints how many come out differently.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent.parent.parent))
+
+from benchmarks.physics_step import SCENE, pushes, tower, with_joints
+from slap_ros.physics.features import ROBOT, body_features, robot_features
+from slap_ros.physics.gripper import finger_around
+from slap_ros.physics.panda import GRASP_POINT, HOME, MAX_STEP, hand_pose
+from slap_ros.physics.pose import Pose
+from slap_ros.physics.world import PandaWorld
+from slap_ros.relational import State
+
+HIGH = np.array([*MAX_STEP, 1.0])
+GRASP = Pose((0.002, -0.003, GRASP_POINT))  # not quite in the middle
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """``after[i]`` is what ``actions[i]`` makes of ``before[i]``."""
+
+    before: np.ndarray  # (pairs, features)
+    actions: np.ndarray  # (pairs, 8)
+    after: np.ndarray
+
+    def save(self, path: Path) -> None:
+        np.savez(path, before=self.before, actions=self.actions, after=self.after)
+
+    @classmethod
+    def load(cls, path: Path) -> Pairs:
+        with np.load(path) as file:
+            return cls(file["before"], file["actions"], file["after"])
+
+    def differing(self, world: PandaWorld, order: Iterable[int]) -> list[int]:
+        """The pairs that come out differently, in any bit."""
+        layout = tower().layout
+        different = []
+        for i in order:
+            world.reset(State(layout, self.before[i].copy()))
+            if world.step(self.actions[i]).key != self.after[i].tobytes():
+                different.append(i)
+        return different
+
+
+def holding(state: State, name: str, joints=HOME) -> State:
+    """The state with one block in the hand."""
+    (robot,) = state.layout.of_type(ROBOT)
+    block = state.layout.object(name)
+    pose = hand_pose(joints).compose(GRASP)
+    (body,) = (body for body in SCENE.free if body.name == name)
+    features = {
+        robot: robot_features(joints, finger_around(body, GRASP), GRASP),
+        block: body_features(pose.position, pose.quaternion, held=True),
+    }
+    changes = {(obj, f): value for obj, given in features.items() for f, value in given.items()}
+    return state.replace(changes)
+
+
+def in_the_air(state: State, rng: np.random.Generator) -> State:
+    """The state with block T thrown."""
+    block = state.layout.object("T")
+    turn = rng.normal(size=4)
+    turn /= np.linalg.norm(turn)
+    features = body_features(
+        (0.35, -0.25, rng.uniform(0.15, 0.4)),
+        tuple(turn.tolist()),
+        tuple(rng.normal(0, 0.5, 3).tolist()),
+        tuple(rng.normal(0, 4, 3).tolist()),
+    )
+    return state.replace({(block, name): value for name, value in features.items()})
+
+
+def record(count: int, seed: int) -> Pairs:
+    """Pairs from pushes with an empty and a full hand, throws, and a gripper that acts."""
+    rng = np.random.default_rng(seed)
+    rows: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+    with PandaWorld(SCENE, tower()) as world:
+        for number, push in enumerate(pushes(count // 9, seed)):
+            start = with_joints(tower(), push.joints)
+            if number % 3 == 1:
+                start = holding(tower(), "T", tuple(push.joints.tolist()))
+            elif number % 3 == 2:
+                start = in_the_air(start, rng)
+            world.reset(start)
+            quiet = np.zeros((3, 8))
+            for action in np.concatenate([push.actions, quiet])[::2]:
+                noisy = np.clip(action + rng.normal(0, 0.01, 8), -HIGH, HIGH)
+                if rng.random() < 0.1:
+                    noisy[7] = rng.choice([-1.0, 1.0])
+                before = world.state
+                rows.append((before.data, noisy, world.step(noisy).data))
+    chosen = rng.permutation(len(rows))[:count]
+    return Pairs(*(np.array([rows[i][part] for i in chosen]) for part in range(3)))
+
+
+def main() -> None:
+    pairs = Pairs.load(Path(sys.argv[1]))
+    order = np.random.default_rng(77).permutation(len(pairs.before))
+    with PandaWorld(SCENE, tower()) as world:
+        for _ in range(20):
+            world.step(HIGH * [1, 1, 1, 1, 1, 1, 1, 0])  # another history first
+        differing = pairs.differing(world, order)
+    sys.stdout.write(f"{len(differing)} of {len(order)} differ\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,113 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A state is all there is: the same state and action give the same next state, bit for bit."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pairs import Pairs, record
+
+from benchmarks.physics_step import BLOCK, NAMES, SCENE, tower
+from slap_ros.physics.clients import release_idle
+from slap_ros.physics.features import POSE_FEATURES, pose_features
+from slap_ros.physics.pose import Pose
+from slap_ros.physics.scene import TABLE, Box, Scene
+from slap_ros.physics.world import PandaWorld
+from slap_ros.relational import State, Type
+
+COUNT = 1000
+
+
+@pytest.fixture(scope="module")
+def pairs() -> Pairs:
+    return record(COUNT, seed=1)
+
+
+def test_the_pairs_are_taken_in_the_thick_of_it(pairs):
+    states = State(tower().layout, pairs.before)
+    blocks = [states[states.layout.object(name)] for name in NAMES]
+    after = State(tower().layout, pairs.after)
+    moving = np.max([np.abs(block[:, 7:13]).max(1) for block in blocks], axis=0) > 0.02
+    shifted = np.max(
+        [
+            np.abs(after[after.layout.object(name)][:, :3] - block[:, :3]).max(1)
+            for name, block in zip(NAMES, blocks, strict=True)
+        ],
+        axis=0,
+    )
+    held = np.max([block[:, 13] for block in blocks], axis=0) > 0.5
+    assert len(pairs.before) == COUNT
+    assert moving.mean() > 0.2
+    assert ((shifted > 1e-3) & ~held).mean() > 0.3
+    assert held.mean() > 0.1
+
+
+def test_the_same_after_any_other_history(pairs, world):
+    for seed in range(2):
+        order = np.random.default_rng(seed).permutation(COUNT)
+        assert pairs.differing(world, order) == []
+
+
+def test_the_same_in_fresh_worlds(pairs):
+    for i in range(0, COUNT, 50):
+        release_idle()  # a new PyBullet client each time
+        with PandaWorld(SCENE, tower()) as world:
+            assert pairs.differing(world, [i]) == []
+
+
+def test_the_same_in_another_process(pairs, tmp_path):
+    pairs.save(tmp_path / "pairs.npz")
+    script = Path(__file__).with_name("pairs.py")
+    answer = subprocess.run(
+        [sys.executable, script, tmp_path / "pairs.npz"], capture_output=True, text=True, check=True
+    )
+    assert f"0 of {COUNT} differ" in answer.stdout
+
+
+def test_a_world_goes_on_as_one_that_was_reset_to_its_state(pairs, world):
+    """Nothing is carried from step to step but the state."""
+    with PandaWorld(SCENE, tower()) as other:
+        for start in range(0, COUNT, 40):
+            state = State(tower().layout, pairs.before[start].copy())
+            world.reset(state)
+            for action in pairs.actions[start : start + 8]:
+                other.reset(state)
+                state = world.step(action)
+                assert other.step(action) == state
+
+
+def test_fixed_bodies_that_the_state_places_leave_no_trace():
+    shelf = Type("shelf", POSE_FEATURES)("shelf")
+    scene = Scene((TABLE, Box("shelf", (0.1, 0.1, 0.01)), *SCENE.free))
+    base = tower()
+
+    def with_shelf(x: float) -> State:
+        features = {
+            obj: {f.name: float(base.get(obj, f.name)) for f in obj.type.features}
+            for obj in base.objects
+        }
+        block = base.layout.object("T")
+        features[block] |= {"x": 0.4, "y": 0.25, "z": 0.3}
+        return State.build({**features, shelf: pose_features(Pose((x, 0.25, 0.2)))})
+
+    under, aside = with_shelf(0.4), with_shelf(0.6)
+    with PandaWorld(scene, under) as world:
+
+        def drop(state: State) -> State:
+            world.reset(state)
+            for _ in range(8):
+                state = world.step(np.zeros(8))
+            return state
+
+        first, other = drop(under), drop(aside)
+        block = BLOCK("T")
+        assert first.get(block, "z") == pytest.approx(0.235, abs=1e-3)
+        assert other.get(block, "z") == pytest.approx(0.1, abs=1e-3)
+        for _ in range(3):
+            assert drop(under) == first
+            assert drop(aside) == other

@@ -1,0 +1,187 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Search: the lazy one costs what the exhaustive one costs, on tasks and on made-up graphs."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from slap_ros.domains import get_domain
+from slap_ros.errors import PlanningLimitError, UnsolvableError
+from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
+from slap_ros.planning.model import Rollout
+from slap_ros.planning.options import Option, OptionKind
+from slap_ros.planning.planner import Problem, make_planner
+from slap_ros.planning.search import search_exhaustively, search_lazily
+from slap_ros.relational import Feature, Layout, State, Type
+
+COUNTER = Type("counter", (Feature("value", "1"),))
+LAYOUT = Layout.of((COUNTER("c"),))
+
+
+@dataclass(frozen=True)
+class MadeUpSkill:
+    """Costs that depend on the low-level state, under bounds of any tightness."""
+
+    name: str
+    seed: int
+    tightness: float
+    step_limit: int = 1000
+    least_steps: int = 1
+
+    def true_cost(self, state):
+        rng = np.random.default_rng([self.seed, int(state.data[0])])
+        return 1 + int(rng.integers(0, 20))
+
+    def lower_bound(self, state, objects):
+        return max(1, int(self.tightness * self.true_cost(state)))
+
+    def start(self, state, objects):
+        raise AssertionError("never run: the model below knows the outcome")
+
+
+class MadeUpModel:
+    """Roll-outs by table: deterministic, path-dependent, some infeasible."""
+
+    def __init__(self):
+        self.executed = 0
+
+    def roll_out(self, option, state, target):
+        self.executed += 1
+        skill = option.skill
+        rng = np.random.default_rng([skill.seed, int(state.data[0]), 1])
+        feasible = rng.random() > 0.15
+        # Few distinct values, so that paths meet again in equal low-level states.
+        final = State(LAYOUT, [float(rng.integers(0, 6))])
+        return Rollout(bool(feasible), skill.true_cost(state), final)
+
+
+@st.composite
+def made_up_graphs(draw):
+    size = draw(st.integers(2, 9))
+    tightness = draw(st.sampled_from([0.0, 0.5, 1.0]))
+    graph = AbstractGraph(goal=1 << 20, nodes=[i + 1 for i in range(size)], depth=[0] * size)
+    goals = draw(st.sets(st.integers(1, size - 1), min_size=1))
+    for goal in goals:
+        graph.nodes[goal] |= 1 << 20
+    pairs = [(i, j) for i in range(size) for j in range(size) if i != j and i not in goals]
+    for number, (i, j) in enumerate(
+        draw(st.lists(st.sampled_from(pairs), max_size=25, unique=False))
+    ):
+        skill = MadeUpSkill(f"s{number}", draw(st.integers(0, 10**6)), tightness)
+        graph.edges.append(Edge(i, j, Option(OptionKind.OPERATOR, skill, ())))
+    return graph
+
+
+def cost_or_none(search, graph):
+    model = MadeUpModel()
+    try:
+        plan = search(graph, State(LAYOUT, [0.0]), model)
+    except UnsolvableError:
+        return None
+    return plan.predicted_steps
+
+
+@settings(max_examples=400, deadline=None)
+@given(made_up_graphs())
+def test_lazy_and_exhaustive_agree_on_made_up_graphs(graph):
+    assert cost_or_none(search_lazily, graph) == cost_or_none(search_exhaustively, graph)
+
+
+def brute_force(graph, model):
+    """The cheapest of all paths, by trying every one."""
+    forward, goals = graph.forward_edges(), set(graph.goal_nodes)
+
+    def best(node, state):
+        if node in goals:
+            return 0
+        costs = []
+        for edge in forward[node]:
+            rollout = model.roll_out(edge.option, state, edge.target)
+            rest = best(edge.target, rollout.final) if rollout.reached else None
+            if rest is not None:
+                costs.append(rollout.steps + rest)
+        return min(costs, default=None)
+
+    return best(0, State(LAYOUT, [0.0]))
+
+
+@settings(max_examples=200, deadline=None)
+@given(made_up_graphs())
+def test_exhaustive_search_finds_the_best_of_all_paths(graph):
+    assert cost_or_none(search_exhaustively, graph) == brute_force(graph, MadeUpModel())
+
+
+def test_lazy_equals_exhaustive_on_500_tasks_with_at_most_half_the_rollouts():
+    domain = get_domain("obstacle2d")
+    rollouts = {"lazy": 0, "exhaustive": 0}
+    for index in range(500):
+        task = domain.task(1000, index)
+        goal = domain.atom_space(task.initial_state).mask(task.goal)
+        costs = set()
+        for name in rollouts:
+            result = make_planner(name, domain, task.initial_state).plan(task.initial_state, goal)
+            rollouts[name] += result.edges_rolled_out
+            costs.add(result.plan.predicted_steps)
+        assert len(costs) == 1, f"task {index}: {costs}"
+    assert rollouts["lazy"] <= 0.5 * rollouts["exhaustive"], rollouts
+
+
+def test_graph_of_the_paper_task_is_that_of_the_reference():
+    """8 nodes, 12 edges, 21 candidate shortcuts."""
+    domain = get_domain("obstacle2d", "paper")
+    task = domain.task(0)
+    problem = Problem.of(domain, task.initial_state)
+    space = problem.model.space
+    graph = build_abstract_graph(
+        space.abstract(task.initial_state), space.mask(task.goal), problem.operators
+    )
+    assert (len(graph.nodes), len(graph.edges), len(graph.candidates())) == (8, 12, 21)
+
+
+def test_lower_bounds_never_exceed_the_true_steps():
+    domain = get_domain("obstacle2d")
+    checked = 0
+    for seed in range(60):
+        task = domain.task(seed)
+        problem = Problem.of(domain, task.initial_state)
+        model, state = problem.model, task.initial_state
+        rng = np.random.default_rng(seed)
+        for _ in range(8):
+            abstract = model.space.abstract(state)
+            choices = [(g, o) for g, o in problem.operators if g.applicable(abstract)]
+            ground, option = choices[rng.integers(len(choices))]
+            rollout = model.roll_out(option, state, ground.apply(abstract))
+            if not rollout.reached:
+                break
+            assert option.skill.lower_bound(state, option.objects) <= rollout.steps
+            assert option.skill.least_steps <= rollout.steps
+            state = rollout.final
+            checked += 1
+    assert checked > 300
+
+
+def test_an_unreachable_goal_is_unsolvable_and_a_node_limit_is_kept():
+    domain = get_domain("obstacle2d")
+    task = domain.task(0)
+    problem = Problem.of(domain, task.initial_state)
+    space = problem.model.space
+    start = space.abstract(task.initial_state)
+    both = space.mask([space.atom("Holding", ["robot", b]) for b in ("block1", "block2")])
+    with pytest.raises(UnsolvableError, match="none of the"):
+        build_abstract_graph(start, both, problem.operators)
+    with pytest.raises(PlanningLimitError, match="more than 3 abstract states"):
+        build_abstract_graph(start, space.mask(task.goal), problem.operators, max_nodes=3)
+
+
+def test_a_goal_that_already_holds_needs_no_plan():
+    domain = get_domain("obstacle2d")
+    task = domain.task(0)
+    space = domain.atom_space(task.initial_state)
+    goal = space.mask([space.atom("GripperEmpty", ["robot"])])
+    for name in ("lazy", "exhaustive", "ff"):
+        result = make_planner(name, domain, task.initial_state).plan(task.initial_state, goal)
+        assert result.plan.edges == ()
