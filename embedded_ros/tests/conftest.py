@@ -7,10 +7,12 @@ from __future__ import annotations
 import itertools
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -18,12 +20,11 @@ import rclpy
 from rclpy.node import Node
 
 PEERS = Path(__file__).parent / "peers.py"
-TIMEOUT_S = 20.0  # a safety limit: everything here takes a fraction of a second
+# A safety limit: everything here takes a fraction of a second, but a loaded machine takes its time.
+TIMEOUT_S = 60.0
 
-# Domains that no other ensemble on this machine uses at the same time; each worker has its own.
-_WORKERS = 2
-_worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
-_domains = itertools.cycle(range(100 + _worker % _WORKERS, 149, _WORKERS))
+_DOMAINS = range(100, 149)
+_next_domains = itertools.cycle(_DOMAINS)
 
 
 class Process:
@@ -33,6 +34,8 @@ class Process:
         self._process = subprocess.Popen(
             [sys.executable, *arguments],
             env={**os.environ, **environment},
+            # Not inherited: under pytest that is /dev/null, and reading it ends at once.
+            stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -42,6 +45,12 @@ class Process:
     def send(self, number: signal.Signals) -> None:
         """Send a signal."""
         self._process.send_signal(number)
+
+    def tell(self, line: str) -> None:
+        """Write a line to its standard input."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(f"{line}\n")
+        self._process.stdin.flush()
 
     def wait_for_line(self, text: str) -> None:
         """Read its standard output up to a line with this text."""
@@ -63,10 +72,37 @@ class Process:
         self._process.communicate()
 
 
+@contextmanager
+def claimed_domain() -> Iterator[int]:
+    """A DDS domain that no other worker, and no other run of these tests, uses meanwhile."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as claim:
+        candidates = itertools.islice(_next_domains, len(_DOMAINS))
+        number = next((number for number in candidates if _claims(claim, number)), None)
+        assert number is not None, "every domain is in use"
+        yield number
+
+
+def _claims(claim: socket.socket, number: int) -> bool:
+    # An abstract address: gone with its process, and shared by whoever shares the loopback.
+    try:
+        claim.bind(f"\0embedded_ros.tests.domain.{number}")
+    except OSError:
+        return False
+    return True
+
+
 @pytest.fixture
-def domain() -> int:
+def domain() -> Iterator[int]:
     """A DDS domain of the test's own."""
-    return next(_domains)
+    with claimed_domain() as number:
+        yield number
+
+
+@pytest.fixture
+def other_domain() -> Iterator[int]:
+    """A second one."""
+    with claimed_domain() as number:
+        yield number
 
 
 @pytest.fixture

@@ -19,7 +19,9 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 
 LATCHED = QoSProfile(depth=3, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-REJECTED_ORDER, FAILING_ORDER, LONG_ORDER = 60, 13, 40
+REJECTED_ORDER, FAILING_ORDER = 60, 13
+HELD_ORDER = 40  # stops halfway until it is cancelled
+TOLD_ORDER = 6  # ends when there is a line on standard input
 
 
 class Echo(Node):
@@ -57,7 +59,9 @@ class Adder(Node):
 
 
 class Counter(Node):
-    """The usual Fibonacci action server, slow enough to be cancelled."""
+    """The usual Fibonacci action server."""
+
+    RESULT_TIMEOUT_S = 900
 
     def __init__(self) -> None:
         super().__init__("counter")
@@ -71,7 +75,7 @@ class Counter(Node):
                 GoalResponse.REJECT if goal.order == REJECTED_ORDER else GoalResponse.ACCEPT
             ),
             cancel_callback=lambda handle: CancelResponse.ACCEPT,
-            result_timeout=1,
+            result_timeout=self.RESULT_TIMEOUT_S,
         )
 
     def _execute(self, handle) -> Fibonacci.Result:
@@ -79,14 +83,24 @@ class Counter(Node):
             raise RuntimeError("this order fails")
         sequence = [0, 1]
         for index in range(1, handle.request.order):
+            while index == HELD_ORDER // 2 and not handle.is_cancel_requested:
+                time.sleep(0.01)
             if handle.is_cancel_requested:
                 handle.canceled()
                 return Fibonacci.Result(sequence=sequence)
             sequence.append(sequence[index] + sequence[index - 1])
             handle.publish_feedback(Fibonacci.Feedback(sequence=sequence))
             time.sleep(0.02)
+        if handle.request.order == TOLD_ORDER:
+            input()
         handle.succeed()
         return Fibonacci.Result(sequence=sequence)
+
+
+class Forgetful(Counter):
+    """One that keeps results for a moment only."""
+
+    RESULT_TIMEOUT_S = 1
 
 
 class Parametrized(Node):
@@ -101,7 +115,9 @@ class Parametrized(Node):
         print(f"{self.get_fully_qualified_name()} {values}", flush=True)
 
 
-NODES = {cls.__name__.lower(): cls for cls in (Echo, Latched, Adder, Counter, Parametrized)}
+NODES = {
+    cls.__name__.lower(): cls for cls in (Echo, Latched, Adder, Counter, Forgetful, Parametrized)
+}
 
 
 def main() -> None:

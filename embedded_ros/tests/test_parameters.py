@@ -36,7 +36,7 @@ from rclpy.exceptions import (
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from conftest import Process, complete, spin_until
+from conftest import TIMEOUT_S, Process, complete, spin_until
 
 Run = Callable[..., Process]
 
@@ -173,7 +173,7 @@ def test_the_six_services(node: Node, run: Run) -> None:
 
     def call(kind: type, name: str, request: object) -> object:
         client = node.create_client(kind, f"/parametrized/{name}")
-        assert client.wait_for_service(10)
+        assert client.wait_for_service(TIMEOUT_S)
         return complete(node, client.call_async(request))
 
     listed = call(ListParameters, "list_parameters", ListParameters.Request())

@@ -22,7 +22,8 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import String
 
-from conftest import Process
+from conftest import TIMEOUT_S, Process, wait_until
+from embedded_ros.transport.config import LEASE_DURATION_S
 
 Run = Callable[..., Process]
 
@@ -35,8 +36,8 @@ from rclpy.node import Node
 
 rclpy.init(args=sys.argv)
 node = Node("main")
-print("ready", flush=True)
 try:
+    print("ready", flush=True)
     {spin}
 except (KeyboardInterrupt, ExternalShutdownException) as error:
     print(type(error).__name__, rclpy.ok())
@@ -64,12 +65,10 @@ def test_signals_end_the_usual_main_cleanly(
 ) -> None:
     process = run(code=MAIN.format(spin=SPINS[spin]))
     process.wait_for_line("ready")
-    time.sleep(0.1)
-    began = time.monotonic()
+    time.sleep(0.1)  # into the wait; a signal before it must do as well
     process.send(number)
     code, out, err = process.finish()
     assert (code, out.strip(), err) == (0, f"{exception} False", "")
-    assert time.monotonic() - began < 5
 
 
 def test_sigterm_without_spin_is_seen_by_ok(run: Run) -> None:
@@ -87,7 +86,7 @@ def test_cycles_leave_nothing_behind(domain: int) -> None:
         received: list[String] = []
         node.create_subscription(String, "t", received.append, 10)
         node.create_publisher(String, "t", 10).publish(String(data="x"))
-        rclpy.spin_once(node, timeout_sec=5)
+        rclpy.spin_once(node, timeout_sec=TIMEOUT_S)
         assert received == [String(data="x")]
         node.destroy_node()
         rclpy.shutdown()
@@ -100,11 +99,15 @@ def test_cycles_leave_nothing_behind(domain: int) -> None:
             threading.active_count(),
         )
 
+    def nothing_left() -> bool:
+        return all(now <= then for now, then in zip(resources(), before, strict=True))
+
     cycle()
     before = resources()
     for _ in range(50):
         cycle()
-    assert resources() == before
+    # The kernel lists a thread for a moment after it was joined.
+    assert wait_until(nothing_left), (before, resources())
 
 
 def test_nodes_that_were_not_destroyed_do_not_outlive_shutdown(domain: int) -> None:
@@ -186,13 +189,13 @@ def test_a_stopped_reader_does_not_freeze_the_publisher(run: Run, domain: int) -
     rclpy.init(args=[], domain_id=domain)
     node = Node("n")
     publisher = node.create_publisher(String, "in", 10)
-    while publisher.get_subscription_count() == 0:
-        time.sleep(0.01)
+    assert wait_until(lambda: publisher.get_subscription_count() > 0)
     process.send(signal.SIGSTOP)
     began = time.monotonic()
     for _ in range(200):
         publisher.publish(String(data="x" * 10_000))
-    assert time.monotonic() - began < 5
+    # Some 10 ms of work; held up by the reader, it would go on when that one's lease ends.
+    assert time.monotonic() - began < LEASE_DURATION_S
     process.send(signal.SIGCONT)
     node.destroy_node()
     rclpy.shutdown()

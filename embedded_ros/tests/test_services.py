@@ -13,7 +13,7 @@ from example_interfaces.srv import AddTwoInts
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from conftest import Process, complete, spin_until
+from conftest import TIMEOUT_S, Process, complete, spin_until
 
 Run = Callable[..., Process]
 
@@ -21,7 +21,7 @@ Run = Callable[..., Process]
 def test_requests_are_answered(node: Node, run: Run) -> None:
     run("adder")
     client = node.create_client(AddTwoInts, "add")
-    assert client.wait_for_service(10)
+    assert client.wait_for_service(TIMEOUT_S)
     futures = [client.call_async(AddTwoInts.Request(a=i, b=1)) for i in range(10)]
     assert [complete(node, future).sum for future in futures] == list(range(1, 11))
 
@@ -29,8 +29,8 @@ def test_requests_are_answered(node: Node, run: Run) -> None:
 def test_two_clients_get_their_own_answers(node: Node, run: Run) -> None:
     run("adder")
     first, second = (node.create_client(AddTwoInts, "add") for _ in range(2))
-    assert first.wait_for_service(10)
-    assert second.wait_for_service(10)
+    assert first.wait_for_service(TIMEOUT_S)
+    assert second.wait_for_service(TIMEOUT_S)
     one = first.call_async(AddTwoInts.Request(a=1, b=1))
     two = second.call_async(AddTwoInts.Request(a=2, b=2))
     assert (complete(node, one).sum, complete(node, two).sum) == (2, 4)
@@ -39,7 +39,7 @@ def test_two_clients_get_their_own_answers(node: Node, run: Run) -> None:
 def test_blocking_calls_work_from_another_thread(node: Node, run: Run) -> None:
     run("adder")
     client = node.create_client(AddTwoInts, "add")
-    assert client.wait_for_service(10)
+    assert client.wait_for_service(TIMEOUT_S)
     answers: list[int] = []
     caller = threading.Thread(
         target=lambda: answers.append(client.call(AddTwoInts.Request(a=3, b=4)).sum)
@@ -60,7 +60,7 @@ def test_a_call_nobody_answers_times_out(node: Node) -> None:
 def test_a_removed_request_stays_pending(node: Node, run: Run) -> None:
     run("adder")
     client = node.create_client(AddTwoInts, "add")
-    assert client.wait_for_service(10)
+    assert client.wait_for_service(TIMEOUT_S)
     removed = client.call_async(AddTwoInts.Request(a=1, b=1))
     client.remove_pending_request(removed)
     complete(node, client.call_async(AddTwoInts.Request(a=1, b=2)))
@@ -73,19 +73,19 @@ def test_an_exception_in_a_service_ends_spin(node: Node) -> None:
 
     node.create_service(Trigger, "fail", fail)
     client = node.create_client(Trigger, "fail")
-    assert client.wait_for_service(5)
+    assert client.wait_for_service(TIMEOUT_S)
     client.call_async(Trigger.Request())
     with pytest.raises(KeyError, match="broken"):
-        spin_until(node, lambda: False, 5)
+        spin_until(node, lambda: False)
 
 
 def test_a_wrong_response_is_refused(node: Node) -> None:
     node.create_service(Trigger, "wrong", lambda request, response: True)
     client = node.create_client(Trigger, "wrong")
-    assert client.wait_for_service(5)
+    assert client.wait_for_service(TIMEOUT_S)
     client.call_async(Trigger.Request())
     with pytest.raises(TypeError, match="/wrong: expected std_srvs/srv/Trigger_Response, got bool"):
-        spin_until(node, lambda: False, 5)
+        spin_until(node, lambda: False)
     with pytest.raises(TypeError, match="expected std_srvs/srv/Trigger_Request"):
         client.call_async(Trigger.Response())
 
@@ -93,7 +93,7 @@ def test_a_wrong_response_is_refused(node: Node) -> None:
 def test_a_destroyed_server_is_not_ready_any_more(node: Node) -> None:
     service = node.create_service(Trigger, "short", lambda request, response: response)
     client = node.create_client(Trigger, "short")
-    assert client.wait_for_service(5)
+    assert client.wait_for_service(TIMEOUT_S)
     node.destroy_service(service)
     assert not client.service_is_ready()
 
@@ -102,7 +102,7 @@ def test_a_service_may_await_another(node: Node, run: Run) -> None:
     run("adder")
     group = rclpy.callback_groups.ReentrantCallbackGroup()
     inner = node.create_client(AddTwoInts, "add", callback_group=group)
-    assert inner.wait_for_service(10)
+    assert inner.wait_for_service(TIMEOUT_S)
 
     async def twice(
         request: AddTwoInts.Request, response: AddTwoInts.Response
@@ -114,5 +114,5 @@ def test_a_service_may_await_another(node: Node, run: Run) -> None:
 
     node.create_service(AddTwoInts, "twice", twice, callback_group=group)
     outer = node.create_client(AddTwoInts, "twice")
-    assert outer.wait_for_service(5)
+    assert outer.wait_for_service(TIMEOUT_S)
     assert complete(node, outer.call_async(AddTwoInts.Request(a=1, b=2))).sum == 6

@@ -15,6 +15,7 @@ import psutil
 import pytest
 from cyclonedds.builtin import (
     BuiltinDataReader,
+    BuiltinTopicDcpsParticipant,
     BuiltinTopicDcpsPublication,
     BuiltinTopicDcpsSubscription,
 )
@@ -103,16 +104,34 @@ def participant(domain: int) -> Iterator[DomainParticipant]:
     configured.__del__()
 
 
-def read_first(reader: DataReader) -> Any:
+def first_answer(writer: DataWriter, question: Any, reader: DataReader) -> Any:
+    """What is received after a question, which may be answered several times."""
+    assert wait_until(lambda: bool(writer.get_matched_subscriptions()))
+    assert wait_until(lambda: bool(reader.get_matched_publications()))
     taken: list[Any] = []
-    assert wait_until(lambda: bool(taken.extend(reader.take(1)) or taken)), "nothing received"
+
+    def answered() -> bool:
+        # Asked again, as the other side may not have discovered our reader yet.
+        writer.write(question)
+        time.sleep(0.05)
+        taken.extend(reader.take(10))
+        return bool(taken)
+
+    assert wait_until(answered), "nothing received"
     return taken[0]
 
 
-def endpoints(participant: DomainParticipant, topic: Any) -> list[Any]:
-    reader = BuiltinDataReader(participant, topic)
-    time.sleep(0.1)
-    return [s for s in reader.read(1000) if s.topic_name]
+def endpoint_on(participant: DomainParticipant, kind: Any, topic: str) -> Any:
+    """The other process's only endpoint on a topic, as soon as it is discovered."""
+    reader = BuiltinDataReader(participant, kind)
+    found: list[Any] = []
+
+    def discovered() -> bool:
+        found.extend(sample for sample in reader.take(1000) if sample.topic_name == topic)
+        return bool(found)
+
+    assert wait_until(discovered), topic
+    return found[0]
 
 
 def user_data(endpoint: Any) -> dict[str, str]:
@@ -127,11 +146,10 @@ def test_strings_cross_in_both_directions(
     reader = DataReader(participant, Topic(participant, "rt/out", String_), RELIABLE)
     writer = DataWriter(participant, Topic(participant, "rt/in", String_), RELIABLE)
     process.wait_for_line("ready")
-    assert wait_until(lambda: bool(writer.get_matched_subscriptions()))
-    assert wait_until(lambda: bool(reader.get_matched_publications()))
+    assert first_answer(writer, String_("probe"), reader) == String_("probe")
     for text in ("", "a", "grüße", "x" * 5000):
         writer.write(String_(text))
-        assert read_first(reader) == String_(text)
+        assert wait_until(lambda text=text: String_(text) in reader.take(10)), text[:10]
 
 
 def test_a_service_answers_with_the_request_header(
@@ -145,10 +163,9 @@ def test_a_service_answers_with_the_request_header(
         participant, Topic(participant, "rq/addRequest", AddTwoInts_Request_), RELIABLE
     )
     process.wait_for_line("ready")
-    assert wait_until(lambda: bool(requests.get_matched_subscriptions()))
-    assert wait_until(lambda: bool(replies.get_matched_publications()))
-    requests.write(AddTwoInts_Request_(guid_=2**63 + 7, seq_=41, a_=-5, b_=7))
-    assert read_first(replies) == AddTwoInts_Response_(guid_=2**63 + 7, seq_=41, sum_=2)
+    request = AddTwoInts_Request_(guid_=2**63 + 7, seq_=41, a_=-5, b_=7)
+    response = AddTwoInts_Response_(guid_=2**63 + 7, seq_=41, sum_=2)
+    assert first_answer(requests, request, replies) == response
 
 
 def test_nodes_and_their_endpoints_are_announced(
@@ -158,19 +175,18 @@ def test_nodes_and_their_endpoints_are_announced(
     reader = DataReader(
         participant, Topic(participant, "ros_discovery_info", ParticipantEntitiesInfo_), LATCHED
     )
+    out = endpoint_on(participant, BuiltinTopicDcpsPublication, "rt/slap/out")
     nodes: list[Any] = []
 
     def announced() -> bool:
         for info in reader.take(10):
             nodes[:] = info.node_entities_info_seq_
-        return any(len(node.writer_gid_seq_) > 2 for node in nodes)
+        writers = [list(gid.data_) for node in nodes for gid in node.writer_gid_seq_]
+        return list(out.key.bytes) in writers
 
     assert wait_until(announced)
     assert [(n.node_namespace_, n.node_name_) for n in nodes] == [("/slap", "echo")]
-    writers = endpoints(participant, BuiltinTopicDcpsPublication)
-    out = next(w for w in writers if w.topic_name == "rt/slap/out")
     assert out.type_name == "std_msgs::msg::dds_::String_"
-    assert list(out.key.bytes) in [list(gid.data_) for gid in nodes[0].writer_gid_seq_]
     assert user_data(out) == {"typehash": STRING_HASH}
 
 
@@ -178,19 +194,27 @@ def test_both_ends_of_a_service_are_tied_together(
     participant: DomainParticipant, run: Callable[..., Process]
 ) -> None:
     run("adder").wait_for_line("ready")
-    assert wait_until(
-        lambda: any(
-            w.topic_name == "rr/addReply"
-            for w in endpoints(participant, BuiltinTopicDcpsPublication)
-        )
-    )
-    writers = endpoints(participant, BuiltinTopicDcpsPublication)
-    readers = endpoints(participant, BuiltinTopicDcpsSubscription)
-    reply = user_data(next(w for w in writers if w.topic_name == "rr/addReply"))
-    request = user_data(next(r for r in readers if r.topic_name == "rq/addRequest"))
+    reply = user_data(endpoint_on(participant, BuiltinTopicDcpsPublication, "rr/addReply"))
+    request = user_data(endpoint_on(participant, BuiltinTopicDcpsSubscription, "rq/addRequest"))
     assert reply["serviceid"] == request["serviceid"]
     assert len(reply["serviceid"].split(".")) == 16
     assert reply["typehash"] != request["typehash"]
+
+
+def test_a_lease_of_four_seconds_is_announced(
+    participant: DomainParticipant, run: Callable[..., Process]
+) -> None:
+    """After which a killed process is taken for gone."""
+    run("echo")
+    reader = BuiltinDataReader(participant, BuiltinTopicDcpsParticipant)
+    others: list[Any] = []
+
+    def discovered() -> bool:
+        others.extend(found for found in reader.take(10) if found.key != participant.guid)
+        return bool(others)
+
+    assert wait_until(discovered)
+    assert others[0].qos[Policy.Liveliness] == Policy.Liveliness.Automatic(4 * 10**9)
 
 
 def test_no_multicast_by_default(domain: int, run: Callable[..., Process]) -> None:

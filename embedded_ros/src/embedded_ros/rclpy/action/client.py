@@ -137,6 +137,9 @@ class ActionClient(Generic[ActT]):
         self._lock = threading.Lock()
         self._destroyed = False
         self._feedback_callbacks: dict[bytes, Callable[[Any], Any]] = {}
+        # The state last heard of each goal whose answer is awaited: it may overtake the answer,
+        # and be the last for long.
+        self._early_states: dict[bytes, int] = {}
         self._goals: weakref.WeakValueDictionary[bytes, ClientGoalHandle] = (
             weakref.WeakValueDictionary()
         )
@@ -215,9 +218,9 @@ class ActionClient(Generic[ActT]):
             raise TypeError(f"expected {self.action_type.Goal.ros_type}, got {type(goal).__name__}")
         goal_id = goal_uuid if goal_uuid is not None else _random_uuid()
         key = goal_id.uuid.tobytes()
-        if feedback_callback is not None:
-            # Before sending: feedback may come before the answer.
-            with self._lock:
+        with self._lock:  # before sending: feedback and states may come before the answer
+            self._early_states[key] = GoalState.UNKNOWN
+            if feedback_callback is not None:
                 self._feedback_callbacks[key] = feedback_callback
         request: Any = self.action_type.Impl.SendGoalService.Request()
         request.goal_id, request.goal = goal_id, goal
@@ -225,7 +228,7 @@ class ActionClient(Generic[ActT]):
         try:
             answer = self._goal_client.call_async(request)
         except Exception:
-            self._end_feedback(key)
+            self._forget(key)
             raise
         answer.add_done_callback(lambda future: self._on_answer(future, goal_id, accepted))
         return accepted
@@ -301,19 +304,28 @@ class ActionClient(Generic[ActT]):
         if executor is not None:
             accepted._set_executor(executor)
         if answer.cancelled():
+            self._forget(goal_id.uuid.tobytes())
             accepted.cancel()
             return
         error = answer.exception()
         if error is not None:
+            self._forget(goal_id.uuid.tobytes())
             accepted.set_exception(error)
             return
         handle = ClientGoalHandle(self, goal_id, answer.result())
         if handle.accepted:
-            with self._lock:
-                self._goals[handle.key] = handle
+            self._track(handle)
         else:
-            self._end_feedback(handle.key)
+            self._forget(handle.key)
         accepted.set_result(handle)
+
+    def _track(self, goal: ClientGoalHandle) -> None:
+        """Have an accepted goal follow its states, from the one that came before the answer."""
+        with self._lock:
+            state = self._early_states.pop(goal.key, GoalState.UNKNOWN)
+            if state != GoalState.UNKNOWN:
+                goal.set_status(state)
+            self._goals[goal.key] = goal
 
     def _on_feedback(self, message: Any) -> Any:
         with self._lock:
@@ -325,10 +337,17 @@ class ActionClient(Generic[ActT]):
             key = status.goal_info.goal_id.uuid.tobytes()
             with self._lock:
                 goal = self._goals.get(key)
+                if key in self._early_states:
+                    self._early_states[key] = status.status
             if goal is not None:
                 goal.set_status(status.status)
             if not GoalState(status.status).is_active:
                 self._end_feedback(key)
+
+    def _forget(self, key: bytes) -> None:
+        with self._lock:
+            self._early_states.pop(key, None)
+        self._end_feedback(key)
 
     def _end_feedback(self, key: bytes) -> None:
         with self._lock:
