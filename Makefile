@@ -3,6 +3,7 @@
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
+TORCH := torch==2.13.0  # pinned: another version trains other policies from the same seed
 METADATA := pyproject.toml setup.py setup.cfg embedded_ros/pyproject.toml
 
 .PHONY: help install demo test lint format clean
@@ -21,7 +22,7 @@ $(VENV)/.installed: $(METADATA)
 	@touch $@
 
 $(VENV)/.tested: $(VENV)/.installed
-	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[test]'
+	$(BIN)/pip install --quiet --disable-pip-version-check '$(strip $(TORCH))' -e '.[test]'
 	@touch $@
 
 demo: install  ## Run the whole ensemble, record bags, replay them, measure

@@ -30,6 +30,7 @@ RUNTIME = [
     "pyyaml>=6",
     "psutil>=5.9",
     "lz4>=4",
+    "safetensors>=0.4",
     "backports.zstd>=1; python_version < '3.14'",
 ]
 PHYSICS = [
@@ -37,8 +38,10 @@ PHYSICS = [
     "pybullet>=3.2.6; python_version < '3.12'",
     "pybullet-arm64>=3.2.6; python_version >= '3.12'",
     "pillow>=10",
+    "opencv-python-headless>=4.9",  # MP4; its FFmpeg is LGPL
 ]
-TRAIN = ["torch>=2.4", "stable-baselines3>=2.3"]
+TRAIN = ["torch>=2.4", "stable-baselines3>=2.3", "tensorboard>=2.15"]
+RAY = ["ray>=2.40"]
 TEST = [
     "pytest>=8",
     "pytest-timeout>=2.3",
@@ -46,6 +49,7 @@ TEST = [
     "hypothesis>=6.100",
     "mcap>=1.2",
     "setuptools>=68,<80",  # for colcon, as in pyproject.toml; what follows would raise it
+    *TRAIN,
     "unified-planning>=1.1",
     "up-aries>=0.4",
     "colcon-common-extensions>=0.3",
@@ -63,9 +67,15 @@ def version() -> str:
     return re.search(r'__version__ = "(.+)"', text)[1]
 
 
-def files(folder: str) -> list[str]:
+def files(folder: str | Path) -> list[str]:
     """The files of a folder, for installation as data."""
     return sorted(str(path) for path in Path(folder).iterdir() if path.is_file())
+
+
+def trees(folder: str) -> list[tuple[str, list[str]]]:
+    """Every folder below one, which need not exist, with its files, for installation as data."""
+    folders = [path for path in (Path(folder), *sorted(Path(folder).rglob("*"))) if path.is_dir()]
+    return [(f"share/{NAME}/{path}", files(path)) for path in folders if files(path)]
 
 
 setup(
@@ -94,9 +104,10 @@ setup(
         (f"share/{NAME}", ["package.xml"]),
         (f"share/{NAME}/launch", files("launch")),
         (f"share/{NAME}/config", files("config")),
+        *trees("models"),
     ],
     install_requires=RUNTIME,
-    extras_require={"physics": PHYSICS, "train": TRAIN, "test": TEST},
+    extras_require={"physics": PHYSICS, "train": TRAIN, "ray": RAY, "test": TEST},
     entry_points={
         "console_scripts": [
             "slap = slap_ros.cli:main",

@@ -38,7 +38,7 @@ from slap_ros.physics.panda import (
     jacobian,
 )
 from slap_ros.physics.pose import Pose, Vector, conjugate, multiply
-from slap_ros.physics.scene import CUBE_EDGE, CUBE_MASS, FRICTION, TABLE, TABLE_TOP, Scene, cube
+from slap_ros.physics.scene import CUBE_EDGE, CUBE_MATERIAL, FRICTION, TABLE, TABLE_TOP, Scene, cube
 from slap_ros.physics.simulation import PANDA, Drive, Simulation, Stepping
 from slap_ros.physics.snapshot import Motion
 from slap_ros.physics.world import ACTION_SPACE, STEPPING, PandaWorld
@@ -228,7 +228,9 @@ class Plain:
             self._add(0.0, body.half_extents_m, body.pose.position)
         self._cubes = [
             self._add(
-                CUBE_MASS, (CUBE_EDGE / 2,) * 3, self._start[self._start.layout.object(n)][:3]
+                CUBE_MATERIAL.mass_kg,
+                (CUBE_EDGE / 2,) * 3,
+                self._start[self._start.layout.object(n)][:3],
             )
             for n in NAMES
         ]

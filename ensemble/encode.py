@@ -17,6 +17,7 @@ from slap_ros.planning.options import OptionKind
 from slap_ros.planning.plan import Plan, PlanEdge
 from slap_ros.relational import AtomSpace, GroundAtom, LiftedOperator, State
 from slap_ros.relational.pddl import write_domain
+from slap_ros.shortcuts.shortcut import Sampling, Shortcut
 from slap_ros.versions import versions
 
 FRAME = "world"
@@ -143,4 +144,15 @@ def skill_info(operator: LiftedOperator, skill: Skill) -> msgs.SkillInfo:
         name=operator.name,
         parameters=[variable.type.name for variable in operator.parameters],
         step_limit=skill.step_limit,
+    )
+
+
+def shortcut_info(shortcut: Shortcut, sampling: Sampling) -> msgs.SkillInfo:
+    """A learned option, with the types of its roles."""
+    return msgs.SkillInfo(
+        kind=OptionKind.SHORTCUT.value,
+        name=shortcut.name,
+        parameters=[kind.partition("(")[0] for kind in shortcut.signature.roles],
+        step_limit=sampling.horizon,
+        training=key_values(shortcut.record),
     )

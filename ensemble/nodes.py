@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from slap_ros.shortcuts.shortcut import DEFAULT
+
 # A node's name is that of its package as well.
 CLASSES = {
     "sim_node": "SimNode",
@@ -29,10 +31,15 @@ class RunSettings:
     planner: str
     record: Path | None  # the bag's folder; None: no recorder
     pace: float = 0.0  # environment steps a second; 0: as fast as commands come
+    shortcuts: str = ""  # a library's folder, or none; empty: the shipped one
+    samples: int = DEFAULT.samples  # attempts of a shortcut in the model
 
 
 def node_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int | float]]:
     """The ROS parameters of every node of the ensemble, by node name."""
+    learned: dict[str, str | int | float] = {"samples": settings.samples}
+    if settings.shortcuts:
+        learned["shortcuts"] = settings.shortcuts
     nodes: dict[str, Mapping[str, str | int | float]] = {
         "sim_node": {
             "domain": settings.domain,
@@ -42,8 +49,8 @@ def node_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int |
             "pace": settings.pace,
         },
         "perception_node": {},
-        "skill_server": {},
-        "planner_node": {"planner": settings.planner},
+        "skill_server": learned,
+        "planner_node": {"planner": settings.planner, **learned},
     }
     if settings.record is not None:
         nodes["recorder_node"] = {"bag": str(settings.record)}

@@ -99,14 +99,20 @@ class EpisodeWatcher:
 class Observer:
     """Pairs states with their atoms and hands on each pair that is newer than the last."""
 
-    def __init__(self, node: Node, on_observation: Callable[[Observation], None]) -> None:
-        """``on_observation`` is called for each observation."""
+    def __init__(
+        self,
+        node: Node,
+        on_observation: Callable[[Observation], None],
+        on_episode: Callable[[Episode], None] = lambda _: None,
+    ) -> None:
+        """``on_episode`` is called for each new episode, before its first observation."""
         self.latest: Observation | None = None
         self._node = node
         self._on_observation = on_observation
+        self._on_episode = on_episode
         self._state: ObjectCentricState | None = None
         self._atoms: AbstractState | None = None
-        self._watcher = EpisodeWatcher(node, lambda _: self._pair())
+        self._watcher = EpisodeWatcher(node, self._open)
         subscribe(node, STATE, self._on_state)
         subscribe(node, ATOMS, self._on_atoms)
 
@@ -127,6 +133,10 @@ class Observer:
 
         await until(self._node, lambda: seen() or seconds(self._node) > deadline)
         return self.latest
+
+    def _open(self, episode: Episode) -> None:
+        self._on_episode(episode)
+        self._pair()
 
     def _on_state(self, message: ObjectCentricState) -> None:
         self._state = message

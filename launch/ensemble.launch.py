@@ -22,6 +22,8 @@ ARGUMENTS = {
     "seed": ("0", "samples the task"),
     "index": ("0", "which of the seed's tasks"),
     "planner": ("lazy", "lazy, exhaustive or ff"),
+    "shortcuts": ("", "folder of a shortcut library, or none; empty: the shipped one"),
+    "samples": ("16", "attempts of a shortcut in the model; the shortest is used"),
     "pace": ("0.0", "environment steps a second, for watching; 0: at full speed"),
     "record": ("", "folder of the bag to record; empty: none"),
     "namespace": ("", "of every node: /robot1 gives /robot1/slap/state"),
@@ -49,6 +51,7 @@ def generate_launch_description() -> LaunchDescription:
     task = {"domain": value("domain", str), "preset": value("preset", str)}
     task |= {"seed": value("seed", int), "index": value("index", int)}
     task |= {"pace": value("pace", float)}
+    learned = {"shortcuts": value("shortcuts", str), "samples": value("samples", int)}
     return LaunchDescription(
         [
             *(
@@ -57,8 +60,8 @@ def generate_launch_description() -> LaunchDescription:
             ),
             node("sim_node", task),
             node("perception_node", {}),
-            node("skill_server", {}),
-            node("planner_node", {"planner": value("planner", str)}),
+            node("skill_server", learned),
+            node("planner_node", {"planner": value("planner", str)} | learned),
             node(
                 "recorder_node",
                 {"bag": value("record", str)},

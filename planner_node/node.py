@@ -4,6 +4,8 @@
 
 ROS Parameters:
     planner (string, "lazy"): lazy, exhaustive or ff; see ``slap_ros.planning.planner``.
+    shortcuts (string, ""): folder of a shortcut library, or none; empty: the shipped one.
+    samples (int, 16): attempts of a shortcut in the model; the shortest is used.
     observation_timeout (double, 10.0): seconds to wait for a perceived state.
     server_timeout (double, 5.0): seconds without a skill server after which a run fails.
 
@@ -39,6 +41,7 @@ from ensemble.interfaces import EXECUTE_SKILL, SOLVE_TASK
 from ensemble.observation import Observation, Observer
 from ensemble.parameters import parameter, read_parameters
 from ensemble.running import run_node
+from ensemble.shortcuts import Repertoires, ShortcutParameters
 from ensemble.waiting import run_in, seconds
 from planner_node.reporting import Reporter
 from planner_node.solving import Solving
@@ -54,7 +57,7 @@ from slap_ros.planning.planner import PLANNERS, make_planner
 
 
 @dataclass(frozen=True)
-class Parameters:
+class Parameters(ShortcutParameters):
     """See the module's docstring."""
 
     planner: str = parameter("lazy", "lazy, exhaustive or ff")
@@ -73,10 +76,11 @@ class PlannerNode(Node):
                 f"parameter planner must be one of {', '.join(PLANNERS)}, "
                 f"not {self._settings.planner!r}"
             )
+        self._repertoires = Repertoires(self, self._settings, self._settings.planner)
         self._busy = False
         self._counts = Counter(tried=0, solved=0)
         self._workers = ThreadPoolExecutor(1, thread_name_prefix="planning")
-        self._observer = Observer(self, lambda _: None)
+        self._observer = Observer(self, lambda _: None, self._repertoires.open)
         self._reporter = Reporter(self)
         self._skills = ActionClient(self, EXECUTE_SKILL.type, EXECUTE_SKILL.name)
         self._actions = ActionServer(
@@ -126,7 +130,12 @@ class PlannerNode(Node):
         atoms = decode_goal(goal.request.goal, episode.space) or episode.task.goal
         planner = await run_in(
             self._workers,
-            lambda: make_planner(self._settings.planner, episode.domain, start.state),
+            lambda: make_planner(
+                self._settings.planner,
+                episode.domain,
+                start.state,
+                self._repertoires.of(episode),
+            ),
         )
         return Solving(
             self,

@@ -3,6 +3,8 @@
 """Runs options and shortcuts: one command for each perceived state.
 
 ROS Parameters:
+    shortcuts (string, ""): folder of a shortcut library, or none; empty: the shipped one.
+    samples (int, 16): attempts of a shortcut in the model; the shortest is used.
     state_timeout (double, 2.0): seconds without a new state after which a skill is given up.
 
 Publishers:
@@ -14,7 +16,7 @@ Subscribers:
     slap/domain, slap/task, slap/state, slap/atoms: see ``ensemble.observation``.
 
 Services:
-    slap/list_skills (slap_msgs/ListSkills): the current domain's skills.
+    slap/list_skills (slap_msgs/ListSkills): the current domain's options and learned shortcuts.
 
 Action servers:
     slap/execute_skill (slap_msgs/ExecuteSkill): run a skill. Cancelling makes the robot hold.
@@ -41,6 +43,7 @@ from ensemble.interfaces import COMMAND, EXECUTE_SKILL, LIST_SKILLS, SKILL_EVENT
 from ensemble.observation import Observation, Observer
 from ensemble.parameters import parameter, read_parameters
 from ensemble.running import run_node
+from ensemble.shortcuts import Repertoires, ShortcutParameters
 from ensemble.waiting import run_in, seconds
 from skill_server.skill_run import SkillRun, requested_option, result
 from slap_ros.domains.domain import Action
@@ -51,7 +54,7 @@ WATCH_PERIOD = 0.1  # s
 
 
 @dataclass(frozen=True)
-class Parameters:
+class Parameters(ShortcutParameters):
     """See the module's docstring."""
 
     state_timeout: float = parameter(2.0, "s without a new state after which a skill is given up")
@@ -63,11 +66,12 @@ class SkillServer(Node):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("skill_server", **kwargs)
         self._settings = read_parameters(self, Parameters)
+        self._repertoires = Repertoires(self, self._settings)
         self._run: SkillRun | None = None
         self._busy = False  # from the acceptance of a goal to its end
         self._counts: Counter[int] = Counter()  # of SkillEvent kinds
         self._workers = ThreadPoolExecutor(1, thread_name_prefix="skill_start")
-        self._observer = Observer(self, self._on_observation)
+        self._observer = Observer(self, self._on_observation, self._repertoires.open)
         self._commands = self.create_publisher(COMMAND.type, COMMAND.name, COMMAND.qos)
         self._events = self.create_publisher(SKILL_EVENTS.type, SKILL_EVENTS.name, SKILL_EVENTS.qos)
         self.create_service(LIST_SKILLS.type, LIST_SKILLS.name, self._on_list)
@@ -101,9 +105,16 @@ class SkillServer(Node):
             response.error_code = int(ErrorCode.NO_STATE)
             response.error_msg = "no domain yet: is sim_node running?"
             return response
+        domain = episode.domain
         response.skills = [
-            encode.skill_info(operator, episode.domain.skills[operator.name])
-            for operator in episode.domain.operators
+            *(
+                encode.skill_info(operator, domain.skills[operator.name])
+                for operator in domain.operators
+            ),
+            *(
+                encode.shortcut_info(shortcut, self._repertoires.sampling)
+                for shortcut in self._repertoires.shortcuts(domain)
+            ),
         ]
         return response
 
@@ -127,14 +138,14 @@ class SkillServer(Node):
 
     async def _begin(self, goal: ServerGoalHandle) -> SkillRun:
         start = await self._observe(goal.request.episode)
-        option, target = requested_option(goal.request, start)
-        actions = start.episode.domain.action_space
-        # Starting a skill may take a while (motion planning), so not here.
-        execution = await run_in(
-            self._workers, lambda: OptionExecution(option, target, actions, start.state)
-        )
-        budget = goal.request.step_budget or option.skill.step_limit
+        # Starting a skill may take a while (motion planning, rehearsal), so not here.
+        execution = await run_in(self._workers, lambda: self._start(goal.request, start))
+        budget = goal.request.step_budget or execution.option.skill.step_limit
         return SkillRun(goal, execution, start, budget, heard_s=seconds(self))
+
+    def _start(self, request: ExecuteSkill.Goal, start: Observation) -> OptionExecution:
+        option, target = requested_option(request, start, self._repertoires)
+        return OptionExecution(option, target, start.episode.domain.action_space, start.state)
 
     async def _observe(self, episode: int) -> Observation:
         """The newest observation; whoever asks for a skill may have seen the episode before us."""

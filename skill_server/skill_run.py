@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from rclpy.action.server import ServerGoalHandle
@@ -11,9 +12,11 @@ from rclpy.task import Future
 from slap_msgs.action import ExecuteSkill
 
 from ensemble.observation import Observation
+from ensemble.shortcuts import Repertoires
 from slap_ros.errors import EpisodeChangedError, ErrorCode, UnknownSkillError
 from slap_ros.messages.decode import decode_atoms
 from slap_ros.planning.options import Option, OptionExecution, OptionKind, Stopped, given_option
+from slap_ros.relational import Object
 
 
 @dataclass
@@ -41,12 +44,14 @@ class SkillRun:
         self.ended.set_result(Stopped(code, f"{self.execution.option}: {reason}"))
 
 
-def requested_option(request: ExecuteSkill.Goal, start: Observation) -> tuple[Option, int]:
+def requested_option(
+    request: ExecuteSkill.Goal, start: Observation, repertoires: Repertoires
+) -> tuple[Option, int]:
     """The option that a goal asks for and the abstract state in which it shall end.
 
     Raises:
         EpisodeChangedError: The goal is for another episode.
-        UnknownSkillError: There is no such option.
+        UnknownSkillError: There is no such option, or it does not lead there from here.
         UnknownObjectError: The task has no such object.
     """
     episode, edge = start.episode, request.edge
@@ -54,11 +59,39 @@ def requested_option(request: ExecuteSkill.Goal, start: Observation) -> tuple[Op
         raise EpisodeChangedError(
             f"goal for episode {request.episode}, but episode {episode.number} is under way"
         )
-    if edge.kind != OptionKind.OPERATOR.value:
-        raise UnknownSkillError(f"unknown shortcut {edge.name!r}: no shortcut library is loaded")
     objects = [episode.space.layout.object(name) for name in edge.objects]
     target = decode_atoms(edge.expected_atoms, episode.space)
+    if edge.kind == OptionKind.SHORTCUT.value:
+        return _shortcut(edge.name, objects, start, target, repertoires), target
     return given_option(episode.domain, edge.name, objects), target
+
+
+def _shortcut(
+    name: str,
+    objects: Sequence[Object],
+    start: Observation,
+    target: int,
+    repertoires: Repertoires,
+) -> Option:
+    """A shortcut from where the robot is."""
+    episode = start.episode
+    known = [shortcut.name for shortcut in repertoires.shortcuts(episode.domain)]
+    repertoire = repertoires.of(episode)
+    if repertoire is None or name not in known:
+        loaded = f"there are {', '.join(known)}" if known else "no shortcut library is loaded"
+        raise UnknownSkillError(f"unknown shortcut {name!r}: {loaded}")
+    option = repertoire.option(name, start.abstract, target)
+    if option is None:
+        raise UnknownSkillError(
+            f"{name} does not lead from here to the expected atoms: what they change is not what "
+            "it was learned for"
+        )
+    if tuple(objects) != option.objects:
+        about, got = (", ".join(map(str, names)) for names in (option.objects, objects))
+        raise UnknownSkillError(
+            f"{name} from here to the expected atoms is about ({about}), not ({got})"
+        )
+    return option
 
 
 def result(stopped: Stopped, steps: int) -> ExecuteSkill.Result:

@@ -34,6 +34,7 @@ def checkout(tmp_path):
         "colcon_defaults.yaml",
     ):
         shutil.copy(ROOT / name, tmp_path / name)
+    shutil.copytree(ROOT / "test/shortcuts/data/obstacle2d", tmp_path / "models" / "obstacle2d")
     return tmp_path
 
 
@@ -58,6 +59,9 @@ def test_colcon_builds_executables_where_ros2_run_looks_for_them(checkout, optio
     installed = checkout / "install" / "slap_ros"
     assert (installed / "share/ament_index/resource_index/packages/slap_ros").exists()
     assert (installed / "share/slap_ros/launch/ensemble.launch.py").exists()
+    models = installed / "share/slap_ros/models/obstacle2d"
+    assert {path.name for path in models.iterdir()} == {"library.json", "Clear_On-7dacdec6"}
+    assert len(list((models / "Clear_On-7dacdec6").iterdir())) == 2
     for name in (*NODES, "slap"):
         assert (installed / "lib/slap_ros" / name).exists()
     (packages,) = installed.glob("lib/python3.*/site-packages")

@@ -78,17 +78,19 @@ def _table(run: RunMetrics) -> Table:
     outcome = "solved" if run.success else f"not solved: {run.error_msg}"
     table = Table(
         "option",
+        "kind",
         "steps",
         "outcome",
         title=(
             f"{run.domain}, preset {run.preset}, seed {run.seed}: {outcome}\n"
-            f"{run.plan_length} steps, {run.planning_seconds:.3f} s planning, "
+            f"{run.plan_length} steps, {run.shortcut_steps} of them in shortcuts, "
+            f"{run.planning_seconds:.3f} s planning, "
             f"{run.replans} replans, {run.edges_rolled_out} edges rolled out"
         ),
     )
     for option in run.options:
         name = f"{option.name}({', '.join(option.objects)})"
-        table.add_row(name, str(option.steps), option.outcome)
+        table.add_row(name, option.kind, str(option.steps), option.outcome)
     return table
 
 
@@ -96,7 +98,7 @@ def _table(run: RunMetrics) -> Table:
 @exits
 def render(
     bag: BagPath,
-    output: Annotated[Path, typer.Option(help="The GIF to write.")],
+    output: Annotated[Path, typer.Option(help="The .gif or .mp4 to write.")],
 ) -> int:
     """Write an animation of the recorded states."""
     found = read_bag(bag)

@@ -4,63 +4,83 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated
 
 import typer
 from rich.table import Table
 
 from slap_ros.cli.console import Json, Planner, Preset, console, print_json, progress
+from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose, sampling
 from slap_ros.domains import get_domain
-from slap_ros.errors import ErrorCode, InvalidLibraryError
-from slap_ros.evaluation.experiment import Experiment, Spread, Summary
-from slap_ros.planning.execution import Episode
-
-NO_SHORTCUTS = "none"
+from slap_ros.errors import ErrorCode
+from slap_ros.evaluation.approaches import Approach, approaches
+from slap_ros.evaluation.experiment import Experiment, Trial, run_all
+from slap_ros.evaluation.summary import Spread, Summary
+from slap_ros.planning.planner import make_planner
 
 
 def evaluate(
     domain: Annotated[str, typer.Argument(help="One of `slap domains`.")],
     tasks: Annotated[int, typer.Option(min=1, help="Tasks a seed.")] = 10,
     seeds: Annotated[int, typer.Option(min=1, help="How many seeds.")] = 5,
-    first_seed: Annotated[int, typer.Option(min=0, help="The first seed.")] = 0,
+    first_seed: Annotated[
+        int,
+        typer.Option(
+            min=0,
+            help="Test seeds are those from 0 on; training draws its tasks from seed 1000000 on.",
+        ),
+    ] = 0,
     preset: Preset = "fair",
-    shortcuts: Annotated[
-        str | None,
-        typer.Option(help="A shortcut library, or none. Default: the shipped one, if there is."),
-    ] = None,
+    shortcuts: Shortcuts = None,
+    samples: Samples = SAMPLES,
     planner: Planner = "lazy",
+    jobs: Annotated[int, typer.Option(min=1, help="Processes; the results are the same.")] = 1,
     json: Json = False,
 ) -> int:
     """Plan and execute many tasks in the world and sum up: success, plan length, planning time.
 
-    Spreads are mean ± sample standard deviation over all tasks.
+    With a shortcut library: pure planning, SLAP as the paper evaluates it (one sample) and SLAP
+    with --samples, on the same tasks. Spreads are mean ± sample standard deviation over all tasks.
     """
-    if shortcuts not in (None, NO_SHORTCUTS):
-        raise InvalidLibraryError(
-            f"{shortcuts}: this version of slap_ros has no shortcut libraries; use --shortcuts none"
-        )
-    experiment = Experiment(get_domain(domain, preset), tasks, seeds, first_seed, planner)
-    summary = Summary.of_pure_planning(experiment, _run(experiment))
+    chosen = get_domain(domain, preset)
+    library = choose(shortcuts, chosen, planner)
+    make_planner(planner, chosen, chosen.task(first_seed).initial_state)
+    experiment = Experiment(chosen, tasks, seeds, first_seed, planner)
+    summaries = _run(experiment, approaches(library, sampling(samples)), jobs)
     if json:
-        print_json(summary.as_json())
+        rows = [summary.as_row() for summary in summaries]
+        print_json(summaries[-1].as_json() | {"approaches": rows})
     else:
-        console.print(_table(summary))
-    return 0 if summary.success_rate == 1.0 else int(ErrorCode.UNKNOWN)
+        console.print(_table(experiment, summaries))
+    solved = all(summary.success_rate == 1.0 for summary in summaries)
+    return 0 if solved else int(ErrorCode.UNKNOWN)
 
 
-def _run(experiment: Experiment) -> list[Episode]:
-    episodes = []
+def _run(experiment: Experiment, compared: Sequence[Approach], jobs: int) -> list[Summary]:
+    """Approach by approach, pure planning first."""
+    summaries: list[Summary] = []
+    yardstick: list[Trial] = []
     with progress() as bar:
-        for seed, index in bar.track(experiment, description=experiment.domain.name):
-            episode = experiment.run(seed, index)
-            episodes.append(episode)
-            if not episode.success:
-                console.print(f"seed {seed}, task {index} not solved: {episode.error.reason}")
-    return episodes
+        watched = bar.add_task(experiment.domain.name, total=len(experiment) * len(compared))
+        for approach in compared:
+            trials = []
+            for trial in run_all(experiment, approach, jobs):
+                trials.append(trial)
+                bar.advance(watched)
+                if not trial.success:
+                    console.print(_complaint(approach, trial), highlight=False, markup=False)
+            trials.sort(key=lambda trial: (trial.seed, trial.index))
+            yardstick = yardstick or trials
+            summaries.append(Summary.of(experiment, approach.name, trials, yardstick))
+    return summaries
 
 
-def _table(summary: Summary) -> Table:
-    experiment = summary.experiment
+def _complaint(approach: Approach, trial: Trial) -> str:
+    return f"{approach.name}: seed {trial.seed}, task {trial.index} not solved: {trial.reason}"
+
+
+def _table(experiment: Experiment, summaries: Sequence[Summary]) -> Table:
     table = Table(
         "approach",
         "success",
@@ -68,19 +88,23 @@ def _table(summary: Summary) -> Table:
         "relative length",
         "planning [s]",
         "edges rolled out",
+        "steps in shortcuts",
         title=(
             f"{experiment.domain.name}, preset {experiment.domain.preset}: "
             f"{experiment.seeds} seeds from {experiment.first_seed} × {experiment.tasks} tasks"
         ),
     )
-    table.add_row(
-        summary.approach,
-        f"{summary.success_rate:.0%}",
-        _spread(summary.plan_length, 1),
-        "-" if summary.relative_length is None else f"{summary.relative_length:.2f}",
-        _spread(summary.planning_seconds, 3),
-        f"{summary.edges_rolled_out:.1f}",
-    )
+    for summary in summaries:
+        relative = summary.relative_length
+        table.add_row(
+            summary.approach,
+            f"{summary.success_rate:.0%}",
+            _spread(summary.plan_length, 1),
+            "-" if relative is None else f"{relative:.2f}",
+            _spread(summary.planning_seconds, 3),
+            f"{summary.edges_rolled_out:.1f}",
+            f"{summary.shortcut_share:.0%}",
+        )
     return table
 
 

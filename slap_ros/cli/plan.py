@@ -10,13 +10,15 @@ from typing import Annotated
 import typer
 
 from slap_ros.cli.console import Goal, Index, Json, Planner, Preset, Seed, console, print_json
+from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose, sampling
 from slap_ros.domains import Domain, Task, get_domain
 from slap_ros.drawing import draw_abstract_graph
 from slap_ros.errors import InvalidParameterError, StorageFullError
+from slap_ros.evaluation.approaches import approaches
 from slap_ros.planning.abstract_graph import AbstractGraph, build_abstract_graph
 from slap_ros.planning.ff import find_operator_sequence
 from slap_ros.planning.plan import PlanningResult
-from slap_ros.planning.planner import Problem, make_planner
+from slap_ros.planning.planner import Problem
 from slap_ros.relational import AtomSpace, GroundAtom, ground_operators
 from slap_ros.relational.pddl import (
     parse_domain,
@@ -36,6 +38,8 @@ def plan(
     index: Index = 0,
     preset: Preset = "fair",
     goal: Goal = None,
+    shortcuts: Shortcuts = None,
+    samples: Samples = SAMPLES,
     planner: Planner = "lazy",
     output: Annotated[
         Path | None, typer.Option(help="Folder for domain.pddl, problem.pddl and graph.svg.")
@@ -53,7 +57,8 @@ def plan(
     task = chosen.task(seed, index)
     space = chosen.atom_space(task.initial_state)
     atoms = parse_goal(goal, space) if goal else task.goal
-    result = make_planner(planner, chosen, task.initial_state).plan(
+    approach = approaches(choose(shortcuts, chosen, planner), sampling(samples))[-1]
+    result = approach.planner(planner, chosen, task.initial_state).plan(
         task.initial_state, space.mask(atoms)
     )
     _show(result, json)

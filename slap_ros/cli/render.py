@@ -10,6 +10,7 @@ from pathlib import Path
 from slap_ros.cli.console import console, progress
 from slap_ros.domains import Domain
 from slap_ros.errors import InvalidParameterError, StorageFullError
+from slap_ros.physics.animation import WRITERS
 from slap_ros.relational import State
 
 
@@ -17,12 +18,15 @@ def check_renderable(domain: Domain, path: Path) -> None:
     """Refuse what could not be rendered before anything is run.
 
     Raises:
-        InvalidParameterError: The domain has no pictures, or the file would be no GIF.
+        InvalidParameterError: The domain has no pictures, or the file another ending than those
+            of animations.
     """
     if domain.animate is None:
         raise InvalidParameterError(f"{domain.name} has no pictures; leave out rendering")
-    if path.suffix != ".gif":
-        raise InvalidParameterError(f"animations are GIFs: give {path.with_suffix('.gif')}")
+    if path.suffix not in WRITERS:
+        raise InvalidParameterError(
+            f"an animation is a file that ends in {' or '.join(WRITERS)}, not {path.name!r}"
+        )
 
 
 def render(domain: Domain, states: Sequence[State], path: Path) -> None:

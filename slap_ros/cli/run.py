@@ -22,6 +22,7 @@ from slap_ros.cli.console import (
 )
 from slap_ros.cli.render import check_renderable
 from slap_ros.cli.render import render as write_animation
+from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts
 from slap_ros.domains import get_domain
 from slap_ros.evaluation.metrics import RunMetrics
 from slap_ros.messages.decode import decode_state
@@ -30,6 +31,7 @@ from slap_ros.messages.interfaces import PLAN, PLAN_EVENT, SKILL_EVENT, STATE
 from slap_ros.planning.execution import MAX_REPLANS
 from slap_ros.planning.planner import make_planner
 from slap_ros.relational.pddl import parse_goal
+from slap_ros.shortcuts.shipped import chosen_library
 
 
 def run(
@@ -38,6 +40,8 @@ def run(
     index: Index = 0,
     preset: Preset = "fair",
     goal: Goal = None,
+    shortcuts: Shortcuts = None,
+    samples: Samples = SAMPLES,
     planner: Planner = "lazy",
     max_replans: Annotated[int, typer.Option(min=0, help="Plans after the first.")] = MAX_REPLANS,
     record: Annotated[
@@ -51,7 +55,7 @@ def run(
     ] = 0.0,
     timeout: Annotated[float, typer.Option(min=0.1, help="Give up after so many seconds.")] = 600.0,
     render: Annotated[
-        Path | None, typer.Option(help="Write an animation of the run as this GIF.")
+        Path | None, typer.Option(help="Write an animation of the run: a .gif or .mp4.")
     ] = None,
     json: Json = False,
 ) -> int:
@@ -61,6 +65,7 @@ def run(
     task = chosen.task(seed, index)
     atoms = parse_goal(goal, chosen.atom_space(task.initial_state)) if goal else frozenset()
     make_planner(planner, chosen, task.initial_state)
+    chosen_library(shortcuts, chosen, planner)
     if record is not None:
         require_new(record)
     if render is not None:
@@ -71,7 +76,9 @@ def run(
     from ensemble.run import RunRequest
     from ensemble.run import run as run_ensemble
 
-    settings = RunSettings(domain, preset, seed, index, planner, record, pace)
+    settings = RunSettings(
+        domain, preset, seed, index, planner, record, pace, shortcuts or "", samples
+    )
     request = RunRequest(settings, atoms, 0, max_replans, timeout, in_process)
     narrator, states = Narrator(), []
 
@@ -123,7 +130,8 @@ class Narrator:
 def _conclude(metrics: RunMetrics, record: Path | None) -> None:
     if metrics.success:
         console.print(
-            f"[bold green]solved[/] in {metrics.plan_length} steps, {metrics.replans} replans, "
+            f"[bold green]solved[/] in {metrics.plan_length} steps, {metrics.shortcut_steps} of "
+            f"them in shortcuts, {metrics.replans} replans, "
             f"{metrics.planning_seconds:.3f} s of planning, "
             f"{metrics.edges_rolled_out} edges rolled out",
             highlight=False,

@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from slap_ros.domains.view import MakeWorlds, OneByOne, View, Worlds
 from slap_ros.errors import InvalidCommandError, InvalidDomainError
 from slap_ros.relational import (
     AtomSpace,
@@ -144,7 +145,7 @@ class VisibleBody:
     colour: tuple[float, float, float, float]  # red green blue opacity, 0 to 1
 
 
-# Writes states, one a control step, as a GIF; tells how many frames are done.
+# Writes states, one a control step, as a GIF or MP4; tells how many frames are done.
 Animate = Callable[[Path, Sequence[State], Callable[[int], None]], None]
 
 
@@ -167,6 +168,9 @@ class Domain:
     unread_types: frozenset[Type] = frozenset()  # whose features no predicate reads: the robot's
     bodies: Callable[[State], Sequence[VisibleBody]] = lambda _: ()  # to be shown
     animate: Animate | None = None
+    view: View | None = None  # what a learner sees; without it there are no shortcuts
+    learned_actions: ActionSpace | None = None  # of shortcuts, where not all actions are theirs
+    make_many: MakeWorlds | None = None  # worlds stepped together, where that is faster
     configuration: Mapping[str, str | int | float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -207,6 +211,11 @@ class Domain:
         if operator.name not in self.skills:
             raise InvalidDomainError(f"{where}: no skill; add one to the domain's skills")
 
+    @property
+    def shortcut_actions(self) -> ActionSpace:
+        """What a shortcut may command."""
+        return self.learned_actions or self.action_space
+
     @cached_property
     def types_by_name(self) -> dict[str, Type]:
         """The types, as decoding a state wants them."""
@@ -226,6 +235,12 @@ class Domain:
     def ground(self, space: AtomSpace) -> tuple[GroundOperator, ...]:
         """The operators over a task's objects."""
         return ground_operators(self.operators, space)
+
+    def make_worlds(self, states: Sequence[State]) -> Worlds:
+        """Worlds of the same objects, one in each of these states."""
+        if self.make_many is not None:
+            return self.make_many(states)
+        return OneByOne(self.make_world, states)
 
     def task(self, seed: int, index: int = 0) -> Task:
         """The ``index``-th task of a seed; every (seed, index) has a stream of its own."""

@@ -3,17 +3,20 @@
 """Domains by name: ours, and those that other distributions register.
 
 Another distribution adds a domain with an entry point in the group ``slap_ros.domains`` whose
-value is a function ``make(preset: str) -> Domain``.
+value is a function ``make(preset: str) -> Domain``; one that also takes a mapping of settings to
+change, by name and as text, has presets such as ``fair:obstacles=6``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache
 from importlib import import_module
 from importlib.metadata import entry_points
 
 from slap_ros.domains.domain import Domain
+from slap_ros.domains.variation import parse_preset
 from slap_ros.errors import InvalidDomainError, InvalidParameterError, UnknownDomainError
 
 PRESETS = ("fair", "paper")  # random tasks; the paper's own start states
@@ -34,17 +37,23 @@ def domain_names() -> list[str]:
 def get_domain(name: str, preset: str = "fair") -> Domain:
     """Make a domain.
 
+    Args:
+        name: One of :func:`domain_names`.
+        preset: One of ``PRESETS``, maybe with settings: ``fair:obstacles=6``.
+
     Raises:
         UnknownDomainError: No such domain.
-        InvalidParameterError: No such preset.
+        InvalidParameterError: No such preset or setting.
         InvalidDomainError: The domain's own code fails or is inconsistent.
     """
-    if preset not in PRESETS:
-        raise InvalidParameterError(f"unknown preset {preset!r}; there are {', '.join(PRESETS)}")
-    return _factory(name)(preset)
+    base, changes = parse_preset(preset)
+    if base not in PRESETS:
+        raise InvalidParameterError(f"unknown preset {base!r}; there are {', '.join(PRESETS)}")
+    factory = _factory(name)
+    return replace(factory(base, changes), preset=preset) if changes else factory(base)
 
 
-def _factory(name: str) -> Callable[[str], Domain]:
+def _factory(name: str) -> Callable[..., Domain]:
     if name in OURS:
         return _load(name, lambda: import_module(OURS[name]).make)
     for entry in entry_points(group=ENTRY_POINTS):
@@ -53,7 +62,7 @@ def _factory(name: str) -> Callable[[str], Domain]:
     raise UnknownDomainError(f"unknown domain {name!r}; there are {', '.join(domain_names())}")
 
 
-def _load(name: str, load: Callable[[], Callable[[str], Domain]]) -> Callable[[str], Domain]:
+def _load(name: str, load: Callable[[], Callable[..., Domain]]) -> Callable[..., Domain]:
     try:
         return load()
     except (ImportError, AttributeError) as error:

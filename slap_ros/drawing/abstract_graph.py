@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from slap_ros.drawing.captions import PAGE_MARGIN_PX, draw_legend, state_facts, write_header
 from slap_ros.drawing.cards import LARGE, SMALL, Card, cut, list_bodies, make_card, make_label
 from slap_ros.drawing.layout import Box, Layout, Link, Route, lay_out
-from slap_ros.drawing.palette import BACK_PEN, BACKGROUND, OPTION_PEN, PLAN_PEN
+from slap_ros.drawing.palette import BACKGROUND, PENS
 from slap_ros.drawing.selection import Selection, ShownEdge, select
 from slap_ros.drawing.svg import Curve, Group, Picture, Shape
 from slap_ros.drawing.words import Words, counted
@@ -59,7 +59,7 @@ def compose(graph: AbstractGraph, space: AtomSpace, plan: Plan | None, title: st
     header = list(write_header(title, facts, width))
     top = header[-1].area.bottom + ABOVE_PX
     layout = layout.moved(PAGE_MARGIN_PX + (width - layout.width) / 2, top)
-    legend, bottom = draw_legend(selection, plan, top + layout.height + BELOW_PX, width)
+    legend, bottom = draw_legend(selection, top + layout.height + BELOW_PX, width)
     shapes: list[Shape] = [
         *header,
         *_draw_edges(selection, labels, layout),
@@ -114,9 +114,8 @@ def _draw_edges(
 
 
 def _curves(edge: ShownEdge, route: Route) -> Iterator[Curve]:
-    forward = PLAN_PEN if edge.step is not None else OPTION_PEN
     for i, waypoints in enumerate(route.curves, start=1):
-        yield Curve(waypoints, forward if edge.is_forward else BACK_PEN, i == len(route.curves))
+        yield Curve(waypoints, PENS[edge.mark], i == len(route.curves))
 
 
 def _edge_title(edge: ShownEdge, selection: Selection) -> str:

@@ -9,16 +9,23 @@ from collections.abc import Iterator, Sequence
 from slap_ros.drawing import text
 from slap_ros.drawing.cards import SMALL, Card, difference_colour
 from slap_ros.drawing.layout import Area, Waypoint
-from slap_ros.drawing.palette import BACK_PEN, CARD, GOAL, INK, MUTED, OPTION_PEN, PLAN_PEN
+from slap_ros.drawing.palette import CARD, GOAL, INK, MUTED, PENS
 from slap_ros.drawing.selection import Selection
 from slap_ros.drawing.svg import Curve, Shape, Text
 from slap_ros.drawing.words import ADDED, REMOVED, Words, counted
 from slap_ros.planning.abstract_graph import AbstractGraph
+from slap_ros.planning.options import OptionKind
 from slap_ros.planning.plan import Plan
 
 PAGE_MARGIN_PX = 24.0
 TITLE_PX, FACT_PX, LEGEND_PX = 18.0, 12.5, 11.0  # font sizes
-PENS = {"plan": PLAN_PEN, "option": OPTION_PEN, "back": BACK_PEN}
+MEANINGS = {
+    "plan": "the plan, with predicted environment steps",
+    "shortcut": "a learned shortcut on the plan",
+    "option": "another option",
+    "other shortcut": "another learned shortcut",
+    "back": "leads back; search does not follow it",
+}
 
 
 def state_facts(
@@ -42,7 +49,9 @@ def _plan_fact(plan: Plan | None) -> str:
     if not plan.edges:
         return "The plan is empty: the goal holds at the start."
     steps = counted(plan.predicted_steps, "step")
-    return f"Plan: {counted(len(plan.edges), 'option')}, {steps} predicted."
+    learned = sum(edge.option.kind is OptionKind.SHORTCUT for edge in plan.edges)
+    shortcuts = f", {counted(learned, 'learned shortcut')} among them" if learned else ""
+    return f"Plan: {counted(len(plan.edges), 'option')}{shortcuts}, {steps} predicted."
 
 
 def write_header(title: str, facts: Sequence[str], width: float) -> Iterator[Text]:
@@ -57,13 +66,11 @@ def write_header(title: str, facts: Sequence[str], width: float) -> Iterator[Tex
             y += FACT_PX * 1.4
 
 
-def draw_legend(
-    selection: Selection, plan: Plan | None, y: float, width: float
-) -> tuple[list[Shape], float]:
+def draw_legend(selection: Selection, y: float, width: float) -> tuple[list[Shape], float]:
     """What marks mean, of those that occur, in rows; and where the last row ends."""
     shapes: list[Shape] = []
     x, row_px, sample_px = PAGE_MARGIN_PX, 24.0, 30.0
-    for kind, meaning in _legend_entries(selection, plan):
+    for kind, meaning in _legend_entries(selection):
         needed = sample_px + 6 + text.width_px(meaning, LEGEND_PX)
         if x > PAGE_MARGIN_PX and x + needed > PAGE_MARGIN_PX + width:
             x, y = PAGE_MARGIN_PX, y + row_px
@@ -73,18 +80,14 @@ def draw_legend(
     return shapes, y + row_px
 
 
-def _legend_entries(selection: Selection, plan: Plan | None) -> Iterator[tuple[str, str]]:
+def _legend_entries(selection: Selection) -> Iterator[tuple[str, str]]:
     if any(node.number > 0 for node in selection.nodes):
         yield ADDED, "holds, unlike at the start"
         yield REMOVED, "held at the start"
     if any(node.is_goal for node in selection.nodes):
         yield "goal", "the goal holds"
-    if plan is not None and plan.edges:
-        yield "plan", "the plan, with predicted environment steps"
-    if any(edge.is_forward and edge.step is None for edge in selection.edges):
-        yield "option", "another option"
-    if any(not edge.is_forward for edge in selection.edges):
-        yield "back", "leads back; search does not follow it"
+    occurring = {edge.mark for edge in selection.edges}
+    yield from ((mark, meaning) for mark, meaning in MEANINGS.items() if mark in occurring)
 
 
 def _sample(kind: str, area: Area) -> list[Shape]:

@@ -21,6 +21,7 @@ from slap_ros.drawing.palette import (
     MUTED,
     PLAN,
     PLAN_TINT,
+    SHORTCUT,
     START,
 )
 from slap_ros.drawing.selection import Selection, ShownEdge, ShownNode
@@ -150,7 +151,8 @@ def make_label(edge: ShownEdge, words: Words) -> Card:
         return _label_card(lines, BACKGROUND, BACKGROUND)
     lines = [Line(f"{edge.step}. {name}", CARD, bold=True), *(Line(line, CARD) for line in rest)]
     lines.append(Line(counted(edge.predicted_steps or 0, "step"), CARD, bold=True))
-    return _label_card(lines, PLAN, PLAN)
+    colour = SHORTCUT if edge.is_shortcut else PLAN
+    return _label_card(lines, colour, colour)
 
 
 def _label_card(lines: Sequence[Line], fill: str, stroke: str) -> Card:

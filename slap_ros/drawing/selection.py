@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from slap_ros.planning.abstract_graph import AbstractGraph
-from slap_ros.planning.options import Option
+from slap_ros.planning.options import Option, OptionKind
 from slap_ros.planning.plan import Plan, PlanEdge
 
 MAX_NODES = 240  # more than anyone can look at; the plan's and the first discovered are kept
@@ -34,6 +34,20 @@ class ShownEdge:
     is_forward: bool  # search may follow it
     step: int | None = None  # place in the plan, from 1
     predicted_steps: int | None = None  # environment steps, for the plan's edges
+
+    @property
+    def is_shortcut(self) -> bool:
+        """Whether it was learned."""
+        return self.option.kind is OptionKind.SHORTCUT
+
+    @property
+    def mark(self) -> str:
+        """How it is to be drawn: as one of ``palette.PENS``."""
+        if not self.is_forward:
+            return "back"
+        if self.step is None:
+            return "other shortcut" if self.is_shortcut else "option"
+        return "shortcut" if self.is_shortcut else "plan"
 
 
 @dataclass(frozen=True)

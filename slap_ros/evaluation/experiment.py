@@ -1,19 +1,16 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Experiments: many tasks, planned and executed in the world, summed up (SLAP §5)."""
+"""Experiments: many tasks, planned and executed in the world (SLAP §5)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from statistics import fmean, stdev
-from typing import Any
 
-from slap_ros.domains import Domain
+from slap_ros.domains import Domain, get_domain
+from slap_ros.evaluation.approaches import PURE_PLANNING, Approach
 from slap_ros.planning.execution import Episode, Executor
-from slap_ros.planning.planner import make_planner
-
-PURE_PLANNING = "pure_planning"
+from slap_ros.shortcuts.workers import local_workers
 
 
 @dataclass(frozen=True)
@@ -35,13 +32,13 @@ class Experiment:
     def __len__(self) -> int:
         return self.tasks * self.seeds
 
-    def run(self, seed: int, index: int) -> Episode:
-        """Solve one task by pure planning, in a world of its own."""
+    def run(self, seed: int, index: int, approach: Approach = PURE_PLANNING) -> Episode:
+        """Solve one task, in a world of its own."""
         task = self.domain.task(seed, index)
         space = self.domain.atom_space(task.initial_state)
         return Executor(
             self.domain,
-            make_planner(self.planner, self.domain, task.initial_state),
+            approach.planner(self.planner, self.domain, task.initial_state),
             self.domain.make_world(task.initial_state),
             space,
             space.mask(task.goal),
@@ -50,62 +47,48 @@ class Experiment:
 
 
 @dataclass(frozen=True)
-class Spread:
-    """Mean and sample standard deviation over tasks."""
+class Trial:
+    """What came of one task."""
 
-    mean: float
-    sd: float
+    seed: int
+    index: int
+    success: bool
+    plan_length: int  # environment steps executed
+    shortcut_steps: int  # of them, those that shortcuts took
+    planning_seconds: float
+    edges_rolled_out: int
+    reason: str  # why not, unless it is a success
 
-    @classmethod
-    def of(cls, values: Sequence[float]) -> Spread:
-        """The spread of at least one value."""
-        return cls(fmean(values), stdev(values) if len(values) > 1 else 0.0)
+
+def run_all(experiment: Experiment, approach: Approach, jobs: int) -> Iterator[Trial]:
+    """Solve every task, ``jobs`` at a time, and tell of each as it ends.
+
+    Every approach has processes of its own: what motion planning remembers of the same task under
+    another approach would make planning look faster than it is.
+    """
+    domain = experiment.domain
+    work = [
+        (domain.name, domain.preset, experiment.planner, approach, seed, index)
+        for seed, index in experiment
+    ]
+    with local_workers(jobs) as workers:
+        for _, trial in workers.run(_try, work):
+            yield trial
 
 
-@dataclass(frozen=True)
-class Summary:
-    """What an experiment came to."""
-
-    experiment: Experiment
-    approach: str
-    success_rate: float
-    plan_length: Spread | None  # environment steps executed, over solved tasks; None: none solved
-    relative_length: float | None  # mean length over that of pure planning on the same tasks
-    planning_seconds: Spread
-    edges_rolled_out: float  # mean
-
-    @classmethod
-    def of_pure_planning(cls, experiment: Experiment, episodes: Sequence[Episode]) -> Summary:
-        """The summary of pure planning, which is its own yardstick."""
-        lengths = [float(episode.plan_length) for episode in episodes if episode.success]
-        return cls(
-            experiment,
-            PURE_PLANNING,
-            fmean(episode.success for episode in episodes),
-            Spread.of(lengths) if lengths else None,
-            1.0 if lengths else None,
-            Spread.of([episode.planning_seconds for episode in episodes]),
-            fmean(episode.edges_rolled_out for episode in episodes),
-        )
-
-    def as_json(self) -> dict[str, Any]:
-        """Plain data."""
-        length = self.plan_length
-        return {
-            "domain": self.experiment.domain.name,
-            "preset": self.experiment.domain.preset,
-            "approach": self.approach,
-            "tasks": self.experiment.tasks,
-            "seeds": self.experiment.seeds,
-            "success_rate": self.success_rate,
-            "plan_length": {
-                "mean": length.mean if length else None,
-                "sd": length.sd if length else None,
-            },
-            "relative_length": self.relative_length,
-            "planning_seconds": {
-                "mean": self.planning_seconds.mean,
-                "sd": self.planning_seconds.sd,
-            },
-            "edges_rolled_out": {"mean": self.edges_rolled_out},
-        }
+def _try(
+    domain: str, preset: str, planner: str, approach: Approach, seed: int, index: int
+) -> Trial:
+    """One task; domains are made anew where this runs."""
+    experiment = Experiment(get_domain(domain, preset), 1, 1, planner=planner)
+    episode = experiment.run(seed, index, approach)
+    return Trial(
+        seed,
+        index,
+        episode.success,
+        episode.plan_length,
+        episode.shortcut_steps,
+        episode.planning_seconds,
+        episode.edges_rolled_out,
+        episode.error.reason,
+    )

@@ -46,6 +46,7 @@ OUTCOMES: Mapping[int, str] = {
     SkillEventKind.CANCELED: "canceled",
 }
 UNFINISHED = "unfinished"
+OPERATOR, SHORTCUT = "operator", "shortcut"  # kinds of options
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,7 @@ class RunMetrics:
     index: int  # which of the seed's tasks
     success: bool  # the run was SOLVED and the goal atoms hold in its last state, as perceived
     plan_length: int  # environment steps
+    shortcut_steps: int  # of them, those that shortcuts took
     planning_seconds: float  # s, all plans together
     replans: int
     edges_rolled_out: int  # options simulated while planning
@@ -198,12 +200,20 @@ class RunLog:
             (end.step == run.start.step or end.step in self._steps.get(run.episode, ()))
             and (run.episode, end.step) in self._atoms
             and reached >= run.count(PlanEventKind.EDGE_REACHED)
+            and self._has_plan(run)
         )
+
+    def _has_plan(self, run: _Run) -> bool:
+        """Whether the newest plan is here, if there is one: it tells shortcuts from options."""
+        planned = [stamp_ns(e.header) for e in run.events if e.kind == PlanEventKind.PLANNED]
+        plans = self._plans.get(run.episode, ())
+        return not planned or any(stamp_ns(plan.header) >= planned[-1] for plan in plans)
 
     def _measure(self, run: _Run, executions: Iterable[_Execution]) -> RunMetrics:
         task = self._tasks.get(run.episode)
         domain = task.domain if task is not None else next(iter(self._presets), "")
         success, error_code, error_msg = self._verdict(run)
+        options = tuple(self._measure_option(run, execution) for execution in executions)
         return RunMetrics(
             domain=domain,
             preset=self._presets.get(domain, ""),
@@ -211,12 +221,13 @@ class RunLog:
             index=task.index if task is not None else 0,
             success=success,
             plan_length=self._plan_length(run),
+            shortcut_steps=sum(option.steps for option in options if option.kind == SHORTCUT),
             planning_seconds=run.planning_ns() / NANOSECONDS,
             replans=run.count(PlanEventKind.PLANNING_STARTED) - 1,
             edges_rolled_out=run.edges_rolled_out(),
             error_code=error_code,
             error_msg=error_msg,
-            options=tuple(self._measure_option(run, execution) for execution in executions),
+            options=options,
         )
 
     def _verdict(self, run: _Run) -> tuple[bool, ErrorCode, str]:
@@ -264,7 +275,7 @@ class RunLog:
         last = end.step if end is not None else self._last_step(run)
         return OptionMetrics(
             name=start.skill,
-            kind="shortcut" if learned else "operator",
+            kind=SHORTCUT if learned else OPERATOR,
             objects=tuple(start.objects),
             steps=max(0, last - start.step),
             outcome=OUTCOMES[end.kind] if end is not None else UNFINISHED,

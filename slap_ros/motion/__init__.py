@@ -18,7 +18,15 @@ from slap_ros.motion.cache import PlanCache
 from slap_ros.motion.collision import CollisionChecker
 from slap_ros.motion.errors import MotionPlanningError
 from slap_ros.motion.inverse_kinematics import ik_candidates, ik_solutions, inverse_kinematics
-from slap_ros.motion.joints import Free, Joints, Path, control_steps, path_steps, within_limits
+from slap_ros.motion.joints import (
+    Free,
+    Joints,
+    Path,
+    control_steps,
+    path_configurations,
+    path_steps,
+    within_limits,
+)
 from slap_ros.motion.linear import linear_motion, shifted
 from slap_ros.motion.planning import plan_path
 from slap_ros.motion.retiming import retime, retime_in_tens
@@ -36,6 +44,7 @@ __all__ = [
     "ik_solutions",
     "inverse_kinematics",
     "linear_motion",
+    "path_configurations",
     "path_steps",
     "plan_path",
     "retime",

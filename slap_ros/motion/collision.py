@@ -83,16 +83,22 @@ class CollisionChecker:
         return free.reshape(np.shape(q)[:-1])
 
     def _free(self, q: Joints) -> Flags:
-        shapes = np.matmul(arm_frames(q)[:, self._links], self._frames)
-        centres = shapes[..., :3, 3]
-        seen = (centres @ self._axes).reshape(*centres.shape[:2], -1, 3) - self._origins
-        outside = np.maximum(np.abs(seen) - self._sizes, 0.0)
+        links = arm_frames(q)
+        # Where the shapes' centres are; how they are turned matters only for the near ones.
+        centres = np.einsum("nsij,sj->nsi", links[:, self._links, :3], self._frames[..., 3])
+        # One product of matrices, not one a configuration.
+        seen = (centres.reshape(-1, 3) @ self._axes).reshape(*centres.shape[:2], -1, 3)
+        seen -= self._origins
+        outside = np.abs(seen)
+        outside -= self._sizes
+        np.maximum(outside, 0.0, out=outside)
         distance2 = np.einsum("...i,...i", outside, outside)
         near = distance2 < self._reaches2
         free = np.ones(len(q), bool)
         if near.any():
             which, shape, obstacle = near.nonzero()
-            turn = np.matmul(shapes[which, shape, :3, :3].swapaxes(1, 2), self._turns[obstacle])
+            turns = np.matmul(links[which, self._links[shape], :3, :3], self._frames[shape, :3, :3])
+            turn = np.matmul(turns.swapaxes(1, 2), self._turns[obstacle])
             offset = seen[which, shape, obstacle]
             sizes = self._halves[shape], self._sizes[obstacle]
             free[which[~apart(turn, offset, *sizes, self._clearances[shape])]] = False

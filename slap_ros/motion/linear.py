@@ -11,7 +11,6 @@ import numpy as np
 from slap_ros.motion.joints import (
     RESOLUTION,
     STEP,
-    Array,
     Free,
     Joints,
     Path,
@@ -20,13 +19,15 @@ from slap_ros.motion.joints import (
     path_configurations,
     within_limits,
 )
-from slap_ros.physics.panda import Pose, grasp_pose, jacobian
+from slap_ros.physics.panda import Pose, Reach, grasp_pose
+from slap_ros.physics.pose import ORIGIN, Vector, conjugate, multiply
 
 INCREMENT = 0.005  # m, between rows of the path
 TURN_INCREMENT = 0.05  # rad
 _ITERATIONS = 8  # of Newton's method, an increment; 2 or 3 are usual
 _CLOSE = 1e-7  # m and rad
 _DAMPING = 1e-4  # m and rad a control step, against singularities
+_DAMPED = _DAMPING**2 * np.eye(6)
 _LARGEST_JUMP = 2.0  # control steps an increment; more is another branch
 
 
@@ -83,38 +84,35 @@ def _angle(start: Pose, target: Pose) -> float:
 
 def _on_the_way(start: Pose, target: Pose, fraction: float) -> Pose:
     x, y, z = (a + fraction * (b - a) for a, b in zip(start.position, target.position, strict=True))
-    turn = fraction * _rotation_vector(start, target)
-    angle = float(np.linalg.norm(turn))
-    ax, ay, az = turn * (math.sin(0.5 * angle) / angle if angle else 0.5)
-    turned = Pose((0.0, 0.0, 0.0), (float(ax), float(ay), float(az), math.cos(0.5 * angle)))
+    turn = [fraction * part for part in _rotation_vector(start, target)]
+    angle = math.sqrt(sum(part * part for part in turn))
+    ax, ay, az = (part * (math.sin(0.5 * angle) / angle if angle else 0.5) for part in turn)
+    turned = Pose((0.0, 0.0, 0.0), (ax, ay, az, math.cos(0.5 * angle)))
     return Pose((x, y, z), turned.compose(Pose((0.0, 0.0, 0.0), start.quaternion)).quaternion)
 
 
-def _rotation_vector(start: Pose, target: Pose) -> Array:
+def _rotation_vector(start: Pose, target: Pose) -> Vector:
     """The turn from one orientation to another, rad, along the axes of the base."""
-    turn = Pose((0.0, 0.0, 0.0), target.quaternion).compose(
-        Pose((0.0, 0.0, 0.0), start.quaternion).inverse()
-    )
-    *axis, w = turn.quaternion
-    sine = math.hypot(*axis)
+    x, y, z, w = multiply(target.quaternion, conjugate(start.quaternion))
+    sine = math.hypot(x, y, z)
     if sine == 0.0:
-        return np.zeros(3)
+        return ORIGIN
     # The shorter of the two ways round.
     angle = 2.0 * math.atan2(sine, abs(w)) * (1.0 if w >= 0.0 else -1.0)
-    return np.array(axis) * (angle / sine)
+    return x * (angle / sine), y * (angle / sine), z * (angle / sine)
 
 
 def _follow(q: Joints, target: Pose) -> Joints | None:
     """The configuration at a nearby pose, by Newton's method in units of control steps."""
     before = q
     for _ in range(_ITERATIONS):
-        here = grasp_pose(q)
-        offset = np.subtract(target.position, here.position)
-        error = np.concatenate([offset, _rotation_vector(here, target)])
-        if np.abs(error).max() < _CLOSE:
+        reach = Reach(q.tolist())
+        offset = (a - b for a, b in zip(target.position, reach.grasp.position, strict=True))
+        error = (*offset, *_rotation_vector(reach.grasp, target))
+        if max(map(abs, error)) < _CLOSE:
             close = control_steps(before, q) <= _LARGEST_JUMP
             return q if close and within_limits(q) else None
-        scaled = jacobian(q) * STEP
-        damped = scaled @ scaled.T + _DAMPING**2 * np.eye(6)
+        scaled = reach.jacobian() * STEP
+        damped = scaled @ scaled.T + _DAMPED
         q = q + STEP * (scaled.T @ np.linalg.solve(damped, error))
     return None

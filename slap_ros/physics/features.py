@@ -4,7 +4,8 @@
 
 A domain's robot is a :data:`ROBOT`; the types of its free bodies begin with
 :data:`BODY_FEATURES`, as in ``Type("block", BODY_FEATURES)``; fixed bodies whose place differs
-from task to task begin with :data:`POSE_FEATURES`.
+from task to task begin with :data:`POSE_FEATURES`. Free bodies whose mass or friction differs from
+task to task have :data:`MATERIAL_FEATURES` as well; the scene's numbers then only are defaults.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from collections.abc import Mapping, Sequence
 
 from slap_ros.physics.panda import FINGER_OPEN, JOINTS
 from slap_ros.physics.pose import IDENTITY, NO_TURN, ORIGIN, Pose, Vector
+from slap_ros.physics.scene import CUBE_MATERIAL, Material
 from slap_ros.relational import Feature, Type
 
 POSE_FEATURES = (
@@ -23,6 +25,7 @@ VELOCITY_FEATURES = (
     *(Feature(f"v{axis}", "m/s") for axis in ("x", "y", "z")),
     *(Feature(f"w{axis}", "rad/s") for axis in ("x", "y", "z")),
 )
+MATERIAL_FEATURES = (Feature("mass", "kg"), Feature("friction", "1"))
 BODY_FEATURES = (*POSE_FEATURES, *VELOCITY_FEATURES, Feature("held", "1"))
 
 JOINT_FEATURES = tuple(Feature(f"joint{i + 1}", "rad") for i in range(JOINTS))
@@ -61,3 +64,8 @@ def body_features(
     """A free body's features, for ``State.build``: m, m/s and rad/s in the base's frame."""
     values = (*position, *quaternion, *velocity, *spin, float(held))
     return dict(zip((f.name for f in BODY_FEATURES), values, strict=True))
+
+
+def material_features(material: Material = CUBE_MATERIAL) -> Mapping[str, float]:
+    """What a free body is made of, for ``State.build``."""
+    return dict(zip((f.name for f in MATERIAL_FEATURES), material, strict=True))

@@ -30,6 +30,7 @@ __all__ = [
     "LINKS",
     "MAX_STEP",
     "Pose",
+    "Reach",
     "grasp_pose",
     "hand_pose",
     "jacobian",
@@ -123,15 +124,29 @@ def jacobian(q: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
     Returns:
         Shape (6, 7): rows 0-2 linear in m/rad, rows 3-5 angular in rad/rad.
     """
-    links = _arm(q)
-    gx, gy, gz = links[-1].compose(_HAND_FRAME).compose(_GRASP_FRAME).position
-    columns = np.empty((6, JOINTS))
-    for i, link in enumerate(links[1:]):
-        x, y, z = rotate(link.quaternion, (0.0, 0.0, 1.0))  # the joint's axis
-        px, py, pz = link.position
-        rx, ry, rz = gx - px, gy - py, gz - pz
-        columns[:, i] = (y * rz - z * ry, z * rx - x * rz, x * ry - y * rx, x, y, z)
-    return columns
+    return Reach(q).jacobian()
+
+
+class Reach:
+    """The grasp point in one configuration, and how it would move: kinematics done once."""
+
+    __slots__ = ("_links", "grasp")
+
+    def __init__(self, q: Sequence[float] | NDArray[np.float64]) -> None:
+        """``q``: joint positions, rad, shape (7,)."""
+        self._links = _arm(q)
+        self.grasp = self._links[-1].compose(_HAND_FRAME).compose(_GRASP_FRAME)
+
+    def jacobian(self) -> NDArray[np.float64]:
+        """See :func:`jacobian`."""
+        gx, gy, gz = self.grasp.position
+        columns = []
+        for link in self._links[1:]:
+            x, y, z = rotate(link.quaternion, (0.0, 0.0, 1.0))  # the joint's axis
+            px, py, pz = link.position
+            rx, ry, rz = gx - px, gy - py, gz - pz
+            columns.append((y * rz - z * ry, z * rx - x * rz, x * ry - y * rx, x, y, z))
+        return np.array(list(zip(*columns, strict=True)))
 
 
 # The grasp point is at (0.5, 0, 0.5) m, the hand points straight down, the fingers move along y.

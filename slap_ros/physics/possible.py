@@ -11,7 +11,7 @@ from slap_ros.errors import InvalidStateError
 from slap_ros.physics.arm import Arm, Obstacle, Sweep
 from slap_ros.physics.panda import FINGER_CLOSED, FINGER_OPEN, JOINT_HIGH, JOINT_LOW
 from slap_ros.physics.pose import Pose
-from slap_ros.physics.scene import Scene
+from slap_ros.physics.scene import Material, Scene
 from slap_ros.physics.snapshot import Snapshot
 
 # Pressed together, bodies overlap for a while by as much as a few centimetres; what overlaps
@@ -23,21 +23,27 @@ LIMIT_TOLERANCE = 1e-9  # rad
 
 
 def require_possible(
-    scene: Scene, snapshot: Snapshot, arm: Arm, obstacles: Sequence[Obstacle]
+    scene: Scene,
+    snapshot: Snapshot,
+    materials: Sequence[Material],
+    arm: Arm,
+    obstacles: Sequence[Obstacle],
 ) -> None:
     """Refuse scenes that cannot be.
 
     Args:
         scene: What there is.
         snapshot: How it is; finite.
+        materials: What the free bodies are made of.
         arm: The same arm.
         obstacles: The fixed bodies that are solid.
 
     Raises:
-        InvalidStateError: A quaternion that is not normalised, joints beyond their limits, the
-            arm or a body inside a fixed body, two bodies inside one another, or a held body that
-            is not in the hand.
+        InvalidStateError: A mass or friction that nothing has, a quaternion that is not
+            normalised, joints beyond their limits, the arm or a body inside a fixed body, two
+            bodies inside one another, or a held body that is not in the hand.
     """
+    _require_materials(scene, materials)
     _require_rotations(scene, snapshot)
     for i, (low, q, high) in enumerate(zip(JOINT_LOW, snapshot.joints, JOINT_HIGH, strict=True)):
         if not low - LIMIT_TOLERANCE <= q <= high + LIMIT_TOLERANCE:
@@ -49,6 +55,16 @@ def require_possible(
     if Sweep(arm, arm).hits(obstacles):
         raise InvalidStateError("the arm, or what it holds, is inside a fixed body")
     _require_apart(scene, snapshot, obstacles)
+
+
+def _require_materials(scene: Scene, materials: Sequence[Material]) -> None:
+    for body, (mass, friction) in zip(scene.free, materials, strict=True):
+        if mass <= 0.0:
+            raise InvalidStateError(f"the mass of {body.name} is {mass} kg, which must be above 0")
+        if friction < 0.0:
+            raise InvalidStateError(
+                f"the friction of {body.name} is {friction}, which must not be negative"
+            )
 
 
 def _require_rotations(scene: Scene, snapshot: Snapshot) -> None:

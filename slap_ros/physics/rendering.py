@@ -4,24 +4,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
 import numpy as np
 import pybullet
-from numpy.typing import NDArray
-from PIL import Image
 
+from slap_ros.physics.animation import Picture, write_pictures
 from slap_ros.physics.panda import CONTROL_PERIOD_S
 from slap_ros.physics.pose import Pose, Vector
 from slap_ros.physics.scene import Body, Scene
 from slap_ros.physics.simulation import PANDA
 from slap_ros.physics.snapshot import Reader
 from slap_ros.relational import State
-
-Picture = NDArray[np.uint8]  # (height, width, 3), red green blue
 
 ARM_JOINTS = range(7)  # indices in the URDF
 FINGER_JOINTS = (9, 10)
@@ -117,29 +114,25 @@ class Camera:
         return added
 
 
-def write_gif(
+def write_animation(
     path: Path,
     camera: Camera,
     states: Iterable[State],
     progress: Callable[[int], None] | None = None,
 ) -> None:
-    """Write an animation in real time, one frame a control step, that repeats.
+    """Write an animation in real time, one frame a control step.
 
     Args:
-        path: The file, to end in ``.gif``.
+        path: The file; its ending says the format, see ``slap_ros.physics.animation``.
         camera: Draws the frames.
         states: One a control step; not empty.
         progress: Told the number of frames drawn so far, after each.
     """
-    frames = []
-    for done, state in enumerate(states, start=1):
-        frames.append(Image.fromarray(camera.picture(state)).quantize(128))
-        if progress is not None:
-            progress(done)
-    frames[0].save(
-        path,
-        save_all=True,
-        append_images=frames[1:],
-        duration=round(CONTROL_PERIOD_S * 1000),  # ms
-        loop=0,
-    )
+
+    def pictures() -> Iterator[Picture]:
+        for done, state in enumerate(states, start=1):
+            yield camera.picture(state)
+            if progress is not None:
+                progress(done)
+
+    write_pictures(path, pictures(), CONTROL_PERIOD_S)

@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 from slap_ros.errors import InvalidDomainError
 from slap_ros.physics.boxes import OrientedBox
@@ -18,6 +19,13 @@ GREY: Colour = (0.6, 0.6, 0.6, 1.0)
 WOOD: Colour = (0.72, 0.6, 0.47, 1.0)
 
 
+class Material(NamedTuple):
+    """What a body is made of, as far as dynamics is concerned."""
+
+    mass_kg: float  # of the whole body
+    friction: float  # Coulomb's coefficient; that of a pair of bodies is the product of both
+
+
 @dataclass(frozen=True)
 class Box:
     """A cuboid.
@@ -25,8 +33,8 @@ class Box:
     Args:
         name: That of the object in the state which it embodies.
         half_extents_m: Half its edges along x, y, z of its own frame.
-        mass_kg: 0 for a body that is fixed.
-        friction: Coulomb's coefficient; that of a pair of bodies is the product of both.
+        mass_kg: 0 for a body that is fixed. A free body may have another one in the state.
+        friction: See :class:`Material`; a free body may have another one in the state.
         colour: For pictures.
         pose: Where a fixed body stands, unless the state has pose features for it. A free body
             is always where the state says.
@@ -41,6 +49,15 @@ class Box:
     pose: Pose = IDENTITY
     solid: bool = True
 
+    @property
+    def material(self) -> Material:
+        """What it is made of, unless the state says otherwise."""
+        return Material(self.mass_kg, self.friction)
+
+    def of(self, material: Material) -> Box:
+        """The same box of another material."""
+        return replace(self, mass_kg=material.mass_kg, friction=material.friction)
+
     def at(self, pose: Pose) -> OrientedBox:
         """The space it fills at a pose."""
         return OrientedBox(pose, self.half_extents_m)
@@ -49,7 +66,7 @@ class Box:
 Body = Box  # the union of all kinds of bodies; meshes will be the next
 
 CUBE_EDGE = 0.05  # m
-CUBE_MASS = 0.5  # kg
+CUBE_MATERIAL = Material(mass_kg=0.5, friction=FRICTION)
 TABLE = Box("table", (0.25, 0.4, 0.25), colour=WOOD, pose=Pose((0.5, 0.0, -0.175)))
 TABLE_TOP = 0.075  # m
 FLOOR_TOP = -0.425  # m
@@ -57,7 +74,7 @@ FLOOR_TOP = -0.425  # m
 
 def cube(name: str, colour: Colour = GREY) -> Box:
     """The reference's 5 cm cube."""
-    return Box(name, (CUBE_EDGE / 2,) * 3, CUBE_MASS, colour=colour)
+    return Box(name, (CUBE_EDGE / 2,) * 3, *CUBE_MATERIAL, colour=colour)
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ import pybullet
 from slap_ros.physics.links import LINK_SHAPES
 from slap_ros.physics.panda import CONTROL_PERIOD_S
 from slap_ros.physics.pose import NO_TURN, ORIGIN, Pose, Vector, conjugate, multiply
-from slap_ros.physics.scene import Body, Scene
+from slap_ros.physics.scene import FRICTION, Body, Material, Scene
 from slap_ros.physics.snapshot import Motion
 
 GRAVITY = 9.81  # m/s², downwards
@@ -78,7 +78,8 @@ def _parking(index: int) -> Vector:
 class Simulation:
     """A PyBullet client with the bodies of a scene.
 
-    It remembers nothing that matters between calls but where the fixed bodies are.
+    It remembers nothing that matters between calls but where the fixed bodies are and what the
+    free ones are made of.
     """
 
     def __init__(self, scene: Scene, stepping: Stepping) -> None:
@@ -98,11 +99,13 @@ class Simulation:
         self._parked = 0
         self._fixed = [self._add_fixed(body) for body in scene.fixed]
         self._free = [self._add_free(body) for body in scene.free]
+        self._materials: list[Material | None] = [None] * len(self._free)
+        self.make_of([body.material for body in scene.free])
         self._links = [self._add_link(i) for i in range(len(LINK_SHAPES))]
         # A held body is one more link. Bodies of one shape share it, as one is held at a time.
-        self._ghosts = {body.half_extents_m: -1 for body in scene.free}
-        for shape in self._ghosts:
-            self._ghosts[shape] = self._add_driven(self._box(shape), ARM_FRICTION)
+        shapes = dict.fromkeys(body.half_extents_m for body in scene.free)
+        self._ghosts = {shape: self._add_driven(self._box(shape), FRICTION) for shape in shapes}
+        self._ghost_frictions = dict.fromkeys(shapes, FRICTION)
         self._driven = [*self._links, *self._ghosts.values()]
         self._parking = {body: _parking(i) for i, body in enumerate([*self._free, *self._driven])}
 
@@ -118,6 +121,23 @@ class Simulation:
         for body, pose in zip(self._fixed, poses, strict=True):
             if body is not None:
                 pybullet.resetBasePositionAndOrientation(body, *pose, self.client)
+
+    def make_of(self, materials: Sequence[Material]) -> None:
+        """Give the scene's free bodies these masses and frictions.
+
+        It has to be told even what a body was created with: PyBullet derives a body's weight in
+        other ways at its creation and later, which differ in the last bit.
+        """
+        for i, (body, material) in enumerate(zip(self._free, materials, strict=True)):
+            if material != self._materials[i]:
+                pybullet.changeDynamics(
+                    body,
+                    -1,
+                    mass=material.mass_kg,
+                    lateralFriction=material.friction,
+                    physicsClientId=self.client,
+                )
+                self._materials[i] = material
 
     def run(
         self,
@@ -192,7 +212,18 @@ class Simulation:
         return Motion(Pose(*pose), velocity, spin)
 
     def _ghost(self, held: int) -> int:
-        return self._ghosts[self.scene.free[held].half_extents_m]
+        """The driven body that stands for a held one, as rough as that is."""
+        shape, material = self.scene.free[held].half_extents_m, self._materials[held]
+        assert material is not None
+        if material.friction != self._ghost_frictions[shape]:
+            pybullet.changeDynamics(
+                self._ghosts[shape],
+                -1,
+                lateralFriction=material.friction,
+                physicsClientId=self.client,
+            )
+            self._ghost_frictions[shape] = material.friction
+        return self._ghosts[shape]
 
     # -- building -------------------------------------------------------------------------------
 

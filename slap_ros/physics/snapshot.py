@@ -16,11 +16,12 @@ from slap_ros.physics.features import (
     BODY_FEATURES,
     GRASP_FEATURES,
     JOINT_FEATURES,
+    MATERIAL_FEATURES,
     POSE_FEATURES,
     ROBOT,
 )
 from slap_ros.physics.pose import IDENTITY, ORIGIN, Pose, Vector
-from slap_ros.physics.scene import Scene
+from slap_ros.physics.scene import Material, Scene
 from slap_ros.relational import Feature, Layout, Object, State
 
 
@@ -61,6 +62,7 @@ class Reader:
     robot: NDArray[np.intp]  # (7 + 1 + 7,): joints, finger, grasp
     bodies: NDArray[np.intp]  # (free bodies, 14)
     fixed: tuple[NDArray[np.intp] | None, ...]  # a fixed body's pose, where the state has one
+    made_of: tuple[NDArray[np.intp] | None, ...]  # a free body's material, where it has one
 
     @staticmethod
     @lru_cache(maxsize=256)
@@ -81,7 +83,8 @@ class Reader:
             np.array([_columns(layout, obj, BODY_FEATURES) for obj in free], dtype=np.intp).reshape(
                 -1, len(BODY_FEATURES)
             ),
-            tuple(_fixed_columns(layout, body.name) for body in scene.fixed),
+            tuple(_optional(layout, body.name, POSE_FEATURES) for body in scene.fixed),
+            tuple(_optional(layout, body.name, MATERIAL_FEATURES) for body in scene.free),
         )
 
     def read(self, state: State) -> Snapshot:
@@ -127,6 +130,13 @@ class Reader:
             for body, columns in zip(scene.fixed, self.fixed, strict=True)
         )
 
+    def materials(self, scene: Scene, state: State) -> tuple[Material, ...]:
+        """What each free body is made of, in the scene's order."""
+        return tuple(
+            body.material if columns is None else Material(*state.data[columns].tolist())
+            for body, columns in zip(scene.free, self.made_of, strict=True)
+        )
+
 
 def _pose(values: list[float]) -> Pose:
     x, y, z, qx, qy, qz, qw = values
@@ -152,8 +162,9 @@ def _embodied(layout: Layout, name: str) -> Object:
     return obj
 
 
-def _fixed_columns(layout: Layout, name: str) -> NDArray[np.intp] | None:
+def _optional(layout: Layout, name: str, features: tuple[Feature, ...]) -> NDArray[np.intp] | None:
+    """Where the state has these features of a body, if it has them."""
     obj = layout.by_name.get(name)
-    if obj is None or not set(POSE_FEATURES) <= set(obj.type.features):
+    if obj is None or not set(features) <= set(obj.type.features):
         return None
-    return _columns(layout, obj, POSE_FEATURES)
+    return _columns(layout, obj, features)

@@ -73,7 +73,7 @@ class PandaWorld:
         self._adopt(state)
         self._simulation = borrow(scene, stepping)
         self._closing = weakref.finalize(self, give_back, self._simulation)
-        self._simulation.place_fixed(self._fixed_poses)
+        self._prepare()
 
     def __enter__(self) -> PandaWorld:
         return self
@@ -109,17 +109,23 @@ class PandaWorld:
         if state.layout is not self._reader.layout and state.layout != self._reader.layout:
             raise InvalidStateError("a world is reset to states of its own objects only")
         self._adopt(state)
+        self._prepare()
+
+    def _prepare(self) -> None:
+        """Tell the simulation what it remembers between control periods."""
         self._simulation.place_fixed(self._fixed_poses)
+        self._simulation.make_of(self._materials)
 
     def _adopt(self, state: State) -> None:
         state.require_finite()
         snapshot = self._reader.read(state)
         poses = self._reader.fixed_poses(self._scene, state)
         obstacles = [Obstacle.of(self._scene.fixed[i].at(poses[i])) for i in self._solid]
+        materials = self._reader.materials(self._scene, state)
         arm = self._arm(snapshot)
-        require_possible(self._scene, snapshot, arm, obstacles)
+        require_possible(self._scene, snapshot, materials, arm, obstacles)
         self._state, self._snapshot, self._posture = state, snapshot, arm
-        self._fixed_poses = poses
+        self._fixed_poses, self._materials = poses, materials
         self._obstacles: list[Obstacle] = obstacles
 
     def step(self, action: Action) -> State:
@@ -211,7 +217,8 @@ class PandaWorld:
         So they do where they came to rest by themselves. They do not in mid-air, over an edge,
         or where they came to rest leaning on the arm.
         """
-        key = (self._fixed_poses, now.held, tuple(now.bodies[i].pose for i in loose))
+        poses = tuple(now.bodies[i].pose for i in loose)
+        key = (self._fixed_poses, self._materials, now.held, poses)
         stands = self._standing.get(key)
         if stands is None:
             after = self._simulation.run(now.bodies, now.held)

@@ -13,7 +13,7 @@ from time import perf_counter
 from slap_ros.domains import Domain, World
 from slap_ros.domains.domain import Action
 from slap_ros.errors import ErrorCode, PlanningLimitError, SkillNotApplicableError, UnsolvableError
-from slap_ros.planning.options import OptionExecution, Stopped
+from slap_ros.planning.options import OptionExecution, OptionKind, Stopped
 from slap_ros.planning.plan import Plan, PlanEdge
 from slap_ros.planning.planner import Planner
 from slap_ros.relational import AtomSpace, State
@@ -28,6 +28,7 @@ class Episode:
     success: bool = False
     states: list[State] = field(default_factory=list)  # the first is the initial one
     actions: list[Action] = field(default_factory=list)
+    shortcut_steps: int = 0  # environment steps, of all executed, that shortcuts took
     replans: int = 0
     planning_seconds: float = 0.0
     edges_rolled_out: int = 0
@@ -117,4 +118,5 @@ class Executor:
                     ErrorCode.STEP_LIMIT, f"the goal was not reached in {self.step_limit} steps"
                 )
             episode.actions.append(action)
+            episode.shortcut_steps += edge.option.kind is OptionKind.SHORTCUT
             episode.states.append(self.world.step(action))

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -21,13 +21,26 @@ class OptionKind(Enum):
     SHORTCUT = 1  # learned
 
 
+def _any(_: State) -> bool:
+    return True
+
+
 @dataclass(frozen=True)
 class Option:
-    """A skill applied to objects."""
+    """A skill applied to objects.
+
+    Args:
+        kind: Given or learned.
+        skill: What controls the robot.
+        objects: What it is applied to.
+        accepts: Whether it may end in a state in which its target's atoms hold. A shortcut may
+            not while things still move or lie where the next option could not be executed.
+    """
 
     kind: OptionKind
     skill: Skill
     objects: tuple[Object, ...]
+    accepts: Callable[[State], bool] = field(default=_any, compare=False, repr=False)
 
     def __str__(self) -> str:
         return f"{self.skill.name}({', '.join(obj.name for obj in self.objects)})"
@@ -94,7 +107,7 @@ class OptionExecution:
 
     def advance(self, state: State, abstract: int) -> Action | Stopped:
         """The next action from the newest state, or why there is none."""
-        if abstract == self.target and self.steps > 0:
+        if abstract == self.target and self.steps > 0 and self.option.accepts(state):
             return Stopped(ErrorCode.NONE)
         if self.steps >= self.option.skill.step_limit:
             return Stopped(

@@ -4,13 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from slap_ros.domains import Domain
 from slap_ros.errors import InvalidParameterError, PlanningLimitError, UnsolvableError
-from slap_ros.planning.abstract_graph import AbstractGraph, build_abstract_graph
+from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
 from slap_ros.planning.ff import find_operator_sequence
 from slap_ros.planning.model import Model
 from slap_ros.planning.options import Option, given_option
@@ -54,17 +54,27 @@ class Problem:
         )
 
 
+class ShortcutSource(Protocol):
+    """Knows shortcuts between abstract states."""
+
+    def edges(self, graph: AbstractGraph) -> Sequence[Edge]:
+        """Edges to be added to a graph."""
+        ...
+
+
 @dataclass(frozen=True)
 class GraphPlanner:
-    """The abstract planning graph, then a shortest path through it (SLAP §4.1).
+    """The abstract planning graph, then a shortest path through it (SLAP §4.1, Alg. 2).
 
-    Where no path can be executed, the graph is deepened beyond the paper's: by one layer, up to
-    ``max_extra_depth``.
+    Shortcuts are edges like others: one that fails in the model is no way, and without any this
+    is pure planning. Where no path can be executed, the graph is deepened beyond the paper's: by
+    one layer, up to ``max_extra_depth``.
     """
 
     problem: Problem
     search: Search = search_lazily
     max_extra_depth: int = 2  # operators
+    shortcuts: ShortcutSource | None = None
 
     def plan(self, state: State, goal: int) -> PlanningResult:
         """See :class:`Planner`."""
@@ -72,6 +82,8 @@ class GraphPlanner:
         before, start = model.executed, model.space.abstract(state)
         for extra_depth in range(self.max_extra_depth + 1):
             graph = build_abstract_graph(start, goal, self.problem.operators, extra_depth)
+            if self.shortcuts is not None:
+                graph.edges.extend(self.shortcuts.edges(graph))
             try:
                 plan = self.search(graph, state, model)
             except UnsolvableError:
@@ -129,23 +141,36 @@ class FFPlanner:
         return edges, None
 
 
-def _exhaustive(problem: Problem) -> Planner:
-    return GraphPlanner(problem, search_exhaustively)
+def _lazy(problem: Problem, shortcuts: ShortcutSource | None) -> Planner:
+    return GraphPlanner(problem, shortcuts=shortcuts)
 
 
-PLANNERS: Mapping[str, Callable[[Problem], Planner]] = {
-    "lazy": GraphPlanner,
+def _exhaustive(problem: Problem, shortcuts: ShortcutSource | None) -> Planner:
+    return GraphPlanner(problem, search_exhaustively, shortcuts=shortcuts)
+
+
+def _ff(problem: Problem, shortcuts: ShortcutSource | None) -> Planner:
+    if shortcuts is not None:
+        raise InvalidParameterError("the planner ff plans without shortcuts; use lazy")
+    return FFPlanner(problem)
+
+
+PLANNERS: Mapping[str, Callable[[Problem, ShortcutSource | None], Planner]] = {
+    "lazy": _lazy,
     "exhaustive": _exhaustive,
-    "ff": FFPlanner,
+    "ff": _ff,
 }
+WITH_SHORTCUTS = ("lazy", "exhaustive")  # planners that can use them
 
 
-def make_planner(name: str, domain: Domain, initial: State) -> Planner:
+def make_planner(
+    name: str, domain: Domain, initial: State, shortcuts: ShortcutSource | None = None
+) -> Planner:
     """A planner by name, for tasks over the objects of ``initial``.
 
     Raises:
-        InvalidParameterError: No planner of that name.
+        InvalidParameterError: No planner of that name, or none that can use shortcuts.
     """
     if name not in PLANNERS:
         raise InvalidParameterError(f"unknown planner {name!r}; there are {', '.join(PLANNERS)}")
-    return PLANNERS[name](Problem.of(domain, initial))
+    return PLANNERS[name](Problem.of(domain, initial), shortcuts)

@@ -86,7 +86,7 @@ class AtomSpace:
 
     def abstract(self, state: State) -> int:
         """The abstract state of a single state."""
-        read = state.data[self._read].tobytes()
+        read = state.data.take(self._read).tobytes()
         mask = self._perceived.get(read)
         if mask is None:
             packed = np.packbits(self.truth(state), bitorder="little")
@@ -96,10 +96,15 @@ class AtomSpace:
             self._perceived[read] = mask
         return mask
 
+    def abstract_each(self, states: State) -> list[int]:
+        """The abstract states of a batch of states, shape (n, layout.size)."""
+        packed = np.packbits(self.truth(states), axis=-1, bitorder="little")
+        return [int.from_bytes(row.tobytes(), "little") for row in packed]
+
     def truth(self, state: State) -> NDArray[np.bool_]:
         """Whether each atom holds, for a state or a batch of states, shape (..., atoms)."""
-        shape = (*state.data.shape[:-1], len(self.atoms))
-        truth = np.broadcast_to(self._truth, shape).copy()
+        truth = np.empty((*state.data.shape[:-1], len(self.atoms)), dtype=bool)
+        truth[...] = self._truth
         for block in self._fluents:
             truth[..., block.where] = block.classifier(state, *block.columns)
         return truth

@@ -33,6 +33,10 @@ class Type:
         """Whether this type is ``other`` or descends from it."""
         return self == other or (self.parent is not None and self.parent.is_a(other))
 
+    def __hash__(self) -> int:
+        # As for objects: the name tells types apart, and types are looked up in every step.
+        return hash(self.name)
+
     def __call__(self, name: str) -> Object:
         """An object of this type."""
         return Object(name, self)

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import wraps
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,7 @@ from slap_ros.errors import MismatchedAtomError
 from slap_ros.relational.objects import Column, Object, Type
 from slap_ros.relational.state import Array, State
 
+T = TypeVar("T")
 Bools = NDArray[np.bool_]
 Classifier = Callable[..., Bools]  # (state, *columns) -> truth, shape (..., atoms)
 Margin = Callable[..., Array]  # (state, *columns) -> signed distance to the threshold, (..., atoms)
@@ -63,6 +66,24 @@ class Predicate:
 
     def __str__(self) -> str:
         return self.name
+
+
+def shared(compute: Callable[[State], T]) -> Callable[[State], T]:
+    """Compute once what several predicates ask of the same state one after the other.
+
+    The latest state is remembered with its answer, and so lives on until another is asked about.
+    """
+    latest: tuple[State, T] | None = None
+
+    @wraps(compute)
+    def answer(state: State) -> T:
+        nonlocal latest
+        known = latest  # read once: threads may compute twice, but never mix up states
+        if known is None or known[0] is not state:
+            known = latest = (state, compute(state))
+        return known[1]
+
+    return answer
 
 
 @dataclass(frozen=True)

@@ -95,6 +95,27 @@ class Layout:
             self._indices[key] = self.columns(column.objects, feature)
         return self._indices[key]
 
+    @cached_property
+    def _grids(self) -> dict[tuple[Column, tuple[str, ...]], NDArray[np.intp]]:
+        return {}
+
+    def grid(self, column: Column, features: tuple[str, ...]) -> NDArray[np.intp]:
+        """Indices of features of a column of objects, shape (objects, features); remembered."""
+        key = (column, features)
+        if key not in self._grids:
+            self._grids[key] = np.stack([self.columns(column.objects, f) for f in features], -1)
+        return self._grids[key]
+
+    @cached_property
+    def _by_type(self) -> dict[Type, Column]:
+        return {}
+
+    def column_of(self, wanted: Type) -> Column:
+        """The objects of a type, or of one below it, as a column; always the same one."""
+        if wanted not in self._by_type:
+            self._by_type[wanted] = Column(self.of_type(wanted))
+        return self._by_type[wanted]
+
     def object(self, name: str) -> Object:
         """The object of that name.
 
@@ -158,6 +179,11 @@ class State:
         state.require_finite()
         return state
 
+    @classmethod
+    def batch(cls, states: Sequence[State]) -> State:
+        """States of the same objects as one, shape (n, size)."""
+        return cls(states[0].layout, np.stack([state.data for state in states]))
+
     def require_finite(self) -> None:
         """Refuse NaN and infinity.
 
@@ -181,8 +207,12 @@ class State:
 
     def stack(self, column: Column, feature: str) -> Array:
         """One feature of several objects, shape (..., objects)."""
-        stacked: Array = self.data[..., self.layout.indices(column, feature)]
-        return stacked
+        return self.data.take(self.layout.indices(column, feature), axis=-1)
+
+    def gather(self, column: Column, features: tuple[str, ...]) -> Array:
+        """Several features of several objects, shape (..., objects, features)."""
+        gathered: Array = self.data[..., self.layout.grid(column, features)]
+        return gathered
 
     def replace(self, changes: Mapping[tuple[Object, str], float]) -> State:
         """The same state with some features changed."""

@@ -28,6 +28,7 @@ def test_the_numbers_are_those_of_what_happened(tmp_path: Path, seed: int) -> No
         "index": 2,
         "success": True,
         "plan_length": script.truth.plan_length,
+        "shortcut_steps": 0,
         "planning_seconds": script.truth.planning_ns / 1e9,
         "replans": 0,
         "edges_rolled_out": script.truth.edges_rolled_out,

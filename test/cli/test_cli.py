@@ -3,10 +3,13 @@
 """The command line: JSON alone on stdout, one clear line and a code of its own for each refusal."""
 
 import json
+import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
+from pathlib import Path
 
+import cv2
 import pytest
 from PIL import Image
 
@@ -14,6 +17,7 @@ KEYS = [
     "domain", "preset", "approach", "tasks", "seeds", "success_rate", "plan_length",
     "relative_length", "planning_seconds", "edges_rolled_out",
 ]  # fmt: skip
+LIBRARY = Path(__file__).parent.parent / "shortcuts" / "data" / "obstacle2d"
 
 BAD_DOMAIN = """(define (domain d) (:requirements :strips :typing) (:types thing)
   (:predicates (P ?x - thing))
@@ -29,10 +33,13 @@ def slap(*arguments, **options):
 
 
 def test_evaluate_prints_the_agreed_json_and_nothing_else():
-    result = slap("evaluate", "obstacle2d", "--tasks", 2, "--seeds", 3, "--json")
+    arguments = ["--tasks", 2, "--seeds", 3, "--shortcuts", "none"]
+    result = slap("evaluate", "obstacle2d", *arguments, "--json")
     assert result.returncode == 0, result.stderr
     numbers = json.loads(result.stdout)
-    assert list(numbers) == KEYS
+    assert list(numbers) == [*KEYS, "approaches"]
+    (row,) = numbers["approaches"]
+    assert {key: row[key] for key in KEYS} == {key: numbers[key] for key in KEYS}
     assert numbers["success_rate"] == 1.0
     assert numbers["relative_length"] == 1.0
     assert numbers["approach"] == "pure_planning"
@@ -41,7 +48,8 @@ def test_evaluate_prints_the_agreed_json_and_nothing_else():
 
 def test_evaluate_solves_everything_and_depends_on_the_seed_alone():
     arguments = ["evaluate", "obstacle2d", "--tasks", 10, "--seeds", 5, "--json"]
-    first = json.loads(slap(*arguments, "--shortcuts", "none").stdout)
+    arguments += ["--shortcuts", "none"]
+    first = json.loads(slap(*arguments).stdout)
     assert first["success_rate"] == 1.0
     again = json.loads(slap(*arguments, "--planner", "exhaustive").stdout)
     assert first["plan_length"] == again["plan_length"]
@@ -50,8 +58,86 @@ def test_evaluate_solves_everything_and_depends_on_the_seed_alone():
     assert other["plan_length"] != first["plan_length"]
 
 
+def without_seconds(numbers):
+    return [
+        {key: value for key, value in row.items() if key != "planning_seconds"}
+        for row in [{k: v for k, v in numbers.items() if k != "approaches"}, *numbers["approaches"]]
+    ]
+
+
+def test_with_a_library_three_approaches_are_compared_on_the_same_tasks():
+    arguments = ["evaluate", "obstacle2d", "--tasks", 2, "--seeds", 2, "--json", "--samples", 4]
+    arguments += ["--shortcuts", LIBRARY]
+    result = slap(*arguments)
+    assert result.returncode == 0, result.stderr
+    numbers = json.loads(result.stdout)
+    pure, paper, ours = numbers["approaches"]
+    names = [row["approach"] for row in (pure, paper, ours)]
+    assert names == ["pure_planning", "slap_1_sample", "slap"]
+    assert {key: ours[key] for key in KEYS} == {key: numbers[key] for key in KEYS}
+    assert pure["shortcut_share"] == 0.0 < ours["shortcut_share"] < 1.0
+    assert ours["relative_length"] == ours["plan_length"]["mean"] / pure["plan_length"]["mean"] < 1
+    assert ours["plan_length"]["mean"] <= paper["plan_length"]["mean"]
+    alone = json.loads(slap(*arguments[:-2], "--shortcuts", "none").stdout)
+    assert without_seconds(alone)[1] == without_seconds(numbers)[1]
+    side_by_side = json.loads(slap(*arguments, "--jobs", 2).stdout)
+    assert without_seconds(side_by_side) == without_seconds(numbers)
+
+
+@pytest.mark.parametrize("command", ["evaluate", "plan", "run"])
+@pytest.mark.parametrize(
+    ("entry", "value", "words"),
+    [("domain", "obstacle_tower", "not of 'obstacle2d'"), ("format", 99, "format 99")],
+)
+def test_a_library_of_something_else_is_refused(tmp_path, command, entry, value, words):
+    library = shutil.copytree(LIBRARY, tmp_path / "library")
+    about = json.loads((library / "library.json").read_text()) | {entry: value}
+    (library / "library.json").write_text(json.dumps(about))
+    result = slap(command, "obstacle2d", "--shortcuts", library)
+    assert result.returncode == 17, result.stderr
+    assert result.stdout == ""
+    (line,) = result.stderr.strip().splitlines()
+    assert line.startswith("error ")
+    assert words in line
+
+
+def test_what_of_a_library_is_damaged_is_left_out_with_a_warning(tmp_path):
+    library = shutil.copytree(LIBRARY, tmp_path / "library")
+    (policy,) = library.glob("*/policy.safetensors")
+    policy.write_bytes(b"")
+    arguments = ["plan", "obstacle2d", "--seed", 1, "--json"]
+    damaged = slap(*arguments, "--shortcuts", library)
+    assert damaged.returncode == 0, damaged.stderr
+    (warning,) = damaged.stderr.strip().splitlines()
+    assert warning.startswith("warning a shortcut is left out: ")
+    assert str(policy) in warning
+    assert damaged.stdout == slap(*arguments, "--shortcuts", "none").stdout
+
+
+def test_a_plan_with_a_shortcut_is_drawn_with_it(tmp_path):
+    arguments = ["plan", "obstacle2d", "--seed", 1, "--shortcuts", LIBRARY, "--samples", 4]
+    result = slap(*arguments, "--output", tmp_path, "--json")
+    assert result.returncode == 0, result.stderr
+    plan = json.loads(result.stdout)
+    (learned,) = [edge["option"] for edge in plan["plan"] if edge["option"].startswith("Clear_On")]
+    drawn = (tmp_path / "graph.svg").read_text()
+    assert f"{learned}, number 2 of the plan" in drawn
+    assert "a learned shortcut on the plan" in drawn
+    ET.fromstring(drawn)
+
+
 def test_plan_writes_pddl_that_it_can_plan_for_and_a_picture(tmp_path):
-    result = slap("plan", "obstacle2d", "--seed", 3, "--output", tmp_path / "out", "--json")
+    result = slap(
+        "plan",
+        "obstacle2d",
+        "--seed",
+        3,
+        "--shortcuts",
+        "none",
+        "--output",
+        tmp_path / "out",
+        "--json",
+    )
     assert result.returncode == 0, result.stderr
     plan = json.loads(result.stdout)
     assert plan["predicted_steps"] == sum(edge["predicted_steps"] for edge in plan["plan"])
@@ -77,7 +163,12 @@ def test_plan_writes_pddl_that_it_can_plan_for_and_a_picture(tmp_path):
             30,
             "the goal holds in none",
         ),
-        (["evaluate", "obstacle2d", "--shortcuts", "nowhere"], 17, "nowhere"),
+        (["evaluate", "obstacle2d", "--shortcuts", "nowhere"], 17, "nowhere: no such folder"),
+        (
+            ["plan", "obstacle2d", "--planner", "ff", "--shortcuts", LIBRARY],
+            15,
+            "ff plans without shortcuts",
+        ),
         (["bag", "info", "nowhere"], 90, "nowhere"),
         (["bag", "evaluate", "/dev/null"], 90, "/dev/null"),
         (["plan", "absent.pddl", "problem.pddl"], 15, "absent.pddl"),
@@ -133,7 +224,8 @@ def test_usage_errors_are_code_2():
 def test_what_cannot_be_rendered_is_refused_before_anything_runs(tmp_path):
     for arguments, words in (
         (["obstacle2d", "--render", tmp_path / "a.gif"], "obstacle2d has no pictures"),
-        (["obstacle_tower", "--render", tmp_path / "a.mp4"], "a.gif"),
+        (["obstacle_tower", "--render", tmp_path / "a.avi"], "ends in .gif or .mp4, not 'a.avi'"),
+        (["obstacle_tower", "--render", tmp_path / "a"], "ends in .gif or .mp4, not 'a'"),
     ):
         result = slap("run", *arguments)
         assert result.returncode == 15
@@ -141,12 +233,13 @@ def test_what_cannot_be_rendered_is_refused_before_anything_runs(tmp_path):
 
 
 def test_a_recorded_tower_is_rendered_frame_by_frame(network, tmp_path):
-    bag, gif = tmp_path / "bag", tmp_path / "run.gif"
-    run = slap(
-        "run", "obstacle_tower", "--goal", "(Holding robot block1)", "--record", bag, "--json"
-    )
+    bag, gif, mp4 = tmp_path / "bag", tmp_path / "run.gif", tmp_path / "run.mp4"
+    goal = ("--goal", "(Holding robot block1)")
+    run = slap("run", "obstacle_tower", *goal, "--record", bag, "--render", mp4, "--json")
     assert run.returncode == 0, run.stderr
     rendered = slap("bag", "render", bag, "--output", gif)
     assert rendered.returncode == 0, rendered.stderr
+    frames = json.loads(run.stdout)["plan_length"] + 1
     with Image.open(gif) as picture:
-        assert picture.n_frames == json.loads(run.stdout)["plan_length"] + 1
+        assert picture.n_frames == frames
+    assert cv2.VideoCapture(str(mp4)).get(cv2.CAP_PROP_FRAME_COUNT) == frames

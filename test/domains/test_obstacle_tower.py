@@ -7,14 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scattered import scattered
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.obstacle_tower.model import BLOCK
-from slap_ros.domains.obstacle_tower.tasks import RandomTasks, Scenery
-from slap_ros.errors import ErrorCode, InvalidStateError
+from slap_ros.domains.obstacle_tower.tasks import PaperTasks, RandomTasks, Scenery
+from slap_ros.errors import ErrorCode, InvalidStateError, UnsolvableError
 from slap_ros.physics.panda import MAX_STEP
+from slap_ros.physics.scene import Material
 from slap_ros.planning.execution import Executor
-from slap_ros.planning.planner import make_planner
+from slap_ros.planning.model import Model
+from slap_ros.planning.planner import GraphPlanner, Problem, make_planner
+from slap_ros.planning.search import search_exhaustively, search_lazily
 from slap_ros.relational import State
 
 FAIR, PAPER = get_domain("obstacle_tower"), get_domain("obstacle_tower", "paper")
@@ -69,14 +73,43 @@ def test_blocks_in_the_air_or_on_edge_lie_on_nothing():
     assert "On(block1, table)" not in atoms(tilted)
 
 
-def test_a_batch_is_perceived_like_its_states():
-    rng = np.random.default_rng(0)
-    initial = FAIR.task(2).initial_state
-    space = FAIR.atom_space(initial)
-    data = initial.data + rng.uniform(-0.05, 0.05, (200, initial.layout.size))
-    truth = space.truth(State(initial.layout, data))
-    for row, one in zip(data, truth, strict=True):
-        assert (space.truth(State(initial.layout, row)) == one).all()
+def test_a_batch_is_perceived_like_its_states_whether_they_stand_or_tumble():
+    rng, seen = np.random.default_rng(0), 0
+    for seed in range(5):
+        initial = FAIR.task(seed).initial_state
+        space = FAIR.atom_space(initial)
+        batch = scattered(initial, rng, 200)
+        truth = space.truth(batch)
+        square = State(initial.layout, batch.data.reshape(10, 20, -1))
+        assert (space.truth(square).reshape(200, -1) == truth).all()
+        for row, one in zip(batch.data, truth, strict=True):
+            state = State(initial.layout, row)
+            assert (space.truth(state) == one).all()
+            assert space.mask(a for a, t in zip(space.atoms, one, strict=True) if t) == (
+                space.abstract(state)
+            )
+        seen += int(truth.sum(axis=0).astype(bool).sum())
+    assert seen > 150  # atoms that hold somewhere
+
+
+@pytest.mark.parametrize("axis", [0.0, 0.4, 2.0])
+def test_a_block_on_its_head_lies_where_it_lies(axis):
+    """Such quaternions have no yaw: both parts that turn about the vertical are 0."""
+    state = PAPER.task(0).initial_state
+    turned = {"qx": math.cos(axis), "qy": math.sin(axis), "qz": 0.0, "qw": 0.0}
+    on_head = state.replace({(state.layout.object("block2"), n): v for n, v in turned.items()})
+    assert atoms(on_head, PAPER) == atoms(state, PAPER)
+    above = on_head.layout.object("block3")
+    for aside in (0.045, 0.055):
+        moved = on_head.replace(
+            {
+                (above, "x"): 0.5 + aside * math.cos(2 * axis),
+                (above, "y"): aside * math.sin(2 * axis),
+            }
+        )
+        yaw = {"qz": math.sin(axis), "qw": math.cos(axis)}  # faces along the way it is moved
+        moved = moved.replace({(above, name): value for name, value in yaw.items()})
+        assert ("On(block3, block2)" in atoms(moved, PAPER)) == (aside < 0.05)
 
 
 def test_tasks_differ_and_stand_by_themselves():
@@ -134,3 +167,72 @@ def test_blocks_inside_one_another_are_refused():
     task = Scenery((0.5, 0.0, 0.0), (0.4, 0.2, 0.0), ((0.41, 0.21, 0.0),)).task()
     with pytest.raises(InvalidStateError, match="block"):
         FAIR.make_world(task.initial_state)
+
+
+def test_masses_and_frictions_are_sampled_last_and_alike_for_all_blocks():
+    wide = RandomTasks(mass=(0.1, 2.0), friction=(0.2, 1.2))
+    seen = set()
+    for seed in range(10):
+        plain = FAIR.task(seed).initial_state
+        state = wide.sample(np.random.default_rng([seed, 0])).initial_state
+        blocks = state.layout.of_type(BLOCK)
+        (mass,) = {float(state.get(block, "mass")) for block in blocks}
+        (friction,) = {float(state.get(block, "friction")) for block in blocks}
+        assert 0.1 < mass < 2.0
+        assert 0.2 < friction < 1.2
+        seen.add((mass, friction))
+        usual = {(b, f): v for b in blocks for f, v in (("mass", 0.5), ("friction", 0.9))}
+        assert state.replace(usual) == plain
+    assert len(seen) == 10
+
+
+@pytest.mark.parametrize("material", [Material(0.05, 0.3), Material(3.0, 1.2)])
+def test_towers_of_other_materials_are_taken_apart_too(material):
+    scenery = replace(PaperTasks().scenery, material=material)
+    episode = solve(scenery.task())
+    assert episode.success, episode.error
+    blocks = episode.states[-1].layout.of_type(BLOCK)
+    assert all(episode.states[-1].get(b, "mass") == material.mass_kg for b in blocks)
+
+
+class WatchedModel(Model):
+    """A model that compares each roll-out with its bound."""
+
+    def _simulate(self, option, state, target):
+        bound = option.skill.lower_bound(state, option.objects)
+        rollout = super()._simulate(option, state, target)
+        if rollout.reached:
+            assert option.skill.least_steps <= bound <= rollout.steps
+            self.slack.append(rollout.steps - bound)
+        return rollout
+
+
+@pytest.mark.parametrize("preset", ["fair", "paper"])
+@pytest.mark.parametrize("seed", range(2))
+def test_the_lazy_search_is_bounded_truly_and_finds_the_cost_of_the_exhaustive(preset, seed):
+    domain = {"fair": FAIR, "paper": PAPER}[preset]
+    settings = RandomTasks(obstacles=(1 + seed, 1 + seed), distractors=(1 - seed, 1 - seed))
+    task = settings.sample(np.random.default_rng(seed))
+    costs, rolled_out, slack = [], [], []
+    for search in (search_lazily, search_exhaustively):
+        model = WatchedModel.of(domain, task.initial_state)
+        model.slack = slack
+        problem = replace(Problem.of(domain, task.initial_state), model=model)
+        plan = GraphPlanner(problem, search).plan(task.initial_state, model.space.mask(task.goal))
+        costs.append(plan.plan.predicted_steps)
+        rolled_out.append(plan.edges_rolled_out)
+    assert costs[0] == costs[1]
+    assert rolled_out[0] < rolled_out[1]
+    assert preset == "paper" or np.median(slack) <= 1  # mostly nothing is in the way
+
+
+@pytest.mark.parametrize("place", [(1.2, 0.0), (0.5, 0.7), (0.8, 0.42)])
+@pytest.mark.parametrize("planner", ["lazy", "ff"])
+def test_a_target_off_the_table_makes_the_task_unsolvable(place, planner):
+    """Far away, beside the table, and where the arm could reach it in mid-air."""
+    task = Scenery((*place, 0.0), (0.4, 0.2, 0.0), ()).task()
+    space = FAIR.atom_space(task.initial_state)
+    with pytest.raises(UnsolvableError, match=r"no path through|leads to the goal"):
+        make_planner(planner, FAIR, task.initial_state).plan(
+            task.initial_state, space.mask(task.goal)
+        )

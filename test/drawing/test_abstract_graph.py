@@ -22,6 +22,7 @@ from slap_ros.drawing import abstract_graph as drawing
 from slap_ros.drawing import draw_abstract_graph
 from slap_ros.drawing.abstract_graph import compose
 from slap_ros.drawing.layout import Area
+from slap_ros.drawing.palette import OTHER_SHORTCUT_PEN, SHORTCUT_PEN
 from slap_ros.drawing.selection import MAX_NODES
 from slap_ros.drawing.svg import Curve, Group, Picture, Rectangle, Text, texts
 from slap_ros.drawing.text import shorten, width_px, wrap
@@ -424,6 +425,21 @@ def test_learned_shortcuts_say_so() -> None:
     plan = Plan((PlanEdge(shortcut, graph.nodes[7], 6),))
     said = [t.content for t in texts(compose(graph, case.space, plan, "Shortcut").shapes)]
     assert "learned shortcut" in said
+
+
+def test_shortcuts_look_different_on_the_plan_and_off_it() -> None:
+    case = obstacle2d(PAPER)
+    given = case.graph.edges[0].option
+    shortcut = Option(OptionKind.SHORTCUT, given.skill, given.objects)
+    graph = replace(case.graph, edges=[*case.graph.edges, Edge(0, 7, shortcut)])
+    plan = Plan((PlanEdge(shortcut, graph.nodes[7], 6),))
+    for taken, meaning in ((plan, "a learned shortcut on the plan"), (None, "another learned")):
+        picture = compose(graph, case.space, taken, "shortcuts")
+        edges = [shape for shape in picture.shapes if isinstance(shape, Group)]
+        (drawn,) = [e for e in edges if e.title.startswith("State 0 to state 7")]
+        pens = {shape.pen for shape in drawn.shapes if isinstance(shape, Curve)}
+        assert pens == {SHORTCUT_PEN if taken else OTHER_SHORTCUT_PEN}
+        assert any(meaning in text.content for text in texts(picture.shapes))
 
 
 # -- legibility ---------------------------------------------------------------------------------

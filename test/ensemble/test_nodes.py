@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 import rclpy
@@ -26,6 +27,7 @@ from ensemble.run import Spinner
 from slap_ros.bags import evaluate_bag
 from slap_ros.messages.interfaces import STATE
 
+LIBRARY = Path(__file__).parent.parent / "shortcuts" / "data" / "obstacle2d"
 ALL = ("sim_node", "perception_node", "skill_server", "planner_node", "recorder_node")
 LIMIT = 15.0  # s, in which a killed node must have ended the run
 
@@ -48,7 +50,9 @@ def spinning():
 
 
 def parameters(record=None, seed=3, pace=0.0):
-    return node_parameters(RunSettings("obstacle2d", "fair", seed, 0, "lazy", record, pace))
+    return node_parameters(
+        RunSettings("obstacle2d", "fair", seed, 0, "lazy", record, pace, shortcuts="none")
+    )
 
 
 def start(name, *arguments):
@@ -285,6 +289,10 @@ def test_a_full_disk_ends_the_run_and_keeps_what_was_recorded(network, tmp_path)
         (["sim_node", "-p", "domain:=moon"], 10, "unknown domain 'moon'"),
         (["sim_node", "-p", "preset:=easy"], 15, "unknown preset 'easy'"),
         (["planner_node", "-p", "planner:=best"], 15, "planner must be one of"),
+        (["planner_node", "-p", "shortcuts:=/nowhere"], 17, "/nowhere: no shortcut library"),
+        (["planner_node", "-p", "planner:=ff", "-p", f"shortcuts:={LIBRARY}"], 15, "planner ff"),
+        (["skill_server", "-p", "shortcuts:=/nowhere"], 17, "/nowhere: no shortcut library"),
+        (["skill_server", "-p", "samples:=0"], 15, "samples must be at least 1"),
         (["recorder_node"], 15, "must name the folder"),
         (["recorder_node", "-p", "bag:=/tmp"], 93, "/tmp exists"),
     ],

@@ -28,7 +28,7 @@ def ignore(type_name, message):
 
 
 def request(record=None, seed=3, in_process=True, **options):
-    settings = RunSettings("obstacle2d", "fair", seed, 0, "lazy", record)
+    settings = RunSettings("obstacle2d", "fair", seed, 0, "lazy", record, shortcuts="none")
     return RunRequest(settings, timeout_s=60, in_process=in_process, **options)
 
 
@@ -46,7 +46,8 @@ def atoms_by_step(bag):
 
 
 def test_live_bag_in_process_and_offline_agree_to_the_digit(network, tmp_path):
-    live = slap("run", "obstacle2d", "--seed", "3", "--record", str(tmp_path / "a"), "--json")
+    arguments = ["--seed", "3", "--shortcuts", "none", "--record", str(tmp_path / "a")]
+    live = slap("run", "obstacle2d", *arguments, "--json")
     assert live.returncode == 0, live.stderr
     from_bag = slap("bag", "evaluate", str(tmp_path / "a"), "--json")
     assert from_bag.returncode == 0, from_bag.stderr
@@ -134,7 +135,9 @@ def test_100_runs_leave_no_thread_no_file_and_no_process(network, tmp_path):
 
 
 def test_a_tower_is_taken_apart_by_the_ensemble_and_replayed_bit_for_bit(network, tmp_path):
-    settings = RunSettings("obstacle_tower", "fair", 1, 0, "lazy", tmp_path / "bag")
+    settings = RunSettings(
+        "obstacle_tower", "fair", 1, 0, "lazy", tmp_path / "bag", shortcuts="none"
+    )
     live = run(RunRequest(settings, timeout_s=100), ignore)
     assert live.success, live.error_msg
     assert replay_bag(tmp_path / "bag").identical

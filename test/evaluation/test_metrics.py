@@ -105,6 +105,7 @@ def test_a_solved_run() -> None:
         "index": 3,
         "success": True,
         "plan_length": 9,
+        "shortcut_steps": 4,
         "planning_seconds": 0.002,
         "replans": 1,
         "edges_rolled_out": 17,

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """States in the thick of it, what was done in them, and what came of it.
 
+All blocks are alike, or each is of a material of its own that differs from push to push.
+
 ``python pairs.py FILE`` replays recorded pairs and prints how many come out differently.
 """
 
@@ -15,6 +17,8 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent.parent))
+
+from materials import mixed
 
 from benchmarks.physics_step import SCENE, pushes, tower, with_joints
 from slap_ros.physics.features import ROBOT, body_features, robot_features
@@ -32,24 +36,32 @@ GRASP = Pose((0.002, -0.003, GRASP_POINT))  # not quite in the middle
 class Pairs:
     """``after[i]`` is what ``actions[i]`` makes of ``before[i]``."""
 
+    mixed: bool  # whether blocks differ in their materials
     before: np.ndarray  # (pairs, features)
     actions: np.ndarray  # (pairs, 8)
     after: np.ndarray
 
     def save(self, path: Path) -> None:
-        np.savez(path, before=self.before, actions=self.actions, after=self.after)
+        np.savez(path, mixed=self.mixed, before=self.before, actions=self.actions, after=self.after)
 
     @classmethod
     def load(cls, path: Path) -> Pairs:
         with np.load(path) as file:
-            return cls(file["before"], file["actions"], file["after"])
+            return cls(bool(file["mixed"]), file["before"], file["actions"], file["after"])
+
+    @property
+    def start(self) -> State:
+        """A state of the same objects."""
+        return mixed(np.random.default_rng(0)) if self.mixed else tower()
+
+    def state(self, i: int) -> State:
+        return State(self.start.layout, self.before[i].copy())
 
     def differing(self, world: PandaWorld, order: Iterable[int]) -> list[int]:
         """The pairs that come out differently, in any bit."""
-        layout = tower().layout
         different = []
         for i in order:
-            world.reset(State(layout, self.before[i].copy()))
+            world.reset(self.state(i))
             if world.step(self.actions[i]).key != self.after[i].tobytes():
                 different.append(i)
         return different
@@ -83,15 +95,16 @@ def in_the_air(state: State, rng: np.random.Generator) -> State:
     return state.replace({(block, name): value for name, value in features.items()})
 
 
-def record(count: int, seed: int) -> Pairs:
+def record(count: int, seed: int, of_mixed: bool = False) -> Pairs:
     """Pairs from pushes with an empty and a full hand, throws, and a gripper that acts."""
     rng = np.random.default_rng(seed)
     rows: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
-    with PandaWorld(SCENE, tower()) as world:
+    with PandaWorld(SCENE, mixed(rng) if of_mixed else tower()) as world:
         for number, push in enumerate(pushes(count // 9, seed)):
-            start = with_joints(tower(), push.joints)
+            standing = mixed(rng) if of_mixed else tower()
+            start = with_joints(standing, push.joints)
             if number % 3 == 1:
-                start = holding(tower(), "T", tuple(push.joints.tolist()))
+                start = holding(standing, "T", tuple(push.joints.tolist()))
             elif number % 3 == 2:
                 start = in_the_air(start, rng)
             world.reset(start)
@@ -103,13 +116,13 @@ def record(count: int, seed: int) -> Pairs:
                 before = world.state
                 rows.append((before.data, noisy, world.step(noisy).data))
     chosen = rng.permutation(len(rows))[:count]
-    return Pairs(*(np.array([rows[i][part] for i in chosen]) for part in range(3)))
+    return Pairs(of_mixed, *(np.array([rows[i][part] for i in chosen]) for part in range(3)))
 
 
 def main() -> None:
     pairs = Pairs.load(Path(sys.argv[1]))
     order = np.random.default_rng(77).permutation(len(pairs.before))
-    with PandaWorld(SCENE, tower()) as world:
+    with PandaWorld(SCENE, pairs.start) as world:
         for _ in range(20):
             world.step(HIGH * [1, 1, 1, 1, 1, 1, 1, 0])  # another history first
         differing = pairs.differing(world, order)

@@ -23,15 +23,21 @@ from slap_ros.relational import State, Type
 COUNT = 1000
 
 
-@pytest.fixture(scope="module")
-def pairs() -> Pairs:
-    return record(COUNT, seed=1)
+@pytest.fixture(scope="module", params=["alike", "mixed"])
+def pairs(request) -> Pairs:
+    return record(COUNT, seed=1, of_mixed=request.param == "mixed")
+
+
+@pytest.fixture
+def world(pairs):
+    with PandaWorld(SCENE, pairs.start) as world:
+        yield world
 
 
 def test_the_pairs_are_taken_in_the_thick_of_it(pairs):
-    states = State(tower().layout, pairs.before)
+    states = State(pairs.start.layout, pairs.before)
     blocks = [states[states.layout.object(name)] for name in NAMES]
-    after = State(tower().layout, pairs.after)
+    after = State(pairs.start.layout, pairs.after)
     moving = np.max([np.abs(block[:, 7:13]).max(1) for block in blocks], axis=0) > 0.02
     shifted = np.max(
         [
@@ -56,7 +62,7 @@ def test_the_same_after_any_other_history(pairs, world):
 def test_the_same_in_fresh_worlds(pairs):
     for i in range(0, COUNT, 50):
         release_idle()  # a new PyBullet client each time
-        with PandaWorld(SCENE, tower()) as world:
+        with PandaWorld(SCENE, pairs.start) as world:
             assert pairs.differing(world, [i]) == []
 
 
@@ -71,9 +77,9 @@ def test_the_same_in_another_process(pairs, tmp_path):
 
 def test_a_world_goes_on_as_one_that_was_reset_to_its_state(pairs, world):
     """Nothing is carried from step to step but the state."""
-    with PandaWorld(SCENE, tower()) as other:
+    with PandaWorld(SCENE, pairs.start) as other:
         for start in range(0, COUNT, 40):
-            state = State(tower().layout, pairs.before[start].copy())
+            state = pairs.state(start)
             world.reset(state)
             for action in pairs.actions[start : start + 8]:
                 other.reset(state)

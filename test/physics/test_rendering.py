@@ -4,15 +4,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import cv2
 import numpy as np
 import pybullet
 import pytest
 from pairs import holding
-from PIL import Image
+from PIL import Image, ImageSequence
 
 from benchmarks.physics_step import NAMES, tower
-from slap_ros.physics.rendering import Camera, View, write_gif
+from slap_ros.physics.animation import WRITERS
+from slap_ros.physics.rendering import Camera, View, write_animation
 from slap_ros.physics.scene import TABLE, Scene, cube
+from slap_ros.relational import State
 
 RED, BLUE = (0.9, 0.1, 0.1, 1.0), (0.1, 0.1, 0.9, 1.0)
 SCENE = Scene((TABLE, *(cube(n, RED if n == "T" else BLUE) for n in NAMES)))
@@ -59,17 +64,66 @@ def test_the_arm_is_drawn_where_it_is(camera):
     assert np.array_equal(camera.picture(state), a)  # it remembers nothing
 
 
-def test_an_animation_has_a_frame_a_step(camera, tmp_path):
+def falling() -> list[State]:
     state = tower()
     block = state.layout.object("T")
-    states = [state.replace({(block, "z"): 0.1 + 0.05 * k}) for k in range(4)]
-    told = []
-    write_gif(tmp_path / "fall.gif", camera, states, told.append)
+    return [state.replace({(block, "z"): 0.3 - 0.05 * k}) for k in range(4)]
+
+
+def frames_of(path: Path) -> list[np.ndarray]:
+    if path.suffix == ".gif":
+        with Image.open(path) as image:
+            return [np.asarray(frame.convert("RGB")) for frame in ImageSequence.Iterator(image)]
+    video, frames = cv2.VideoCapture(str(path)), []
+    while True:
+        found, frame = video.read()
+        if not found:
+            return frames
+        frames.append(cv2.cvtColor(frame, cv2.COLOR_BGR2RGB))
+
+
+@pytest.mark.parametrize("ending", WRITERS)
+def test_an_animation_has_a_frame_a_step_that_shows_it(camera, tmp_path, ending):
+    states, told = falling(), []
+    path = tmp_path / f"fall{ending}"
+    write_animation(path, camera, states, told.append)
     assert told == [1, 2, 3, 4]
+    assert list(tmp_path.iterdir()) == [path]  # nothing else is left
+    frames = frames_of(path)
+    assert len(frames) == 4
+    for frame, state in zip(frames, states, strict=True):
+        assert frame.shape == (120, 160, 3)
+        assert np.abs(middle_of(frame, 0) - middle_of(camera.picture(state), 0)).max() < 2
+
+
+def test_animations_play_in_real_time(camera, tmp_path):
+    write_animation(tmp_path / "fall.gif", camera, falling())
+    write_animation(tmp_path / "fall.mp4", camera, falling())
     with Image.open(tmp_path / "fall.gif") as image:
-        assert image.n_frames == 4
-        assert image.size == (160, 120)
         assert image.info["duration"] in (120, 130)  # ms, in hundredths of a second
+    assert cv2.VideoCapture(str(tmp_path / "fall.mp4")).get(cv2.CAP_PROP_FPS) == 8.0
+
+
+@pytest.mark.parametrize("ending", WRITERS)
+@pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError])
+def test_an_interrupted_animation_leaves_what_was_there(camera, tmp_path, ending, error):
+    path = tmp_path / f"fall{ending}"
+    path.write_text("the last one")
+
+    def interrupt(done: int) -> None:
+        if done == 3:
+            raise error
+
+    with pytest.raises(error):
+        write_animation(path, camera, falling(), interrupt)
+    assert list(tmp_path.iterdir()) == [path]
+    assert path.read_text() == "the last one"
+
+
+@pytest.mark.parametrize("ending", WRITERS)
+def test_a_folder_that_is_not_there_is_an_error(camera, tmp_path, ending):
+    with pytest.raises(OSError, match=r"folder|No such file"):
+        write_animation(tmp_path / "nowhere" / f"fall{ending}", camera, falling())
 
 
 def test_a_closed_camera_leaks_no_client():

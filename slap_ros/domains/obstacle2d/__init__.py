@@ -9,15 +9,25 @@ positions are centres. Read on in this order: ``model`` (types, predicates, oper
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 from slap_ros.domains.domain import Domain
 from slap_ros.domains.obstacle2d import model, skills, tasks
 from slap_ros.domains.obstacle2d.bodies import visible_bodies
-from slap_ros.domains.obstacle2d.dynamics import ACTION_SPACE, CONTROL_PERIOD, Obstacle2DWorld
+from slap_ros.domains.obstacle2d.dynamics import (
+    ACTION_SPACE,
+    CONTROL_PERIOD,
+    Obstacle2DWorld,
+    Obstacle2DWorlds,
+)
+from slap_ros.domains.obstacle2d.view import VIEW
+from slap_ros.domains.variation import varied
 
 
-def make(preset: str) -> Domain:
+def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Domain:
     """The domain: preset ``fair`` samples different tasks, ``paper`` the reference's three."""
-    settings = tasks.SETTINGS[preset]
+    settings = varied(tasks.SETTINGS[preset], changes)
     return Domain(
         name="obstacle2d",
         preset=preset,
@@ -33,5 +43,7 @@ def make(preset: str) -> Domain:
         step_limit=tasks.STEP_LIMIT,
         unread_types=frozenset({model.ROBOT}),
         bodies=visible_bodies,
+        view=VIEW,
+        make_many=Obstacle2DWorlds,
         configuration=settings.as_configuration(),
     )

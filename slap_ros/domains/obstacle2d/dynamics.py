@@ -10,6 +10,7 @@ a carried block is let go only over free table, and then stands there.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -174,6 +175,35 @@ def require_possible(state: State) -> None:
         for j in range(i):
             if max(abs(x[i] - x[j]), abs(y[i] - y[j])) < BLOCK_SIZE - CONTACT:
                 raise InvalidStateError(f"{name} and {names[j]} are inside one another")
+
+
+class Obstacle2DWorlds:
+    """Many worlds of the same objects."""
+
+    def __init__(self, states: Sequence[State]) -> None:
+        """Begin in ``states``.
+
+        Raises:
+            InvalidStateError: A scene that cannot be.
+        """
+        for state in states:
+            require_possible(state)
+        self._layout = states[0].layout
+        self._data = np.stack([state.data for state in states])
+
+    @property
+    def states(self) -> State:
+        """The current states, a batch."""
+        return State(self._layout, self._data.copy())
+
+    def reset(self, world: int, state: State) -> None:
+        """Let one world continue from ``state``."""
+        self._data[world] = state.data
+
+    def step(self, actions: Array) -> State:
+        """Act in every world once; ``actions``: shape (worlds, 3)."""
+        self._data = step(self._layout, self._data, actions)
+        return self.states
 
 
 class Obstacle2DWorld:

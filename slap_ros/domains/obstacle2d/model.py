@@ -26,6 +26,7 @@ BLOCK_SIZE = 0.2  # m, width and height of every block and of the robot's grippe
 OVERLAP_TOLERANCE = 1e-3  # m, how far a block may reach over an area's edge without overlapping it
 INSIDE_TOLERANCE = 0.01  # m, how far a block in the target area may reach over its edge
 RESTING_TOLERANCE = 1e-6  # m, height over the table at which a block still rests on it
+STEEPNESS = 1e6  # 1, of that tolerance in margins: all of it counts as the whole table sideways
 
 X, Y = Feature("x", "m"), Feature("y", "m")
 ROBOT = Type("robot", (X, Y))
@@ -61,10 +62,13 @@ def _reach(state: State, block: Column, surface: Column) -> Array:
 
 
 def _rest_margin(state: State, block: Column) -> Array:
-    """Positive where the block lies on the table: not held, bottom at the table's top."""
+    """Positive where the block lies on the table: not held, bottom at the table's top.
+
+    It rises so steeply that the margin of a block at rest is that of the distances sideways.
+    """
     height = np.where(state.stack(block, "held") > 0.5, 1.0, state.stack(block, "y"))
-    margin: Array = RESTING_TOLERANCE - height
-    return margin
+    margin = RESTING_TOLERANCE - height
+    return np.maximum(margin, STEEPNESS * margin)
 
 
 def _overlap_margin(state: State, block: Column, surface: Column) -> Array:

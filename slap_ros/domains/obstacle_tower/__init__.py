@@ -12,10 +12,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 from slap_ros.domains.domain import ActionSpace, Domain
 from slap_ros.domains.obstacle_tower import model, skills, tasks
 from slap_ros.domains.obstacle_tower.scenery import animate, scene_of, visible_bodies
+from slap_ros.domains.obstacle_tower.view import VIEW
+from slap_ros.domains.variation import varied
 from slap_ros.physics.features import ROBOT
 from slap_ros.physics.panda import CONTROL_PERIOD_S
 from slap_ros.physics.world import ACTION_SPACE, PandaWorld
@@ -30,9 +33,9 @@ ACTIONS: Mapping[str, ActionSpace] = {"fair": ACTION_SPACE, "paper": WHATEVER}
 TIMINGS: Mapping[str, skills.Timing] = {"fair": skills.AtSpeedLimit(), "paper": skills.InTens()}
 
 
-def make(preset: str) -> Domain:
+def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Domain:
     """The domain: preset ``fair`` samples different tasks, ``paper`` has the reference's one."""
-    settings, actions = SETTINGS[preset], ACTIONS[preset]
+    settings, actions = varied(SETTINGS[preset], changes), ACTIONS[preset]
     return Domain(
         name="obstacle_tower",
         preset=preset,
@@ -49,5 +52,7 @@ def make(preset: str) -> Domain:
         unread_types=frozenset({ROBOT}),
         bodies=visible_bodies,
         animate=animate,
+        view=VIEW,
+        learned_actions=ACTION_SPACE,
         configuration=settings.as_configuration(),
     )

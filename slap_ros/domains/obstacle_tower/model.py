@@ -4,28 +4,34 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from slap_ros.physics.features import BODY_FEATURES, POSE_FEATURES, ROBOT
+from slap_ros.physics.features import BODY_FEATURES, MATERIAL_FEATURES, POSE_FEATURES, ROBOT
 from slap_ros.relational import (
     Column,
     Feature,
     Layout,
     LiftedAtom,
     LiftedOperator,
+    Object,
     Predicate,
     State,
     Type,
     Variable,
 )
-from slap_ros.relational.predicates import Bools
+from slap_ros.relational.predicates import Bools, shared
 from slap_ros.relational.state import Array
 
 TOUCHING = 0.004  # m, height over a thing at which a block still lies on it
 CENTRED = 0.015  # m, distance from the target's middle at which a block still is in it
+MOST_REMEMBERED = 1024  # columns of objects, a layout
+TINY = float(np.finfo(np.float64).tiny)
+STEEPNESS = 50.0  # 1, of tolerances in margins: all of TOUCHING counts as 20 cm sideways
 
 # Of blocks and surfaces alike, so that predicates can ask both at once.
 THING_FEATURES = (
@@ -34,119 +40,185 @@ THING_FEATURES = (
     Feature("is_target", "1"),
 )
 THING = Type("thing")
-BLOCK = Type("block", (*BODY_FEATURES, *THING_FEATURES), THING)
+BLOCK = Type("block", (*BODY_FEATURES, *MATERIAL_FEATURES, *THING_FEATURES), THING)
 SURFACE = Type("surface", (*POSE_FEATURES, *THING_FEATURES), THING)
 TYPES = (ROBOT, THING, BLOCK, SURFACE)
 
-
-# -- metrics: shapes are (..., atoms), or (..., blocks, things) for all pairs ---------------------
-
-
-class Boxes(NamedTuple):
-    """Boxes side by side, as arrays that broadcast against those of other boxes."""
-
-    centre: Array  # m, (3, ..., boxes)
-    edges: Array  # half its edges, m: coordinate, edge, and then as above, (3, 3, ..., boxes)
-    turn: Array  # cosine and sine of its yaw, (2, ..., boxes)
-
-    @classmethod
-    def of(cls, state: State, column: Column) -> Boxes:
-        """The boxes of a column, along the last axis."""
-        centre = np.stack([state.stack(column, axis) for axis in ("x", "y", "z")])
-        half = np.stack([state.stack(column, f"half_{axis}") for axis in ("x", "y", "z")])
-        q = np.stack([state.stack(column, f"q{part}") for part in ("x", "y", "z", "w")])
-        products = q[:, None] * q
-        rotation = np.tensordot(TO_ROTATION, products, axes=([2, 3], [0, 1]))
-        turn = np.stack([products[3, 3] - products[2, 2], 2.0 * products[2, 3]]) / (
-            products[3, 3] + products[2, 2] + np.finfo(np.float64).tiny
-        )
-        return cls(centre, rotation * half, turn)
-
-    def along(self, axis: int) -> Boxes:
-        """The same with a new axis in every array, for pairs of boxes."""
-        return Boxes(*(np.expand_dims(array, axis) for array in self))
-
-    @property
-    def height(self) -> Array:
-        """How far they reach up, and down, from their centres."""
-        height: Array = np.abs(self.edges[2]).sum(axis=0)
-        return height
-
-    def width(self, cos: Array, sin: Array) -> Array:
-        """How far they reach from their centres along a horizontal unit vector."""
-        width: Array = np.abs(self.edges[0] * cos + self.edges[1] * sin).sum(axis=0)
-        return width
+Complex = NDArray[np.complex128]
 
 
-def _to_rotation() -> Array:
-    """The linear map from products of a quaternion's parts, x y z w, to a rotation matrix."""
-    to = np.zeros((3, 3, 4, 4))
+# -- where things lie -----------------------------------------------------------------------------
+
+Indices = NDArray[np.intp]
+W, Z, X, Y = range(4)  # parts of a quaternion as they are read: (w, z) and (x, y) turn the plane
+
+
+def _to_edges() -> Array:
+    """The linear map from the products of a quaternion's parts to where a unit cube's edges point.
+
+    Returns:
+        Shape (16, 9): x and y of the first, second and third edge, then z of each.
+    """
+    to = np.zeros((4, 4, 9))
+    axes, place = (X, Y, Z), ((0, 2, 4), (1, 3, 5), (6, 7, 8))  # place[coordinate][edge]
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        to[i, i, [i, 3, j, k], [i, 3, j, k]] = 1.0, 1.0, -1.0, -1.0
-        to[i, j, i, j], to[i, j, k, 3] = 2.0, -2.0
-        to[i, k, i, k], to[i, k, j, 3] = 2.0, 2.0
-    return to
+        a, b, c = axes[i], axes[j], axes[k]
+        to[[a, W, b, c], [a, W, b, c], place[i][i]] = 1.0, 1.0, -1.0, -1.0
+        to[a, b, place[i][j]], to[c, W, place[i][j]] = 2.0, -2.0
+        to[a, c, place[i][k]], to[b, W, place[i][k]] = 2.0, 2.0
+    return to.reshape(16, 9)
 
 
-TO_ROTATION = _to_rotation()
+TO_EDGES = _to_edges()
+HALVES = (*("half_x",) * 2, *("half_y",) * 2, *("half_z",) * 2, "half_x", "half_y", "half_z")
 
 
-def _touches(block: Boxes, thing: Boxes) -> Array:
-    """Positive where the block's lowest point is at the height of the thing's highest."""
-    gap = block.centre[2] - block.height - thing.centre[2] - thing.height
-    touches: Array = TOUCHING - np.abs(gap)
-    return touches
+@dataclass(frozen=True, eq=False)
+class Things:
+    """The blocks, then the surfaces of a layout, and where their features are."""
+
+    blocks: int  # how many
+    objects: tuple[Object, ...]
+    quaternions: Indices  # (things, 4), parts as read
+    places: Indices  # (things, 2): x, y
+    halves: Indices  # (things, 9), as in TO_EDGES
+    z: Indices  # (things,), as those that follow
+    is_movable: Indices
+    is_target: Indices
+    _numbers: dict[Column, Indices] = field(default_factory=dict)
+
+    @staticmethod
+    @lru_cache(maxsize=256)
+    def of(layout: Layout) -> Things:
+        """Those of a layout."""
+        blocks = layout.of_type(BLOCK)
+        objects = (*blocks, *layout.of_type(SURFACE))
+
+        def where(*features: str) -> Indices:
+            return np.array([layout.columns(objects, name) for name in features])
+
+        return Things(
+            len(blocks),
+            objects,
+            where("qw", "qz", "qx", "qy").T,
+            where("x", "y").T,
+            where(*HALVES).T,
+            *where("z", "is_movable", "is_target"),
+        )
+
+    def numbers(self, column: Column) -> Indices:
+        """The objects of a column as numbers."""
+        numbers = self._numbers.get(column)
+        if numbers is None:
+            numbers = np.array([self.objects.index(obj) for obj in column.objects])
+            if len(self._numbers) == MOST_REMEMBERED:
+                self._numbers.clear()
+            self._numbers[column] = numbers
+        return numbers
 
 
-def _covers(block: Boxes, thing: Boxes) -> Array:
-    """Positive where the block is over part of the thing, seen along the thing's axes."""
-    dx, dy = block.centre[0] - thing.centre[0], block.centre[1] - thing.centre[1]
-    cos, sin = thing.turn
-    ahead = thing.width(cos, sin) + block.width(cos, sin) - np.abs(cos * dx + sin * dy)
-    aside = thing.width(-sin, cos) + block.width(-sin, cos) - np.abs(cos * dy - sin * dx)
-    covers: Array = np.minimum(ahead, aside)
-    return covers
+class Lie(NamedTuple):
+    """How everything lies in a state, as margins in m."""
+
+    things: Things
+    on: Array  # of blocks on things, shape (..., blocks * things)
+    room: Array  # for a block on things, shape (..., things)
 
 
-def _centred(block: Boxes, target: Boxes) -> Array:
-    """Positive where the block's centre is over the middle of the target."""
-    dx, dy = block.centre[0] - target.centre[0], block.centre[1] - target.centre[1]
-    centred: Array = CENTRED - np.hypot(dx, dy)
-    return centred
+@shared
+def lie(state: State) -> Lie:
+    """How everything lies: all at once, as predicates share most of it.
+
+    Horizontal vectors are complex numbers: turned by a product, seen along both axes at once.
+    """
+    things, data = Things.of(state.layout), state.data
+    blocks = slice(things.blocks)
+    q = data.take(things.quaternions, axis=-1)
+    products = (q[..., None] * q[..., None, :]).reshape(*q.shape[:-1], 16)
+    edges = products @ TO_EDGES * data.take(things.halves, axis=-1)
+    is_movable = data.take(things.is_movable, axis=-1) > 0.5
+    is_target = data.take(things.is_target, axis=-1) > 0.5
+
+    # A block touches what its lowest point is at the height of.
+    z, height = data.take(things.z, axis=-1), np.add.reduce(np.abs(edges[..., 6:]), axis=-1)
+    gap = (z - height)[..., blocks, None] - (z + height)[..., None, :]
+    touches = _unpinched(TOUCHING - np.abs(gap))
+
+    # It covers what it is over, seen along the axes of that thing.
+    places = _complex(data.take(things.places, axis=-1))[..., 0]
+    way = places[..., blocks, None] - places[..., None, :]
+    back = _turned_back(q, edges)[..., None, :]
+    width = _width(_complex(edges[..., :6])[..., None, :], back)
+    own_width = np.diagonal(width, axis1=-3, axis2=-2).swapaxes(-1, -2)[..., None, :, :]
+    ahead_aside = width[..., blocks, :, :] + own_width - _along_axes(way * back)
+    covers = np.minimum(ahead_aside[..., 0], ahead_aside[..., 1])
+
+    # It lies in the middle of a target; elsewhere on the table; or on a part of another block.
+    centred = CENTRED - np.abs(way)
+    to_target = np.where(is_target[..., None, :], centred, -1.0)[..., things.blocks :]
+    elsewhere = _strictly(-np.maximum.reduce(to_target, axis=-1, initial=-1.0))[..., None]
+    on_table = np.minimum(covers, elsewhere)
+    off_targets = np.where(is_movable[..., None, :], covers, on_table)
+    sideways = np.where(is_target[..., None, :], centred, off_targets)
+    on = np.minimum(touches, sideways)
+
+    # On the table there is always room; on targets and blocks for one block only.
+    over = np.maximum.reduce(np.minimum(touches, covers), axis=-2, initial=-1.0)
+    room = np.where(is_movable | is_target, _strictly(-over), 1.0)
+    return Lie(things, on.reshape(*on.shape[:-2], -1), room)
+
+
+def _complex(pairs: Array) -> Complex:
+    """Numbers from their parts side by side, without copying."""
+    numbers: Complex = pairs.view(np.complex128)
+    return numbers
+
+
+def _along_axes(vectors: Complex) -> Array:
+    """How far vectors reach along the axes, shape (..., 2)."""
+    return np.abs(vectors[..., None].view(np.float64))
+
+
+def _turned_back(q: Array, edges: Array) -> Complex:
+    """What turns the plane so that things lie along its axes, by their yaw.
+
+    Of the two parts of a quaternion that have to do with the yaw, one is 0 for what lies on its
+    bottom, the other for what lies on its head. The larger one is taken.
+    """
+    parts = _complex(q)
+    part: Complex = np.where(edges[..., 8] > 0.0, parts[..., 0], parts[..., 1])
+    back: Complex = part.conj() / part
+    return back
+
+
+def _width(edges: Complex, back: Complex) -> Array:
+    """How far boxes reach from their centres along turned axes, shape (..., 2)."""
+    along = _along_axes(edges * back[..., None])
+    width: Array = along[..., 0, :] + along[..., 1, :] + along[..., 2, :]
+    return width
+
+
+def _unpinched(tolerance: Array) -> Array:
+    """A tolerance that, where it is kept, leaves a smallest margin to the distances sideways."""
+    return np.maximum(tolerance, STEEPNESS * tolerance)
 
 
 def _strictly(margin: Array) -> Array:
     """Make a negated margin false at 0, where the original still holds."""
-    return margin - np.finfo(np.float64).tiny
+    return margin - TINY
 
 
 # -- predicates -----------------------------------------------------------------------------------
 
 
 def _on_margin(state: State, block: Column, thing: Column) -> Array:
-    """In the middle of the target; elsewhere on the table; or over part of another block."""
-    blocks, things = Boxes.of(state, block), Boxes.of(state, thing)
-    targets = Boxes.of(state, _all(state.layout, SURFACE))
-    is_target = _is(state, _all(state.layout, SURFACE), "is_target")
-    in_targets = np.where(
-        is_target[..., None, :], _centred(blocks.along(-1), targets.along(-2)), -1.0
-    )
-    elsewhere = _strictly(-in_targets.max(axis=-1))
-    covers = _covers(blocks, things)
-    on_table = np.minimum(covers, elsewhere)
-    on_others = np.where(_is(state, thing, "is_movable"), covers, on_table)
-    centred = _centred(blocks, things)
-    sideways = np.where(_is(state, thing, "is_target"), centred, on_others)
-    return np.minimum(_touches(blocks, things), sideways)
+    things, on, _ = lie(state)
+    return on.take(things.numbers(block) * len(things.objects) + things.numbers(thing), axis=-1)
 
 
 def _nothing_on_margin(state: State, thing: Column) -> Array:
-    """On the table there is always room; on targets and blocks for one block only."""
-    blocks = Boxes.of(state, _all(state.layout, BLOCK)).along(-1)
-    things = Boxes.of(state, thing).along(-2)
-    over = np.minimum(_touches(blocks, things), _covers(blocks, things)).max(axis=-2)
-    for_one = _is(state, thing, "is_movable") | _is(state, thing, "is_target")
-    return np.where(for_one, _strictly(-over), 1.0)
+    things, _, room = lie(state)
+    return room.take(things.numbers(thing), axis=-1)
 
 
 @lru_cache(maxsize=256)
@@ -172,8 +244,8 @@ def _not_held(state: State, _: Column, block: Column) -> Bools:
 
 
 def _gripper_empty(state: State, _: Column) -> Bools:
-    held = state.stack(_all(state.layout, BLOCK), "held")
-    empty: Bools = held.max(axis=-1, keepdims=True) < 0.5
+    held = _is(state, _all(state.layout, BLOCK), "held")
+    empty: Bools = ~np.logical_or.reduce(held, axis=-1, keepdims=True)
     return empty
 
 

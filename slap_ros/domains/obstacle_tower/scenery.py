@@ -43,8 +43,8 @@ def visible_bodies(state: State) -> list[VisibleBody]:
 
 
 def animate(path: Path, states: Sequence[State], progress: Callable[[int], None]) -> None:
-    """Write states, one a control step, as a GIF; ``progress`` is told the frames done."""
-    from slap_ros.physics.rendering import Camera, write_gif  # only here are pictures needed
+    """Write states, one a control step, as an animation; ``progress`` is told the frames done."""
+    from slap_ros.physics.rendering import Camera, write_animation  # only here are they needed
 
     with Camera(scene_of(states[0])) as camera:
-        write_gif(path, camera, states, progress)
+        write_animation(path, camera, states, progress)

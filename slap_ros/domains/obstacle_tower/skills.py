@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -28,9 +28,10 @@ from slap_ros.motion import (
     Free,
     MotionPlanningError,
     PlanCache,
-    control_steps,
     inverse_kinematics,
     linear_motion,
+    path_configurations,
+    path_steps,
     retime,
     retime_in_tens,
     shifted,
@@ -54,6 +55,8 @@ SEED = 0  # of motion plans: a plan is a function of the state alone
 GRIP, RELEASE = 1.0, -1.0  # gripper commands
 ATTEMPTS = 2  # random paths for a motion; more shorten plans by little and cost much
 PLANS = PlanCache(attempts=ATTEMPTS)
+REMEMBERED = 1024  # ways: bounded first, planned later
+ROUNDING = 1e-6  # control steps
 
 JOINT_NAMES = tuple(feature.name for feature in JOINT_FEATURES)
 POSE_NAMES = tuple(feature.name for feature in POSE_FEATURES)
@@ -123,9 +126,11 @@ def _quarter_turns(yaw: float) -> list[float]:
 # -- ways -----------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Way:
-    """How the grasp point gets to one of several poses.
+    """How the grasp point gets to one of several poses: up, across, down.
+
+    What it takes to bound its length serves to plan it, too, and is computed once.
 
     Args:
         state: Where it begins.
@@ -137,72 +142,115 @@ class Way:
     ends: Sequence[Pose]
     touched: tuple[Object, ...]
 
-    def shortest(self) -> float:
-        """Control steps that no way to any of the ends can take fewer of."""
-        q = _joints(self.state)
-        steps = [_steps(q, inverse_kinematics(end, q)) for end in self.ends]
-        return min(steps)
-
     def pieces(self) -> list[Joints]:
         """Up, across and down: paths in rad, shape (k, 7), each from where the last one ends.
 
         Raises:
             SkillNotApplicableError: None of the ends can be reached.
         """
-        start = self._depart()
-        free = self._free((), CARRYING)
-        for above, end in self._nearest_first(start[-1], free):
+        for descent in self.descents:
             try:
-                across = PLANS.plan_path(start[-1], above, free, seed=SEED)
+                start, above = descent.straight
+                across = PLANS.plan_path(start, above, _free(self.state), seed=SEED)
             except MotionPlanningError:
                 continue
-            down = linear_motion(above, end, free=self.touching)
-            if down is not None:
-                return [start, across, down]
+            if descent.down is not None:
+                return [descent.up, across, descent.down]
         raise SkillNotApplicableError(f"none of {len(self.ends)} grasps can be reached from here")
+
+    def least_steps(self, timing: Timing) -> float:
+        """Control steps that it takes at least: across it may have to go round something.
+
+        Infinite where none of the ends can be reached.
+        """
+        least = math.inf
+        for descent in self.descents:
+            towards = [descent.up, descent.straight]
+            if timing.least_steps(towards) >= least:
+                break  # nor are those that are further away any nearer
+            if descent.down is not None:
+                least = min(least, timing.least_steps([*towards, descent.down]))
+        return least
+
+    @property
+    def is_open(self) -> bool:
+        """Whether one of the ends is reached straight across, and so surely."""
+        free = _free(self.state)
+        return any(
+            descent.down is not None and free(path_configurations(descent.straight)).all()
+            for descent in self.descents
+        )
 
     @cached_property
     def touching(self) -> CollisionChecker:
         """What is free on the way down, and where corners may be cut."""
-        return self._free(self.touched)
+        return _checker(self.state, self.touched)
 
-    def _depart(self) -> Joints:
-        """Straight up, where the fingers or the block in them are still close to something."""
-        q = _joints(self.state)
-        if self._free((), AT_EASE)(q[None])[0]:
-            return q[None]
-        up = linear_motion(q, shifted(grasp_pose(q), (0.0, 0.0, CLEARANCE)))
+    @cached_property
+    def descents(self) -> list[Descent]:
+        """To the ends that have something over them, the nearest first; none if it cannot begin."""
+        up, found = _departure(self.state), []
         if up is None:
-            raise SkillNotApplicableError("the arm cannot move up from here")
-        return up
-
-    def _nearest_first(self, q: Joints, free: CollisionChecker) -> list[tuple[Joints, Pose]]:
-        """Configurations over the ends, by control steps from ``q``."""
-        found = []
+            return []
         for end in self.ends:
-            above = inverse_kinematics(shifted(end, (0.0, 0.0, CLEARANCE)), q, free=free)
+            over = shifted(end, (0.0, 0.0, CLEARANCE))
+            above = inverse_kinematics(over, up[-1], free=_free(self.state))
             if above is not None:
-                found.append((_steps(q, above), above, end))
-        return [(above, end) for _, above, end in sorted(found, key=lambda item: item[0])]
-
-    def _free(
-        self, touched: tuple[Object, ...], held_margin: float = SETTING_DOWN
-    ) -> CollisionChecker:
-        held = _held(self.state)
-        things = (*self.state.layout.of_type(BLOCK), *self.state.layout.of_type(SURFACE))
-        solid = [
-            _box(self.state, thing)
-            for thing in things
-            if thing != held and thing not in touched and self.state.get(thing, "is_target") < 0.5
-        ]
-        block = None if held is None else Box(_grasp(self.state), _box(self.state, held).half)
-        (robot,) = self.state.layout.of_type(ROBOT)
-        finger = float(self.state.get(robot, "finger"))
-        return CollisionChecker(solid, held=block, finger=finger, held_margin=held_margin)
+                found.append(Descent(up, np.stack([up[-1], above]), end, self.touching))
+        return sorted(found, key=lambda descent: path_steps(descent.straight))
 
 
-def _steps(start: Joints, goal: Joints | None) -> float:
-    return math.inf if goal is None else float(control_steps(start, goal))
+@dataclass(frozen=True, eq=False)
+class Descent:
+    """A way to one of the ends, but for what may be between."""
+
+    up: Joints  # rad, shape (k, 7)
+    straight: Joints  # across, if nothing were in between: rad, shape (2, 7)
+    end: Pose  # of the grasp point
+    free: Free  # on the way down
+
+    @cached_property
+    def down(self) -> Joints | None:
+        """The path in rad, shape (k, 7), if there is one."""
+        return linear_motion(self.straight[-1], self.end, free=self.free)
+
+
+@lru_cache(maxsize=REMEMBERED)
+def _departure(state: State) -> Joints | None:
+    """Straight up, where the fingers or the block in them are still close to something."""
+    q = _joints(state)
+    if _checker(state, (), AT_EASE)(q[None])[0]:
+        return q[None]
+    return linear_motion(q, shifted(grasp_pose(q), (0.0, 0.0, CLEARANCE)))
+
+
+@lru_cache(maxsize=REMEMBERED)
+def _free(state: State) -> CollisionChecker:
+    """What is free on the way across."""
+    return _checker(state, (), CARRYING)
+
+
+def forget() -> None:
+    """Forget every motion, for fair measurements; nothing else changes."""
+    PLANS.clear()
+    for remembered in (_departure, _free, _way_to_grasp, _way_to_place):
+        remembered.cache_clear()
+
+
+def _checker(
+    state: State, touched: tuple[Object, ...], held_margin: float = SETTING_DOWN
+) -> CollisionChecker:
+    held = _held(state)
+    things = (*state.layout.of_type(BLOCK), *state.layout.of_type(SURFACE))
+    solid = [
+        _box(state, thing)
+        for thing in things
+        if thing != held and thing not in touched and state.get(thing, "is_target") < 0.5
+    ]
+    block = None if held is None else Box(_grasp(state), _box(state, held).half)
+    (robot,) = state.layout.of_type(ROBOT)
+    finger = float(state.get(robot, "finger"))
+    return CollisionChecker(solid, held=block, finger=finger, held_margin=held_margin)
 
 
 class Follow:
@@ -230,8 +278,8 @@ class Timing(Protocol):
         """Positions in rad, shape (n, 7), without the start; corners may be cut where free."""
         ...
 
-    def least_steps(self, straight: float) -> int:
-        """Control steps to a place to which the joints need so many at their limits."""
+    def least_steps(self, pieces: Sequence[Joints]) -> int:
+        """Positions that pieces take at least, be they straight or bent between the same ends."""
         ...
 
 
@@ -243,9 +291,9 @@ class AtSpeedLimit:
         path = np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])])
         return retime(path, free=free)
 
-    def least_steps(self, straight: float) -> int:
-        """See :class:`Timing`. Less one: the redundancy is searched on a grid."""
-        return 1 if math.isinf(straight) else max(1, math.floor(straight) - 1)
+    def least_steps(self, pieces: Sequence[Joints]) -> int:
+        """See :class:`Timing`. What is bent is longer, and a stop at a corner costs more."""
+        return math.ceil(sum(path_steps(piece) for piece in pieces) - ROUNDING)
 
 
 class InTens:
@@ -257,10 +305,14 @@ class InTens:
         up, *across, down = (*pieces, pieces[-1][-1:]) if len(pieces) == 1 else pieces
         return np.concatenate([retime_in_tens(p) for p in (_ends(up), *across, _ends(down))])
 
-    def least_steps(self, straight: float) -> int:
-        """See :class:`Timing`: across and down."""
-        del straight
-        return 20
+    def least_steps(self, pieces: Sequence[Joints]) -> int:
+        """See :class:`Timing`."""
+        return sum(len(retime_in_tens(_ends(piece))) for piece in pieces)
+
+
+def _bound(least: float, after: int, step_limit: int) -> int:
+    """A way, and so many steps after it; a way that cannot be gone is never too short."""
+    return step_limit if math.isinf(least) else int(least) + after
 
 
 def _ends(path: Joints) -> Joints:
@@ -294,8 +346,9 @@ class PickSkill:
     least_steps: int = 3  # down, grip, up
 
     def lower_bound(self, state: State, objects: tuple[Object, ...]) -> int:
-        """Straight to the grasp; grip; lift."""
-        return 2 + self.timing.least_steps(self._way(state, objects).shortest())
+        """The way to the grasp; grip; lift."""
+        least = self._way(state, objects).least_steps(self.timing)
+        return _bound(least, 2, self.step_limit)
 
     def start(self, state: State, objects: tuple[Object, ...]) -> Policy:
         """Plan the motion.
@@ -307,9 +360,7 @@ class PickSkill:
 
     def _way(self, state: State, objects: tuple[Object, ...]) -> Way:
         _, block, _ = objects
-        pose = _pose(state, block)
-        grasps = [_from_above(pose.position, yaw) for yaw in _quarter_turns(_yaw(pose))]
-        return Way(state, grasps, touched=(block,))
+        return _way_to_grasp(state, block)
 
 
 @dataclass(frozen=True)
@@ -322,8 +373,9 @@ class PlaceOnSkill:
     least_steps: int = 2  # down, release
 
     def lower_bound(self, state: State, objects: tuple[Object, ...]) -> int:
-        """Straight to the place, and the release."""
-        return 1 + self.timing.least_steps(self._way(state, objects).shortest())
+        """The way to the place, and the release."""
+        least = self._way(state, objects).least_steps(self.timing)
+        return _bound(least, 1, self.step_limit)
 
     def start(self, state: State, objects: tuple[Object, ...]) -> Policy:
         """Plan the motion.
@@ -336,8 +388,7 @@ class PlaceOnSkill:
     def _way(self, state: State, objects: tuple[Object, ...]) -> Way:
         _, _, thing = objects
         x, y, _ = _pose(state, thing).position
-        yaws = _quarter_turns(_yaw(_pose(state, thing)))
-        return _way_to_place(state, (x, y), yaws, thing)
+        return _way_to_place(state, (x, y), _yaw(_pose(state, thing)), thing)
 
 
 @dataclass(frozen=True)
@@ -350,9 +401,14 @@ class PlaceSkill:
     least_steps: int = 2  # down, release
 
     def lower_bound(self, state: State, objects: tuple[Object, ...]) -> int:
-        """Which place it will be is not known without planning."""
-        del state, objects
-        return self.least_steps
+        """The way to the nearest of the places that it may be, and the release."""
+        _, block, table = objects
+        least = math.inf
+        for way in _ways_to_table(state, block, table):
+            least = min(least, way.least_steps(self.timing))
+            if way.is_open:
+                break
+        return _bound(least, 1, self.step_limit)
 
     def start(self, state: State, objects: tuple[Object, ...]) -> Policy:
         """Plan the motion.
@@ -361,9 +417,7 @@ class PlaceSkill:
             SkillNotApplicableError: No place can be reached.
         """
         _, block, table = objects
-        yaw = _yaw(_pose(state, block))
-        for place in _places(state, block, table):
-            way = _way_to_place(state, place, _quarter_turns(yaw), table)
+        for way in _ways_to_table(state, block, table):
             try:
                 return Follow(_script(way, self.timing, RELEASE, 0.0))
             except SkillNotApplicableError:
@@ -371,9 +425,23 @@ class PlaceSkill:
         raise SkillNotApplicableError(f"no place on the table can be reached with {block}")
 
 
-def _way_to_place(
-    state: State, place: tuple[float, float], yaws: Sequence[float], thing: Object
-) -> Way:
+@lru_cache(maxsize=REMEMBERED)
+def _way_to_grasp(state: State, block: Object) -> Way:
+    """The way to a grasp from above, fingers along the faces of the block."""
+    pose = _pose(state, block)
+    grasps = [_from_above(pose.position, yaw) for yaw in _quarter_turns(_yaw(pose))]
+    return Way(state, grasps, touched=(block,))
+
+
+def _ways_to_table(state: State, block: Object, table: Object) -> Iterator[Way]:
+    """The ways to free places on the table, in the order in which they are tried."""
+    yaw = _yaw(_pose(state, block))
+    for place in _places(state, block, table):
+        yield _way_to_place(state, place, yaw, table)
+
+
+@lru_cache(maxsize=REMEMBERED)
+def _way_to_place(state: State, place: tuple[float, float], yaw: float, thing: Object) -> Way:
     """The way on which the held block comes to stand on a thing at a place."""
     block, grasp = _held(state), _grasp(state)
     if block is None:
@@ -381,8 +449,8 @@ def _way_to_place(
     pose, size = _pose(state, block), _box(state, block).half[2]
     height = _top(state, thing) + size + DROP
     ends = []
-    for yaw in yaws:
-        turn = yaw - _yaw(pose)
+    for turned_yaw in _quarter_turns(yaw):
+        turn = turned_yaw - _yaw(pose)
         turned = multiply((0.0, 0.0, math.sin(turn / 2), math.cos(turn / 2)), pose.quaternion)
         ends.append(Pose((*place, height), turned).compose(grasp.inverse()))
     return Way(state, ends, touched=(thing,))

@@ -13,10 +13,16 @@ import numpy as np
 from slap_ros.domains.domain import Task
 from slap_ros.domains.obstacle_tower.model import BLOCK, NOT_IS_TARGET, ON, SURFACE
 from slap_ros.errors import InvalidStateError
-from slap_ros.physics.features import ROBOT, body_features, pose_features, robot_features
+from slap_ros.physics.features import (
+    ROBOT,
+    body_features,
+    material_features,
+    pose_features,
+    robot_features,
+)
 from slap_ros.physics.panda import HOME
 from slap_ros.physics.pose import Pose
-from slap_ros.physics.scene import CUBE_EDGE, TABLE, TABLE_TOP
+from slap_ros.physics.scene import CUBE_EDGE, CUBE_MATERIAL, TABLE, TABLE_TOP, Material
 from slap_ros.relational import GroundAtom, Object, State
 
 STEP_LIMIT = 500  # environment steps (SLAP Table 8)
@@ -28,21 +34,22 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class Scenery:
-    """Where everything stands; yaws in rad."""
+    """Where everything stands, yaws in rad; and what all blocks are made of."""
 
     target: tuple[float, float, float]  # x, y, yaw
     target_block: tuple[float, float, float]
     tower: tuple[tuple[float, float, float], ...]  # from the bottom; the first is on the target
     distractors: tuple[tuple[float, float, float], ...] = ()
+    material: Material = CUBE_MATERIAL
 
     def task(self) -> Task:
         """The task to put the target block on the target."""
         features: dict[Object, Mapping[str, float]] = {ROBOT("robot"): robot_features(HOME)}
-        features[BLOCK("block1")] = _block(*self.target_block)
+        features[BLOCK("block1")] = _block(self.material, *self.target_block)
         others = [(*place, level) for level, place in enumerate(self.tower)]
         others += [(*place, 0) for place in self.distractors]
         for number, place in enumerate(others, start=2):
-            features[BLOCK(f"block{number}")] = _block(*place)
+            features[BLOCK(f"block{number}")] = _block(self.material, *place)
         x, y, yaw = self.target
         plate = Pose((x, y, TABLE_TOP - PLATE_HALF[2]), _turn(yaw))
         features[SURFACE("target")] = _surface(plate, PLATE_HALF, is_target=1.0)
@@ -66,7 +73,7 @@ def target_block_on_target(state: State) -> frozenset[GroundAtom]:
 
 @dataclass(frozen=True)
 class RandomTasks:
-    """Everything sampled anew for each task. Lengths in m, angles in rad."""
+    """Everything sampled anew for each task. Lengths in m, angles in rad, masses in kg."""
 
     obstacles: tuple[int, int] = (3, 3)  # blocks of the tower, inclusive
     distractors: tuple[int, int] = (0, 2)  # blocks that stand about besides, inclusive
@@ -77,6 +84,9 @@ class RandomTasks:
     block_y: Range = (-0.3, 0.3)
     stacking_offset: float = 0.003
     stacking_turn: float = 0.1
+    # Of all blocks of a task alike.
+    mass: Range = (CUBE_MATERIAL.mass_kg, CUBE_MATERIAL.mass_kg)
+    friction: Range = (CUBE_MATERIAL.friction, CUBE_MATERIAL.friction)
 
     def sample(self, rng: np.random.Generator) -> Task:
         """A task."""
@@ -94,7 +104,9 @@ class RandomTasks:
         )
         placed: list[tuple[float, float]] = [(x, y)]
         standing = tuple(self._stand_apart(rng, placed) for _ in range(1 + distractors))
-        return Scenery((x, y, yaw), standing[0], tower, standing[1:]).task()
+        # Last, so that where things stand does not depend on it.
+        material = Material(rng.uniform(*self.mass), rng.uniform(*self.friction))
+        return Scenery((x, y, yaw), standing[0], tower, standing[1:], material).task()
 
     def _stand_apart(
         self, rng: np.random.Generator, placed: list[tuple[float, float]]
@@ -130,11 +142,14 @@ class PaperTasks:
         return {name: str(value) for name, value in asdict(self.scenery).items()}
 
 
-def _block(x: float, y: float, yaw: float, level: int = 0) -> Mapping[str, float]:
+def _block(
+    material: Material, x: float, y: float, yaw: float, level: int = 0
+) -> Mapping[str, float]:
     z = TABLE_TOP + CUBE_EDGE * (level + 0.5)
     half = CUBE_EDGE / 2
     return {
         **body_features((x, y, z), _turn(yaw)),
+        **material_features(material),
         **_thing((half, half, half), is_movable=1.0, is_target=0.0),
     }
 

@@ -1,0 +1,80 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The shortcuts that a node may use: parameters, loading, one repertoire an episode."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from rclpy.node import Node
+
+from ensemble.observation import Episode
+from ensemble.parameters import parameter
+from slap_ros.domains import Domain
+from slap_ros.errors import InvalidParameterError
+from slap_ros.shortcuts.library import Library
+from slap_ros.shortcuts.repertoire import Repertoire
+from slap_ros.shortcuts.shipped import chosen_library, require_usable
+from slap_ros.shortcuts.shortcut import DEFAULT, Shortcut
+
+
+@dataclass(frozen=True)
+class ShortcutParameters:
+    """What planner and skill server must be given alike."""
+
+    shortcuts: str = parameter("", "folder of a shortcut library, or none; empty: the shipped one")
+    samples: int = parameter(DEFAULT.samples, "attempts of a shortcut in the model when planning")
+
+
+class Repertoires:
+    """The library of whatever domain the simulator runs, and what it offers in each episode."""
+
+    def __init__(self, node: Node, settings: ShortcutParameters, planner: str = "lazy") -> None:
+        """Refuse what can be seen to be wrong before a domain is known.
+
+        Raises:
+            InvalidParameterError: No samples, or a planner that cannot use shortcuts.
+            InvalidLibraryError: The library cannot be used as a whole.
+            UnknownDomainError: It is a library of a domain that is not installed here.
+        """
+        if settings.samples < 1:
+            raise InvalidParameterError(
+                f"parameter samples must be at least 1, not {settings.samples}"
+            )
+        require_usable(settings.shortcuts, planner)
+        self.sampling = replace(DEFAULT, samples=settings.samples)
+        self._node, self._choice, self._planner = node, settings.shortcuts, planner
+        self._libraries: dict[str, Library | None] = {}  # by domain
+        self._made: tuple[Episode, Repertoire] | None = None
+
+    def open(self, episode: Episode) -> None:
+        """Load the library of an episode's domain, once.
+
+        Raises:
+            InvalidLibraryError: It cannot be used as a whole, or is another domain's.
+        """
+        name = episode.domain.name
+        if name not in self._libraries:
+            library = chosen_library(self._choice, episode.domain, self._planner)
+            self._libraries[name] = library
+            for reason in library.refused if library is not None else ():
+                self._node.get_logger().warning(f"a shortcut is left out: {reason}")
+
+    def shortcuts(self, domain: Domain) -> tuple[Shortcut, ...]:
+        """Those of a domain that was opened."""
+        library = self._libraries.get(domain.name)
+        return library.shortcuts if library is not None else ()
+
+    def of(self, episode: Episode) -> Repertoire | None:
+        """What there is in an episode; None without shortcuts.
+
+        It has a world of its own, so make it in the worker thread that uses it.
+        """
+        shortcuts = self.shortcuts(episode.domain)
+        if not shortcuts:
+            return None
+        if self._made is None or self._made[0] is not episode:
+            initial = episode.task.initial_state
+            repertoire = Repertoire(episode.domain, shortcuts, initial, self.sampling)
+            self._made = (episode, repertoire)
+        return self._made[1]

@@ -1,0 +1,45 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The options ``--shortcuts`` and ``--samples`` of several commands."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated
+
+import typer
+
+from slap_ros.cli.console import console
+from slap_ros.domains import Domain
+from slap_ros.shortcuts.library import Library
+from slap_ros.shortcuts.shipped import chosen_library
+from slap_ros.shortcuts.shortcut import DEFAULT, Sampling
+
+SAMPLES = DEFAULT.samples
+
+Shortcuts = Annotated[
+    str | None,
+    typer.Option(help="A shortcut library, or none. Default: the shipped one, if there is."),
+]
+Samples = Annotated[
+    int, typer.Option(min=1, help="Attempts of a shortcut in the model; the shortest is used.")
+]
+
+
+def choose(choice: str | None, domain: Domain, planner: str) -> Library | None:
+    """The library to plan with, if any; say what of it is left out and why.
+
+    Raises:
+        InvalidLibraryError: It cannot be used as a whole.
+        InvalidParameterError: The planner cannot use it.
+    """
+    library = chosen_library(choice, domain, planner)
+    for reason in library.refused if library is not None else ():
+        console.print("[yellow]warning[/]", end=" ")
+        console.print(f"a shortcut is left out: {reason}", highlight=False, markup=False)
+    return library
+
+
+def sampling(samples: int) -> Sampling:
+    """The usual, with so many attempts."""
+    return replace(DEFAULT, samples=samples)

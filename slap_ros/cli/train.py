@@ -1,0 +1,183 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``slap train``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from pathlib import Path
+from threading import Event, Thread
+from time import monotonic
+from typing import Annotated, Any
+
+import typer
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+
+from slap_ros.cli.console import Json, Preset, console, print_json
+from slap_ros.domains import get_domain
+from slap_ros.errors import InvalidParameterError
+from slap_ros.shortcuts.jobs import Kept, Place
+from slap_ros.shortcuts.library import save_library
+from slap_ros.shortcuts.settings import training_settings
+from slap_ros.shortcuts.training import Candidate, Training
+from slap_ros.shortcuts.workers import Workers, local_workers, ray_workers
+
+REFRESH_S = 1.0
+
+
+def train(
+    domain: Annotated[str, typer.Argument(help="One of `slap domains`.")],
+    output: Annotated[
+        Path | None, typer.Option(help="The library's folder. Default: runs/models/DOMAIN.")
+    ] = None,
+    preset: Preset = "fair",
+    seed: Annotated[int, typer.Option(min=0, help="Of everything.")] = 0,
+    settings: Annotated[
+        str, typer.Option(help="ours, or paper: the paper's hyper-parameters.")
+    ] = "ours",
+    steps: Annotated[
+        int | None, typer.Option(min=1, help="Environment steps a shortcut; default: settings'.")
+    ] = None,
+    jobs: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
+    ray: Annotated[
+        str | None, typer.Option(help="Address of a Ray cluster to run on instead, or local.")
+    ] = None,
+    work: Annotated[
+        Path | None,
+        typer.Option(help="Folder for checkpoints and logs; the same one again goes on."),
+    ] = None,
+    json: Json = False,
+) -> int:
+    """Discover and learn shortcuts: explore, rank, train, keep what makes plans shorter.
+
+    Interrupted, it goes on where it was when the same command is given again. Progress for
+    TensorBoard is in the work folder.
+    """
+    get_domain(domain, preset)
+    chosen = training_settings(settings, domain)
+    if steps is not None:
+        chosen = replace(chosen, ppo=replace(chosen.ppo, total_steps=steps))
+    _require_torch()
+    output = output or Path("runs/models") / domain
+    work = work or output.with_name(f"{output.name}-training")
+    began = monotonic()
+    with _workers(jobs, ray) as workers, _Show() as show:
+        library = Training(Place(domain, preset, seed), chosen, work, workers, show).run()
+    command = _command(domain, preset, seed, settings, steps)
+    library = replace(library, record={"command": command, **library.record})
+    save_library(output, library)
+    if json:
+        print_json({"library": str(output), **library.record, "seconds": monotonic() - began})
+    console.print(
+        f"{len(library.shortcuts)} shortcuts in {output}, "
+        f"{monotonic() - began:.0f} s; see what they are worth with "
+        f"`slap evaluate {domain} --shortcuts {output}`",
+        highlight=False,
+    )
+    return 0
+
+
+def _workers(jobs: int, ray: str | None) -> AbstractContextManager[Workers]:
+    return local_workers(jobs) if ray is None else ray_workers(ray)
+
+
+def _command(domain: str, preset: str, seed: int, settings: str, steps: int | None) -> str:
+    parts = [f"slap train {domain} --preset {preset} --seed {seed} --settings {settings}"]
+    return " ".join([*parts, *([f"--steps {steps}"] if steps is not None else [])])
+
+
+def _require_torch() -> None:
+    try:
+        import stable_baselines3  # noqa: F401
+    except ImportError as error:
+        raise InvalidParameterError(
+            f"training needs torch and stable-baselines3 ({error}): pip install 'slap_ros[train]'"
+        ) from error
+
+
+class _Show:
+    """Progress on the terminal. What is learned elsewhere is followed by its progress file."""
+
+    def __init__(self) -> None:
+        self._bars = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.fields[detail]}"),
+            TimeRemainingColumn(),
+            console=console,
+            transient=True,
+        )
+        self._counting: dict[str, TaskID] = {}
+        self._following: tuple[Event, Thread] | None = None
+
+    def __enter__(self) -> _Show:
+        self._bars.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._unfollow()
+        self._bars.stop()
+
+    def counting(self, what: str, done: int, total: int) -> None:
+        """So many jobs of a kind are done."""
+        self._unfollow()
+        if done == 0 or what not in self._counting:
+            self._counting[what] = self._bars.add_task(what, total=total, detail="")
+        self._bars.update(self._counting[what], completed=done, detail=f"{done} of {total}")
+        if done == total:
+            self._bars.remove_task(self._counting.pop(what))
+
+    def candidates(self, ranked: Sequence[Candidate]) -> None:
+        """What was found worth learning."""
+        console.print(f"{len(ranked)} candidates; the most promising:", highlight=False)
+        for candidate in ranked[:5]:
+            console.print(
+                f"  {candidate.signature.name} after {', '.join(candidate.origin) or 'the start'}: "
+                f"{candidate.promise:.0%} of a plan, found in {candidate.tasks} tasks",
+                highlight=False,
+            )
+
+    def learning(self, name: str, folder: Path, total_steps: int) -> None:
+        """Follow a training."""
+        self._unfollow()
+        bar = self._bars.add_task(f"learning {name}", total=total_steps, detail="")
+        stop = Event()
+        thread = Thread(target=self._follow, args=(Kept(folder), bar, stop), daemon=True)
+        self._following = stop, thread
+        thread.start()
+
+    def _follow(self, kept: Kept, bar: TaskID, stop: Event) -> None:
+        while not stop.wait(REFRESH_S):
+            stages = _latest(kept.progress)
+            if stages:
+                last = stages[max(stages)]
+                length = "-" if last["length"] is None else f"{last['length']:.1f}"
+                detail = f"success {last['success']:.0%}, length {length}"
+                steps = sum(stage["steps"] for stage in stages.values())
+                self._bars.update(bar, completed=steps, detail=detail)
+        self._bars.remove_task(bar)
+
+    def _unfollow(self) -> None:
+        if self._following is not None:
+            stop, thread = self._following
+            stop.set()
+            thread.join()
+            self._following = None
+
+    def judged(self, name: str, before: float, after: float, kept: bool) -> None:
+        """What it is worth."""
+        console.print(
+            f"{name}: plans of {before:.1f} steps become {after:.1f}{'' if kept else '; not kept'}",
+            highlight=False,
+        )
+
+
+def _latest(path: Path) -> dict[int, dict[str, Any]]:
+    """The last line of each stage in a progress file; an unfinished line is left out."""
+    if not path.exists():
+        return {}
+    lines = path.read_text(encoding="utf-8").split("\n")[:-1]
+    return {line["stage"]: line for line in map(json.loads, lines)}

@@ -1,0 +1,59 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Obstacle 2D as a learner sees it. Lengths in m, divided by a block's size or the reach."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from slap_ros.domains.obstacle2d.model import BLOCK, BLOCK_SIZE, GRIPPER_EMPTY, HOLDING, ROBOT
+from slap_ros.domains.view import View
+from slap_ros.relational import Column, State
+from slap_ros.relational.state import Array
+
+
+def _hand(state: State) -> Array:
+    """The gripper's x and y, and the height of the lowest of it and what it carries, (n, 3)."""
+    robot, blocks = state.layout.column_of(ROBOT), state.layout.column_of(BLOCK)
+    place = state.gather(robot, ("x", "y"))[..., 0, :]
+    held = state.stack(blocks, "held") > 0.5
+    carried = np.where(held, state.stack(blocks, "y"), np.inf).min(axis=-1)
+    low = np.minimum(place[..., 1], carried)
+    return np.concatenate([place, low[..., None]], axis=-1)
+
+
+def _robot(_: State, hand: Array) -> Array:
+    """Where it is in the unit square, how far down what it carries reaches, how low it is."""
+    x, y, low = np.moveaxis(hand, -1, 0)
+    return np.stack([2 * x - 1, 2 * y - 1, (y - low) / BLOCK_SIZE, low / BLOCK_SIZE], axis=-1)
+
+
+def _things(state: State, hand: Array, column: Column) -> Array:
+    """Where on the table, how far aside of the gripper; blocks: how far below, whether held."""
+    x, y = hand[..., 0, None], hand[..., 1, None]
+    there = state.stack(column, "x")
+    features = [2 * there - 1, (there - x) / (2 * BLOCK_SIZE)]
+    if column.objects[0].type.is_a(BLOCK):
+        features += [(state.stack(column, "y") - y) / (2 * BLOCK_SIZE)]
+        features += [state.stack(column, "held")]
+    return np.stack(features, axis=-1)
+
+
+def _distance(state: State, hand: Array, column: Column) -> Array:
+    """To blocks: to where what the robot acts with would touch them from the side."""
+    if not column.objects[0].type.is_a(BLOCK):
+        return np.full((*state.data.shape[:-1], len(column.objects)), np.inf)
+    x, low = hand[..., 0, None], hand[..., 2, None]
+    aside = np.abs(state.stack(column, "x") - x) - BLOCK_SIZE
+    above = low - state.stack(column, "y") - BLOCK_SIZE / 2
+    distance: Array = np.hypot(np.maximum(aside, 0.0), np.maximum(above, 0.0))
+    return distance
+
+
+VIEW = View(
+    hand=_hand,
+    robot=_robot,
+    things=_things,
+    distance=_distance,
+    grasping=frozenset({HOLDING, GRIPPER_EMPTY}),
+)

@@ -1,0 +1,103 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Obstacle Tower as a learner sees it: joints, and everything else from the hand."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from slap_ros.domains.obstacle_tower.model import BLOCK, GRIPPER_EMPTY, HOLDING, NOT_HOLDING
+from slap_ros.domains.view import View
+from slap_ros.motion.kinematics import GRASP_IN_LAST_LINK, arm_frames, matrix
+from slap_ros.physics.features import GRASP_FEATURES, JOINT_FEATURES, ROBOT
+from slap_ros.physics.panda import GRASP_POINT, JOINT_HIGH, JOINT_LOW
+from slap_ros.physics.scene import TABLE_TOP
+from slap_ros.relational import Column, State
+from slap_ros.relational.predicates import Bools
+from slap_ros.relational.state import Array
+
+FAR = 0.2  # m, the scale of what is seen
+FAST = 0.5  # m/s
+STILL = 0.05  # m/s and rad/s, along each axis: a block so slow stays where it is
+FALLEN = TABLE_TOP - 0.05  # m, below which a block's centre is off the table
+FINGER_ROOM = 0.025  # m, between the target and what lies beside it, to put a block down there
+
+JOINTS = tuple(feature.name for feature in JOINT_FEATURES)
+GRASP_POSITION = tuple(feature.name for feature in GRASP_FEATURES[:3])
+POSITION = ("x", "y", "z")
+VELOCITY = ("vx", "vy", "vz")
+TWIST = (*VELOCITY, "wx", "wy", "wz")
+_MIDDLE = (np.array(JOINT_HIGH) + JOINT_LOW) / 2
+_HALF_RANGE = (np.array(JOINT_HIGH) - JOINT_LOW) / 2
+_GRASP_FRAME = matrix(GRASP_IN_LAST_LINK)
+_GRASP_OFFSET = np.array([0.0, 0.0, GRASP_POINT])
+OFF_CENTRE = 0.02  # m, the scale of where in the fingers a block is held
+
+
+def _joints(state: State) -> Array:
+    joints: Array = state.gather(state.layout.column_of(ROBOT), JOINTS)[:, 0]
+    return joints
+
+
+def _hand(state: State) -> Array:
+    """Frame of the point between the fingertips, shape (n, 4, 4)."""
+    hand: Array = arm_frames(_joints(state))[:, -1] @ _GRASP_FRAME
+    return hand
+
+
+def _robot(state: State, hand: Array) -> Array:
+    """Joints over their ranges; hand: x and z axes, height; what it holds, from the hand."""
+    layout = state.layout
+    held = state.stack(layout.column_of(BLOCK), "held").max(axis=-1, keepdims=True)
+    offset = state.gather(layout.column_of(ROBOT), GRASP_POSITION)[:, 0] - _GRASP_OFFSET
+    joints = (_joints(state) - _MIDDLE) / _HALF_RANGE
+    height = (hand[:, 2, 3:] - TABLE_TOP) / FAR
+    axes = (hand[:, :3, 0], hand[:, :3, 2])
+    return np.concatenate([joints, *axes, height, held, held * offset / OFF_CENTRE], axis=-1)
+
+
+def _things(state: State, hand: Array, column: Column) -> Array:
+    """Where from the hand, in the base's axes; yaw of what is fixed, velocity of what is not."""
+    place = _from(hand, state, column) / FAR
+    if column.objects[0].type.is_a(BLOCK):
+        return np.concatenate([place, np.clip(state.gather(column, VELOCITY) / FAST, -3, 3)], -1)
+    turn = state.gather(column, ("qz", "qw"))
+    yaw = 8.0 * np.arctan2(turn[..., 0], turn[..., 1])  # a square looks the same four times
+    return np.concatenate([place, np.sin(yaw)[..., None], np.cos(yaw)[..., None]], axis=-1)
+
+
+def _distance(state: State, hand: Array, column: Column) -> Array:
+    """From the hand to blocks."""
+    if not column.objects[0].type.is_a(BLOCK):
+        return np.full((*state.data.shape[:-1], len(column.objects)), np.inf)
+    distance: Array = np.sqrt(np.square(_from(hand, state, column)).sum(axis=-1))
+    return distance
+
+
+def _from(hand: Array, state: State, column: Column) -> Array:
+    """Positions less that of the hand, m, shape (n, objects, 3)."""
+    seen: Array = state.gather(column, POSITION) - hand[:, None, :3, 3]
+    return seen
+
+
+def _settled(state: State) -> Bools:
+    twists = np.abs(state.gather(state.layout.column_of(BLOCK), TWIST))
+    settled: Bools = twists.max(axis=(-2, -1)) < STILL
+    return settled
+
+
+def _lost(state: State) -> Bools:
+    lost: Bools = state.stack(state.layout.column_of(BLOCK), "z").min(axis=-1) < FALLEN
+    return lost
+
+
+VIEW = View(
+    hand=_hand,
+    robot=_robot,
+    things=_things,
+    distance=_distance,
+    settled=_settled,
+    lost=_lost,
+    slack={"NothingOn": FINGER_ROOM},
+    grasping=frozenset({HOLDING, NOT_HOLDING, GRIPPER_EMPTY}),
+)

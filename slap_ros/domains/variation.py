@@ -1,0 +1,69 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Presets with some settings changed: ``fair:obstacles=6,mass=0.8..1.2``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, TypeVar
+
+from slap_ros.errors import InvalidParameterError
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+    Settings = TypeVar("Settings", bound=DataclassInstance)
+
+
+def parse_preset(text: str) -> tuple[str, dict[str, str]]:
+    """A preset's name, and the settings to change.
+
+    Raises:
+        InvalidParameterError: Not of the form ``name`` or ``name:setting=value,...``.
+    """
+    name, colon, rest = text.partition(":")
+    changes: dict[str, str] = {}
+    for part in rest.split(",") if colon else ():
+        key, equals, value = (piece.strip() for piece in part.partition("="))
+        if not (key and equals and value):
+            raise InvalidParameterError(
+                f"preset {text!r}: {part!r} is not of the form setting=value, as in "
+                "fair:obstacles=6,mass=0.8..1.2"
+            )
+        changes[key] = value
+    return name, changes
+
+
+def varied(settings: Settings, changes: Mapping[str, str]) -> Settings:
+    """Settings with some changed. A range is ``low..high``, or one number for both.
+
+    Raises:
+        InvalidParameterError: There is no such setting, or it cannot have that value.
+    """
+    known = {field.name: getattr(settings, field.name) for field in fields(settings)}
+    values = {}
+    for name, text in changes.items():
+        if name not in known:
+            raise InvalidParameterError(f"unknown setting {name!r}; there are {', '.join(known)}")
+        values[name] = _read(name, text, known[name])
+    return replace(settings, **values)
+
+
+def _read(name: str, text: str, now: object) -> object:
+    """The text as a value like the present one."""
+    is_range = isinstance(now, tuple) and len(now) == 2
+    kind = type(now[0] if isinstance(now, tuple) else now)
+    if kind not in (int, float):
+        raise InvalidParameterError(f"setting {name!r} cannot be given on the command line")
+    pieces = text.split("..") if is_range else [text]
+    try:
+        numbers = [kind(piece) for piece in pieces]
+    except ValueError:
+        numbers = []
+    if not 1 <= len(numbers) <= 2 or numbers[0] > numbers[-1]:
+        raise InvalidParameterError(
+            f"setting {name!r} is {now}, which {text!r} cannot replace"
+            + ("; give low..high" if is_range else "")
+        )
+    return (numbers[0], numbers[-1]) if is_range else numbers[0]

@@ -1,0 +1,50 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What is compared: planning with given options alone, and with shortcuts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from slap_ros.domains import Domain
+from slap_ros.planning.planner import Planner, make_planner
+from slap_ros.relational import State
+from slap_ros.shortcuts.library import Library
+from slap_ros.shortcuts.repertoire import Repertoire
+from slap_ros.shortcuts.shortcut import DEFAULT, PAPER, Sampling, Shortcut
+
+
+@dataclass(frozen=True)
+class Approach:
+    """A way to plan.
+
+    Args:
+        name: As reports have it.
+        shortcuts: What may be used besides the given options.
+        sampling: How they are tried out.
+    """
+
+    name: str
+    shortcuts: tuple[Shortcut, ...] = ()
+    sampling: Sampling = DEFAULT
+
+    def planner(self, name: str, domain: Domain, initial: State) -> Planner:
+        """The planner of that name, for tasks over the objects of ``initial``."""
+        if not self.shortcuts:
+            return make_planner(name, domain, initial)
+        repertoire = Repertoire(domain, self.shortcuts, initial, self.sampling)
+        return make_planner(name, domain, initial, repertoire)
+
+
+PURE_PLANNING = Approach("pure_planning")
+
+
+def approaches(library: Library | None, sampling: Sampling) -> tuple[Approach, ...]:
+    """What to compare: the yardstick first, what matters most last."""
+    if library is None:
+        return (PURE_PLANNING,)
+    return (
+        PURE_PLANNING,
+        Approach("slap_1_sample", library.shortcuts, PAPER),
+        Approach("slap", library.shortcuts, sampling),
+    )

@@ -1,0 +1,209 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Shortcut libraries on disk: a folder a shortcut, readable without torch, never a pickle.
+
+::
+
+    models/obstacle_tower/
+      library.json               format, domain, preset, versions, the command that made it
+      NothingOn_On-8fbd5384/
+        shortcut.json            signature, shortest success, training record
+        policy.safetensors       weights and normalisation
+
+What is damaged is not used: a shortcut that cannot be read is refused with a reason and the rest
+of the library serves without it. A library of another domain or of a newer format is refused as
+a whole.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from safetensors import SafetensorError
+from safetensors.numpy import load_file, save_file
+
+from slap_ros.domains import Domain
+from slap_ros.errors import InvalidLibraryError
+from slap_ros.shortcuts.policy import Normalisation, Policy, Weights
+from slap_ros.shortcuts.shortcut import Shortcut
+from slap_ros.shortcuts.signature import Signature
+
+FORMAT = 1
+LIBRARY, SHORTCUT, POLICY = "library.json", "shortcut.json", "policy.safetensors"
+
+Record = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Library:
+    """Shortcuts of a domain.
+
+    Args:
+        domain: Its name.
+        shortcuts: Those that could be read, in order of their names.
+        record: How the library was made.
+        refused: Why the others were not read.
+    """
+
+    domain: str
+    shortcuts: tuple[Shortcut, ...] = ()
+    record: Record = field(default_factory=dict)
+    refused: tuple[InvalidLibraryError, ...] = ()
+
+
+def save_library(path: Path, library: Library) -> None:
+    """Write a library as a folder, in place of the one that may be there.
+
+    It is written beside and then moved, so that there always is a whole one.
+    """
+    path = path.resolve()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draft = path.with_name(f".{path.name}.{os.getpid()}.draft")
+    shutil.rmtree(draft, ignore_errors=True)
+    draft.mkdir()
+    for shortcut in library.shortcuts:
+        save_shortcut(draft / shortcut.name, shortcut)
+    _write(draft / LIBRARY, {"format": FORMAT, "domain": library.domain, **library.record})
+    old = path.with_name(f".{path.name}.{os.getpid()}.old")
+    if path.exists():
+        path.rename(old)
+    draft.rename(path)
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def load_library(path: Path, domain: Domain) -> Library:
+    """Read a library.
+
+    Raises:
+        InvalidLibraryError: There is none, or it is damaged as a whole, newer than this version,
+            or another domain's.
+    """
+    if not path.is_dir():
+        raise InvalidLibraryError(
+            f"{path}: no such folder; `slap train {domain.name}` makes a shortcut library"
+        )
+    about = _read(path / LIBRARY)
+    if about.get("format") != FORMAT:
+        raise InvalidLibraryError(
+            f"{path}: format {about.get('format')!r}, this version of slap_ros reads {FORMAT}; "
+            "train anew or use the version of slap_ros that made it"
+        )
+    if about.get("domain") != domain.name:
+        raise InvalidLibraryError(
+            f"{path}: a library of domain {about.get('domain')!r}, not of {domain.name!r}"
+        )
+    shortcuts, refused = [], []
+    for folder in sorted(entry for entry in path.iterdir() if entry.is_dir()):
+        try:
+            shortcuts.append(load_shortcut(folder))
+        except InvalidLibraryError as error:
+            refused.append(error)
+    record = {k: v for k, v in about.items() if k not in ("format", "domain")}
+    return Library(domain.name, tuple(shortcuts), record, tuple(refused))
+
+
+# -- one shortcut ---------------------------------------------------------------------------------
+
+
+def save_shortcut(folder: Path, shortcut: Shortcut) -> None:
+    """Write one shortcut into a new folder or over an older version of it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    _write(
+        folder / SHORTCUT,
+        {
+            "signature": shortcut.signature.as_json(),
+            "shortest": shortcut.shortest,
+            "record": dict(shortcut.record),
+        },
+    )
+    save_file(_tensors(shortcut.policy), folder / POLICY)
+
+
+def load_shortcut(folder: Path) -> Shortcut:
+    """Read one shortcut.
+
+    Raises:
+        InvalidLibraryError: It is damaged.
+    """
+    about = _read(folder / SHORTCUT)
+    try:
+        signature = Signature.from_json(about["signature"])
+        shortest, record = int(about["shortest"]), dict(about["record"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise InvalidLibraryError(f"{folder / SHORTCUT}: damaged: {error!r}") from error
+    if signature.name != folder.name:
+        raise InvalidLibraryError(
+            f"{folder}: the signature inside is that of {signature.name}; the folder was renamed "
+            "or the file changed"
+        )
+    return Shortcut(signature, _load_policy(folder / POLICY), shortest, record)
+
+
+def _tensors(policy: Policy) -> dict[str, Weights]:
+    tensors = {
+        "normalisation.mean": policy.normalisation.mean,
+        "normalisation.deviation": policy.normalisation.deviation,
+        "log_std": policy.log_std,
+    }
+    for i, (weights, bias) in enumerate(policy.layers):
+        tensors[f"layer{i}.weights"] = np.ascontiguousarray(weights)
+        tensors[f"layer{i}.bias"] = np.ascontiguousarray(bias)
+    return tensors
+
+
+def _load_policy(path: Path) -> Policy:
+    try:
+        tensors = load_file(path)
+    except (OSError, SafetensorError) as error:
+        raise InvalidLibraryError(f"{path}: cannot be read: {error}") from error
+    try:
+        count = sum(name.endswith(".weights") for name in tensors)
+        policy = Policy(
+            Normalisation(tensors["normalisation.mean"], tensors["normalisation.deviation"]),
+            tuple((tensors[f"layer{i}.weights"], tensors[f"layer{i}.bias"]) for i in range(count)),
+            tensors["log_std"],
+        )
+    except KeyError as error:
+        raise InvalidLibraryError(f"{path}: tensor {error} is missing") from error
+    _check(path, policy)
+    return policy
+
+
+def _check(path: Path, policy: Policy) -> None:
+    """Refuse tensors that do not fit together or are not finite."""
+    size = policy.normalisation.mean.shape
+    fits = bool(policy.layers) and policy.normalisation.deviation.shape == size
+    for weights, bias in policy.layers:
+        fits = fits and weights.ndim == 2 and weights.shape[1:] == size
+        size = bias.shape
+        fits = fits and weights.shape[:1] == size
+    if not fits or policy.log_std.shape != size:
+        raise InvalidLibraryError(f"{path}: the shapes of its tensors do not fit together")
+    if not all(np.isfinite(tensor).all() for tensor in _tensors(policy).values()):
+        raise InvalidLibraryError(f"{path}: not all numbers in it are finite")
+
+
+# -- JSON -----------------------------------------------------------------------------------------
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InvalidLibraryError(f"{path}: cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise InvalidLibraryError(f"{path}: damaged: {error}") from error
+    if not isinstance(data, dict):
+        raise InvalidLibraryError(f"{path}: damaged: a JSON object was expected")
+    return data
+
+
+def _write(path: Path, data: Mapping[str, Any]) -> None:
+    path.write_text(json.dumps(data, indent=2, allow_nan=False) + "\n", encoding="utf-8")

@@ -1,0 +1,93 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Which shortcut library is used: the one that somebody chose, or the one shipped with a domain."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import slap_ros
+from slap_ros.domains import Domain, get_domain
+from slap_ros.errors import InvalidLibraryError, InvalidParameterError
+from slap_ros.planning.planner import WITH_SHORTCUTS
+from slap_ros.shortcuts.library import LIBRARY, Library, load_library
+from slap_ros.shortcuts.sight import view_of
+
+NONE = "none"  # the choice of no library
+SHARE = Path("share") / "slap_ros"  # under an installation's prefix
+
+
+def shipped_library(domain: str) -> Path | None:
+    """The folder of a domain's shipped library, if there is one."""
+    folders = (root / "models" / domain for root in _roots())
+    return next((folder for folder in folders if folder.is_dir()), None)
+
+
+def _roots() -> Iterator[Path]:
+    """Where models may be: beside the package in a checkout, else installed."""
+    yield Path(slap_ros.__file__).resolve().parent.parent
+    overlays = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+    for prefix in [*filter(None, overlays), sys.prefix]:
+        yield Path(prefix) / SHARE
+
+
+def chosen_library(choice: str | None, domain: Domain, planner: str = "lazy") -> Library | None:
+    """The library that a choice stands for; None: plan without shortcuts.
+
+    Args:
+        choice: A library's folder, ``none``, or nothing: the shipped one, if there is one and
+            the planner can use it.
+        domain: What it is for.
+        planner: Its name.
+
+    Raises:
+        InvalidLibraryError: It cannot be used as a whole.
+        InvalidParameterError: The planner cannot use the library that was chosen.
+        InvalidDomainError: Nothing can be learned in the domain, so it has no use for one.
+    """
+    path = _chosen_path(choice, domain.name, planner)
+    if path is None:
+        return None
+    library = load_library(path, domain)
+    view_of(domain)
+    return library
+
+
+def _chosen_path(choice: str | None, domain: str, planner: str) -> Path | None:
+    if choice == NONE:
+        return None
+    if not choice:
+        return shipped_library(domain) if planner in WITH_SHORTCUTS else None
+    if planner not in WITH_SHORTCUTS:
+        raise InvalidParameterError(
+            f"the planner {planner} plans without shortcuts: leave out {choice}, or use "
+            f"{' or '.join(WITH_SHORTCUTS)}"
+        )
+    return Path(choice)
+
+
+def require_usable(choice: str, planner: str = "lazy") -> None:
+    """Refuse a choice that can be seen to be wrong before the domain is known.
+
+    Raises:
+        InvalidLibraryError: See :func:`chosen_library`.
+        InvalidParameterError: See :func:`chosen_library`.
+        UnknownDomainError: It is a library of a domain that is not installed here.
+    """
+    if choice not in ("", NONE):
+        chosen_library(choice, get_domain(_domain_of(Path(choice))), planner)
+
+
+def _domain_of(path: Path) -> str:
+    """Of which domain a library says that it is."""
+    try:
+        return str(json.loads((path / LIBRARY).read_text(encoding="utf-8"))["domain"])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InvalidLibraryError(
+            f"{path}: no shortcut library: {LIBRARY}: {error!r}; give a folder that `slap train` "
+            f"made, or {NONE}"
+        ) from error

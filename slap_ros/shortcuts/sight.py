@@ -1,0 +1,174 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a shortcut's policy sees, and how far it still has to go.
+
+The observation has the robot and a slot for each role, of the object that plays it: whether there
+is one, what it looks like from the robot, how much of its atoms is still to be done (SLAP §4.4:
+the projection on relevant objects). Where a change concerns more objects of a kind than training
+had, the slots show those that are not done yet, in their order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slap_ros.domains import Domain
+from slap_ros.domains.view import View
+from slap_ros.errors import InvalidDomainError
+from slap_ros.relational import AtomSpace, Column, GroundAtom, Object, State
+from slap_ros.relational.predicates import Bools, Predicate
+from slap_ros.relational.state import Array
+from slap_ros.shortcuts.signature import Change, Kind, Signature, concerned, kinds
+
+WEIGHT = 3.0  # of an atom that is not done at all against being ``length_m`` away
+DONE = 1e-9  # deficit below which an atom counts as done
+
+
+def view_of(domain: Domain) -> View:
+    """The domain's view.
+
+    Raises:
+        InvalidDomainError: It has none.
+    """
+    if domain.view is None:
+        raise InvalidDomainError(
+            f"domain {domain.name} has no view, so that nothing can be learned in it"
+        )
+    return domain.view
+
+
+@dataclass(frozen=True)
+class _Atoms:
+    """Changed atoms of one predicate and sign."""
+
+    predicate: Predicate
+    wanted: bool
+    columns: tuple[Column, ...]
+    slack: float
+
+    def deficits(self, state: State, length: float) -> Array:
+        """0 where done, towards 1 the further away, shape (n, atoms)."""
+        if self.predicate.margin is None:
+            holds = self.predicate.classifier(state, *self.columns)
+            return np.where(holds == self.wanted, 0.0, 1.0)
+        margin = self.predicate.margin(state, *self.columns)
+        missing = np.maximum(self.slack + (-margin if self.wanted else margin), 0.0)
+        deficits: Array = missing / (missing + length)
+        return deficits
+
+
+@dataclass(frozen=True)
+class Look:
+    """What there is to see in each of n states.
+
+    Args:
+        observations: For the policy, shape (n, size); of the same size for all changes that the
+            signature suits.
+        potential: About minus the steps to go, shape (n,), for shaping rewards. Two terms: what
+            is missing of the changed atoms, through the metric behind each predicate, and the
+            way from the hand to the first object, from the ground up, that still has something
+            missing: what lies below carries the rest.
+        near: Whether nothing is missing, slack included, and nothing moves, shape (n,).
+    """
+
+    observations: NDArray[np.float32]
+    potential: Array
+    near: Bools
+
+
+class Sight:
+    """The senses of one change in one task, for batches of states."""
+
+    def __init__(
+        self, domain: Domain, space: AtomSpace, signature: Signature, change: Change
+    ) -> None:
+        self.domain, self.space, self.signature, self.change = domain, space, signature, change
+        self.view = view_of(domain)
+        self.objects = concerned(change, space)
+        self._number = {obj: i for i, obj in enumerate(self.objects)}
+        self._atoms = [
+            self._group(sign == "+", predicate, [atom for _, atom in atoms])
+            for (sign, predicate), atoms in groupby(
+                change.atoms(space), key=lambda signed: (signed[0], signed[1].predicate)
+            )
+        ]
+        self._about = np.array(  # (atoms, objects): which atoms are about which objects
+            [[obj in atom.objects for obj in self.objects] for _, atom in change.atoms(space)]
+        )
+        self._kinds = self._of_kinds()
+        self.gripper = any(group.predicate in self.view.grasping for group in self._atoms)
+
+    def _group(self, wanted: bool, predicate: Predicate, atoms: Sequence[GroundAtom]) -> _Atoms:
+        columns = tuple(Column(objs) for objs in zip(*(a.objects for a in atoms), strict=True))
+        return _Atoms(predicate, wanted, columns, self.view.slack.get(predicate.name, 0.0))
+
+    def _of_kinds(self) -> list[tuple[int, Column, NDArray[np.intp]]]:
+        """For each kind: slots, objects, and their numbers."""
+        kind: dict[Kind, list[Object]] = {name: [] for name in self.signature.slots}
+        for obj in self.objects:
+            kind[kinds(self.space)[obj]].append(obj)
+        return [
+            (self.signature.slots[name], Column(tuple(objects)), self._numbers(objects))
+            for name, objects in kind.items()
+        ]
+
+    def _numbers(self, objects: Sequence[Object]) -> NDArray[np.intp]:
+        return np.array([self._number[obj] for obj in objects], dtype=np.intp)
+
+    def look(self, state: State) -> Look:
+        """Look at states, a batch of shape (n, layout.size)."""
+        length = self.view.length_m
+        deficits = np.concatenate([g.deficits(state, length) for g in self._atoms], axis=-1)
+        missing = (deficits[:, :, None] * self._about).max(axis=1)
+        hand = self.view.hand(state)
+        return Look(
+            self._observe(state, hand, missing),
+            self._potential(state, hand, deficits, missing),
+            (deficits < DONE).all(axis=-1) & self.view.settled(state),
+        )
+
+    def done(self, state: State, look: Look, targets: Sequence[int]) -> Bools:
+        """Whether each state is one in which the shortcut may end, in its abstract state."""
+        done = look.near.copy()
+        for i in np.flatnonzero(done):
+            done[i] = self.space.abstract(State(state.layout, state.data[i])) == targets[int(i)]
+        return done
+
+    def may_end(self, state: State) -> bool:
+        """Whether a shortcut may end in this state once its target's atoms hold."""
+        return bool(self.look(State(state.layout, state.data[None])).near[0])
+
+    def _potential(self, state: State, hand: Array, deficits: Array, missing: Array) -> Array:
+        ways = np.full(missing.shape, np.inf)
+        for _, column, numbers in self._kinds:
+            ways[:, numbers] = self.view.distance(state, hand, column)
+        first = np.argmax((missing > DONE) & np.isfinite(ways), axis=1)[:, None]
+        way = np.take_along_axis(ways, first, axis=1)[:, 0]
+        open_ = np.take_along_axis(missing, first, axis=1)[:, 0] > DONE
+        way = np.where(open_ & np.isfinite(way), way, 0.0) / self.view.length_m
+        potential: Array = -(WEIGHT * deficits.sum(axis=-1) + way)
+        return potential
+
+    def _observe(self, state: State, hand: Array, missing: Array) -> NDArray[np.float32]:
+        parts = [self.view.robot(state, hand)]
+        for slots, column, numbers in self._kinds:
+            seen = self.view.things(state, hand, column)
+            there = np.ones((*seen.shape[:2], 1))
+            seen = np.concatenate([there, missing[:, numbers, None], seen], axis=-1)
+            parts.append(_into_slots(seen, slots).reshape(len(seen), -1))
+        return np.concatenate(parts, axis=-1).astype(np.float32)
+
+
+def _into_slots(seen: Array, slots: int) -> Array:
+    """Shape (n, objects, f) into (n, slots, f): absent ones 0, of too many those not done."""
+    count = seen.shape[1]
+    if count <= slots:
+        return np.pad(seen, ((0, 0), (0, slots - count), (0, 0)))
+    done = seen[..., 1] <= DONE
+    first = np.argsort(done, axis=1, kind="stable")[:, :slots]
+    return np.take_along_axis(seen, first[..., None], axis=1)

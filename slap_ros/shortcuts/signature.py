@@ -1,0 +1,217 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a shortcut changes, and for which objects: substitution (SLAP §4.4, A.2, Alg. 3).
+
+A change is the atoms that it adds and those that it deletes. Lifted, its objects become roles;
+each role has a *kind*: the object's type with the static atoms that hold of it alone, so that a
+table and a target area, both surfaces, are different kinds.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from hashlib import sha256
+from typing import Any
+
+from slap_ros.relational import AtomSpace, GroundAtom, Object
+
+Kind = str
+Pattern = tuple[str, str, tuple[Kind, ...]]  # "+" or "-", predicate, kinds of its objects
+
+
+@dataclass(frozen=True)
+class Change:
+    """From an abstract state to another: masks over a task's atoms."""
+
+    add: int
+    delete: int
+
+    @classmethod
+    def between(cls, source: int, target: int) -> Change:
+        """What is different in ``target``."""
+        return cls(target & ~source, source & ~target)
+
+    def apply(self, abstract: int) -> int:
+        """The abstract state after the change."""
+        return (abstract & ~self.delete) | self.add
+
+    def atoms(self, space: AtomSpace) -> Iterator[tuple[str, GroundAtom]]:
+        """The atoms with their signs, in the space's order."""
+        for atom in space.decode(self.add):
+            yield "+", atom
+        for atom in space.decode(self.delete):
+            yield "-", atom
+
+
+@lru_cache(maxsize=256)
+def kinds(space: AtomSpace) -> Mapping[Object, Kind]:
+    """The kind of each object of a task."""
+    labels: dict[Object, list[str]] = {obj: [] for obj in space.layout.objects}
+    for atom in space.decode(space.static_truth):
+        if len(atom.objects) == 1:
+            labels[atom.objects[0]].append(atom.predicate.name)
+    return {obj: f"{obj.type}({','.join(sorted(names))})" for obj, names in labels.items()}
+
+
+def concerned(change: Change, space: AtomSpace) -> tuple[Object, ...]:
+    """The objects of a change, from the ground up: in order of kind, then as they stand.
+
+    Objects that were on something are ordered by how many others lie between them and one whose
+    kind nothing else has: a tower from its bottom. So roles do not depend on names.
+    """
+    kind = kinds(space)
+    objects = {obj for _, atom in change.atoms(space) for obj in atom.objects}
+    depth = _depths(change, space, objects)
+    order = {obj: i for i, obj in enumerate(space.layout.objects)}
+    return tuple(sorted(objects, key=lambda obj: (kind[obj], depth[obj], order[obj])))
+
+
+def _depths(change: Change, space: AtomSpace, objects: set[Object]) -> dict[Object, int]:
+    kind = kinds(space)
+    count = Counter(kind[obj] for obj in objects)
+    bonds = [atom.objects for atom in space.decode(change.delete) if len(atom.objects) > 1]
+    depth = {obj: 0 for obj in objects if count[kind[obj]] == 1}
+    while True:
+        reached = {
+            other: min(depth[obj] for obj in bond if obj in depth) + 1
+            for bond in bonds
+            if any(obj in depth for obj in bond)
+            for other in bond
+            if other not in depth
+        }
+        if not reached:
+            return {obj: depth.get(obj, len(objects)) for obj in objects}
+        depth.update(reached)
+
+
+@dataclass(frozen=True)
+class Signature:
+    """A lifted change, as one was trained on.
+
+    Args:
+        roles: The kind of each role.
+        add: Atoms added: predicate and the roles that it is about.
+        delete: Atoms deleted.
+    """
+
+    roles: tuple[Kind, ...]
+    add: frozenset[tuple[str, tuple[int, ...]]]
+    delete: frozenset[tuple[str, tuple[int, ...]]]
+
+    @classmethod
+    def of(cls, change: Change, space: AtomSpace) -> Signature:
+        """Lift a change."""
+        objects, kind = concerned(change, space), kinds(space)
+        number = {obj: i for i, obj in enumerate(objects)}
+
+        def lifted(mask: int) -> frozenset[tuple[str, tuple[int, ...]]]:
+            return frozenset(
+                (atom.predicate.name, tuple(number[obj] for obj in atom.objects))
+                for atom in space.decode(mask)
+            )
+
+        return cls(tuple(kind[obj] for obj in objects), lifted(change.add), lifted(change.delete))
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "roles": list(self.roles),
+            "add": [[predicate, list(roles)] for predicate, roles in sorted(self.add)],
+            "delete": [[predicate, list(roles)] for predicate, roles in sorted(self.delete)],
+        }
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Signature:
+        """The signature of :meth:`as_json`.
+
+        Raises:
+            KeyError, TypeError, ValueError: The data is no signature.
+        """
+        roles = tuple(str(kind) for kind in data["roles"])
+
+        def atoms(lists: Sequence[Any]) -> frozenset[tuple[str, tuple[int, ...]]]:
+            return frozenset((str(name), tuple(int(i) for i in about)) for name, about in lists)
+
+        signature = cls(roles, atoms(data["add"]), atoms(data["delete"]))
+        for _, about in signature.add | signature.delete:
+            if not all(0 <= i < len(roles) for i in about):
+                raise ValueError(f"an atom is about a role that is not among the {len(roles)}")
+        return signature
+
+    @cached_property
+    def patterns(self) -> frozenset[Pattern]:
+        """What is changed, whatever the objects and however many they are."""
+        signed = [("+", *atom) for atom in self.add] + [("-", *atom) for atom in self.delete]
+        return frozenset(
+            (sign, predicate, tuple(self.roles[i] for i in arguments))
+            for sign, predicate, arguments in signed
+        )
+
+    @cached_property
+    def slots(self) -> Mapping[Kind, int]:
+        """How many objects of each kind it has room for, kinds in order."""
+        return dict(sorted(Counter(self.roles).items()))
+
+    @cached_property
+    def name(self) -> str:
+        """A name that says what it adds, and is different for what is different."""
+        text = repr((self.roles, sorted(self.add), sorted(self.delete)))
+        words = "_".join(sorted({predicate for predicate, _ in self.add})) or "nothing"
+        return f"{words}-{sha256(text.encode()).hexdigest()[:8]}"
+
+    def suits(self, change: Change, space: AtomSpace) -> bool:
+        """Whether the change has all of its patterns, with any number of objects.
+
+        As in Alg. 3 the change may have more atoms, but about these objects only. Beyond it, the
+        number of objects is free: Alg. 3 wants each atom of the training's change, so that what
+        was learned on a tower of three is of no use for a tower of two. What was learned is
+        tried in the model anyway, before it is used.
+        """
+        kind = kinds(space)
+        found: set[Pattern] = set()
+        mine: set[Object] = set()
+        others: set[Object] = set()
+        for sign, atom in change.atoms(space):
+            pattern = (sign, atom.predicate.name, tuple(kind[obj] for obj in atom.objects))
+            if pattern in self.patterns:
+                found.add(pattern)
+                mine.update(atom.objects)
+            else:
+                others.update(atom.objects)
+        return found == self.patterns and others <= mine
+
+    def substitutions(self, change: Change, space: AtomSpace) -> Iterator[tuple[Object, ...]]:
+        """Objects for the roles such that every lifted atom is in the change (SLAP Alg. 3)."""
+        kind = kinds(space)
+        objects = concerned(change, space)
+        added = {(a.predicate.name, a.objects) for a in space.decode(change.add)}
+        deleted = {(a.predicate.name, a.objects) for a in space.decode(change.delete)}
+
+        def extend(chosen: tuple[Object, ...]) -> Iterator[tuple[Object, ...]]:
+            if len(chosen) == len(self.roles):
+                yield chosen
+                return
+            for obj in objects:
+                if kind[obj] == self.roles[len(chosen)] and obj not in chosen:
+                    longer = (*chosen, obj)
+                    if self._agrees(longer, added, deleted):
+                        yield from extend(longer)
+
+        return extend(())
+
+    def _agrees(
+        self,
+        chosen: Sequence[Object],
+        added: set[tuple[str, tuple[Object, ...]]],
+        deleted: set[tuple[str, tuple[Object, ...]]],
+    ) -> bool:
+        """Whether the atoms all of whose roles are filled are in the change."""
+        return all(
+            (predicate, tuple(chosen[i] for i in roles)) in there
+            for lifted, there in ((self.add, added), (self.delete, deleted))
+            for predicate, roles in lifted
+            if max(roles, default=0) < len(chosen)
+        )

@@ -1,0 +1,136 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where jobs run: local processes, or a Ray cluster."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from multiprocessing import get_context
+from threading import Thread
+from time import sleep
+from typing import Any, Protocol, TypeVar
+
+from slap_ros.errors import InvalidParameterError
+
+Result = TypeVar("Result")
+WATCH_S = 1.0
+
+
+class Workers(Protocol):
+    """Runs jobs side by side; each is a function of its arguments alone, wherever it runs."""
+
+    @property
+    def count(self) -> int:
+        """How many jobs run at once."""
+        ...
+
+    def run(
+        self, function: Callable[..., Result], jobs: Sequence[tuple[Any, ...]]
+    ) -> Iterator[tuple[int, Result]]:
+        """Number and result of each job, as they end."""
+        ...
+
+
+class NoWorkers:
+    """This process does everything itself, one job after the other."""
+
+    count = 1
+
+    def run(
+        self, function: Callable[..., Result], jobs: Sequence[tuple[Any, ...]]
+    ) -> Iterator[tuple[int, Result]]:
+        """See :class:`Workers`."""
+        for i, job in enumerate(jobs):
+            yield i, function(*job)
+
+
+class LocalWorkers:
+    """Processes of this machine."""
+
+    def __init__(self, pool: ProcessPoolExecutor, count: int) -> None:
+        self._pool, self.count = pool, count
+
+    def run(
+        self, function: Callable[..., Result], jobs: Sequence[tuple[Any, ...]]
+    ) -> Iterator[tuple[int, Result]]:
+        """See :class:`Workers`."""
+        numbers = {self._pool.submit(function, *job): i for i, job in enumerate(jobs)}
+        for future in as_completed(numbers):
+            yield numbers[future], future.result()
+
+
+class RayWorkers:
+    """Processes of a Ray cluster, on which slap_ros must be installed."""
+
+    def __init__(self, ray: Any) -> None:
+        self._ray = ray
+        self.count = max(1, int(ray.cluster_resources().get("CPU", 1)))
+
+    def run(
+        self, function: Callable[..., Result], jobs: Sequence[tuple[Any, ...]]
+    ) -> Iterator[tuple[int, Result]]:
+        """See :class:`Workers`."""
+        remote = self._ray.remote(num_cpus=1)(function)
+        numbers = {remote.remote(*job): i for i, job in enumerate(jobs)}
+        waiting = list(numbers)
+        while waiting:
+            (ready,), waiting = self._ray.wait(waiting, num_returns=1)
+            yield numbers[ready], self._ray.get(ready)
+
+
+def _end_with(parent: int) -> None:
+    """Let this process end when its parent is no more, however that came about."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            sleep(WATCH_S)
+        os._exit(1)
+
+    Thread(target=watch, daemon=True).start()
+
+
+@contextmanager
+def local_workers(count: int) -> Iterator[LocalWorkers]:
+    """So many processes; those still running are not waited for after an error."""
+    # Spawned, not forked: physics clients and threads do not survive a fork.
+    context = get_context("spawn")
+    pool = ProcessPoolExecutor(
+        count, mp_context=context, initializer=_end_with, initargs=(os.getpid(),)
+    )
+    try:
+        yield LocalWorkers(pool, count)
+    except BaseException:
+        for process in list((pool._processes or {}).values()):
+            process.terminate()
+        raise
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+@contextmanager
+def ray_workers(address: str) -> Iterator[RayWorkers]:
+    """The cluster at an address; ``local`` starts one on this machine.
+
+    Raises:
+        InvalidParameterError: Ray is not installed, or nothing answers there.
+    """
+    try:
+        import ray
+    except ImportError as error:
+        raise InvalidParameterError("Ray is not installed: pip install 'slap_ros[ray]'") from error
+    try:
+        ray.init(address=address, log_to_driver=False)
+    except (ConnectionError, ValueError, RuntimeError) as error:
+        raise InvalidParameterError(f"no Ray cluster at {address!r}: {error}") from error
+    try:
+        yield RayWorkers(ray)
+    finally:
+        ray.shutdown()
+
+
+def in_order(results: Iterable[tuple[int, Result]]) -> list[Result]:
+    """Results by the number of their jobs."""
+    return [result for _, result in sorted(results, key=lambda numbered: numbered[0])]

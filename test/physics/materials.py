@@ -1,0 +1,36 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The tower, of blocks whose mass and friction the state says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from benchmarks.physics_step import BLOCK, NAMES, tower
+from slap_ros.physics.features import BODY_FEATURES, MATERIAL_FEATURES, material_features
+from slap_ros.physics.scene import CUBE_MATERIAL, Material
+from slap_ros.relational import State, Type
+
+MADE_BLOCK = Type("block", (*BODY_FEATURES, *MATERIAL_FEATURES))
+
+
+def made_of(materials: Mapping[str, Material]) -> State:
+    """The tower, of these materials; the reference's where none is given."""
+    state = tower()
+    features = {}
+    for obj in state.objects:
+        known = {f.name: float(state.get(obj, f.name)) for f in obj.type.features}
+        if obj.type == BLOCK:
+            obj = MADE_BLOCK(obj.name)
+            known |= material_features(materials.get(obj.name, CUBE_MATERIAL))
+        features[obj] = known
+    return State.build(features)
+
+
+def mixed(rng: np.random.Generator) -> State:
+    """The tower, each block from feather to lead and from ice to rubber."""
+    return made_of(
+        {n: Material(float(np.exp(rng.uniform(-3, 1))), rng.uniform(0.0, 1.5)) for n in NAMES}
+    )

@@ -1,0 +1,67 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Makes the small library in ``data/obstacle2d``: ``python test/shortcuts/make_library.py``.
+
+It has one shortcut: with a block in the hand, push the obstacle off the target area.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from slap_ros.domains import get_domain
+from slap_ros.planning.planner import Problem
+from slap_ros.shortcuts.library import Library, save_library
+from slap_ros.shortcuts.ppo import Learner, Progress, normalisation_of
+from slap_ros.shortcuts.ppo_settings import PpoSettings
+from slap_ros.shortcuts.practice import Practice, Rewards, Start
+from slap_ros.shortcuts.settings import TRAINING_SEED
+from slap_ros.shortcuts.shortcut import Shortcut
+from slap_ros.shortcuts.signature import Change, Signature
+
+DATA = Path(__file__).parent / "data" / "obstacle2d"
+DOMAIN = get_domain("obstacle2d")
+TASKS, STEPS, HORIZON = 200, 40_000, 30
+
+
+def start(index: int) -> Start | None:
+    """With block1 in the hand; None where the obstacle lies wholly in the target area."""
+    state = DOMAIN.task(TRAINING_SEED, index).initial_state
+    problem = Problem.of(DOMAIN, state)
+    space = problem.model.space
+    pick = {str(ground): (ground, option) for ground, option in problem.operators}
+    ground, option = pick["Pick(robot, block1, table)"]
+    holding = ground.apply(space.abstract(state))
+    added = space.mask([space.atom("Clear", ["target"]), space.atom("On", ["block2", "table"])])
+    deleted = space.mask([space.atom("Overlap", ["block2", "target"])])
+    inside = space.mask([space.atom("On", ["block2", "target"])])
+    picked = problem.model.roll_out(option, state, holding)
+    if not picked.reached or holding & inside:
+        return None
+    return Start(picked.final, space, Change(added, deleted))
+
+
+def main() -> None:
+    starts = [found for index in range(TASKS) if (found := start(index)) is not None]
+    signature = Signature.of(starts[0].change, starts[0].space)
+    rng, settings = np.random.default_rng(0), PpoSettings(total_steps=STEPS)
+    practice = Practice(DOMAIN, signature, starts, settings.environments, HORIZON, Rewards(), rng)
+    learner = Learner(practice, normalisation_of(practice, rng, 64), settings, seed=0)
+    last = Progress(0, 0, 0.0, 0.0, 0.0)
+
+    def report(progress: Progress) -> bool:
+        nonlocal last
+        last = progress
+        return True
+
+    learner.learn(report)
+    record = {"steps": last.steps, "success": last.success, "length": round(last.length, 2)}
+    shortcut = Shortcut(signature, learner.policy(), shortest=1, record=record)
+    save_library(DATA, Library(DOMAIN.name, (shortcut,), {"made_by": "make_library.py"}))
+    print(len(starts), shortcut.name, record)  # noqa: T201
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,236 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Libraries that are there, are not, are damaged; and that what is rehearsed is reproducible."""
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import slap_ros
+from slap_ros.domains import get_domain
+from slap_ros.errors import InvalidLibraryError, InvalidParameterError
+from slap_ros.evaluation.approaches import PURE_PLANNING, approaches
+from slap_ros.shortcuts import shipped
+from slap_ros.shortcuts.library import load_library
+from slap_ros.shortcuts.shipped import chosen_library, require_usable, shipped_library
+from slap_ros.shortcuts.shortcut import Sampling
+
+DATA = Path(__file__).parent / "data" / "obstacle2d"
+DOMAIN = get_domain("obstacle2d")
+SAMPLING = Sampling(samples=4)
+
+
+@pytest.fixture
+def library(tmp_path):
+    return shutil.copytree(DATA, tmp_path / "library")
+
+
+def only(library, name):
+    """A file of the library's only shortcut."""
+    (path,) = library.glob(f"*/{name}")
+    return path
+
+
+def plan(library, seed=1):
+    """The plan's edges with their steps."""
+    task = DOMAIN.task(seed)
+    goal = DOMAIN.atom_space(task.initial_state).mask(task.goal)
+    approach = approaches(library, SAMPLING)[-1] if library is not None else PURE_PLANNING
+    planner = approach.planner("lazy", DOMAIN, task.initial_state)
+    result = planner.plan(task.initial_state, goal)
+    return [(str(edge), edge.target, edge.predicted_steps) for edge in result.plan.edges]
+
+
+def steps(edges):
+    return sum(predicted for *_, predicted in edges)
+
+
+def test_the_whole_library_shortens_a_plan(library):
+    pure, slap = plan(None), plan(load_library(library, DOMAIN))
+    assert steps(slap) < steps(pure)
+    assert any(name.startswith("Clear_On") for name, *_ in slap)
+
+
+def truncate(path):
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def flip_header(path):
+    content = bytearray(path.read_bytes())
+    content[12] ^= 0xFF
+    path.write_bytes(bytes(content))
+
+
+def not_finite(path):
+    """The last weight becomes a NaN."""
+    path.write_bytes(path.read_bytes()[:-4] + np.float32("nan").tobytes())
+
+
+@pytest.mark.parametrize(
+    ("name", "damage"),
+    [
+        ("shortcut.json", truncate),
+        ("shortcut.json", Path.unlink),
+        ("policy.safetensors", truncate),
+        ("policy.safetensors", flip_header),
+        ("policy.safetensors", not_finite),
+        ("policy.safetensors", Path.unlink),
+    ],
+)
+def test_a_damaged_shortcut_is_left_out_with_a_reason(library, name, damage):
+    path = only(library, name)
+    damage(path)
+    loaded = load_library(library, DOMAIN)
+    assert loaded.shortcuts == ()
+    (reason,) = loaded.refused
+    assert str(path) in str(reason)
+    assert plan(loaded) == plan(None)
+
+
+def test_a_renamed_shortcut_is_left_out(library):
+    folder = only(library, "shortcut.json").parent
+    folder.rename(folder.with_name("Mine"))
+    loaded = load_library(library, DOMAIN)
+    assert "renamed" in str(loaded.refused[0])
+    assert plan(loaded) == plan(None)
+
+
+def test_flipped_weights_do_no_harm(library):
+    """No reader can tell one finite weight from another. The model can."""
+    path, rng = only(library, "policy.safetensors"), np.random.default_rng(0)
+    content = path.read_bytes()
+    for _ in range(3):
+        flipped = np.frombuffer(content, np.uint8).copy()
+        at = rng.integers(len(content) // 2, len(content), 400)
+        flipped[at] ^= rng.integers(1, 256, 400).astype(np.uint8)
+        path.write_bytes(flipped.tobytes())
+        loaded = load_library(library, DOMAIN)
+        assert steps(plan(loaded)) <= steps(plan(None))
+        assert loaded.shortcuts or plan(loaded) == plan(None)
+
+
+def rewrite(library, **values):
+    path = library / "library.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | values))
+
+
+WHOLE = [
+    (lambda library: rewrite(library, format=99), "format 99"),
+    (lambda library: rewrite(library, domain="obstacle_tower"), "'obstacle_tower', not of"),
+    (lambda library: truncate(library / "library.json"), "library.json"),
+    (lambda library: (library / "library.json").unlink(), "library.json"),
+    (shutil.rmtree, "no such folder"),
+]
+
+
+@pytest.mark.parametrize(("damage", "words"), WHOLE)
+def test_a_library_that_cannot_be_used_is_refused(library, damage, words):
+    damage(library)
+    with pytest.raises(InvalidLibraryError, match=words) as refused:
+        chosen_library(str(library), DOMAIN)
+    assert str(library) in str(refused.value)
+
+
+@pytest.mark.parametrize("damage", [damage for damage, _ in WHOLE if damage is not WHOLE[1][0]])
+def test_much_can_be_refused_before_the_domain_is_known(library, damage):
+    require_usable(str(library))
+    damage(library)
+    with pytest.raises(InvalidLibraryError, match=str(library)):
+        require_usable(str(library))
+
+
+# -- which library ----------------------------------------------------------------------------
+
+
+@pytest.fixture
+def nothing_shipped(tmp_path, monkeypatch):
+    """An installation of its own, still without models; its prefix."""
+    prefix = tmp_path / "prefix"
+    package = prefix / "lib" / "slap_ros" / "__init__.py"
+    monkeypatch.setattr(slap_ros, "__file__", str(package))
+    monkeypatch.setattr(sys, "prefix", str(prefix))
+    monkeypatch.setenv("AMENT_PREFIX_PATH", "")
+    return prefix
+
+
+def test_nothing_is_shipped_unless_it_is(nothing_shipped):
+    assert shipped_library("obstacle2d") is None
+    assert chosen_library(None, DOMAIN) is None
+    assert chosen_library("", DOMAIN) is None
+
+
+@pytest.mark.parametrize("place", ["lib/models", "share/slap_ros/models", "overlay"])
+def test_the_shipped_library_is_found_and_used_unless_told_otherwise(
+    nothing_shipped, place, tmp_path, monkeypatch
+):
+    overlays = f"{tmp_path / 'none'}:{tmp_path / 'overlay'}"
+    monkeypatch.setenv("AMENT_PREFIX_PATH", overlays)
+    root = tmp_path / "overlay/share/slap_ros/models" if place == "overlay" else None
+    folder = (root or nothing_shipped / place) / "obstacle2d"
+    shutil.copytree(DATA, folder)
+    assert shipped_library("obstacle2d") == folder
+    assert shipped_library("obstacle_tower") is None
+    assert len(chosen_library(None, DOMAIN).shortcuts) == 1
+    assert chosen_library("none", DOMAIN) is None
+    assert chosen_library("", DOMAIN, planner="ff") is None  # which cannot use it
+    with pytest.raises(InvalidParameterError, match="ff plans without shortcuts"):
+        chosen_library(str(DATA), DOMAIN, planner="ff")
+
+
+def test_a_checkout_ships_what_is_in_its_models():
+    root = Path(shipped.__file__).parents[2]
+    for name in ("obstacle2d", "obstacle_tower"):
+        folder = root / "models" / name
+        assert shipped_library(name) == (folder if folder.is_dir() else None)
+
+
+# -- the same everywhere ------------------------------------------------------------------------
+
+REHEARSE = """
+import sys
+from pathlib import Path
+from hashlib import sha256
+from slap_ros.domains import get_domain
+from slap_ros.planning.options import OptionKind
+from slap_ros.planning.planner import GraphPlanner, Problem
+from slap_ros.shortcuts.library import load_library
+from slap_ros.shortcuts.repertoire import Repertoire
+from slap_ros.shortcuts.shipped import chosen_library
+from slap_ros.evaluation.approaches import approaches
+import ensemble.nodes, slap_ros.cli
+assert "torch" not in sys.modules, "torch was imported"
+domain = get_domain("obstacle2d")
+digest = sha256()
+for seed in (1, 4):
+    task = domain.task(seed)
+    problem = Problem.of(domain, task.initial_state)
+    repertoire = Repertoire(domain, load_library(Path(sys.argv[1]), domain).shortcuts,
+                            task.initial_state)
+    goal = problem.model.space.mask(task.goal)
+    plan = GraphPlanner(problem, shortcuts=repertoire).plan(task.initial_state, goal).plan
+    state = task.initial_state
+    for edge in plan.edges:
+        policy = edge.option.skill.start(state, edge.option.objects)
+        if edge.option.kind is OptionKind.SHORTCUT:
+            digest.update(policy(state).tobytes())
+            for attempt in repertoire._rehearsal._memory.values():
+                digest.update(b"".join(choice.tobytes() for choice in attempt.choices))
+        state = problem.model.roll_out(edge.option, state, edge.target).final
+print(digest.hexdigest(), sha256().hexdigest() != digest.hexdigest())
+assert "torch" not in sys.modules, "torch was imported"
+"""
+
+
+def test_a_rehearsal_is_the_same_in_every_process_and_needs_no_torch():
+    command = [sys.executable, "-c", REHEARSE, str(DATA)]
+    told = [
+        subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
+        for _ in range(2)
+    ]
+    assert told[0] == told[1]
+    assert told[0][1] == "True"  # something was rehearsed

@@ -1,0 +1,133 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The shortcut MDP, against the domain's own worlds and atoms."""
+
+import numpy as np
+import pytest
+
+from slap_ros.domains import get_domain
+from slap_ros.planning.planner import Problem
+from slap_ros.relational import State
+from slap_ros.shortcuts.practice import ActionMap, Practice, Rewards, Start
+from slap_ros.shortcuts.sight import Sight
+from slap_ros.shortcuts.signature import Change, Signature
+
+DOMAIN = get_domain("obstacle2d", "fair")
+OURS = Rewards()
+
+
+def start_of(index):
+    """Holding the target block, to push the obstacle out of the target area."""
+    task = DOMAIN.task(21, index)
+    problem = Problem.of(DOMAIN, task.initial_state)
+    space = problem.model.space
+    (pick,) = [o for g, o in problem.operators if str(g) == "Pick(robot, block1, table)"]
+    (ground,) = [g for g, _ in problem.operators if str(g) == "Pick(robot, block1, table)"]
+    held = problem.model.roll_out(
+        pick, task.initial_state, ground.apply(space.abstract(task.initial_state))
+    )
+    assert held.reached
+    add = space.mask([space.atom("Clear", ["target"]), space.atom("On", ["block2", "table"])])
+    return Start(held.final, space, Change(add, space.mask([overlap(space)])))
+
+
+def overlap(space):
+    return space.atom("Overlap", ["block2", "target"])
+
+
+STARTS = [start_of(index) for index in range(8)]
+SIGNATURE = Signature.of(STARTS[0].change, STARTS[0].space)
+
+
+def practice(episodes=24, horizon=25, rewards=OURS, seed=3):
+    rng = np.random.default_rng(seed)
+    return Practice(DOMAIN, SIGNATURE, STARTS, episodes, horizon, rewards, rng)
+
+
+def random_steps(run, count, seed=5):
+    rng = np.random.default_rng(seed)
+    for step in range(count):
+        if step % 4 == 0:
+            actions = rng.uniform(-1, 1, (run.episodes, run.actions.size))
+        yield run.step(actions)
+
+
+def test_tasks_with_different_objects_practise_side_by_side():
+    assert len({len(start.state.objects) for start in STARTS}) > 1
+    run = practice()
+    assert run.episodes == 24
+    assert run.observations.shape[0] == 24
+
+
+def test_it_is_done_exactly_where_the_target_abstract_state_is_reached():
+    run = practice(episodes=16)
+    done = 0
+    for _ in range(200):
+        targets = [list(group._targets) for group in run._groups]
+        (steps,) = random_steps(run, 1, seed=_)
+        first = 0
+        for group, wanted in zip(run._groups, targets, strict=True):
+            ended = steps.ended[first : first + group.size]
+            states = group._worlds.states
+            for i in range(group.size):
+                if not ended[i]:  # else the world has begun anew
+                    state = State(states.layout, states.data[i])
+                    assert group.sight.space.abstract(state) != wanted[i]
+            first += group.size
+        done += int(steps.done.sum())
+    assert done > 0
+
+
+def test_the_horizon_is_told_apart_from_an_end():
+    run = practice(horizon=3)
+    ends = list(random_steps(run, 6))
+    assert not ends[1].late.any()
+    assert ends[2].late.sum() + ends[2].done.sum() == 24 - ends[0].done.sum() - ends[1].done.sum()
+    assert not (ends[2].late & ends[2].done).any()
+
+
+def test_shaping_telescopes():
+    """With shaping, a return differs by the potential at the start alone (Ng et al. 1999)."""
+    plain, shaped = Rewards(shaping=0.0, discount=0.9), Rewards(shaping=1.0, discount=0.9)
+    runs = [practice(rewards=rewards) for rewards in (plain, shaped)]
+    potential = np.concatenate([group._potential for group in runs[1]._groups])
+    returns = np.zeros((2, 24))
+    alive = np.ones(24, dtype=bool)
+    ended = np.zeros(24, dtype=bool)
+    for t, pair in enumerate(zip(*(random_steps(run, 25) for run in runs), strict=True)):
+        for i, steps in enumerate(pair):
+            returns[i] += np.where(alive, 0.9**t * steps.rewards, 0.0)
+        ended |= alive & pair[0].done
+        alive &= ~pair[0].ended
+    scale = plain.scale
+    assert ended.any()
+    assert returns[1][ended] == pytest.approx(returns[0][ended] - scale * potential[ended])
+
+
+def test_the_gripper_acts_only_where_what_is_held_is_to_change():
+    assert ActionMap(DOMAIN, gripper=False)(np.ones((5, 2))).shape == (5, 3)
+    start = STARTS[0]
+    assert not Sight(DOMAIN, start.space, SIGNATURE, start.change).gripper
+    release = Change(start.space.mask([start.space.atom("GripperEmpty", ["robot"])]), 0)
+    signature = Signature.of(release, start.space)
+    assert Sight(DOMAIN, start.space, signature, release).gripper
+
+
+def test_same_seed_same_practice():
+    first, second = (list(random_steps(practice(), 40)) for _ in range(2))
+    for a, b in zip(first, second, strict=True):
+        assert a.observations.tobytes() == b.observations.tobytes()
+        assert a.rewards.tobytes() == b.rewards.tobytes()
+
+
+def test_what_is_seen_does_not_depend_on_how_many_are_looked_at():
+    start = STARTS[0]
+    sight = Sight(DOMAIN, start.space, SIGNATURE, start.change)
+    world = DOMAIN.make_world(start.state)
+    rng = np.random.default_rng(0)
+    states = [world.step(np.array([*rng.uniform(-0.1, 0.1, 2), 0.0])) for _ in range(20)]
+    together = sight.look(State.batch(states))
+    for i, state in enumerate(states):
+        alone = sight.look(State.batch([state]))
+        assert alone.observations[0].tobytes() == together.observations[i].tobytes()
+        assert alone.potential[0] == together.potential[i]

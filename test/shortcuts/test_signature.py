@@ -1,0 +1,134 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Lifting of changes, and substitution of objects."""
+
+import numpy as np
+import pytest
+
+from slap_ros.domains import get_domain
+from slap_ros.domains.obstacle_tower import make
+from slap_ros.domains.obstacle_tower.tasks import RandomTasks
+from slap_ros.shortcuts.reach import Reach
+from slap_ros.shortcuts.signature import Change, Signature, concerned
+
+
+def tower(obstacles, seed=0, distractors=0):
+    """The atoms of a tower task, and the change of knocking the whole tower over."""
+    counts = (obstacles, obstacles), (distractors, distractors)
+    state = RandomTasks(*counts).sample(np.random.default_rng(seed)).initial_state
+    space = make("fair").atom_space(state)
+    blocks = [f"block{i}" for i in range(2, obstacles + 2)]
+    add = [space.atom("On", [b, "table"]) for b in blocks] + [space.atom("NothingOn", ["target"])]
+    add += [space.atom("NothingOn", [b]) for b in blocks[:-1]]
+    delete = [
+        space.atom("On", [b, under]) for b, under in zip(blocks, ["target", *blocks], strict=False)
+    ]
+    return space, Change(space.mask(add), space.mask(delete))
+
+
+def test_a_change_leads_from_source_to_target():
+    _, change = tower(3)
+    source = change.delete | 1
+    assert Change.between(source, change.apply(source)) == change
+
+
+def test_the_same_change_of_other_objects_has_the_same_signature():
+    space, change = tower(3, seed=1)
+    other_space, other = tower(3, seed=2, distractors=2)
+    assert Signature.of(change, space) == Signature.of(other, other_space)
+    assert Signature.of(change, space).name == Signature.of(other, other_space).name
+
+
+def test_roles_follow_the_tower_and_not_the_names():
+    space, change = tower(4)
+    towers = [obj.name for obj in concerned(change, space) if obj.name.startswith("block")]
+    assert towers == ["block2", "block3", "block4", "block5"]
+    # The same tower built the other way round.
+    on = lambda block, under: space.atom("On", [block, under])  # noqa: E731
+    upside_down = Change(
+        change.add,
+        space.mask(
+            on(*pair)
+            for pair in (
+                ("block5", "target"),
+                ("block4", "block5"),
+                ("block3", "block4"),
+                ("block2", "block3"),
+            )
+        ),
+    )
+    towers = [obj.name for obj in concerned(upside_down, space) if obj.name.startswith("block")]
+    assert towers == ["block5", "block4", "block3", "block2"]
+
+
+def test_a_table_and_a_target_are_different_roles():
+    space, change = tower(2)
+    kinds = Signature.of(change, space).slots
+    assert sorted(kinds.values()) == [1, 1, 2]
+
+
+@pytest.mark.parametrize("obstacles", [2, 3, 4, 6])
+def test_what_was_learned_on_three_suits_other_towers(obstacles):
+    learned = Signature.of(*reversed(tower(3)))
+    space, change = tower(obstacles)
+    assert learned.suits(change, space)
+
+
+def test_it_does_not_suit_another_change():
+    space, change = tower(3)
+    learned = Signature.of(change, space)
+    half = Change(change.add & -change.add, 0)
+    assert not learned.suits(half, space)
+    assert not learned.suits(Change(change.delete, change.add), space)
+
+
+def test_more_atoms_are_welcome_if_they_are_about_the_same_objects():
+    space, change = tower(3, distractors=1)
+    learned = Signature.of(change, space)
+    holding = space.mask([space.atom("Holding", ["robot", "block1"])])
+    assert not learned.suits(Change(change.add | holding, change.delete), space)
+    turned = space.mask([space.atom("On", ["block2", "block4"])])
+    assert learned.suits(Change(change.add | turned, change.delete), space)
+
+
+def test_algorithm_3_wants_every_atom_of_training():
+    learned = Signature.of(*reversed(tower(3)))
+    space, three = tower(3)
+    (only,) = learned.substitutions(three, space)
+    assert [obj.name for obj in only] == [obj.name for obj in concerned(three, space)]
+    assert not list(learned.substitutions(*reversed(tower(2))))
+    # Of a higher tower, the lower three fit: they alone stood on the target.
+    space, four = tower(4)
+    found = list(learned.substitutions(four, space))
+    assert [obj.name for obj in found[0]][:3] == ["block2", "block3", "block4"]
+
+
+def test_a_signature_survives_json():
+    learned = Signature.of(*reversed(tower(3)))
+    assert Signature.from_json(learned.as_json()) == learned
+    broken = learned.as_json()
+    broken["add"][0][1] = [99]
+    with pytest.raises(ValueError, match="role"):
+        Signature.from_json(broken)
+
+
+def test_reach_finds_exactly_the_pairs_that_suit():
+    domain = get_domain("obstacle2d", "fair")
+    from slap_ros.planning.abstract_graph import build_abstract_graph
+    from slap_ros.planning.planner import Problem
+
+    for index in range(5):
+        task = domain.task(11, index)
+        problem = Problem.of(domain, task.initial_state)
+        space = problem.model.space
+        graph = build_abstract_graph(
+            space.abstract(task.initial_state), space.mask(task.goal), problem.operators
+        )
+        pairs = graph.candidates()
+        changes = {pair: Change.between(*(graph.nodes[i] for i in pair)) for pair in pairs}
+        signatures = {Signature.of(change, space) for change in changes.values()}
+        assert len(signatures) > 3
+        for signature in signatures:
+            slowly = {p for p, c in changes.items() if signature.suits(c, space)}
+            quickly = set(Reach(signature, space).pairs(graph.nodes))
+            assert slowly == quickly & set(pairs)

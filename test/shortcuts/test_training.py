@@ -1,0 +1,161 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Training from exploration to a library on disk, small."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+
+import pytest
+
+from slap_ros.domains import get_domain
+from slap_ros.errors import InvalidParameterError
+from slap_ros.shortcuts import jobs
+from slap_ros.shortcuts.explore import Explored, Find
+from slap_ros.shortcuts.jobs import Place
+from slap_ros.shortcuts.library import load_library, save_library
+from slap_ros.shortcuts.settings import Exploration, training_settings
+from slap_ros.shortcuts.signature import Signature
+from slap_ros.shortcuts.training import Training, rank
+from slap_ros.shortcuts.workers import NoWorkers
+
+PLACE = Place("obstacle2d", "fair", 5)
+OURS = training_settings("ours", "obstacle2d")
+SMALL = replace(
+    OURS,
+    exploration=Exploration(tasks=2, rollouts=60, length=30, hold=4),
+    ppo=replace(OURS.ppo, total_steps=6_000),
+    starts=24,
+    validation=3,
+    shortcuts=1,
+)
+
+
+class Audience:
+    """Keeps what it is told."""
+
+    def __init__(self, interrupt_at=None):
+        self.verdicts, self.interrupt_at = [], interrupt_at
+
+    def counting(self, what, done, total):
+        if (what, done) == self.interrupt_at:
+            raise KeyboardInterrupt
+
+    def candidates(self, ranked):
+        self.ranked = ranked
+
+    def learning(self, name, folder, total_steps):
+        pass
+
+    def judged(self, name, before, after, kept):
+        self.verdicts.append((name, before, after, kept))
+
+
+def train(folder, settings=SMALL, audience=None):
+    audience = audience or Audience()
+    return Training(PLACE, settings, folder, NoWorkers(), audience).run(), audience
+
+
+def files(folder):
+    return {
+        path.relative_to(folder): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.name != "library.json"
+    }
+
+
+def without_time(record):
+    return {k: v for k, v in record.items() if k != "cpu_s"}
+
+
+def test_pushing_is_discovered_learned_and_worth_it_and_twice_the_same(tmp_path):
+    library, audience = train(tmp_path / "work")
+    ((name, before, after, kept),) = audience.verdicts
+    assert kept
+    assert after < 0.9 * before
+    assert name.startswith("Clear_On-")
+    save_library(tmp_path / "first", library)
+    again, _ = train(tmp_path / "work2")
+    for one, other in zip(library.shortcuts, again.shortcuts, strict=True):
+        assert one.signature == other.signature
+        assert one.shortest == other.shortest
+        assert without_time(one.record) == without_time(other.record)
+        for mine, its in zip(one.policy.layers, other.policy.layers, strict=True):
+            assert mine[0].tobytes() == its[0].tobytes()
+    loaded = load_library(tmp_path / "first", get_domain("obstacle2d"))
+    assert [shortcut.name for shortcut in loaded.shortcuts] == [name]
+    assert not loaded.refused
+
+
+def test_it_goes_on_where_it_was_interrupted(tmp_path):
+    with pytest.raises(KeyboardInterrupt):
+        train(tmp_path / "work", audience=Audience(interrupt_at=("collecting starts", 24)))
+    explored = (tmp_path / "work" / "explored.json").read_bytes()
+    library, _ = train(tmp_path / "work")
+    assert (tmp_path / "work" / "explored.json").read_bytes() == explored
+    whole, _ = train(tmp_path / "whole")
+    assert (
+        library.shortcuts[0]
+        .policy.mean(whole.shortcuts[0].policy.normalisation.mean[None])
+        .tobytes()
+        == whole.shortcuts[0]
+        .policy.mean(whole.shortcuts[0].policy.normalisation.mean[None])
+        .tobytes()
+    )
+
+
+KILLED = """
+import os, sys
+from pathlib import Path
+from slap_ros.shortcuts import jobs
+jobs.CHECKPOINT_S = 0.0
+sys.path.insert(0, {tests!r})
+import test_training as t
+original = jobs.Kept.append
+def append(self, progress):
+    original(self, progress)
+    if progress["steps"] > 3000:
+        os.kill(os.getpid(), 9)
+jobs.Kept.append = append
+t.train(Path({work!r}))
+"""
+
+
+def test_a_killed_training_resumes_from_its_checkpoint(tmp_path):
+    work, tests = tmp_path / "work", str(jobs.Path(__file__).parent)
+    code = KILLED.format(tests=tests, work=str(work))
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == -9
+    (progress,) = work.glob("*/progress.jsonl")
+    before = len(progress.read_text().splitlines())
+    library, _ = train(work)
+    steps = [json.loads(line)["steps"] for line in progress.read_text().splitlines()]
+    assert len(steps) > before
+    assert steps[before] > 1024  # not from the beginning
+    assert steps[-1] >= 6000
+    assert len(library.shortcuts) == 1
+
+
+def test_another_training_in_the_same_folder_is_refused(tmp_path):
+    train(tmp_path, replace(SMALL, shortcuts=0))
+    with pytest.raises(InvalidParameterError, match="other settings"):
+        train(tmp_path, replace(SMALL, shortcuts=0, starts=25))
+
+
+def find(name, promise, origin=("Pick",)):
+    return Find(
+        Signature(("block",), frozenset({(name, (0,))}), frozenset()), origin, 3, 4, 100, promise
+    )
+
+
+def test_candidates_are_ranked_by_what_they_save_over_all_tasks():
+    everywhere = [find("A", 40.0), find("A", 30.0)], [find("A", 20.0)]
+    once = [find("B", 50.0)], []
+    explored = [
+        Explored((*a, *b), 10, 100, {"Pick": 5.0}) for a, b in zip(everywhere, once, strict=True)
+    ]
+    first, second = rank(explored)
+    assert first.signature.name.startswith("A-")
+    assert first.promise == pytest.approx(0.3)
+    assert second.promise == pytest.approx(0.25)
+    assert (first.tasks, second.tasks) == (2, 1)
