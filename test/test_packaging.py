@@ -60,8 +60,8 @@ def test_colcon_builds_executables_where_ros2_run_looks_for_them(checkout, optio
     assert (installed / "share/ament_index/resource_index/packages/slap_ros").exists()
     assert (installed / "share/slap_ros/launch/ensemble.launch.py").exists()
     models = installed / "share/slap_ros/models/obstacle2d"
-    assert {path.name for path in models.iterdir()} == {"library.json", "Clear_On-7dacdec6"}
-    assert len(list((models / "Clear_On-7dacdec6").iterdir())) == 2
+    assert {path.name for path in models.iterdir()} == {"library.json", "Clear_On-e41568a9"}
+    assert len(list((models / "Clear_On-e41568a9").iterdir())) == 2
     for name in (*NODES, "slap"):
         assert (installed / "lib/slap_ros" / name).exists()
     (packages,) = installed.glob("lib/python3.*/site-packages")

@@ -27,7 +27,7 @@ from slap_ros.relational import State
 from slap_ros.shortcuts.practice import ActionMap
 from slap_ros.shortcuts.settings import Exploration
 from slap_ros.shortcuts.sight import view_of
-from slap_ros.shortcuts.signature import Change, Signature
+from slap_ros.shortcuts.signature import Change, Signature, context_of
 
 Origin = tuple[str, ...]  # operators by which a shortcut's source was reached
 ONE_BY_ONE = 4  # worlds that cannot be stepped together
@@ -132,10 +132,12 @@ class Explorer:
         )
 
     def _value(self, vertex: Vertex, j: int, lengths: list[int], to_go: float) -> Find:
-        change = Change.between(self.graph.nodes[vertex.node], self.graph.nodes[j])
+        source = self.graph.nodes[vertex.node]
+        change = Change.between(source, self.graph.nodes[j])
+        context = context_of(source, view_of(self._domain).grasping, self.space)
         with_it = vertex.cost + min(lengths) + to_go
         return Find(
-            Signature.of(change, self.space),
+            Signature.of(change, self.space, context),
             origin_of(vertex),
             len(lengths),
             min(lengths),

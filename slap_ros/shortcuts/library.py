@@ -22,17 +22,19 @@ import os
 import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from safetensors import SafetensorError
-from safetensors.numpy import load_file, save_file
+from safetensors.numpy import load, save
 
 from slap_ros.domains import Domain
 from slap_ros.errors import InvalidLibraryError
 from slap_ros.shortcuts.policy import Normalisation, Policy, Weights
 from slap_ros.shortcuts.shortcut import Shortcut
+from slap_ros.shortcuts.sight import action_size, observation_size
 from slap_ros.shortcuts.signature import Signature
 
 FORMAT = 1
@@ -102,11 +104,30 @@ def load_library(path: Path, domain: Domain) -> Library:
     shortcuts, refused = [], []
     for folder in sorted(entry for entry in path.iterdir() if entry.is_dir()):
         try:
-            shortcuts.append(load_shortcut(folder))
+            shortcut = load_shortcut(folder)
+            _require_fit(shortcut, folder, domain)
+            shortcuts.append(shortcut)
         except InvalidLibraryError as error:
             refused.append(error)
     record = {k: v for k, v in about.items() if k not in ("format", "domain")}
     return Library(domain.name, tuple(shortcuts), record, tuple(refused))
+
+
+def _require_fit(shortcut: Shortcut, folder: Path, domain: Domain) -> None:
+    """Refuse a policy that sees or does something else than the domain's view has."""
+    seen = observation_size(domain, shortcut.signature)
+    size = shortcut.policy.normalisation.mean.size
+    if seen is not None and seen != size:
+        raise InvalidLibraryError(
+            f"{folder}: the policy sees {size} features, the view of {domain.name} has {seen}: "
+            "learned with another version of slap_ros; train anew"
+        )
+    actions = action_size(domain, shortcut.signature)
+    if shortcut.policy.log_std.size != actions:
+        raise InvalidLibraryError(
+            f"{folder}: the policy has {shortcut.policy.log_std.size} actions, shortcuts of this "
+            f"kind in {domain.name} have {actions}"
+        )
 
 
 # -- one shortcut ---------------------------------------------------------------------------------
@@ -115,15 +136,17 @@ def load_library(path: Path, domain: Domain) -> Library:
 def save_shortcut(folder: Path, shortcut: Shortcut) -> None:
     """Write one shortcut into a new folder or over an older version of it."""
     folder.mkdir(parents=True, exist_ok=True)
+    tensors = save(_tensors(shortcut.policy))
     _write(
         folder / SHORTCUT,
         {
             "signature": shortcut.signature.as_json(),
             "shortest": shortcut.shortest,
             "record": dict(shortcut.record),
+            "sha256": sha256(tensors).hexdigest(),
         },
     )
-    save_file(_tensors(shortcut.policy), folder / POLICY)
+    (folder / POLICY).write_bytes(tensors)
 
 
 def load_shortcut(folder: Path) -> Shortcut:
@@ -136,6 +159,7 @@ def load_shortcut(folder: Path) -> Shortcut:
     try:
         signature = Signature.from_json(about["signature"])
         shortest, record = int(about["shortest"]), dict(about["record"])
+        checksum = str(about["sha256"])
     except (KeyError, TypeError, ValueError) as error:
         raise InvalidLibraryError(f"{folder / SHORTCUT}: damaged: {error!r}") from error
     if signature.name != folder.name:
@@ -143,7 +167,7 @@ def load_shortcut(folder: Path) -> Shortcut:
             f"{folder}: the signature inside is that of {signature.name}; the folder was renamed "
             "or the file changed"
         )
-    return Shortcut(signature, _load_policy(folder / POLICY), shortest, record)
+    return Shortcut(signature, _load_policy(folder / POLICY, checksum), shortest, record)
 
 
 def _tensors(policy: Policy) -> dict[str, Weights]:
@@ -158,11 +182,14 @@ def _tensors(policy: Policy) -> dict[str, Weights]:
     return tensors
 
 
-def _load_policy(path: Path) -> Policy:
+def _load_policy(path: Path, checksum: str) -> Policy:
     try:
-        tensors = load_file(path)
+        content = path.read_bytes()
+        tensors = load(content)
     except (OSError, SafetensorError) as error:
         raise InvalidLibraryError(f"{path}: cannot be read: {error}") from error
+    if sha256(content).hexdigest() != checksum:
+        raise InvalidLibraryError(f"{path}: damaged: its checksum is not the one in {SHORTCUT}")
     try:
         count = sum(name.endswith(".weights") for name in tensors)
         policy = Policy(

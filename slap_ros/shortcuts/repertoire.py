@@ -12,7 +12,7 @@ from slap_ros.planning.options import Option, OptionKind
 from slap_ros.relational import State
 from slap_ros.shortcuts.reach import Reach
 from slap_ros.shortcuts.shortcut import DEFAULT, GroundShortcut, Rehearsal, Sampling, Shortcut
-from slap_ros.shortcuts.sight import Sight
+from slap_ros.shortcuts.sight import Sight, view_of
 from slap_ros.shortcuts.signature import Change, concerned
 
 
@@ -30,7 +30,9 @@ class Repertoire:
         self._domain = domain
         self._space = domain.atom_space(initial)
         self._rehearsal = Rehearsal(domain, domain.make_world(initial), sampling)
-        self._reach = [Reach(s.signature, self._space) for s in self.shortcuts]
+        self._reach = [
+            Reach(s.signature, self._space, view_of(domain).grasping) for s in self.shortcuts
+        ]
         self._sights: dict[tuple[str, Change], Sight] = {}
 
     def edges(self, graph: AbstractGraph) -> list[Edge]:

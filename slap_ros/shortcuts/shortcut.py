@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from hashlib import sha256
@@ -21,6 +22,7 @@ from slap_ros.shortcuts.practice import ActionMap
 from slap_ros.shortcuts.sight import Sight
 from slap_ros.shortcuts.signature import Change, Signature
 
+HOPE = 6  # failures, on top of as many for each success, before a shortcut is given up
 NARROWER = 0.7  # of the spread of variations from one round to the next
 SAME = 1e-6  # in any feature's unit: up to here a state is the one that was foreseen
 
@@ -60,14 +62,14 @@ class Sampling:
     """
 
     samples: int = 16
-    refinements: int = 0
+    refinements: int = 1
     horizon: int = 40
-    patience: int = 4
+    patience: int = 16
     spread: float = 0.35
 
 
 DEFAULT = Sampling()
-PAPER = Sampling(samples=1, horizon=100)
+PAPER = Sampling(samples=1, refinements=0, horizon=100)
 
 
 @dataclass(frozen=True)
@@ -99,15 +101,23 @@ class Rehearsal:
         self.sampling = sampling
         self._domain, self._world = domain, world
         self._memory: dict[tuple[str, Change, bytes], Attempt] = {}
+        self._failures: Counter[str] = Counter()  # more than expected, of each shortcut
 
     def best(self, shortcut: Shortcut, sight: Sight, state: State) -> Attempt:
-        """The shortest attempt that succeeded; if none did, any."""
+        """The shortest attempt that succeeded; if none did, any.
+
+        A shortcut that fails again and again in a task is not tried any more there: a useless
+        one shall not cost much.
+        """
         key = (shortcut.name, sight.change, state.key)
+        if key not in self._memory and self._failures[shortcut.name] >= HOPE:
+            return Attempt((), (), False)
         if key not in self._memory:
             seed = sha256(repr(key[:2]).encode() + state.key).digest()[:8]
             rng = np.random.default_rng(int.from_bytes(seed, "little"))
             best = self._sample(shortcut.policy, sight, state, rng)
             self._memory[key] = self._refine(best, sight, state, rng)
+            self._failures[shortcut.name] += -HOPE if best.reached else 1
         return self._memory[key]
 
     def _sample(
@@ -200,8 +210,8 @@ class GroundShortcut:
 
     @property
     def least_steps(self) -> int:
-        """No success in training was shorter."""
-        return self.shortcut.shortest
+        """Half of the shortest success in training, which sampling may well beat."""
+        return max(1, self.shortcut.shortest // 2)
 
     def lower_bound(self, state: State, objects: tuple[Object, ...]) -> int:
         """The same from every state."""

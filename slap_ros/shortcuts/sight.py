@@ -42,6 +42,34 @@ def view_of(domain: Domain) -> View:
     return domain.view
 
 
+def uses_gripper(domain: Domain, signature: Signature) -> bool:
+    """Whether the shortcut is to change what is held, and so has the gripper among its actions."""
+    grasping = {predicate.name for predicate in view_of(domain).grasping}
+    return any(predicate in grasping for _, predicate, _ in signature.patterns)
+
+
+def action_size(domain: Domain, signature: Signature) -> int:
+    """How many actions the policy has: all axes but for the gripper, or all."""
+    axes = len(domain.shortcut_actions.axes)
+    return axes if uses_gripper(domain, signature) else axes - 1
+
+
+def observation_size(domain: Domain, signature: Signature) -> int | None:
+    """How much the policy sees; None where no task at hand has objects of all its kinds."""
+    view, state = view_of(domain), domain.task(0).initial_state
+    kind = kinds(domain.atom_space(state))
+    examples = {name: obj for obj, name in kind.items()}
+    if not set(signature.slots) <= set(examples):
+        return None
+    batch = State.batch([state])
+    hand = view.hand(batch)
+    size = view.robot(batch, hand).shape[-1]
+    for name, slots in signature.slots.items():
+        seen = view.things(batch, hand, Column((examples[name],)))
+        size += slots * (2 + seen.shape[-1])  # whether there is one, and what is missing
+    return int(size)
+
+
 @dataclass(frozen=True)
 class _Atoms:
     """Changed atoms of one predicate and sign."""
@@ -70,9 +98,8 @@ class Look:
         observations: For the policy, shape (n, size); of the same size for all changes that the
             signature suits.
         potential: About minus the steps to go, shape (n,), for shaping rewards. Two terms: what
-            is missing of the changed atoms, through the metric behind each predicate, and the
-            way from the hand to the first object, from the ground up, that still has something
-            missing: what lies below carries the rest.
+            is missing of the changed atoms, through the metric behind each predicate; and, as
+            long as something is missing of the lowest object, the way to it: it carries the rest.
         near: Whether nothing is missing, slack included, and nothing moves, shape (n,).
     """
 
@@ -101,7 +128,7 @@ class Sight:
             [[obj in atom.objects for obj in self.objects] for _, atom in change.atoms(space)]
         )
         self._kinds = self._of_kinds()
-        self.gripper = any(group.predicate in self.view.grasping for group in self._atoms)
+        self.gripper = uses_gripper(domain, signature)
 
     def _group(self, wanted: bool, predicate: Predicate, atoms: Sequence[GroundAtom]) -> _Atoms:
         columns = tuple(Column(objs) for objs in zip(*(a.objects for a in atoms), strict=True))
@@ -147,10 +174,9 @@ class Sight:
         ways = np.full(missing.shape, np.inf)
         for _, column, numbers in self._kinds:
             ways[:, numbers] = self.view.distance(state, hand, column)
-        first = np.argmax((missing > DONE) & np.isfinite(ways), axis=1)[:, None]
-        way = np.take_along_axis(ways, first, axis=1)[:, 0]
-        open_ = np.take_along_axis(missing, first, axis=1)[:, 0] > DONE
-        way = np.where(open_ & np.isfinite(way), way, 0.0) / self.view.length_m
+        lowest = int(np.argmax(np.isfinite(ways[0])))  # of those that can be gone to
+        ahead = np.isfinite(ways[:, lowest]) & (missing[:, lowest] > DONE)
+        way = np.where(ahead, ways[:, lowest], 0.0) / self.view.length_m
         potential: Array = -(WEIGHT * deficits.sum(axis=-1) + way)
         return potential
 

@@ -10,13 +10,13 @@ table and a target area, both surfaces, are different kinds.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from hashlib import sha256
 from typing import Any
 
-from slap_ros.relational import AtomSpace, GroundAtom, Object
+from slap_ros.relational import AtomSpace, GroundAtom, Object, Predicate
 
 Kind = str
 Pattern = tuple[str, str, tuple[Kind, ...]]  # "+" or "-", predicate, kinds of its objects
@@ -44,6 +44,14 @@ class Change:
             yield "+", atom
         for atom in space.decode(self.delete):
             yield "-", atom
+
+
+def context_of(
+    abstract: int, predicates: Collection[Predicate], space: AtomSpace
+) -> frozenset[str]:
+    """The names of those predicates of which some atom holds in an abstract state."""
+    holding = (atom.predicate for atom in space.decode(abstract & ~space.static))
+    return frozenset(predicate.name for predicate in holding if predicate in predicates)
 
 
 @lru_cache(maxsize=256)
@@ -95,14 +103,19 @@ class Signature:
         roles: The kind of each role.
         add: Atoms added: predicate and the roles that it is about.
         delete: Atoms deleted.
+        context: What held where it was learned, of the predicates about what is held: a slap with
+            a block in the hand is another one than with the hand empty.
     """
 
     roles: tuple[Kind, ...]
     add: frozenset[tuple[str, tuple[int, ...]]]
     delete: frozenset[tuple[str, tuple[int, ...]]]
+    context: frozenset[str] = frozenset()
 
     @classmethod
-    def of(cls, change: Change, space: AtomSpace) -> Signature:
+    def of(
+        cls, change: Change, space: AtomSpace, context: frozenset[str] = frozenset()
+    ) -> Signature:
         """Lift a change."""
         objects, kind = concerned(change, space), kinds(space)
         number = {obj: i for i, obj in enumerate(objects)}
@@ -113,7 +126,8 @@ class Signature:
                 for atom in space.decode(mask)
             )
 
-        return cls(tuple(kind[obj] for obj in objects), lifted(change.add), lifted(change.delete))
+        roles = tuple(kind[obj] for obj in objects)
+        return cls(roles, lifted(change.add), lifted(change.delete), context)
 
     def as_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -121,6 +135,7 @@ class Signature:
             "roles": list(self.roles),
             "add": [[predicate, list(roles)] for predicate, roles in sorted(self.add)],
             "delete": [[predicate, list(roles)] for predicate, roles in sorted(self.delete)],
+            "context": sorted(self.context),
         }
 
     @classmethod
@@ -135,7 +150,8 @@ class Signature:
         def atoms(lists: Sequence[Any]) -> frozenset[tuple[str, tuple[int, ...]]]:
             return frozenset((str(name), tuple(int(i) for i in about)) for name, about in lists)
 
-        signature = cls(roles, atoms(data["add"]), atoms(data["delete"]))
+        context = frozenset(str(name) for name in data["context"])
+        signature = cls(roles, atoms(data["add"]), atoms(data["delete"]), context)
         for _, about in signature.add | signature.delete:
             if not all(0 <= i < len(roles) for i in about):
                 raise ValueError(f"an atom is about a role that is not among the {len(roles)}")
@@ -158,14 +174,16 @@ class Signature:
     @cached_property
     def name(self) -> str:
         """A name that says what it adds, and is different for what is different."""
-        text = repr((self.roles, sorted(self.add), sorted(self.delete)))
+        parts = (self.roles, sorted(self.add), sorted(self.delete), sorted(self.context))
+        text = repr(parts)
         words = "_".join(sorted({predicate for predicate, _ in self.add})) or "nothing"
         return f"{words}-{sha256(text.encode()).hexdigest()[:8]}"
 
     def suits(self, change: Change, space: AtomSpace) -> bool:
         """Whether the change has all of its patterns, with any number of objects.
 
-        As in Alg. 3 the change may have more atoms, but about these objects only. Beyond it, the
+        As in Alg. 3 the change may delete more atoms, but about these objects only, and, unlike
+        there, it adds no others: nothing that was not to be achieved in training. Beyond it, the
         number of objects is free: Alg. 3 wants each atom of the training's change, so that what
         was learned on a tower of three is of no use for a tower of two. What was learned is
         tried in the model anyway, before it is used.
@@ -179,6 +197,8 @@ class Signature:
             if pattern in self.patterns:
                 found.add(pattern)
                 mine.update(atom.objects)
+            elif sign == "+":
+                return False
             else:
                 others.update(atom.objects)
         return found == self.patterns and others <= mine

@@ -65,13 +65,20 @@ class Candidate:
     promise: float
 
 
+Learning = tuple[frozenset[Pattern], frozenset[str]]  # what makes a problem another one
+
+
+def _learning(signature: Signature) -> Learning:
+    return signature.patterns, signature.context
+
+
 def rank(explored: Sequence[Explored]) -> list[Candidate]:
     """Candidates, the most promising first."""
-    groups: dict[tuple[frozenset[Pattern], Origin], list[Find]] = {}
+    groups: dict[tuple[Learning, Origin], list[Find]] = {}
     for one in explored:
-        best: dict[tuple[frozenset[Pattern], Origin], Find] = {}
+        best: dict[tuple[Learning, Origin], Find] = {}
         for find in one.finds:
-            key = (find.signature.patterns, find.origin)
+            key = (_learning(find.signature), find.origin)
             if key not in best or find.promise > best[key].promise:
                 best[key] = find
         for key, find in best.items():
@@ -119,14 +126,14 @@ class Training:
         self.audience.candidates(ranked)
         operator_steps = _mean_steps(explored)
         length = baseline = self._plan_length(())
-        tried: set[frozenset[Pattern]] = set()
+        tried: set[Learning] = set()
         for candidate in ranked:
             promised = baseline * (1.0 - candidate.promise)
-            if candidate.signature.patterns in tried or not self._shorter(promised, length):
+            if _learning(candidate.signature) in tried or not self._shorter(promised, length):
                 continue
             if len(tried) == self.settings.shortcuts:
                 break
-            tried.add(candidate.signature.patterns)
+            tried.add(_learning(candidate.signature))
             shortcut = self._try(candidate, operator_steps)
             if shortcut is None:
                 continue

@@ -105,9 +105,9 @@ def local_workers(count: int) -> Iterator[LocalWorkers]:
     except BaseException:
         for process in list((pool._processes or {}).values()):
             process.terminate()
-        raise
-    finally:
         pool.shutdown(wait=False, cancel_futures=True)
+        raise
+    pool.shutdown()
 
 
 @contextmanager

@@ -35,7 +35,7 @@ from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.shortcut import DEFAULT
 
 DATA = Path(__file__).parent.parent / "shortcuts" / "data" / "obstacle2d"
-SHORTCUT = "Clear_On-7dacdec6"
+SHORTCUT = "Clear_On-e41568a9"
 SEED = 1
 
 

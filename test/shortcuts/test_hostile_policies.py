@@ -17,7 +17,7 @@ from slap_ros.shortcuts.policy import Normalisation, Policy
 from slap_ros.shortcuts.practice import ActionMap
 from slap_ros.shortcuts.shortcut import Sampling, Shortcut, one
 from slap_ros.shortcuts.sight import Sight
-from slap_ros.shortcuts.signature import Change, Signature
+from slap_ros.shortcuts.signature import Change, Signature, context_of
 
 DATA = Path(__file__).parent / "data" / "obstacle2d"
 HASTY = Sampling(samples=3, patience=2, horizon=15)
@@ -44,7 +44,8 @@ def hostile(domain, seed, value, count):
     changes = {}
     for i, j in graph.candidates():
         change = Change.between(graph.nodes[i], graph.nodes[j])
-        changes.setdefault(Signature.of(change, space), change)
+        context = context_of(graph.nodes[i], domain.view.grasping, space)
+        changes.setdefault(Signature.of(change, space, context), change)
         if len(changes) == count:
             break
     return tuple(

@@ -38,7 +38,7 @@ from slap_ros.motion import (
 )
 from slap_ros.physics.features import GRASP_FEATURES, JOINT_FEATURES, POSE_FEATURES, ROBOT
 from slap_ros.physics.panda import GRASP_POINT, grasp_pose
-from slap_ros.physics.pose import Pose, Vector, conjugate, multiply, rotate
+from slap_ros.physics.pose import ORIGIN, Pose, Vector, conjugate, rotate
 from slap_ros.relational import Object, State
 
 STEP_LIMIT = 100  # environment steps
@@ -442,17 +442,19 @@ def _ways_to_table(state: State, block: Object, table: Object) -> Iterator[Way]:
 
 @lru_cache(maxsize=REMEMBERED)
 def _way_to_place(state: State, place: tuple[float, float], yaw: float, thing: Object) -> Way:
-    """The way on which the held block comes to stand on a thing at a place."""
+    """The way on which the held block comes to stand on a thing at a place.
+
+    However the hand is tilted now, it points down there: so the block was grasped.
+    """
     block, grasp = _held(state), _grasp(state)
     if block is None:
         raise SkillNotApplicableError("nothing is held")
-    pose, size = _pose(state, block), _box(state, block).half[2]
-    height = _top(state, thing) + size + DROP
+    height = _top(state, thing) + _box(state, block).half[2] + DROP
+    in_hand = _yaw(_from_above(ORIGIN, 0.0).compose(grasp))
     ends = []
     for turned_yaw in _quarter_turns(yaw):
-        turn = turned_yaw - _yaw(pose)
-        turned = multiply((0.0, 0.0, math.sin(turn / 2), math.cos(turn / 2)), pose.quaternion)
-        ends.append(Pose((*place, height), turned).compose(grasp.inverse()))
+        upright = _from_above(ORIGIN, turned_yaw - in_hand).compose(grasp).quaternion
+        ends.append(Pose((*place, height), upright).compose(grasp.inverse()))
     return Way(state, ends, touched=(thing,))
 
 

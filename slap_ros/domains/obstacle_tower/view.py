@@ -4,23 +4,32 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
-from slap_ros.domains.obstacle_tower.model import BLOCK, GRIPPER_EMPTY, HOLDING, NOT_HOLDING
+from slap_ros.domains.obstacle_tower.model import (
+    BLOCK,
+    GRIPPER_EMPTY,
+    HOLDING,
+    NOT_HOLDING,
+    SURFACE,
+)
 from slap_ros.domains.view import View
 from slap_ros.motion.kinematics import GRASP_IN_LAST_LINK, arm_frames, matrix
 from slap_ros.physics.features import GRASP_FEATURES, JOINT_FEATURES, ROBOT
 from slap_ros.physics.panda import GRASP_POINT, JOINT_HIGH, JOINT_LOW
 from slap_ros.physics.scene import TABLE_TOP
-from slap_ros.relational import Column, State
+from slap_ros.relational import Column, Object, State
 from slap_ros.relational.predicates import Bools
 from slap_ros.relational.state import Array
 
 FAR = 0.2  # m, the scale of what is seen
+NEAR = 0.1  # m, the scale of what is beside the target
 FAST = 0.5  # m/s
 STILL = 0.05  # m/s and rad/s, along each axis: a block so slow stays where it is
 FALLEN = TABLE_TOP - 0.05  # m, below which a block's centre is off the table
-FINGER_ROOM = 0.025  # m, between the target and what lies beside it, to put a block down there
+FINGER_ROOM = 0.02  # m, between the target and what lies beside it, to put a block down there
 
 JOINTS = tuple(feature.name for feature in JOINT_FEATURES)
 GRASP_POSITION = tuple(feature.name for feature in GRASP_FEATURES[:3])
@@ -57,13 +66,39 @@ def _robot(state: State, hand: Array) -> Array:
 
 
 def _things(state: State, hand: Array, column: Column) -> Array:
-    """Where from the hand, in the base's axes; yaw of what is fixed, velocity of what is not."""
+    """Where from the hand, in the base's axes.
+
+    Of blocks also: how fast, and where over the target. Of what is fixed: which way it is turned.
+    """
     place = _from(hand, state, column) / FAR
     if column.objects[0].type.is_a(BLOCK):
-        return np.concatenate([place, np.clip(state.gather(column, VELOCITY) / FAST, -3, 3)], -1)
+        speed = np.clip(state.gather(column, VELOCITY) / FAST, -3, 3)
+        return np.concatenate([place, speed, _over_target(state, column) / NEAR], axis=-1)
     turn = state.gather(column, ("qz", "qw"))
     yaw = 8.0 * np.arctan2(turn[..., 0], turn[..., 1])  # a square looks the same four times
     return np.concatenate([place, np.sin(yaw)[..., None], np.cos(yaw)[..., None]], axis=-1)
+
+
+def _over_target(state: State, column: Column) -> Array:
+    """Positions in the plane along the axes of the target, from its middle, m, (n, objects, 2)."""
+    x, y, z, w = np.moveaxis(state.gather(_target(state), ("x", "y", "qz", "qw")), -1, 0)
+    sin, cos = 2.0 * z * w, w * w - z * z
+    seen = state.gather(column, ("x", "y"))
+    dx, dy = seen[..., 0] - x, seen[..., 1] - y
+    return np.stack([cos * dx + sin * dy, cos * dy - sin * dx], axis=-1)
+
+
+def _target(state: State) -> Column:
+    """The target, alone; targets stay targets, so that one state of a batch tells."""
+    surfaces = state.layout.column_of(SURFACE)
+    first = state.data.reshape(-1, state.data.shape[-1])[0]
+    labels = first[state.layout.grid(surfaces, ("is_target",))[:, 0]]
+    return _alone(surfaces.objects[int(np.argmax(labels))])
+
+
+@lru_cache(maxsize=256)
+def _alone(obj: Object) -> Column:
+    return Column((obj,))
 
 
 def _distance(state: State, hand: Array, column: Column) -> Array:
