@@ -29,6 +29,8 @@ demo: install  ## Run the whole ensemble, record bags, replay them, measure
 	@set -e; export PATH="$(abspath $(BIN)):$$PATH"; bag=runs/demo-$$(date +%Y%m%d-%H%M%S); \
 	echo "== one task, every node a process"; \
 	slap run obstacle2d --seed 3 --record $$bag; \
+	echo "== the same task without learned shortcuts"; \
+	slap run obstacle2d --seed 3 --shortcuts none; \
 	slap plan obstacle2d --seed 3 --output $$bag-plan; \
 	echo "== the same numbers from the bag alone"; \
 	slap bag evaluate $$bag; \
@@ -37,7 +39,9 @@ demo: install  ## Run the whole ensemble, record bags, replay them, measure
 	echo "== many tasks, and the start states of the paper"; \
 	slap evaluate obstacle2d --tasks 10 --seeds 5; \
 	slap evaluate obstacle2d --tasks 10 --seeds 5 --preset paper; \
-	echo "== a Panda takes a tower apart"; \
+	echo "== a Panda takes a tower apart, block by block"; \
+	slap run obstacle_tower --seed 1 --shortcuts none; \
+	echo "== and with what it learned"; \
 	slap run obstacle_tower --seed 1 --record $$bag-tower --render $$bag-tower.gif; \
 	slap bag replay $$bag-tower; \
 	echo "bag: $$bag   abstract graph: $$bag-plan/graph.svg   animation: $$bag-tower.gif"

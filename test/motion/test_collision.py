@@ -160,10 +160,12 @@ def distance_in_bullet(bullet, bodies):
 
 
 def test_links_are_where_bullet_has_them(bullet):
-    pybullet, _, robot = bullet
+    pybullet, client, robot = bullet
     for q in random_configurations(np.random.default_rng(3), 20):
         set_joints(bullet, q)
-        states = pybullet.getLinkStates(robot, range(7), computeForwardKinematics=True)
+        states = pybullet.getLinkStates(
+            robot, range(7), computeForwardKinematics=True, physicsClientId=client
+        )
         expected = link_poses(q, FINGER_OPEN)[1 : LINKS.index("hand")]
         for state, pose in zip(states, expected, strict=True):
             np.testing.assert_allclose(state[4], pose.position, atol=1e-6)
