@@ -95,7 +95,7 @@ def test_a_tower_is_taken_apart_all_the_same():
     brief = Sampling(samples=1, horizon=6)
     pure = plan(domain, seed, PURE_PLANNING)
     for value in (float("nan"), 0.0, 1.0):
-        approach = Approach("hostile", hostile(domain, seed, value, count=1), brief)
+        approach = Approach("hostile", hostile(domain, seed, value, count=6), brief)
         with_it = plan(domain, seed, approach)
         assert with_it.edges_rolled_out > pure.edges_rolled_out
         assert with_it.plan.predicted_steps <= pure.plan.predicted_steps

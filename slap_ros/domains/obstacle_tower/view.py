@@ -70,6 +70,8 @@ def _things(state: State, hand: Array, column: Column) -> Array:
 
     Of blocks also: how fast, and where over the target. Of what is fixed: which way it is turned.
     """
+    if column.objects[0].type.is_a(ROBOT):
+        return np.zeros((*state.data.shape[:-1], len(column.objects), 0))  # it is seen already
     place = _from(hand, state, column) / FAR
     if column.objects[0].type.is_a(BLOCK):
         speed = np.clip(state.gather(column, VELOCITY) / FAST, -3, 3)
