@@ -77,10 +77,19 @@ class RunClient(Node):
             and (not recording or self._close_bag.service_is_ready())
         )
 
-    def send(self, goal: Collection[GroundAtom], step_limit: int, max_replans: int) -> Future:
+    def send(
+        self,
+        goal: Collection[GroundAtom],
+        step_limit: int,
+        max_replans: int,
+        episode: int = 0,
+    ) -> Future:
         """Ask for the task to be solved; the future's result is the goal handle."""
         request = SolveTask.Goal(
-            goal=encode.goal(goal), step_limit=step_limit, max_replans=max_replans
+            episode=episode,
+            goal=encode.goal(goal),
+            step_limit=step_limit,
+            max_replans=max_replans,
         )
         return self._solve.send_goal_async(request)
 

@@ -18,7 +18,7 @@ Subscribers:
     slap/domain, slap/task, slap/state, slap/atoms: see ``ensemble.observation``.
 
 Action servers:
-    slap/solve_task (slap_msgs/SolveTask): solve the current episode's task.
+    slap/solve_task (slap_msgs/SolveTask): solve an episode's task.
 
 Action clients:
     slap/execute_skill (slap_msgs/ExecuteSkill): one goal for each edge of the plan.
@@ -47,6 +47,7 @@ from planner_node.reporting import Reporter
 from planner_node.solving import Solving
 from slap_ros.errors import (
     BusyError,
+    EpisodeChangedError,
     InvalidParameterError,
     NoTaskError,
     SlapError,
@@ -119,7 +120,7 @@ class PlannerNode(Node):
             raise BusyError("another task is being solved; cancel it first")
         self._busy = True
         try:
-            start = await self._observe()
+            start = await self._observe(goal.request.episode)
             solving = await self._prepare(goal, start)
             return await solving.run()
         finally:
@@ -150,13 +151,21 @@ class PlannerNode(Node):
             goal.request.step_limit or episode.task.step_limit,
         )
 
-    async def _observe(self) -> Observation:
-        """The newest observation, waited for if there is none yet."""
-        latest = await self._observer.wait(0, self._settings.observation_timeout)
-        if latest is None:
+    async def _observe(self, episode: int) -> Observation:
+        """The newest observation, waited for until there is one of the episode.
+
+        Who has just reset the simulator may know of the new episode before this node does.
+        """
+        latest = await self._observer.wait(episode, self._settings.observation_timeout)
+        if latest is None or latest.episode.number < episode:
             raise NoTaskError(
-                f"no perceived state within {self._settings.observation_timeout} s: "
+                f"no perceived state{f' of episode {episode}' if episode else ''} within "
+                f"{self._settings.observation_timeout} s: "
                 "are sim_node (or robot_bridge) and perception_node running?"
+            )
+        if episode and latest.episode.number != episode:
+            raise EpisodeChangedError(
+                f"goal for episode {episode}, but episode {latest.episode.number} is under way"
             )
         return latest
 

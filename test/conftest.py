@@ -3,22 +3,31 @@
 """Every test that opens a network gets a DDS domain of its own."""
 
 import itertools
-import os
+import socket
 
 import pytest
 
-# Apart from those of embedded_ros' own tests, and within what UDP ports allow. Each worker has
-# its own.
-WORKERS = 2
-WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
-DOMAIN_IDS = itertools.cycle(range(150 + WORKER % WORKERS, 200, WORKERS))
+# Apart from those of embedded_ros' own tests, and within what UDP ports allow.
+DOMAIN_IDS = range(150, 200)
+_next_ids = itertools.cycle(DOMAIN_IDS)
 
 
 @pytest.fixture
 def network(monkeypatch):
-    """A DDS domain that nobody else uses; its id."""
-    number = next(DOMAIN_IDS)
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
-    monkeypatch.delenv("ROS_AUTOMATIC_DISCOVERY_RANGE", raising=False)
-    assert os.environ["ROS_DOMAIN_ID"] == str(number)
-    return number
+    """A DDS domain that no other worker, and no other run of these tests, uses meanwhile."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as claim:
+        candidates = itertools.islice(_next_ids, len(DOMAIN_IDS))
+        number = next((number for number in candidates if _claims(claim, number)), None)
+        assert number is not None, "every domain is in use"
+        monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
+        monkeypatch.delenv("ROS_AUTOMATIC_DISCOVERY_RANGE", raising=False)
+        yield number
+
+
+def _claims(claim, number):
+    # An abstract address: gone with its process, and shared by whoever shares the loopback.
+    try:
+        claim.bind(f"\0slap_ros.tests.domain.{number}")
+    except OSError:
+        return False
+    return True

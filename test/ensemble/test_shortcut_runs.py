@@ -37,6 +37,7 @@ from slap_ros.shortcuts.shortcut import DEFAULT
 DATA = Path(__file__).parent.parent / "shortcuts" / "data" / "obstacle2d"
 SHORTCUT = "Clear_On-e41568a9"
 SEED = 1
+LIMIT = 60.0  # s, far more than anything here takes
 
 
 def request(record=None, shortcuts=DATA, seed=SEED):
@@ -72,7 +73,7 @@ def test_a_shortcut_is_executed_attributed_and_replayed(network, tmp_path):
 def test_processes_tell_the_same_live_and_from_the_bag(network, tmp_path):
     def slap(*arguments):
         command = [sys.executable, "-m", "slap_ros.cli", *map(str, arguments)]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=90)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT)
         assert done.returncode == 0, done.stderr
         return done.stdout
 
@@ -111,14 +112,14 @@ def test_learned_shortcuts_are_listed(network):
     nodes = node_parameters(request().settings)
     with InProcessHost({name: nodes[name] for name in ("sim_node", "skill_server")}, executor):
         service = client.create_client(LIST_SKILLS.type, LIST_SKILLS.name)
-        assert spinner.until(service.service_is_ready, 20)
+        assert spinner.until(service.service_is_ready, LIMIT)
 
         def skills():
             answer = service.call_async(ListSkills.Request())
-            assert spinner.until(answer.done, 10)
+            assert spinner.until(answer.done, LIMIT)
             return answer.result().skills
 
-        assert spinner.until(skills, 20)  # once the skill server knows the domain
+        assert spinner.until(skills, LIMIT)  # once the skill server knows the domain
         (learned,) = [skill for skill in skills() if skill.kind == OptionKind.SHORTCUT.value]
     client.destroy_node()
     executor.shutdown()
