@@ -42,6 +42,7 @@ PHYSICS = [
 ]
 TRAIN = ["torch>=2.4", "stable-baselines3>=2.3", "tensorboard>=2.15"]
 RAY = ["ray>=2.40"]
+STUDIES = ["matplotlib>=3.8"]
 TEST = [
     "pytest>=8",
     "pytest-timeout>=2.3",
@@ -50,6 +51,7 @@ TEST = [
     "mcap>=1.2",
     "setuptools>=68,<80",  # for colcon, as in pyproject.toml; what follows would raise it
     *TRAIN,
+    *STUDIES,
     "unified-planning>=1.1",
     "up-aries>=0.4",
     "colcon-common-extensions>=0.3",
@@ -107,7 +109,13 @@ setup(
         *trees("models"),
     ],
     install_requires=RUNTIME,
-    extras_require={"physics": PHYSICS, "train": TRAIN, "ray": RAY, "test": TEST},
+    extras_require={
+        "physics": PHYSICS,
+        "train": TRAIN,
+        "ray": RAY,
+        "studies": STUDIES,
+        "test": TEST,
+    },
     entry_points={
         "console_scripts": [
             "slap = slap_ros.cli:main",

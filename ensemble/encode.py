@@ -124,10 +124,17 @@ def plan_edge(edge: PlanEdge, space: AtomSpace) -> msgs.PlanEdge:
 
 
 def plan(
-    value: Plan, goal_mask: int, space: AtomSpace, episode: int, number: int, stamp: Time
+    value: Plan,
+    goal_mask: int,
+    space: AtomSpace,
+    episode: int,
+    number: int,
+    stamp: Time,
+    origin: Mapping[str, str | int],
 ) -> msgs.Plan:
-    """The ``number``-th plan of a run."""
+    """The ``number``-th plan of a run; ``origin``: what made it, as the message has it."""
     return msgs.Plan(
+        **origin,
         header=header(stamp),
         episode=episode,
         number=number,

@@ -65,6 +65,12 @@ class Repertoires:
         library = self._libraries.get(domain.name)
         return library.shortcuts if library is not None else ()
 
+    def origin(self, domain: Domain) -> dict[str, str | int]:
+        """Which library is used and how, as a plan's message has it."""
+        library = self._libraries.get(domain.name)
+        digest = library.digest if library is not None else ""
+        return {"library": digest, "samples": self.sampling.samples}
+
     def of(self, episode: Episode) -> Repertoire | None:
         """What there is in an episode; None without shortcuts.
 

@@ -147,6 +147,7 @@ class PlannerNode(Node):
             self._skill_server_watch(),
             self._workers,
             planner,
+            {"planner": self._settings.planner, **self._repertoires.origin(episode.domain)},
             episode.space.mask(atoms),
             goal.request.step_limit or episode.task.step_limit,
         )

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,10 +29,17 @@ class Reporter:
         self._plans = node.create_publisher(PLAN.type, PLAN.name, PLAN.qos)
         self._events = node.create_publisher(PLAN_EVENTS.type, PLAN_EVENTS.name, PLAN_EVENTS.qos)
 
-    def plan(self, plan: Plan, goal: int, number: int, at: Observation) -> None:
+    def plan(
+        self,
+        plan: Plan,
+        goal: int,
+        number: int,
+        at: Observation,
+        origin: Mapping[str, str | int],
+    ) -> None:
         """Publish the ``number``-th plan of a run, to reach the mask ``goal``."""
         space, episode = at.episode.space, at.episode.number
-        self._plans.publish(encode.plan(plan, goal, space, episode, number, self._now()))
+        self._plans.publish(encode.plan(plan, goal, space, episode, number, self._now(), origin))
 
     def event(self, kind: int, at: Observation, **details: Any) -> int:
         """Publish a PlanEvent; its stamp in ns."""

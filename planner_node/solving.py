@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
@@ -54,6 +54,7 @@ class Solving:
         skill_server_lost: Whether the skill server has been away for too long.
         workers: Where planning runs.
         planner: Plans for the episode's objects.
+        origin: What makes the plans, as their messages have it.
         goal_mask: What to reach.
         step_limit: Environment steps.
     """
@@ -66,6 +67,7 @@ class Solving:
     skill_server_lost: Callable[[], bool]
     workers: Executor
     planner: Planner
+    origin: Mapping[str, str | int]
     goal_mask: int
     step_limit: int
 
@@ -125,7 +127,7 @@ class Solving:
         done = self._event(PlanEvent.PLANNED, edges_rolled_out=rolled_out)
         self._tally.planning_ns += done - started
         self._tally.edges_rolled_out += rolled_out
-        self.reporter.plan(result.plan, self.goal_mask, number, self._latest)
+        self.reporter.plan(result.plan, self.goal_mask, number, self._latest, self.origin)
         self._feedback(
             SolveTask.Feedback.EXECUTING,
             graph_nodes=result.graph_nodes,

@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.relational import Column, Predicate, State
+from slap_ros.relational import Column, Object, Predicate, State
 from slap_ros.relational.predicates import Bools
 from slap_ros.relational.state import Array
 
@@ -55,6 +55,7 @@ class View:
             (n, objects, f).
         distance: (state, hand, objects) to how far the hand, or what it holds, is from each, m,
             shape (n, objects); infinite for what there is no point in going to.
+        apart: (state, object, objects) to how far each is from the first, m, shape (n, objects).
         settled: Whether nothing would move by itself any more, shape (n,).
         lost: Whether something happened that cannot be undone, shape (n,).
         slack: By how much the margin of a predicate must pass its threshold before a shortcut
@@ -69,6 +70,7 @@ class View:
     robot: Callable[[State, Array], Array]
     things: Callable[[State, Array, Column], Array]
     distance: Callable[[State, Array, Column], Array]
+    apart: Callable[[State, Object, Column], Array]
     settled: Callable[[State], Bools] = _always
     lost: Callable[[State], Bools] = _never
     slack: Mapping[str, float] = field(default_factory=dict)

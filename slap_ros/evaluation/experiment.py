@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from slap_ros.domains import Domain, get_domain
+from slap_ros.domains import Domain, Task, get_domain
 from slap_ros.evaluation.approaches import PURE_PLANNING, Approach
 from slap_ros.planning.execution import Episode, Executor
 from slap_ros.shortcuts.workers import local_workers
@@ -34,16 +34,20 @@ class Experiment:
 
     def run(self, seed: int, index: int, approach: Approach = PURE_PLANNING) -> Episode:
         """Solve one task, in a world of its own."""
-        task = self.domain.task(seed, index)
-        space = self.domain.atom_space(task.initial_state)
-        return Executor(
-            self.domain,
-            approach.planner(self.planner, self.domain, task.initial_state),
-            self.domain.make_world(task.initial_state),
-            space,
-            space.mask(task.goal),
-            task.step_limit,
-        ).run()
+        return solve(self.domain, self.domain.task(seed, index), approach, self.planner)
+
+
+def solve(domain: Domain, task: Task, approach: Approach, planner: str = "lazy") -> Episode:
+    """Plan for any task of a domain and execute the plan, in a world of its own."""
+    space = domain.atom_space(task.initial_state)
+    return Executor(
+        domain,
+        approach.planner(planner, domain, task.initial_state),
+        domain.make_world(task.initial_state),
+        space,
+        space.mask(task.goal),
+        task.step_limit,
+    ).run()
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,20 @@ class Trial:
     planning_seconds: float
     edges_rolled_out: int
     reason: str  # why not, unless it is a success
+
+    @classmethod
+    def of(cls, seed: int, index: int, episode: Episode) -> Trial:
+        """What an episode came to."""
+        return cls(
+            seed,
+            index,
+            episode.success,
+            episode.plan_length,
+            episode.shortcut_steps,
+            episode.planning_seconds,
+            episode.edges_rolled_out,
+            episode.error.reason,
+        )
 
 
 def run_all(experiment: Experiment, approach: Approach, jobs: int) -> Iterator[Trial]:
@@ -81,14 +99,4 @@ def _try(
 ) -> Trial:
     """One task; domains are made anew where this runs."""
     experiment = Experiment(get_domain(domain, preset), 1, 1, planner=planner)
-    episode = experiment.run(seed, index, approach)
-    return Trial(
-        seed,
-        index,
-        episode.success,
-        episode.plan_length,
-        episode.shortcut_steps,
-        episode.planning_seconds,
-        episode.edges_rolled_out,
-        episode.error.reason,
-    )
+    return Trial.of(seed, index, experiment.run(seed, index, approach))

@@ -77,6 +77,9 @@ class RunMetrics:
     error_code: ErrorCode
     error_msg: str
     options: tuple[OptionMetrics, ...]
+    planner: str  # of the first plan, like what follows; empty: there was no plan
+    library: str  # digest of the shortcuts that it knew
+    samples: int  # attempts of a shortcut in its model
 
     def as_json(self) -> dict[str, Any]:
         """Plain data, keys in the order of the fields."""
@@ -214,6 +217,7 @@ class RunLog:
         domain = task.domain if task is not None else next(iter(self._presets), "")
         success, error_code, error_msg = self._verdict(run)
         options = tuple(self._measure_option(run, execution) for execution in executions)
+        first = next(iter(self._plans_of(run)), None)
         return RunMetrics(
             domain=domain,
             preset=self._presets.get(domain, ""),
@@ -228,6 +232,9 @@ class RunLog:
             error_code=error_code,
             error_msg=error_msg,
             options=options,
+            planner=first.planner if first is not None else "",
+            library=first.library if first is not None else "",
+            samples=first.samples if first is not None else 0,
         )
 
     def _verdict(self, run: _Run) -> tuple[bool, ErrorCode, str]:
@@ -248,13 +255,17 @@ class RunLog:
 
     def _goal(self, run: _Run) -> AtomNames | None:
         """What the run was to reach: the goal of its plans, or else the task's own."""
-        first = stamp_ns(run.start.header)
-        last = stamp_ns(run.events[-1].header)
-        for plan in reversed(self._plans.get(run.episode, [])):
-            if first <= stamp_ns(plan.header) <= last and len(plan.goal):
+        for plan in reversed(self._plans_of(run)):
+            if len(plan.goal):
                 return atom_names(plan.goal)
         task = self._tasks.get(run.episode)
         return atom_names(task.goal) if task is not None else None
+
+    def _plans_of(self, run: _Run) -> list[PlanMessage]:
+        """The plans made in a run, in order."""
+        first, last = stamp_ns(run.start.header), stamp_ns(run.events[-1].header)
+        plans = self._plans.get(run.episode, ())
+        return [plan for plan in plans if first <= stamp_ns(plan.header) <= last]
 
     def _plan_length(self, run: _Run) -> int:
         first, last = run.start.step, self._last_step(run)

@@ -111,6 +111,9 @@ class PlanMessage(Protocol):
     episode: int
     goal: Sequence[GroundAtomMessage]
     edges: Sequence[PlanEdgeMessage]
+    planner: str
+    library: str
+    samples: int
 
 
 class PlanEventMessage(Protocol):

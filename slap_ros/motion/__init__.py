@@ -17,7 +17,12 @@ from slap_ros.motion.boxes import Box
 from slap_ros.motion.cache import PlanCache
 from slap_ros.motion.collision import CollisionChecker
 from slap_ros.motion.errors import MotionPlanningError
-from slap_ros.motion.inverse_kinematics import ik_candidates, ik_solutions, inverse_kinematics
+from slap_ros.motion.inverse_kinematics import (
+    ik_candidates,
+    ik_solutions,
+    inverse_kinematics,
+    nearest_configurations,
+)
 from slap_ros.motion.joints import (
     Free,
     Joints,
@@ -44,6 +49,7 @@ __all__ = [
     "ik_solutions",
     "inverse_kinematics",
     "linear_motion",
+    "nearest_configurations",
     "path_configurations",
     "path_steps",
     "plan_path",

@@ -27,7 +27,7 @@ class PlanCache:
 
         Args:
             capacity: Plans to keep; the one not asked for longest goes first.
-            attempts: Random paths to find for a plan.
+            attempts: Random paths to find for a plan where one bend will not do.
         """
         self._capacity = capacity
         self._attempts = attempts

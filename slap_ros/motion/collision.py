@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import cast
 
 import numpy as np
@@ -113,15 +114,10 @@ def _moving_shapes(
     Returns:
         Index of that link (0 for link 1), frame in it, half extents, and distance to be kept.
     """
-    zero = link_poses((0.0,) * JOINTS, finger)
-    links, frames, halves, clearances = [], [], [], []
-    for shape in ARM_SHAPES:
-        index = LINKS.index(shape.link)
-        carrier = min(index, LAST_LINK)  # link 7 carries hand and fingers
-        links.append(carrier - 1)
-        frames.append(matrix(zero[carrier].inverse().compose(zero[index]).compose(shape.box.pose)))
-        halves.append(shape.box.half)
-        clearances.append(shape.radius + margin)
+    shapes = _arm_shapes(finger)
+    links, frames = [link for link, _ in shapes], [frame for _, frame in shapes]
+    halves = [shape.box.half for shape in ARM_SHAPES]
+    clearances = [shape.radius + margin for shape in ARM_SHAPES]
     if held is not None:
         links.append(LAST_LINK - 1)
         frames.append(matrix(GRASP_IN_LAST_LINK.compose(held.pose)))
@@ -133,3 +129,16 @@ def _moving_shapes(
         np.array(halves),
         np.array(clearances),
     )
+
+
+@lru_cache(maxsize=64)
+def _arm_shapes(finger: float) -> tuple[tuple[int, Array], ...]:
+    """Of each of the arm's shapes: the index of its link, 0 for link 1, and its frame in it."""
+    zero = link_poses((0.0,) * JOINTS, finger)
+    found = []
+    for shape in ARM_SHAPES:
+        index = LINKS.index(shape.link)
+        carrier = min(index, LAST_LINK)  # link 7 carries hand and fingers
+        frame = matrix(zero[carrier].inverse().compose(zero[index]).compose(shape.box.pose))
+        found.append((carrier - 1, frame))
+    return tuple(found)

@@ -12,6 +12,7 @@ https://doi.org/10.1109/ICCMA54375.2021.9646185
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import cast
 
 import numpy as np
@@ -33,9 +34,10 @@ SHOULDER = np.array([0.0, 0.0, 0.333])  # m, where the axes of joints 1, 2 and 3
 UPPER_ARM, FOREARM = 0.316, 0.384  # m, along the axes of joints 3 and 5
 ELBOW = 0.0825  # m, from both of these axes to that of joint 4
 WRIST = 0.088  # m, from the axes of joints 5 and 6 to that of joint 7
+BRANCHES = 8  # elbow, wrist, shoulder
 
-SWEEP = 256  # values of joint 7 over its range
-REFINEMENT = 17  # values around the best of the sweep
+SWEEP = 64  # values of joint 7 over its range
+REFINEMENT = 33  # values around the best of the sweep
 _FREE_BATCH = 16  # candidates that are checked for collisions together
 _UPRIGHT = 1e-9  # sine of joint 2, below which joints 1 and 3 turn about the same axis
 
@@ -57,16 +59,32 @@ def inverse_kinematics(target: Pose, near: Joints, *, free: Free | None = None) 
     Returns:
         rad, shape (7,); None if the pose is out of reach or no configuration there is free.
     """
+    return nearest_configurations([target], near, free=free)[0]
+
+
+def nearest_configurations(
+    targets: Sequence[Pose], near: Joints, *, free: Free | None = None
+) -> list[Joints | None]:
+    """What :func:`inverse_kinematics` gives for each of some poses, found together.
+
+    Args:
+        targets: Poses of the grasp point in the base's frame.
+        near: Configuration to be near to, rad, shape (7,).
+        free: Which configurations are free of collisions; all, if None.
+
+    Returns:
+        For each pose rad, shape (7,); None if it is out of reach or no configuration there is free.
+    """
     near = configuration(near)
-    best = _first_free(ik_candidates(target, near), free)
-    if best is None:
-        return None
-    spacing = (HIGH[6] - LOW[6]) / SWEEP
-    around = np.clip(best[6] + np.linspace(-spacing, spacing, REFINEMENT), LOW[6], HIGH[6])
-    refined = _nearest_first(ik_solutions(target, around, near[0]), near)
-    refined = refined[control_steps(near, refined) < control_steps(near, best)]
-    better = _first_free(refined, free)
-    return best if better is None else better
+    swept = _solutions(targets, [_sweep(near)] * len(targets), near)
+    best = _first_free(swept, free)
+    refined = _solutions(targets, [_around(q) for q in best], near)
+    nearer = [
+        q if known is None else q[control_steps(near, q) < control_steps(near, known)]
+        for q, known in zip(refined, best, strict=True)
+    ]
+    better = _first_free(nearer, free)
+    return [known if q is None else q for q, known in zip(better, best, strict=True)]
 
 
 def ik_candidates(target: Pose, near: Joints) -> Joints:
@@ -79,21 +97,57 @@ def ik_candidates(target: Pose, near: Joints) -> Joints:
     Returns:
         rad, shape (k, 7); k is 0 if the pose is out of reach.
     """
-    sweep = np.append(np.linspace(LOW[6], HIGH[6], SWEEP), near[6])
-    return _nearest_first(ik_solutions(target, sweep, near[0]), near)
+    return _solutions([target], [_sweep(near)], near)[0]
+
+
+def _sweep(near: Joints) -> Array:
+    """Values of joint 7 over its range, and the one that it has: shape (SWEEP + 1,)."""
+    return np.append(np.linspace(LOW[6], HIGH[6], SWEEP), near[6])
+
+
+def _around(best: Joints | None) -> Array:
+    """Values of joint 7 between the neighbours of the best in the sweep; none without a best."""
+    if best is None:
+        return np.empty(0)
+    spacing = (HIGH[6] - LOW[6]) / (SWEEP - 1)
+    around = best[6] + np.linspace(-spacing, spacing, REFINEMENT)
+    return cast(Array, np.clip(around, LOW[6], HIGH[6]))
+
+
+def _solutions(targets: Sequence[Pose], joint7: Sequence[Array], near: Joints) -> list[Joints]:
+    """At each pose with its values of joint 7: configurations, shape (k, 7), nearest first."""
+    counts = [len(values) for values in joint7]
+    frames = np.repeat([matrix(target) for target in targets], counts, axis=0)
+    branches = ik_branches(frames, np.concatenate(joint7), near[0])
+    found = np.split(branches, np.cumsum(counts)[:-1])
+    return [_nearest_first(q[within_limits(q)], near) for q in found]
 
 
 def _nearest_first(q: Joints, near: Joints) -> Joints:
     return q[np.argsort(control_steps(near, q), kind="stable")]
 
 
-def _first_free(candidates: Joints, free: Free | None) -> Joints | None:
-    # The nearest alone first: mostly it is free.
-    for batch in np.split(candidates, range(1, len(candidates), _FREE_BATCH)):
-        allowed = np.ones(len(batch), bool) if free is None else free(batch)
-        if allowed.any():
-            return cast(Joints, batch[np.argmax(allowed)])
-    return None
+def _first_free(candidates: Sequence[Joints], free: Free | None) -> list[Joints | None]:
+    """The first that is free in each of some arrays of the shape (k, 7), k from 0 on."""
+    firsts = [q[:1] for q in candidates]
+    if free is not None:
+        # These alone first, and together: mostly they are free.
+        allowed = iter(free(np.concatenate(firsts)).tolist())
+        firsts = [
+            first if len(first) == 0 or next(allowed) else _next_free(q[1:], free)
+            for first, q in zip(firsts, candidates, strict=True)
+        ]
+    return [first[0] if len(first) else None for first in firsts]
+
+
+def _next_free(candidates: Joints, free: Free) -> Joints:
+    """The first that is free, shape (1, 7), or none, shape (0, 7)."""
+    for i in range(0, len(candidates), _FREE_BATCH):
+        batch = candidates[i : i + _FREE_BATCH]
+        found = batch[free(batch)]
+        if len(found):
+            return found[:1]
+    return candidates[:0]
 
 
 def ik_solutions(target: Pose, joint7: Array, joint1: float = 0.0) -> Joints:
@@ -107,14 +161,30 @@ def ik_solutions(target: Pose, joint7: Array, joint1: float = 0.0) -> Joints:
     Returns:
         rad, shape (k, 7), within the limits.
     """
+    q = ik_branches(matrix(target)[None], joint7, joint1).reshape(-1, JOINTS)
+    return q[within_limits(q)]
+
+
+def ik_branches(targets: Array, joint7: Array, joint1: float = 0.0) -> Joints:
+    """The configuration of every branch at each of many poses, joint 7 given.
+
+    Args:
+        targets: Poses of the grasp point in the base's frame, as homogeneous transforms, lengths
+            in m, shape (m, 4, 4), or (1, 4, 4) for the same pose throughout.
+        joint7: rad, shape (m,).
+        joint1: rad; taken where the upper arm is upright and joint 1 is free.
+
+    Returns:
+        rad, shape (m, BRANCHES, 7), NaN where a branch does not reach; joint limits are not heeded.
+    """
     # Axes are unit vectors of the base's frame; the frame of link i is named by i. Arrays have
     # the shape (m, elbow, wrist, shoulder) of the choices made so far, vectors 3 before it.
-    last = matrix(target) @ _TO_LAST_LINK
-    last_x, last_y, last_z = last[:3, :3].T[:, :, None, None, None, None]
+    last = targets @ _TO_LAST_LINK
+    last_x, last_y, last_z, origin = last[:, :3].transpose(2, 1, 0)[..., None, None, None]
     q7 = joint7[:, None, None, None]
     cos7, sin7 = np.cos(q7), np.sin(q7)
     x6, y6, z6 = cos7 * last_x - sin7 * last_y, -last_z, sin7 * last_x + cos7 * last_y
-    wrist = last[:3, 3][:, None, None, None, None] - WRIST * x6
+    wrist = origin - WRIST * x6
     to_shoulder = SHOULDER[:, None, None, None, None] - wrist
 
     with np.errstate(invalid="ignore"):  # NaN: out of reach
@@ -142,8 +212,8 @@ def ik_solutions(target: Pose, joint7: Array, joint1: float = 0.0) -> Joints:
         q3 = np.where(upright, _wrap(np.arctan2(x3[1], x3[0]) - joint1, -np.pi), q3)
 
         parts = (q1, q2, q3, _wrap(q4, -2.0 * np.pi), q5, _wrap(q6, LOW[5]), q7)
-    q: Joints = np.stack(np.broadcast_arrays(*parts), axis=-1).reshape(-1, JOINTS)
-    return q[within_limits(q)]
+    q: Joints = np.stack(np.broadcast_arrays(*parts), axis=-1).reshape(-1, BRANCHES, JOINTS)
+    return q
 
 
 def _elbow(distance2: Array) -> Array:

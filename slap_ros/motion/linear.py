@@ -22,9 +22,10 @@ from slap_ros.motion.joints import (
 from slap_ros.physics.panda import Pose, Reach, grasp_pose
 from slap_ros.physics.pose import ORIGIN, Vector, conjugate, multiply
 
-INCREMENT = 0.005  # m, between rows of the path
+INCREMENT = 0.0125  # m, between rows of the path: coming down, less than 1 mm off the line
 TURN_INCREMENT = 0.05  # rad
-_ITERATIONS = 8  # of Newton's method, an increment; 2 or 3 are usual
+_HALVINGS = 2  # of an increment
+_ITERATIONS = 8  # of Newton's method, an increment; 3 or 4 are usual
 _CLOSE = 1e-7  # m and rad
 _DAMPING = 1e-4  # m and rad a control step, against singularities
 _DAMPED = _DAMPING**2 * np.eye(6)
@@ -48,13 +49,13 @@ def linear_motion(
     """The path on which the grasp point goes straight to a pose, turning evenly.
 
     Every increment continues from the one before along the Jacobian, by the fewest control steps,
-    so that the arm stays in its branch.
+    so that the arm stays in its branch; where it is too long for that, it is halved.
 
     Args:
         q: Where to start, rad, shape (7,).
         target: Pose of the grasp point in the base's frame.
         free: Which configurations are free of collisions; all, if None.
-        increment: Distance between rows, m.
+        increment: Distance between rows, m; less where joints move fast.
         resolution: Control steps between checked configurations.
 
     Returns:
@@ -67,10 +68,10 @@ def linear_motion(
     count = max(1, math.ceil(max(parts) - 1e-9))
     path = [q]
     for i in range(1, count + 1):
-        following = _follow(path[-1], _on_the_way(start, target, i / count))
+        following = _rows(path[-1], start, target, ((i - 1) / count, i / count), _HALVINGS)
         if following is None:
             return None
-        path.append(following)
+        path += following
     rows = np.stack(path)
     if free is not None and not free(path_configurations(rows, resolution)).all():
         return None
@@ -100,6 +101,32 @@ def _rotation_vector(start: Pose, target: Pose) -> Vector:
     # The shorter of the two ways round.
     angle = 2.0 * math.atan2(sine, abs(w)) * (1.0 if w >= 0.0 else -1.0)
     return x * (angle / sine), y * (angle / sine), z * (angle / sine)
+
+
+def _rows(
+    q: Joints, start: Pose, target: Pose, part: tuple[float, float], halvings: int
+) -> list[Joints] | None:
+    """The rows of a part of the way behind ``q``: one if that does, else those of both halves.
+
+    Args:
+        q: Where the part begins, rad, shape (7,).
+        start: Pose where the whole way begins.
+        target: Pose where it ends.
+        part: Fractions of the way, from and to.
+        halvings: How often the part may be halved.
+    """
+    begin, end = part
+    following = _follow(q, _on_the_way(start, target, end))
+    if following is not None:
+        return [following]
+    if halvings == 0:
+        return None
+    middle = 0.5 * (begin + end)
+    first = _rows(q, start, target, (begin, middle), halvings - 1)
+    if first is None:
+        return None
+    second = _rows(first[-1], start, target, (middle, end), halvings - 1)
+    return None if second is None else first + second
 
 
 def _follow(q: Joints, target: Pose) -> Joints | None:

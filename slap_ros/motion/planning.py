@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from slap_ros.motion.detour import detour
 from slap_ros.motion.errors import MotionPlanningError
 from slap_ros.motion.joints import (
     RESOLUTION,
@@ -25,7 +26,7 @@ from slap_ros.motion.shortcutting import shorten, straighten
 
 ATTEMPTS = 4  # paths, of which the one of fewest control steps is kept
 MAX_SAMPLES = 500  # of the joint space, an attempt
-SHORTCUTS = 40  # tries to shorten a path
+SHORTCUTS = 20  # tries to shorten a path
 GOOD_ENOUGH = 1.05  # control steps over those of the straight way, at which no more paths are tried
 
 
@@ -40,14 +41,16 @@ def plan_path(
     shortcuts: int = SHORTCUTS,
     resolution: float = RESOLUTION,
 ) -> Path:
-    """A collision-free path: straight if that is free, else the best of a few random ones.
+    """A collision-free path: straight, or with a bend, or else the best of a few random ones.
+
+    Bent and random paths are then shortened.
 
     Args:
         start: rad, shape (7,).
         goal: rad, shape (7,).
         free: Which configurations are free of collisions.
         seed: Fixes the result.
-        attempts: Random paths to find, each shortened; fewer if one is nearly straight.
+        attempts: Random paths to find if one bend will not do; fewer if one is nearly straight.
         max_samples: Samples of the joint space after which an attempt fails.
         shortcuts: Tries to shorten each path.
         resolution: Control steps between checked configurations.
@@ -69,18 +72,24 @@ def plan_path(
         return np.stack([start, goal])
 
     rng = np.random.default_rng(seed)
-    direct = float(control_steps(start, goal))
+
+    def shortened(path: Path) -> Path:
+        path = shorten(path, free, rng, tries=shortcuts, resolution=resolution)
+        return straighten(path, free, resolution=resolution)
+
+    bent = detour(start, goal, free, rng, resolution=resolution)
+    if bent is not None:
+        return shortened(bent)
+    enough = GOOD_ENOUGH * float(control_steps(start, goal))
     best: Path | None = None
     for _ in range(attempts):
         found = connect(start, goal, free, rng, max_samples=max_samples, resolution=resolution)
         if found is None:
             break
-        found = straighten(found, free, resolution=resolution)
-        found = shorten(found, free, rng, tries=shortcuts, resolution=resolution)
-        found = straighten(found, free, resolution=resolution)
+        found = shortened(straighten(found, free, resolution=resolution))
         if best is None or path_steps(found) < path_steps(best):
             best = found
-        if path_steps(best) <= GOOD_ENOUGH * direct:
+        if path_steps(best) <= enough:
             break
     if best is None:
         raise MotionPlanningError(

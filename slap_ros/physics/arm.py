@@ -88,6 +88,14 @@ class Obstacle(NamedTuple):
         return cls(box, box.pose.position[2] + height)
 
 
+class Contact(NamedTuple):
+    """A point of the arm that is further inside a fixed body than it may be."""
+
+    link: int  # index in panda.LINKS
+    point: Vector
+    depth: float  # m, by which it is to rise
+
+
 class Sweep:
     """The arm's way from one configuration to another in a control step."""
 
@@ -136,8 +144,25 @@ class Sweep:
                     return True
         return False
 
+    def deepest(self, obstacles: Sequence[Obstacle]) -> Contact | None:
+        """Where the arm would be deepest in an obstacle, seen from above; None if in none."""
+        found = None
+        for link, way in enumerate(self.ways):
+            reach = self.end.radii[link] + way
+            for box, top in obstacles:
+                if box.near(self.end.centres[link], reach) and self._enters(link, box):
+                    point = min(self.end.box(link).corners(), key=lambda corner: corner[2])
+                    depth = top - _depth(link) - point[2]
+                    if depth > 0.0 and (found is None or depth > found.depth):
+                        found = Contact(self._carrier(link), point, depth)
+        return found
+
+    def _carrier(self, link: int) -> int:
+        """Which of the robot's links a link is, or is held by."""
+        return LINK_SHAPES[link].link if link < len(LINK_SHAPES) else HAND
+
     def _enters(self, link: int, box: OrientedBox) -> bool:
-        core = box.shrunk(LINK_DEPTH if link < len(LINK_SHAPES) else HELD_DEPTH)
+        core = box.shrunk(_depth(link))
         looks = math.ceil(self.ways[link] / max(2.0 * min(box.half), SAMPLING)) or 1
         return any(core.overlaps(self._at(link, k / looks)) for k in range(1, looks + 1))
 
@@ -152,6 +177,11 @@ class Sweep:
         px, py, pz = (a + part * (b - a) for a, b in zip(p, u, strict=True))
         pose = Pose((px, py, pz), (x / length, y / length, z / length, w / length))
         return self.start.box_at(link, pose)
+
+
+def _depth(link: int) -> float:
+    """How far a link may reach into a fixed body, m."""
+    return LINK_DEPTH if link < len(LINK_SHAPES) else HELD_DEPTH
 
 
 def _angle(p: Quaternion, q: Quaternion) -> float:

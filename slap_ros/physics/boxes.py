@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from itertools import product
 from typing import NamedTuple
 
 from slap_ros.physics.pose import Pose, Quaternion, Vector, conjugate, multiply, rotate
@@ -29,6 +30,11 @@ class OrientedBox(NamedTuple):
     def radius(self) -> float:
         """Half the diagonal, m."""
         return math.hypot(*self.half)
+
+    def corners(self) -> list[Vector]:
+        """The eight corners."""
+        x, y, z = self.half
+        return [self.pose.apply(corner) for corner in product((-x, x), (-y, y), (-z, z))]
 
     def near(self, point: Vector, distance: float) -> bool:
         """Whether a point is within ``distance`` m of the box."""

@@ -35,6 +35,7 @@ __all__ = [
     "hand_pose",
     "jacobian",
     "link_poses",
+    "rise",
 ]
 
 JOINTS = 7
@@ -125,6 +126,23 @@ def jacobian(q: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
         Shape (6, 7): rows 0-2 linear in m/rad, rows 3-5 angular in rad/rad.
     """
     return Reach(q).jacobian()
+
+
+def rise(q: Sequence[float] | NDArray[np.float64], link: int, point: Vector) -> tuple[float, ...]:
+    """How fast a point of a link rises with each joint, m/rad.
+
+    Args:
+        q: Joint positions, rad, shape (7,).
+        link: Which of :data:`LINKS`.
+        point: In the base's frame.
+    """
+    x, y, _ = point
+    rates = []
+    for joint, pose in enumerate(_arm(q)[1:], start=1):
+        ax, ay, _ = rotate(pose.quaternion, (0.0, 0.0, 1.0))  # the joint's axis
+        px, py, _ = pose.position
+        rates.append(ax * (y - py) - ay * (x - px) if joint <= link else 0.0)
+    return tuple(rates)
 
 
 class Reach:

@@ -16,11 +16,11 @@ from types import TracebackType
 
 from slap_ros.domains.domain import Action, ActionSpace
 from slap_ros.errors import InvalidStateError
-from slap_ros.physics.arm import Arm, Obstacle, Sweep
+from slap_ros.physics.arm import Arm, Contact, Obstacle, Sweep
 from slap_ros.physics.clients import borrow, give_back
 from slap_ros.physics.features import JOINT_FEATURES
 from slap_ros.physics.gripper import grip
-from slap_ros.physics.panda import JOINT_HIGH, JOINT_LOW, MAX_STEP
+from slap_ros.physics.panda import HAND, JOINT_HIGH, JOINT_LOW, MAX_STEP, grasp_pose, rise
 from slap_ros.physics.possible import require_possible
 from slap_ros.physics.scene import Scene
 from slap_ros.physics.simulation import Drive, Stepping
@@ -38,8 +38,10 @@ STEPPING = Stepping()
 REST_SPEED = 0.02  # m/s and rad/s, along each axis
 REST_SHIFT = 2e-4  # m, along each axis
 REST_TURN = 1e-3  # 1, of each component of the quaternion
-PRESSED = 0.006  # m, how far the arm may press bodies into one another; deeper, it stays
+PRESSED = 0.006  # m, how far the arm may press bodies into one another; deeper, it yields
 JAMMED = 0.02  # m, where no body moves: between two immovable ones the solver has no answer
+RAISED = 4  # times that the arm is raised at most, lest it enters a fixed body
+CLEAR = 1e-4  # m, over where it just does not
 MOST_REMEMBERED = 256  # arrangements of bodies known to stand or not
 
 
@@ -131,9 +133,10 @@ class PandaWorld:
     def step(self, action: Action) -> State:
         """Act for one control period.
 
-        A motion that would drive the arm into a fixed body, or press bodies into one another,
-        is not carried out: the arm stays, the bodies go on. Nor does the gripper act where its
-        fingers would enter a fixed body.
+        Where a motion would drive the arm into a fixed body, the arm slides along the top of it.
+        Where it would press bodies into one another, the hand yields upwards. Where that does
+        not help, the motion is not carried out: the arm stays, the bodies go on. Nor does the
+        gripper act where its fingers would enter a fixed body.
 
         Raises:
             InvalidCommandError: The action is not in the action space; nothing moved.
@@ -165,16 +168,31 @@ class PandaWorld:
         """Where everything is once the arm went to its goal, or stayed because it must not."""
         sweep = Sweep(start, self._arm(goal))
         if sweep.hits(self._obstacles):
-            goal, sweep = now, Sweep(start, self._arm(now))
+            goal = self._sliding(now, goal, start)
+            sweep = Sweep(start, self._arm(goal))
         bodies, depth = self._bodies_after(now, sweep)
-        if depth > PRESSED and goal is not now:
-            stay = Sweep(start, self._arm(now))
-            unpressed, less = self._bodies_after(now, stay)
-            if less < depth:
-                goal, sweep, bodies, depth = now, stay, unpressed, less
+        for softer in (_hand_raised, _stay):
+            if depth <= PRESSED or goal is now:
+                break
+            other = softer(now, goal, depth)
+            way = Sweep(start, self._arm(other))
+            if other is now or not way.hits(self._obstacles):
+                relieved, less = self._bodies_after(now, way)
+                if less < depth:
+                    goal, sweep, bodies, depth = other, way, relieved, less
         if depth > JAMMED:
             bodies = self._frozen(now, sweep.end)
         return replace(goal, bodies=bodies), sweep.end
+
+    def _sliding(self, now: Snapshot, goal: Snapshot, start: Arm) -> Snapshot:
+        """The goal with the arm raised until it enters nothing; ``now`` if it cannot be raised."""
+        for _ in range(RAISED):
+            sweep = Sweep(start, self._arm(goal))
+            contact = sweep.deepest(self._obstacles)
+            if contact is None:
+                return now if sweep.hits(self._obstacles) else goal
+            goal = replace(goal, joints=_raised(now.joints, goal.joints, contact))
+        return now
 
     def _arm(self, snapshot: Snapshot) -> Arm:
         held = None if snapshot.held is None else self._scene.free[snapshot.held]
@@ -234,6 +252,37 @@ def _within_limits(joints: tuple[float, ...], displacement: list[float]) -> tupl
     return tuple(
         min(max(q, low), high) for low, q, high in zip(JOINT_LOW, moved, JOINT_HIGH, strict=True)
     )
+
+
+def _stay(now: Snapshot, goal: Snapshot, depth: float) -> Snapshot:
+    """The arm where it is."""
+    del goal, depth
+    return now
+
+
+def _hand_raised(now: Snapshot, goal: Snapshot, depth: float) -> Snapshot:
+    """The goal with the hand higher by ``depth`` m; an arm that was not to move stays."""
+    if goal.joints == now.joints:
+        return now
+    contact = Contact(HAND, grasp_pose(goal.joints).position, depth)
+    return replace(goal, joints=_raised(now.joints, goal.joints, contact))
+
+
+def _raised(
+    start: tuple[float, ...], goal: tuple[float, ...], contact: Contact
+) -> tuple[float, ...]:
+    """The goal with a point raised, fast joints first; within the speed limit from the start."""
+    rates = rise(goal, contact.link, contact.point)
+    weights = [rate * step * step for rate, step in zip(rates, MAX_STEP, strict=True)]
+    yielding = sum(rate * weight for rate, weight in zip(rates, weights, strict=True))
+    if yielding <= 0.0:
+        return start
+    lift = (contact.depth + CLEAR) / yielding
+    displacement = [
+        min(max(g + lift * weight - s, -step), step)
+        for g, s, weight, step in zip(goal, start, weights, MAX_STEP, strict=True)
+    ]
+    return _within_limits(start, displacement)
 
 
 def _rests(before: Motion, after: Motion) -> bool:

@@ -25,6 +25,10 @@ def _any(_: State) -> bool:
     return True
 
 
+def _never() -> bool:
+    return False
+
+
 @dataclass(frozen=True)
 class Option:
     """A skill applied to objects.
@@ -35,12 +39,14 @@ class Option:
         objects: What it is applied to.
         accepts: Whether it may end in a state in which its target's atoms hold. A shortcut may
             not while things still move or lie where the next option could not be executed.
+        given_up: Whether it need not be tried any more in this task: its like failed too often.
     """
 
     kind: OptionKind
     skill: Skill
     objects: tuple[Object, ...]
     accepts: Callable[[State], bool] = field(default=_any, compare=False, repr=False)
+    given_up: Callable[[], bool] = field(default=_never, compare=False, repr=False)
 
     def __str__(self) -> str:
         return f"{self.skill.name}({', '.join(obj.name for obj in self.objects)})"

@@ -15,7 +15,7 @@ cost.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import count
 
@@ -99,56 +99,104 @@ def search_exhaustively(graph: AbstractGraph, state: State, model: Model) -> Pla
     raise _infeasible(graph)
 
 
-def search_lazily(graph: AbstractGraph, state: State, model: Model) -> Plan:
-    """Best first by cost so far plus lower bounds of what is to come, rolling out on demand.
+@dataclass(order=True)
+class _Waiting:
+    """What may be looked at next: a vertex, or an edge out of it that was not rolled out yet."""
 
-    The queue holds vertices, and edges not yet rolled out with the bound of their skill from the
-    state at their source; an edge is rolled out when it comes to the front. Bounds never exceed
-    the true steps, so the first goal vertex at the front is the cheapest.
+    bound: int  # environment steps of any plan through it
+    tie: int
+    vertex: Vertex = field(compare=False)
+    edge: Edge | None = field(compare=False)
+    least: int = field(compare=False)  # environment steps that the edge takes
+
+    @property
+    def node(self) -> int:
+        """Where it leads."""
+        return self.vertex.node if self.edge is None else self.edge.target
+
+
+class _Frontier:
+    """What waits, best first by cost so far plus lower bounds of what is to come."""
+
+    def __init__(self, graph: AbstractGraph) -> None:
+        self._goals = graph.goal_nodes
+        self._keep(graph.forward_edges())
+        self._queue: list[_Waiting] = []
+        self._tie = count()
+
+    def push(self, vertex: Vertex, edge: Edge | None = None, least: int = 0) -> None:
+        """Let something wait, if a goal can be reached through it."""
+        # Deeper first among equals: they are nearer to the goal.
+        self._put(_Waiting(0, -next(self._tie), vertex, edge, least))
+
+    def _put(self, waiting: _Waiting) -> None:
+        rest = self._to_go[waiting.node]
+        if rest is not None:
+            waiting.bound = waiting.vertex.cost + waiting.least + rest
+            heapq.heappush(self._queue, waiting)
+
+    def pop(self) -> _Waiting | None:
+        """The best; None if nothing waits."""
+        while self._queue:
+            best = heapq.heappop(self._queue)
+            known = best.bound
+            rest = self._to_go[best.node]
+            if rest is not None and best.vertex.cost + best.least + rest <= known:
+                return best
+            self._put(best)  # bounds rose since it was pushed
+        return None
+
+    def give_up(self) -> None:
+        """Leave out the options that were given up: their bounds promise what they do not keep."""
+        self._keep([[e for e in out if not e.option.given_up()] for out in self.forward])
+
+    def _keep(self, forward: list[list[Edge]]) -> None:
+        """Look ahead along these edges, and leave out those through which no goal is reached."""
+        self._to_go = _steps_to_go(forward, self._goals)
+        self.forward = [[e for e in out if self._to_go[e.target] is not None] for out in forward]
+
+
+def search_lazily(graph: AbstractGraph, state: State, model: Model) -> Plan:
+    """Best first, rolling out on demand: an edge when it comes to the front of what waits.
+
+    Until then it counts with the bound of its skill from the state at its source. Bounds never
+    exceed the true steps, so the first goal vertex at the front is the cheapest.
 
     Raises:
         UnsolvableError: No path of the graph can be executed from ``state``.
     """
-    forward, goals = graph.forward_edges(), set(graph.goal_nodes)
-    to_go = _steps_to_go(graph, forward)
-    tie = count()
+    frontier, goals = _Frontier(graph), set(graph.goal_nodes)
     start = Vertex(0, state, 0)
-    queue: list[tuple[int, int, Vertex, Edge | None]] = []
     cheapest = {start.key: 0}
-
-    def push(vertex: Vertex, edge: Edge | None, bound: int, node: int) -> None:
-        rest = to_go[node]
-        if rest is not None:  # a goal can be reached from here
-            # Deeper first among equals: they are nearer to the goal.
-            heapq.heappush(queue, (vertex.cost + bound + rest, -next(tie), vertex, edge))
-
-    push(start, None, 0, 0)
-    while queue:
-        _, _, vertex, edge = heapq.heappop(queue)
-        if edge is not None:
+    frontier.push(start)
+    while (best := frontier.pop()) is not None:
+        vertex, edge = best.vertex, best.edge
+        if edge is not None and not edge.option.given_up():
             rollout = model.roll_out(edge.option, vertex.state, graph.nodes[edge.target])
             if rollout.reached:
                 cost = vertex.cost + rollout.steps
                 reached = Vertex(edge.target, rollout.final, cost, vertex, edge)
                 if cost < cheapest.get(reached.key, cost + 1):
                     cheapest[reached.key] = cost
-                    push(reached, None, 0, reached.node)
-        elif vertex.node in goals:
+                    frontier.push(reached)
+            elif edge.option.given_up():
+                frontier.give_up()
+        elif edge is None and vertex.node in goals:
             return _plan(graph, vertex)
-        elif vertex.cost == cheapest[vertex.key]:
-            for out in forward[vertex.node]:
+        elif edge is None and vertex.cost == cheapest[vertex.key]:
+            for out in frontier.forward[vertex.node]:
                 skill = out.option.skill
-                bound = max(skill.least_steps, skill.lower_bound(vertex.state, out.option.objects))
-                push(vertex, out, bound, out.target)
+                bound = skill.lower_bound(vertex.state, out.option.objects)
+                frontier.push(vertex, out, max(skill.least_steps, bound))
     raise _infeasible(graph)
 
 
-def _steps_to_go(graph: AbstractGraph, forward: list[list[Edge]]) -> list[int | None]:
+def _steps_to_go(forward: list[list[Edge]], goals: Sequence[int]) -> list[int | None]:
     """Lower bound of the steps from each node to a goal; None where there is no way."""
-    steps: list[int | None] = [None] * len(graph.nodes)
-    for goal in graph.goal_nodes:
+    steps: list[int | None] = [None] * len(forward)
+    for goal in goals:
         steps[goal] = 0
-    for node in reversed(range(len(graph.nodes))):  # forward edges lead to later nodes
+    for node in reversed(range(len(forward))):  # forward edges lead to later nodes
         for edge in forward[node]:
             rest = steps[edge.target]
             if rest is not None:

@@ -89,8 +89,7 @@ class AtomSpace:
         read = state.data.take(self._read).tobytes()
         mask = self._perceived.get(read)
         if mask is None:
-            packed = np.packbits(self.truth(state), bitorder="little")
-            mask = int.from_bytes(packed.tobytes(), "little")
+            mask = _mask(self.truth(state))
             if len(self._perceived) == MOST_REMEMBERED:
                 self._perceived.clear()
             self._perceived[read] = mask
@@ -98,8 +97,7 @@ class AtomSpace:
 
     def abstract_each(self, states: State) -> list[int]:
         """The abstract states of a batch of states, shape (n, layout.size)."""
-        packed = np.packbits(self.truth(states), axis=-1, bitorder="little")
-        return [int.from_bytes(row.tobytes(), "little") for row in packed]
+        return [_mask(truth) for truth in self.truth(states)]
 
     def truth(self, state: State) -> NDArray[np.bool_]:
         """Whether each atom holds, for a state or a batch of states, shape (..., atoms)."""
@@ -174,6 +172,11 @@ class _Block:
             tuple(Column(objects) for objects in columns),
             slice(start, start + len(numbers)),
         )
+
+
+def _mask(truth: NDArray[np.bool_]) -> int:
+    """Bits of one state's atoms."""
+    return int.from_bytes(np.packbits(truth, bitorder="little").tobytes(), "little")
 
 
 def _type_consistent(

@@ -184,6 +184,10 @@ class State:
         """States of the same objects as one, shape (n, size)."""
         return cls(states[0].layout, np.stack([state.data for state in states]))
 
+    def alone(self) -> State:
+        """A batch of this state alone, shape (1, size)."""
+        return State(self.layout, self.data[None])
+
     def require_finite(self) -> None:
         """Refuse NaN and infinity.
 

@@ -24,7 +24,7 @@ from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract
 from slap_ros.planning.planner import GraphPlanner, Problem
 from slap_ros.planning.search import Vertex
 from slap_ros.relational import State
-from slap_ros.shortcuts.practice import ActionMap
+from slap_ros.shortcuts.action_map import ActionMap
 from slap_ros.shortcuts.settings import Exploration
 from slap_ros.shortcuts.sight import view_of
 from slap_ros.shortcuts.signature import Change, Signature, context_of

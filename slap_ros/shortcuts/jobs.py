@@ -24,7 +24,7 @@ from slap_ros.shortcuts.repertoire import Repertoire
 from slap_ros.shortcuts.settings import TRAINING_SEED, Exploration, TrainingSettings
 from slap_ros.shortcuts.shortcut import Sampling, Shortcut
 from slap_ros.shortcuts.signature import Signature
-from slap_ros.shortcuts.starts import StartRecord, find_start, recall, wander
+from slap_ros.shortcuts.starts import StartRecord, find_start, recall
 
 if TYPE_CHECKING:
     from slap_ros.shortcuts.ppo import Learner, Progress
@@ -110,7 +110,6 @@ def learn(
     domain = place.make()
     rng = np.random.default_rng([place.seed, len(starts)])
     known = recall(domain, starts)
-    known = wander(domain, known, settings.variants, settings.wandering, rng)
 
     def practice(ppo: PpoSettings) -> Practice:
         rewards = replace(settings.rewards, discount=ppo.discount)

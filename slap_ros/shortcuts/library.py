@@ -34,7 +34,7 @@ from slap_ros.domains import Domain
 from slap_ros.errors import InvalidLibraryError
 from slap_ros.shortcuts.policy import Normalisation, Policy, Weights
 from slap_ros.shortcuts.shortcut import Shortcut
-from slap_ros.shortcuts.sight import action_size, observation_size
+from slap_ros.shortcuts.sight import action_map, observation_size
 from slap_ros.shortcuts.signature import Signature
 
 FORMAT = 1
@@ -58,6 +58,16 @@ class Library:
     shortcuts: tuple[Shortcut, ...] = ()
     record: Record = field(default_factory=dict)
     refused: tuple[InvalidLibraryError, ...] = ()
+
+    @property
+    def digest(self) -> str:
+        """What was learned, as 16 hexadecimal digits; empty where that is nothing."""
+        if not self.shortcuts:
+            return ""
+        whole = sha256()
+        for shortcut in self.shortcuts:
+            whole.update(shortcut.name.encode() + save(_tensors(shortcut.policy)))
+        return whole.hexdigest()[:16]
 
 
 def save_library(path: Path, library: Library) -> None:
@@ -122,7 +132,7 @@ def _require_fit(shortcut: Shortcut, folder: Path, domain: Domain) -> None:
             f"{folder}: the policy sees {size} features, the view of {domain.name} has {seen}: "
             "learned with another version of slap_ros; train anew"
         )
-    actions = action_size(domain, shortcut.signature)
+    actions = action_map(domain, shortcut.signature).size
     if shortcut.policy.log_std.size != actions:
         raise InvalidLibraryError(
             f"{folder}: the policy has {shortcut.policy.log_std.size} actions, shortcuts of this "

@@ -43,43 +43,20 @@ class Rewards:
     """What a step is worth, in steps; all is multiplied by ``scale``."""
 
     step: float = -1.0
-    idle: float = -3.0  # more, where nothing moves: there a policy without noise stays for ever
     done: float = 10.0
     shaping: float = 1.0
     discount: float = 0.97
     scale: float = 0.1
 
-    def of(self, gain: Array, idle: Bools, done: Bools, lost: Bools) -> Array:
+    def of(self, gain: Array, done: Bools, lost: Bools) -> Array:
         """Rewards of steps that raised the potential by ``gain``, shape (n,).
 
         Losing ends the episode, so it must cost more than all steps that it saves.
         """
         worst = self.step / (1.0 - self.discount)
         return self.scale * (
-            self.step
-            + self.idle * idle
-            + self.done * done
-            + self.shaping * gain
-            + worst * (lost & ~done)
+            self.step + self.done * done + self.shaping * gain + worst * (lost & ~done)
         )
-
-
-class ActionMap:
-    """The policy's actions, from -1 to 1, and the robot's."""
-
-    def __init__(self, domain: Domain, gripper: bool) -> None:
-        space = domain.shortcut_actions
-        low, high = np.array(space.low), np.array(space.high)
-        self._middle, self._half = (low + high) / 2, (high - low) / 2
-        self._gripper = gripper
-        self.size = len(low) if gripper else len(low) - 1
-
-    def __call__(self, actions: Array) -> Array:
-        """The robot's actions, shape (..., axes); without a gripper axis it stays as it is."""
-        if not self._gripper:
-            actions = np.concatenate([actions, np.zeros((*actions.shape[:-1], 1))], axis=-1)
-        mapped: Array = self._middle + self._half * np.clip(actions, -1.0, 1.0)
-        return mapped
 
 
 @dataclass(frozen=True)
@@ -123,7 +100,7 @@ class Practice:
             if share
         ]
         self.episodes = sum(group.size for group in self._groups)
-        self.actions = ActionMap(domain, self._groups[0].sight.gripper)
+        self.actions = self._groups[0].sight.actions
         self._lengths = np.zeros(self.episodes, dtype=np.intp)
         self.observations = np.concatenate([group.observations for group in self._groups])
 
@@ -139,14 +116,14 @@ class Practice:
                 self._groups, np.split(commands, bounds), np.split(late, bounds), strict=True
             )
         ]
-        idle, done, lost, before, after, last, now = (
+        done, lost, before, after, last, now = (
             np.concatenate(values) for values in zip(*parts, strict=True)
         )
         after = np.where(done | lost, 0.0, after)
         gain = self._rewards.discount * after - before
         lengths = self._lengths.copy()
         self._lengths[done | lost | late] = 0
-        rewards = self._rewards.of(gain, idle, done, lost)
+        rewards = self._rewards.of(gain, done, lost)
         return Steps(now, rewards, done, lost & ~done, late & ~done & ~lost, lengths, last)
 
 
@@ -176,16 +153,15 @@ class _Group:
         self.observations, self._potential = look.observations, look.potential
 
     def step(self, commands: Array, late: Bools) -> tuple[NDArray[Any], ...]:
-        """Idle, done, lost, potentials before and after, last observations, present ones."""
-        before, was = self._potential, self._worlds.states
+        """Done, lost, potentials before and after, last observations, present ones."""
+        before = self._potential
         state = self._worlds.step(commands)
-        idle = (state.data == was.data).all(axis=1)
         look = self.sight.look(state)
         done = self.sight.done(state, look, self._targets)
         lost = self.sight.view.lost(state)
         self.observations, self._potential = look.observations.copy(), look.potential.copy()
         self._begin_anew(np.flatnonzero(done | lost | late))
-        return idle, done, lost, before, look.potential, look.observations, self.observations
+        return done, lost, before, look.potential, look.observations, self.observations
 
     def _begin_anew(self, ended: NDArray[np.intp]) -> None:
         if not ended.size:

@@ -29,7 +29,7 @@ class Repertoire:
         self.shortcuts = tuple(shortcuts)
         self._domain = domain
         self._space = domain.atom_space(initial)
-        self._rehearsal = Rehearsal(domain, domain.make_world(initial), sampling)
+        self._rehearsal = Rehearsal(domain.make_world(initial), sampling)
         self._reach = [
             Reach(s.signature, self._space, view_of(domain).grasping) for s in self.shortcuts
         ]
@@ -59,7 +59,10 @@ class Repertoire:
         if key not in self._sights:
             self._sights[key] = Sight(self._domain, self._space, shortcut.signature, change)
         sight = self._sights[key]
-        skill = GroundShortcut(shortcut, change, sight, self._rehearsal)
         return Option(
-            OptionKind.SHORTCUT, skill, concerned(change, self._space), accepts=sight.may_end
+            OptionKind.SHORTCUT,
+            GroundShortcut(shortcut, change, sight, self._rehearsal),
+            concerned(change, self._space),
+            accepts=sight.may_end,
+            given_up=lambda: self._rehearsal.gave_up(shortcut),
         )

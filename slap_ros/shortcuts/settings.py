@@ -37,6 +37,7 @@ class Exploration:
     nodes: int = 6
 
 
+LEARN = PpoSettings(total_steps=400_000)
 POLISH = PpoSettings(
     rollout_steps=128,
     batch_size=512,
@@ -58,8 +59,6 @@ class TrainingSettings:
         rewards: From what.
         horizon: Environment steps of a training episode.
         starts: Initial states, each of another task.
-        variants: Of each, states near it.
-        wandering: Random steps to these at most.
         shortcuts: How many are trained at most, the most promising first.
         least_saving: Part of a plan's length that a candidate must promise, and keep, to stay.
         validation: Tasks on which plan length is watched.
@@ -67,13 +66,11 @@ class TrainingSettings:
     """
 
     exploration: Exploration = field(default_factory=Exploration)
-    ppo: PpoSettings = field(default_factory=PpoSettings)
+    ppo: PpoSettings = LEARN
     polish: PpoSettings | None = POLISH
     rewards: Rewards = field(default_factory=Rewards)
-    horizon: int = 40
-    starts: int = 150
-    variants: int = 0
-    wandering: int = 4
+    horizon: int = 100
+    starts: int = 300
     shortcuts: int = 4
     least_saving: float = 0.05
     validation: int = 8
@@ -111,9 +108,8 @@ _PAPER = replace(
     OURS,
     exploration=Exploration(rollouts=100, length=300, hits=5, hold=1, nodes=1000),
     polish=None,
-    variants=0,
     ppo=replace(_PAPER_PPO, total_steps=300_000),
-    rewards=Rewards(idle=0.0, done=100.0, shaping=0.0, discount=0.99, scale=1.0),
+    rewards=Rewards(done=100.0, shaping=0.0, discount=0.99, scale=1.0),
     horizon=100,
     sampling=PAPER,
 )
@@ -125,7 +121,6 @@ SETTINGS: Mapping[str, Mapping[str, TrainingSettings]] = {
             ppo=PpoSettings(total_steps=120_000),
             polish=None,
             horizon=30,
-            wandering=12,
             starts=200,
         ),
         "": OURS,
@@ -135,7 +130,7 @@ SETTINGS: Mapping[str, Mapping[str, TrainingSettings]] = {
             _PAPER,
             exploration=Exploration(rollouts=1000, length=100, hits=1, hold=1, nodes=1000),
             ppo=replace(_PAPER_PPO, rollout_steps=50, total_steps=50_000),
-            rewards=Rewards(step=-0.5, idle=0.0, done=10.0, shaping=0.0, discount=0.99, scale=1.0),
+            rewards=Rewards(step=-0.5, done=10.0, shaping=0.0, discount=0.99, scale=1.0),
             horizon=50,
             sampling=replace(PAPER, horizon=50),
         ),

@@ -11,18 +11,16 @@ from hashlib import sha256
 
 import numpy as np
 
-from slap_ros.domains import Domain, World
 from slap_ros.domains import Policy as Control
+from slap_ros.domains import World
 from slap_ros.domains.domain import Action
 from slap_ros.errors import InvalidCommandError, SkillNotApplicableError
 from slap_ros.relational import Object, State
-from slap_ros.relational.state import Array
 from slap_ros.shortcuts.policy import Policy, Weights
-from slap_ros.shortcuts.practice import ActionMap
 from slap_ros.shortcuts.sight import Sight
 from slap_ros.shortcuts.signature import Change, Signature
 
-HOPE = 6  # failures, on top of as many for each success, before a shortcut is given up
+HOPE = 3  # failures, on top of as many for each success, before a shortcut is given up
 NARROWER = 0.7  # of the spread of variations from one round to the next
 SAME = 1e-6  # in any feature's unit: up to here a state is the one that was foreseen
 
@@ -96,21 +94,20 @@ class Rehearsal:
     generator that is seeded with them. So planner, skill server and replay agree.
     """
 
-    def __init__(self, domain: Domain, world: World, sampling: Sampling) -> None:
+    def __init__(self, world: World, sampling: Sampling) -> None:
         """Rehearse in ``world``, which nobody else may use."""
         self.sampling = sampling
-        self._domain, self._world = domain, world
+        self._world = world
         self._memory: dict[tuple[str, Change, bytes], Attempt] = {}
         self._failures: Counter[str] = Counter()  # more than expected, of each shortcut
 
     def best(self, shortcut: Shortcut, sight: Sight, state: State) -> Attempt:
         """The shortest attempt that succeeded; if none did, any.
 
-        A shortcut that fails again and again in a task is not tried any more there: a useless
-        one shall not cost much.
+        One that was given up is not tried.
         """
         key = (shortcut.name, sight.change, state.key)
-        if key not in self._memory and self._failures[shortcut.name] >= HOPE:
+        if key not in self._memory and self.gave_up(shortcut):
             return Attempt((), (), False)
         if key not in self._memory:
             seed = sha256(repr(key[:2]).encode() + state.key).digest()[:8]
@@ -119,6 +116,10 @@ class Rehearsal:
             self._memory[key] = self._refine(best, sight, state, rng)
             self._failures[shortcut.name] += -HOPE if best.reached else 1
         return self._memory[key]
+
+    def gave_up(self, shortcut: Shortcut) -> bool:
+        """Whether it failed again and again in this task: a useless one shall not cost much."""
+        return self._failures[shortcut.name] >= HOPE
 
     def _sample(
         self, policy: Policy, sight: Sight, state: State, rng: np.random.Generator
@@ -152,9 +153,8 @@ class Rehearsal:
     ) -> Attempt:
         """Run for at most ``limit`` steps, the horizon if None."""
         target = sight.change.apply(sight.space.abstract(state))
-        to_action = ActionMap(self._domain, sight.gripper)
         self._world.reset(state)
-        seen = sight.look(one(state)).observations
+        seen = sight.look(state.alone()).observations
         choices: list[Weights] = []
         states: list[State] = []
         for step in range(self.sampling.horizon if limit is None else limit):
@@ -162,10 +162,10 @@ class Rehearsal:
             states.append(state)
             choices.append(choice)
             try:
-                state = self._world.step(to_action(choice.astype(np.float64)))
+                state = self._world.step(sight.actions(choice.astype(np.float64)))
             except InvalidCommandError:  # a policy that wants what is no number
                 break
-            batch = one(state)
+            batch = state.alone()
             look = sight.look(batch)
             if sight.done(batch, look, [target])[0]:
                 return Attempt(tuple(choices), tuple(states), True)
@@ -173,11 +173,6 @@ class Rehearsal:
                 break
             seen = look.observations
         return Attempt(tuple(choices), tuple(states), False)
-
-
-def one(state: State) -> State:
-    """A batch of one state."""
-    return State(state.layout, state.data[None])
 
 
 def _limit(best: Attempt) -> int | None:
@@ -234,8 +229,7 @@ class GroundShortcut:
 
     def act(self, choice: Weights) -> Action:
         """The robot's action for a choice of the policy."""
-        action: Array = ActionMap(self.sight.domain, self.sight.gripper)(choice.astype(np.float64))
-        return action
+        return self.sight.actions(choice.astype(np.float64))
 
 
 class Performance:
@@ -256,5 +250,5 @@ class Performance:
                 self._step += 1
                 return self._skill.act(choice)
         self._foreseen = ()
-        seen = self._skill.sight.look(one(state)).observations
+        seen = self._skill.sight.look(state.alone()).observations
         return self._skill.act(self._skill.shortcut.policy.mean(seen)[0])

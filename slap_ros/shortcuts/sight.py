@@ -23,9 +23,11 @@ from slap_ros.errors import InvalidDomainError
 from slap_ros.relational import AtomSpace, Column, GroundAtom, Object, State
 from slap_ros.relational.predicates import Bools, Predicate
 from slap_ros.relational.state import Array
+from slap_ros.shortcuts.action_map import ActionMap
 from slap_ros.shortcuts.signature import Change, Kind, Signature, concerned, kinds
 
 WEIGHT = 3.0  # of an atom that is not done at all against being ``length_m`` away
+QUEUE = 3.0  # of an object whose turn has not come, against the same
 DONE = 1e-9  # deficit below which an atom counts as done
 
 
@@ -48,10 +50,9 @@ def uses_gripper(domain: Domain, signature: Signature) -> bool:
     return any(predicate in grasping for _, predicate, _ in signature.patterns)
 
 
-def action_size(domain: Domain, signature: Signature) -> int:
-    """How many actions the policy has: all axes but for the gripper, or all."""
-    axes = len(domain.shortcut_actions.axes)
-    return axes if uses_gripper(domain, signature) else axes - 1
+def action_map(domain: Domain, signature: Signature) -> ActionMap:
+    """What the policy's actions are."""
+    return ActionMap(domain, uses_gripper(domain, signature))
 
 
 def observation_size(domain: Domain, signature: Signature) -> int | None:
@@ -61,7 +62,7 @@ def observation_size(domain: Domain, signature: Signature) -> int | None:
     examples = {name: obj for obj, name in kind.items()}
     if not set(signature.slots) <= set(examples):
         return None
-    batch = State.batch([state])
+    batch = state.alone()
     hand = view.hand(batch)
     size = view.robot(batch, hand).shape[-1]
     for name, slots in signature.slots.items():
@@ -98,8 +99,8 @@ class Look:
         observations: For the policy, shape (n, size); of the same size for all changes that the
             signature suits.
         potential: About minus the steps to go, shape (n,), for shaping rewards. Two terms: what
-            is missing of the changed atoms, through the metric behind each predicate; and, as
-            long as something is missing of the lowest object, the way to it: it carries the rest.
+            is missing of the changed atoms, through the metric behind each predicate; and the way
+            to the lowest object of which something is missing: it carries the rest.
         near: Whether nothing is missing, slack included, and nothing moves, shape (n,).
     """
 
@@ -128,7 +129,7 @@ class Sight:
             [[obj in atom.objects for obj in self.objects] for _, atom in change.atoms(space)]
         )
         self._kinds = self._of_kinds()
-        self.gripper = uses_gripper(domain, signature)
+        self.actions = action_map(domain, signature)
 
     def _group(self, wanted: bool, predicate: Predicate, atoms: Sequence[GroundAtom]) -> _Atoms:
         columns = tuple(Column(objs) for objs in zip(*(a.objects for a in atoms), strict=True))
@@ -151,11 +152,12 @@ class Sight:
         """Look at states, a batch of shape (n, layout.size)."""
         length = self.view.length_m
         deficits = np.concatenate([g.deficits(state, length) for g in self._atoms], axis=-1)
-        missing = (deficits[:, :, None] * self._about).max(axis=1)
         hand = self.view.hand(state)
+        ways = self._ways(state, hand)
+        missing = self._missing(state, deficits, ways)
         return Look(
             self._observe(state, hand, missing),
-            self._potential(state, hand, deficits, missing),
+            self._potential(deficits, missing, ways),
             (deficits < DONE).all(axis=-1) & self.view.settled(state),
         )
 
@@ -168,16 +170,42 @@ class Sight:
 
     def may_end(self, state: State) -> bool:
         """Whether a shortcut may end in this state once its target's atoms hold."""
-        return bool(self.look(State(state.layout, state.data[None])).near[0])
+        return bool(self.look(state.alone()).near[0])
 
-    def _potential(self, state: State, hand: Array, deficits: Array, missing: Array) -> Array:
-        ways = np.full(missing.shape, np.inf)
+    def _ways(self, state: State, hand: Array) -> Array:
+        """From the hand to each object, m; infinite to what it cannot go to."""
+        ways = np.full((len(state.data), len(self.objects)), np.inf)
         for _, column, numbers in self._kinds:
             ways[:, numbers] = self.view.distance(state, hand, column)
-        lowest = int(np.argmax(np.isfinite(ways[0])))  # of those that can be gone to
-        ahead = np.isfinite(ways[:, lowest]) & (missing[:, lowest] > DONE)
-        way = np.where(ahead, ways[:, lowest], 0.0) / self.view.length_m
-        potential: Array = -(WEIGHT * deficits.sum(axis=-1) + way)
+        return ways
+
+    def _missing(self, state: State, deficits: Array, ways: Array) -> Array:
+        """What is missing of each object's atoms, shape (n, objects).
+
+        Of atoms that are about nothing one could go to, the nearest object is to blame that one
+        can: a block in the wrong place is what is to be moved, not the place.
+        """
+        missing: Array = (deficits[:, :, None] * self._about).max(axis=1)
+        can_go = np.isfinite(ways[0])
+        orphans = ~(self._about & can_go).any(axis=1)
+        if not orphans.any() or not can_go.any():
+            return missing
+        choice = np.flatnonzero(can_go)
+        column = Column(tuple(self.objects[i] for i in choice))
+        due = (deficits[:, orphans, None] * self._about[orphans]).max(axis=1)
+        rows = np.arange(len(missing))
+        for i in np.flatnonzero(self._about[orphans].any(axis=0)):
+            nearest = choice[self.view.apart(state, self.objects[i], column).argmin(axis=-1)]
+            missing[rows, nearest] = np.maximum(missing[rows, nearest], due[:, i])
+        return missing
+
+    def _potential(self, deficits: Array, missing: Array, ways: Array) -> Array:
+        """Objects one after the other, in their order; each that is done is a step forward."""
+        left = (missing > DONE) & np.isfinite(ways)
+        every, first = np.arange(len(left)), left.argmax(axis=-1)
+        way = np.where(left.any(axis=-1), ways[every, first] / self.view.length_m, 0.0)
+        queue = QUEUE * np.maximum(left.sum(axis=-1) - 1, 0)
+        potential: Array = -(WEIGHT * deficits.sum(axis=-1) + np.nan_to_num(way) + queue)
         return potential
 
     def _observe(self, state: State, hand: Array, missing: Array) -> NDArray[np.float32]:

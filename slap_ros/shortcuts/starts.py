@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from slap_ros.domains import Domain, World
+from slap_ros.domains import Domain
 from slap_ros.errors import SlapError
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
 from slap_ros.planning.planner import Problem
 from slap_ros.relational import AtomSpace, State
 from slap_ros.shortcuts.explore import Origin, ways_to_goal
-from slap_ros.shortcuts.practice import ActionMap, Start
+from slap_ros.shortcuts.practice import Start
 from slap_ros.shortcuts.reach import Reach
 from slap_ros.shortcuts.sight import view_of
 from slap_ros.shortcuts.signature import Change, Signature
@@ -65,40 +65,6 @@ def recall(domain: Domain, records: Sequence[StartRecord]) -> list[Start]:
         state = State(initial.layout, np.array(record.features))
         starts.append(Start(state, space, Change(record.add, record.delete)))
     return starts
-
-
-def wander(
-    domain: Domain, starts: Sequence[Start], variants: int, steps: int, rng: np.random.Generator
-) -> list[Start]:
-    """The starts, and states near them: after a few random steps that changed no atom.
-
-    A shortcut begins where an option ended, which is nearly the same for the robot each time.
-    From elsewhere other ways are shorter, and what was learned there is of use on the way.
-    """
-    found = list(starts)
-    for start in starts:
-        world = domain.make_world(start.state)
-        for _ in range(variants):
-            state = _wandered(domain, world, start, int(rng.integers(1, steps + 1)), rng)
-            if state is not None:
-                found.append(Start(state, start.space, start.change))
-    return found
-
-
-def _wandered(
-    domain: Domain, world: World, start: Start, steps: int, rng: np.random.Generator
-) -> State | None:
-    """So many random steps from a start, the direction held; None where an atom changed."""
-    to_action, view = ActionMap(domain, gripper=False), view_of(domain)
-    world.reset(start.state)
-    direction = rng.uniform(-1.0, 1.0, to_action.size)
-    for _ in range(steps):
-        state = world.step(to_action(direction))
-    batch = State.batch([state])
-    if not view.settled(batch)[0] or view.lost(batch)[0]:
-        return None
-    same = start.space.abstract(state) == start.space.abstract(start.state)
-    return state if same else None
 
 
 def find_start(

@@ -22,11 +22,6 @@ WATCH_S = 1.0
 class Workers(Protocol):
     """Runs jobs side by side; each is a function of its arguments alone, wherever it runs."""
 
-    @property
-    def count(self) -> int:
-        """How many jobs run at once."""
-        ...
-
     def run(
         self, function: Callable[..., Result], jobs: Sequence[tuple[Any, ...]]
     ) -> Iterator[tuple[int, Result]]:
@@ -36,8 +31,6 @@ class Workers(Protocol):
 
 class NoWorkers:
     """This process does everything itself, one job after the other."""
-
-    count = 1
 
     def run(
         self, function: Callable[..., Result], jobs: Sequence[tuple[Any, ...]]
@@ -50,8 +43,8 @@ class NoWorkers:
 class LocalWorkers:
     """Processes of this machine."""
 
-    def __init__(self, pool: ProcessPoolExecutor, count: int) -> None:
-        self._pool, self.count = pool, count
+    def __init__(self, pool: ProcessPoolExecutor) -> None:
+        self._pool = pool
 
     def run(
         self, function: Callable[..., Result], jobs: Sequence[tuple[Any, ...]]
@@ -67,7 +60,6 @@ class RayWorkers:
 
     def __init__(self, ray: Any) -> None:
         self._ray = ray
-        self.count = max(1, int(ray.cluster_resources().get("CPU", 1)))
 
     def run(
         self, function: Callable[..., Result], jobs: Sequence[tuple[Any, ...]]
@@ -101,7 +93,7 @@ def local_workers(count: int) -> Iterator[LocalWorkers]:
         count, mp_context=context, initializer=_end_with, initargs=(os.getpid(),)
     )
     try:
-        yield LocalWorkers(pool, count)
+        yield LocalWorkers(pool)
     except BaseException:
         for process in list((pool._processes or {}).values()):
             process.terminate()

@@ -35,6 +35,9 @@ def test_the_numbers_are_those_of_what_happened(tmp_path: Path, seed: int) -> No
         "error_code": 0,
         "error_msg": "",
         "options": script.truth.options,
+        "planner": "lazy",
+        "library": "0123456789abcdef",
+        "samples": 16,
     }
     assert sum(option["steps"] for option in script.truth.options) == run.plan_length
     assert evaluation.mismatches == []

@@ -265,6 +265,9 @@ class Script:
             goal=self.atoms_of(goal),
             edges=edges,
             predicted_steps=plan.predicted_steps,
+            planner="lazy",
+            library="0123456789abcdef",
+            samples=16,
         )
 
     def _step(self, world: Any, action: Any, step: int) -> Any:

@@ -150,6 +150,17 @@ def reset(client, spinner, **request):
     return answer.result()
 
 
+def test_a_task_is_solved_in_the_episode_that_was_asked_for(network):
+    with spinning() as (client, spinner), ProcessHost(parameters()):
+        assert spinner.until(lambda: client.ready(False), LIMIT)
+        for episode in (2, 3):  # at once: before the planner can have heard of it
+            assert reset(client, spinner, seed=episode).episode == episode
+            assert solve(client, spinner, episode=episode).success
+        late = solve(client, spinner, episode=2)
+        assert late.error_code == 35
+        assert "goal for episode 2, but episode 3 is under way" in late.error_msg
+
+
 def test_commands_that_are_stale_or_impossible_move_nothing(network):
     only = {"sim_node": parameters()["sim_node"]}
     with spinning() as (client, spinner), ProcessHost(only):

@@ -61,7 +61,9 @@ def test_a_shortcut_is_executed_attributed_and_replayed(network, tmp_path):
     assert replay_bag(tmp_path / "bag").identical
 
     domain = get_domain("obstacle2d")
-    slap = approaches(load_library(DATA, domain), DEFAULT)[-1]
+    library = load_library(DATA, domain)
+    assert (live.planner, live.library, live.samples) == ("lazy", library.digest, 16)
+    slap = approaches(library, DEFAULT)[-1]
     offline = Experiment(domain, tasks=1, seeds=1).run(SEED, 0, slap)
     assert offline.plan_length == live.plan_length
     assert offline.shortcut_steps == live.shortcut_steps

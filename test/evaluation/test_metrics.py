@@ -58,7 +58,8 @@ class Story:
 
     def plan(self, *edges: tuple[int, str], episode: int = 1, goal: Any = ()) -> None:
         named = [SimpleNamespace(kind=kind, name=name) for kind, name in edges]
-        self.tell(PLAN, episode=episode, edges=named, goal=goal)
+        origin = {"planner": "lazy", "library": "0123456789abcdef", "samples": 16}
+        self.tell(PLAN, episode=episode, edges=named, goal=goal, **origin)
 
     def skill(self, kind: SkillEventKind, step: int, name: str = "Pick", episode: int = 1) -> None:
         self.tell(
@@ -127,6 +128,9 @@ def test_a_solved_run() -> None:
                 "outcome": "reached",
             },
         ],
+        "planner": "lazy",
+        "library": "0123456789abcdef",
+        "samples": 16,
     }
     plain = solved().run().as_json()
     assert plain == expected

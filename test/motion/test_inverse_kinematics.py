@@ -16,6 +16,7 @@ from slap_ros.motion import (
     ik_candidates,
     ik_solutions,
     inverse_kinematics,
+    nearest_configurations,
     within_limits,
 )
 from slap_ros.motion.kinematics import arm_frames, matrix
@@ -121,6 +122,19 @@ def test_below_the_table_nothing_is_free():
     below = top_down(0.5, 0.0, 0.0)
     assert inverse_kinematics(below, START) is not None
     assert inverse_kinematics(below, START, free=CollisionChecker([TABLE])) is None
+
+
+def test_poses_together_are_as_each_alone():
+    free = CollisionChecker([TABLE])
+    heights = (0.2, 0.0, 0.3)  # the second is below the table
+    poses = [top_down(0.5, 0.1, z, yaw) for yaw in (0.0, 1.0) for z in heights]
+    poses.append(top_down(2.0, 0.0, 0.5))  # out of reach
+    together = nearest_configurations(poses, START, free=free)
+    assert [q is None for q in together] == [False, True, False, False, True, False, True]
+    for pose, q in zip(poses, together, strict=True):
+        alone = inverse_kinematics(pose, START, free=free)
+        assert (alone is None) == (q is None)
+        assert q is None or np.allclose(q, alone, atol=1e-12)
 
 
 def test_upright_upper_arm_keeps_joint_1():

@@ -31,6 +31,7 @@ from slap_ros.motion import (
     plan_path,
     within_limits,
 )
+from slap_ros.motion.detour import detour
 from slap_ros.motion.joints import LOW, between, free_count, path_configurations
 from slap_ros.motion.shortcutting import shorten
 
@@ -71,6 +72,27 @@ def test_over_the_tower():
     path = plan_path(start, goal, free, seed=0)
     check(path, start, goal, free)
     assert path_steps(path) < 2.0 * control_steps(start, goal)
+
+
+def test_a_single_bend_leads_over_the_tower():
+    start, goal, free = across_the_tower()
+    found = detour(start, goal, free, np.random.default_rng(0), resolution=0.125)
+    assert found.shape == (3, 7)
+    check(found, start, goal, free)
+
+
+def test_where_one_bend_is_not_enough_a_path_is_found_at_random():
+    goal = START + np.array([2.0, 0, 0, 0, 0, 0, 0])
+
+    def slalom(q):
+        """Joint 1 passes one wall with joint 2 up, the next with joint 2 down."""
+        first, second = (np.abs(q[:, 0] - wall) < 0.05 for wall in (0.5, 1.5))
+        return (~first | (q[:, 1] > 0.1)) & (~second | (q[:, 1] < -0.4))
+
+    assert detour(START, goal, slalom, np.random.default_rng(0), resolution=0.125) is None
+    path = plan_path(START, goal, slalom, seed=0)
+    check(path, START, goal, slalom)
+    assert len(path) > 3
 
 
 @settings(max_examples=25, deadline=None)

@@ -102,10 +102,10 @@ def test_joints_stop_at_their_limits(world):
     assert joints(state)[6] == JOINT_LOW[6]
 
 
-# -- steps that are refused ---------------------------------------------------------------------
+# -- where the arm would enter something --------------------------------------------------------
 
 
-def test_the_arm_stays_where_it_would_enter_the_table(world):
+def test_the_arm_does_not_enter_the_table(world):
     world.reset(hand_at((0.6, 0.25, 0.12)))
     lowest = 1.0
     for _ in range(30):
@@ -113,10 +113,27 @@ def test_the_arm_stays_where_it_would_enter_the_table(world):
         down = reach(np.array(grasp_pose(q).position) - [0, 0, 0.01], 0.0, q)
         state = world.step(np.array([*(down - q), 0.0]))
         lowest = min(lowest, grasp_pose(joints(state)).position[2])
-    assert np.array_equal(joints(state), q)  # stays
     tip = lowest - (0.0584 + 0.0539 - 0.1034)
     assert 0.075 - 0.01 <= tip < 0.075  # in contact: at most 1 cm deep, though not less than 0
-    assert not np.array_equal(joints(move(world, (0, 0, 0.05), 5)), q)  # and can leave
+    assert (
+        grasp_pose(joints(move(world, (0, 0, 0.05), 5))).position[2] > lowest + 0.02
+    )  # and leaves
+
+
+def test_the_arm_slides_along_the_table(world):
+    """Down and aside: aside it goes, and no deeper."""
+    world.reset(hand_at((0.55, 0.2, 0.1)))
+    start = np.array(grasp_pose(joints(world.state)).position)
+    for _ in range(15):
+        q = joints(world.state)
+        there = np.array(grasp_pose(q).position)
+        on = reach(there - [0, 0.01, 0.01], 0.0, q)
+        state = world.step(np.array([*np.clip(on - q, -np.array(MAX_STEP), MAX_STEP), 0.0]))
+        assert grasp_pose(joints(state)).position[2] - (0.0584 + 0.0539 - 0.1034) > 0.064
+        assert (np.abs(joints(state) - q) <= np.array(MAX_STEP) + 1e-12).all()
+    gone = start - grasp_pose(joints(state)).position
+    assert gone[1] > 0.09
+    assert gone[2] < 0.05
 
 
 def test_what_is_held_may_reach_two_centimetres_into_the_table(world):

@@ -91,6 +91,24 @@ def test_lazy_and_exhaustive_agree_on_made_up_graphs(graph):
     assert cost_or_none(search_lazily, graph) == cost_or_none(search_exhaustively, graph)
 
 
+class DeadEnd(MadeUpSkill):
+    """Leads nowhere: how long it takes need not be known."""
+
+    def lower_bound(self, state, objects):
+        raise AssertionError("never asked")
+
+
+def test_lazy_search_does_not_look_at_dead_ends():
+    graph = AbstractGraph(goal=1 << 20, nodes=[1, 2, 3 | 1 << 20], depth=[0] * 3)
+    skills = {1: DeadEnd("nowhere", 0, 1.0), 2: MadeUpSkill("there", 0, 1.0)}
+    for target, skill in skills.items():
+        graph.edges.append(Edge(0, target, Option(OptionKind.OPERATOR, skill, ())))
+    model = MadeUpModel()
+    plan = search_lazily(graph, State(LAYOUT, [0.0]), model)
+    assert [edge.option.skill.name for edge in plan.edges] == ["there"]
+    assert model.executed == 1
+
+
 def brute_force(graph, model):
     """The cheapest of all paths, by trying every one."""
     forward, goals = graph.forward_edges(), set(graph.goal_nodes)

@@ -14,8 +14,7 @@ from slap_ros.planning.abstract_graph import build_abstract_graph
 from slap_ros.planning.planner import Problem
 from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.policy import Normalisation, Policy
-from slap_ros.shortcuts.practice import ActionMap
-from slap_ros.shortcuts.shortcut import Sampling, Shortcut, one
+from slap_ros.shortcuts.shortcut import HOPE, Sampling, Shortcut
 from slap_ros.shortcuts.sight import Sight
 from slap_ros.shortcuts.signature import Change, Signature, context_of
 
@@ -26,8 +25,8 @@ HASTY = Sampling(samples=3, patience=2, horizon=15)
 def always(domain, space, signature, change, initial, value):
     """A shortcut whose policy gives the same number for every axis, whatever it sees."""
     sight = Sight(domain, space, signature, change)
-    seen = sight.look(one(initial)).observations.shape[1]
-    axes = ActionMap(domain, sight.gripper).size
+    seen = sight.look(initial.alone()).observations.shape[1]
+    axes = sight.actions.size
     zeros, ones = np.zeros(seen, np.float32), np.ones(seen, np.float32)
     layer = np.zeros((axes, seen), np.float32), np.full(axes, value, np.float32)
     quiet = np.full(axes, -30.0, np.float32)
@@ -77,6 +76,16 @@ def test_what_never_succeeds_changes_nothing(value, seed):
     assert theirs.success
     assert theirs.shortcut_steps == 0
     assert np.array_equal(theirs.actions, ours.actions)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_was_given_up_does_not_mislead_the_search(seed):
+    """Bounds of edges that were given up are forgotten, with all that hoped for them."""
+    domain = get_domain("obstacle2d")
+    shortcuts = hostile(domain, seed, 0.0, count=4)
+    pure = plan(domain, seed, PURE_PLANNING)
+    with_it = plan(domain, seed, Approach("hostile", shortcuts, HASTY))
+    assert with_it.edges_rolled_out <= pure.edges_rolled_out + 4 * (HOPE + len(shortcuts))
 
 
 @pytest.mark.parametrize("value", [1.0, -1.0])

@@ -8,7 +8,8 @@ import pytest
 from slap_ros.domains import get_domain
 from slap_ros.planning.planner import Problem
 from slap_ros.relational import State
-from slap_ros.shortcuts.practice import ActionMap, Practice, Rewards, Start
+from slap_ros.shortcuts.action_map import ActionMap
+from slap_ros.shortcuts.practice import Practice, Rewards, Start
 from slap_ros.shortcuts.sight import Sight
 from slap_ros.shortcuts.signature import Change, Signature
 
@@ -107,10 +108,10 @@ def test_shaping_telescopes():
 def test_the_gripper_acts_only_where_what_is_held_is_to_change():
     assert ActionMap(DOMAIN, gripper=False)(np.ones((5, 2))).shape == (5, 3)
     start = STARTS[0]
-    assert not Sight(DOMAIN, start.space, SIGNATURE, start.change).gripper
+    assert Sight(DOMAIN, start.space, SIGNATURE, start.change).actions.size == 2
     release = Change(start.space.mask([start.space.atom("GripperEmpty", ["robot"])]), 0)
     signature = Signature.of(release, start.space)
-    assert Sight(DOMAIN, start.space, signature, release).gripper
+    assert Sight(DOMAIN, start.space, signature, release).actions.size == 3
 
 
 def test_same_seed_same_practice():

@@ -12,12 +12,13 @@ import numpy as np
 from slap_ros.domains.domain import Task
 from slap_ros.domains.obstacle2d.model import BLOCK, BLOCK_SIZE, IS_TARGET, ON, ROBOT, SURFACE
 from slap_ros.domains.obstacle2d.skills import nearest_free_place
-from slap_ros.errors import InvalidStateError
+from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.relational import GroundAtom, Object, State
 
 STEP_LIMIT = 50  # environment steps (SLAP Table 8)
 TABLE_WIDTH = 1.0 + BLOCK_SIZE  # m: block centres range over the unit square
 TARGET_WIDTH = BLOCK_SIZE  # m, an area for one block
+TRIES = 20_000  # scenes drawn before there is said to be no room
 LEAST_OVERLAP = 0.02  # m, by which the obstacle reaches into the target area at least
 
 Range = tuple[float, float]
@@ -49,12 +50,16 @@ class RandomTasks:
         """A task that picking and placing can solve.
 
         Scenes are drawn until one leaves room to put the obstacle down off the target area.
+
+        Raises:
+            InvalidParameterError: There is no room for so many bystanders.
         """
         bystanders = int(rng.integers(self.bystanders[0], self.bystanders[1] + 1))
-        while True:
+        for _ in range(TRIES):
             task = self._draw(rng, bystanders)
             if task is not None:
                 return task
+        raise InvalidParameterError(f"the table has no room for {bystanders} bystanders")
 
     def _draw(self, rng: np.random.Generator, bystanders: int) -> Task | None:
         target_x = rng.uniform(*self.target_x)

@@ -8,7 +8,7 @@ import numpy as np
 
 from slap_ros.domains.obstacle2d.model import BLOCK, BLOCK_SIZE, GRIPPER_EMPTY, HOLDING, ROBOT
 from slap_ros.domains.view import View
-from slap_ros.relational import Column, State
+from slap_ros.relational import Column, Object, State
 from slap_ros.relational.state import Array
 
 
@@ -50,10 +50,17 @@ def _distance(state: State, hand: Array, column: Column) -> Array:
     return distance
 
 
+def _apart(state: State, thing: Object, column: Column) -> Array:
+    """Along the table."""
+    apart: Array = np.abs(state.stack(column, "x") - state.stack(Column((thing,)), "x"))
+    return apart
+
+
 VIEW = View(
     hand=_hand,
     robot=_robot,
     things=_things,
     distance=_distance,
+    apart=_apart,
     grasping=frozenset({HOLDING, GRIPPER_EMPTY}),
 )

@@ -28,8 +28,8 @@ from slap_ros.motion import (
     Free,
     MotionPlanningError,
     PlanCache,
-    inverse_kinematics,
     linear_motion,
+    nearest_configurations,
     path_configurations,
     path_steps,
     retime,
@@ -43,7 +43,7 @@ from slap_ros.relational import Object, State
 
 STEP_LIMIT = 100  # environment steps
 CLEARANCE = 0.05  # m, over a place before coming down to it and after leaving it
-LIFT = 0.01  # m, by which a block is lifted before it counts as picked
+LIFT = 0.02  # m, of a block that counts as picked; the fingers go as far in a control step
 # Distances in m that a held block keeps from others: so far away it may be turned as one likes,
 # on its way across, and when it is set down between others.
 AT_EASE, CARRYING, SETTING_DOWN = 0.02, 0.005, -0.001
@@ -53,7 +53,7 @@ PLACE_SPACING = 0.05  # m, of the grid of these places
 TABLE_MARGIN = 0.05  # m, of these places from the table's edges
 SEED = 0  # of motion plans: a plan is a function of the state alone
 GRIP, RELEASE = 1.0, -1.0  # gripper commands
-ATTEMPTS = 2  # random paths for a motion; more shorten plans by little and cost much
+ATTEMPTS = 2  # random paths for a motion that needs them; more shorten it by little
 PLANS = PlanCache(attempts=ATTEMPTS)
 REMEMBERED = 1024  # ways: bounded first, planned later
 ROUNDING = 1e-6  # control steps
@@ -149,13 +149,14 @@ class Way:
             SkillNotApplicableError: None of the ends can be reached.
         """
         for descent in self.descents:
+            if descent.down is None:
+                continue
             try:
                 start, above = descent.straight
                 across = PLANS.plan_path(start, above, _free(self.state), seed=SEED)
             except MotionPlanningError:
                 continue
-            if descent.down is not None:
-                return [descent.up, across, descent.down]
+            return [descent.up, across, descent.down]
         raise SkillNotApplicableError(f"none of {len(self.ends)} grasps can be reached from here")
 
     def least_steps(self, timing: Timing) -> float:
@@ -192,9 +193,9 @@ class Way:
         up, found = _departure(self.state), []
         if up is None:
             return []
-        for end in self.ends:
-            over = shifted(end, (0.0, 0.0, CLEARANCE))
-            above = inverse_kinematics(over, up[-1], free=_free(self.state))
+        over = [shifted(end, (0.0, 0.0, CLEARANCE)) for end in self.ends]
+        nearest = nearest_configurations(over, up[-1], free=_free(self.state))
+        for end, above in zip(self.ends, nearest, strict=True):
             if above is not None:
                 found.append(Descent(up, np.stack([up[-1], above]), end, self.touching))
         return sorted(found, key=lambda descent: path_steps(descent.straight))

@@ -12,7 +12,7 @@ import numpy as np
 
 from slap_ros.domains.domain import Task
 from slap_ros.domains.obstacle_tower.model import BLOCK, NOT_IS_TARGET, ON, SURFACE
-from slap_ros.errors import InvalidStateError
+from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.physics.features import (
     ROBOT,
     body_features,
@@ -26,6 +26,7 @@ from slap_ros.physics.scene import CUBE_EDGE, CUBE_MATERIAL, TABLE, TABLE_TOP, M
 from slap_ros.relational import GroundAtom, Object, State
 
 STEP_LIMIT = 500  # environment steps (SLAP Table 8)
+TRIES = 10_000  # places drawn before there is said to be no room
 PLATE_HALF = (0.026, 0.026, 0.0005)  # the target: a plate for one block, flush with the table
 GAP = 0.1  # between the middles of things that stand apart at least, so that fingers fit between
 
@@ -111,12 +112,19 @@ class RandomTasks:
     def _stand_apart(
         self, rng: np.random.Generator, placed: list[tuple[float, float]]
     ) -> tuple[float, float, float]:
-        """A place away from those already taken, which it joins."""
-        while True:
+        """A place away from those already taken, which it joins.
+
+        Raises:
+            InvalidParameterError: There is no room for another block.
+        """
+        for _ in range(TRIES):
             x, y = rng.uniform(*self.block_x), rng.uniform(*self.block_y)
             if all(math.hypot(x - px, y - py) > 1.4 * GAP for px, py in placed):
                 placed.append((x, y))
                 return x, y, rng.uniform(*self.yaw)
+        raise InvalidParameterError(
+            f"the table has no room for {len(placed)} blocks that stand apart from the tower"
+        )
 
     def as_configuration(self) -> Mapping[str, str | int | float]:
         """The settings by name."""

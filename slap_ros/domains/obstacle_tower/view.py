@@ -19,7 +19,7 @@ from slap_ros.domains.view import View
 from slap_ros.motion.kinematics import GRASP_IN_LAST_LINK, arm_frames, matrix
 from slap_ros.physics.features import GRASP_FEATURES, JOINT_FEATURES, ROBOT
 from slap_ros.physics.panda import GRASP_POINT, JOINT_HIGH, JOINT_LOW
-from slap_ros.physics.scene import TABLE_TOP
+from slap_ros.physics.scene import CUBE_EDGE, TABLE_TOP
 from slap_ros.relational import Column, Object, State
 from slap_ros.relational.predicates import Bools
 from slap_ros.relational.state import Array
@@ -40,6 +40,7 @@ _MIDDLE = (np.array(JOINT_HIGH) + JOINT_LOW) / 2
 _HALF_RANGE = (np.array(JOINT_HIGH) - JOINT_LOW) / 2
 _GRASP_FRAME = matrix(GRASP_IN_LAST_LINK)
 _GRASP_OFFSET = np.array([0.0, 0.0, GRASP_POINT])
+BESIDE, OVER = CUBE_EDGE / 2, CUBE_EDGE  # m, of the hand over a block's middle and a target's
 OFF_CENTRE = 0.02  # m, the scale of where in the fingers a block is held
 
 
@@ -104,11 +105,26 @@ def _alone(obj: Object) -> Column:
 
 
 def _distance(state: State, hand: Array, column: Column) -> Array:
-    """From the hand to blocks."""
-    if not column.objects[0].type.is_a(BLOCK):
+    """From the hand to blocks and targets: so high that the table is not in the way.
+
+    Who is where a block should not be keeps it from coming to lie there.
+    """
+    thing = column.objects[0].type
+    if thing.is_a(ROBOT):
         return np.full((*state.data.shape[:-1], len(column.objects)), np.inf)
-    distance: Array = np.sqrt(np.square(_from(hand, state, column)).sum(axis=-1))
-    return distance
+    height = BESIDE if thing.is_a(BLOCK) else OVER
+    way = _from(hand, state, column) + np.array([0.0, 0.0, height])
+    distance: Array = np.sqrt(np.square(way).sum(axis=-1))
+    if thing.is_a(BLOCK):
+        return distance
+    return np.where(state.stack(column, "is_target") > 0.5, distance, np.inf)
+
+
+def _apart(state: State, thing: Object, column: Column) -> Array:
+    """From middle to middle."""
+    way = state.gather(column, POSITION) - state.gather(_alone(thing), POSITION)
+    apart: Array = np.sqrt(np.square(way).sum(axis=-1))
+    return apart
 
 
 def _from(hand: Array, state: State, column: Column) -> Array:
@@ -133,6 +149,7 @@ VIEW = View(
     robot=_robot,
     things=_things,
     distance=_distance,
+    apart=_apart,
     settled=_settled,
     lost=_lost,
     slack={"NothingOn": FINGER_ROOM},

@@ -1,0 +1,76 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Past what is in the way with a single bend, which is mostly enough.
+
+The slowest joint alone sets the length of a path, so while it is on its way the others may well
+make a detour. How long a bend makes the path is known at once, whether it is free is not: many are
+drawn, and the shortest that is free is taken.
+"""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+
+from slap_ros.motion.joints import (
+    STEP,
+    Free,
+    Joints,
+    Path,
+    control_steps,
+    path_configurations,
+    within_limits,
+)
+from slap_ros.physics.panda import JOINTS
+
+BENDS = 512  # to choose from
+SPREAD = 10.0  # control steps, the widest standard deviation of the bends from the straight way
+_MIDDLE = 0.2, 0.8  # where on the straight way
+_BATCH = 32  # bends that are looked at together
+_GLANCES = 2, 6  # configurations each way from a bend: by them most blocked paths are found out
+
+
+def detour(
+    start: Joints, goal: Joints, free: Free, rng: np.random.Generator, *, resolution: float
+) -> Path | None:
+    """The path of fewest control steps that is free, of many with one bend.
+
+    Args:
+        start: Free, rad, shape (7,).
+        goal: Free, rad, shape (7,).
+        free: Which configurations are free of collisions.
+        rng: Where the bends come from.
+        resolution: Control steps between checked configurations.
+
+    Returns:
+        rad, shape (3, 7); None if none of them is free.
+    """
+    bends = _bends(start, goal, rng)
+    for i in range(0, len(bends), _BATCH):
+        batch = bends[i : i + _BATCH]
+        for count in _GLANCES:
+            glances = _glances(start, batch, goal, count)
+            batch = batch[free(glances.reshape(-1, JOINTS)).reshape(glances.shape[:2]).all(0)]
+        for bend in batch:
+            path: Path = np.stack([start, bend, goal])
+            if free(path_configurations(path, resolution)).all():
+                return path
+    return None
+
+
+def _bends(start: Joints, goal: Joints, rng: np.random.Generator) -> Joints:
+    """Configurations around the straight way, those that bend it least first: rad, shape (k, 7)."""
+    along = rng.uniform(*_MIDDLE, (BENDS, 1))
+    aside = rng.uniform(0.0, SPREAD, (BENDS, 1)) * rng.normal(size=(BENDS, JOINTS))
+    q = start + along * (goal - start) + aside * STEP
+    q = q[within_limits(q)]
+    lengths = control_steps(start, q) + control_steps(q, goal)
+    return cast(Joints, q[np.argsort(lengths, kind="stable")])
+
+
+def _glances(start: Joints, bends: Joints, goal: Joints, count: int) -> Joints:
+    """So many configurations each way from some bends: rad, shape (2 count - 1, k, 7)."""
+    fractions = np.arange(1, count + 1)[:, None, None] / count
+    there, back = (end + fractions * (bends - end) for end in (start, goal))
+    return np.concatenate([there, back[:-1]])  # the bends themselves once

@@ -1,0 +1,140 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How studies draw. matplotlib is needed for that alone, and loaded here alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from io import StringIO
+from typing import TYPE_CHECKING, Any
+
+from slap_ros.drawing.palette import BORDER, INK, MUTED, PLAN, SHORTCUT
+from slap_ros.errors import InvalidParameterError
+from slap_ros.evaluation.summary import Spread
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Size = tuple[float, float]  # inches, width and height
+
+STYLE: dict[Any, Any] = {
+    "svg.hashsalt": "slap_ros",  # names inside depend on the drawing alone
+    "svg.fonttype": "none",  # text stays text
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],  # one of the widest, so that others fit as well
+    "font.size": 9,
+    "axes.titlesize": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": BORDER,
+    "axes.labelcolor": INK,
+    "axes.axisbelow": True,
+    "axes.grid": True,
+    "grid.color": "#e6e8eb",
+    "text.color": INK,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "legend.frameon": False,
+    "figure.constrained_layout.wspace": 0.05,
+}
+# Okabe and Ito's, without yellow and black: apart from one another for the colour-blind as well.
+LINES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
+
+
+@dataclass(frozen=True)
+class Mark:
+    """How an approach is drawn: told apart by colour and by shape."""
+
+    label: str
+    colour: str
+    marker: str
+
+
+MARKS = {
+    "pure_planning": Mark("pure planning", PLAN, "o"),
+    "slap_1_sample": Mark("SLAP, 1 sample", MUTED, "^"),
+    "slap": Mark("SLAP", SHORTCUT, "s"),
+}
+
+
+def label(approach: str) -> str:
+    """An approach as people read it."""
+    return MARKS[approach].label
+
+
+def require_matplotlib() -> None:
+    """Refuse to begin what could not be drawn in the end.
+
+    Raises:
+        InvalidParameterError: matplotlib is not installed.
+    """
+    if find_spec("matplotlib") is None:
+        raise InvalidParameterError(
+            "studies draw with matplotlib, which is not installed: pip install 'slap_ros[studies]'"
+        )
+
+
+def picture(draw: Callable[[Figure], None], size: Size) -> str:
+    """SVG; the same drawing gives the same text."""
+    from matplotlib import rc_context, rcdefaults, rcParams
+    from matplotlib.figure import Figure
+
+    with rc_context():
+        rcdefaults()  # whatever the user's own settings are
+        rcParams.update(STYLE)
+        figure = Figure(figsize=size, layout="constrained")
+        draw(figure)
+        drawn = StringIO()
+        figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": None})
+    # A line that ends in a space is a change to whoever edits the file.
+    return "\n".join(line.rstrip() for line in drawn.getvalue().splitlines()) + "\n"
+
+
+def plot_spreads(
+    axes: Axes, places: Sequence[float], spreads: Sequence[Spread | None], approach: str
+) -> None:
+    """Means joined by a line, with a bar of one standard deviation each; where there is one."""
+    known = [(x, spread) for x, spread in zip(places, spreads, strict=True) if spread is not None]
+    axes.errorbar(
+        [x for x, _ in known],
+        [spread.mean for _, spread in known],
+        [spread.sd for _, spread in known],
+        elinewidth=1,
+        capsize=2.5,
+        **_pen(approach),
+    )
+
+
+def plot_values(
+    axes: Axes, places: Sequence[float], values: Sequence[float], approach: str
+) -> None:
+    """Values joined by a line."""
+    axes.plot(places, values, **_pen(approach))
+
+
+def _pen(approach: str) -> dict[str, Any]:
+    mark = MARKS[approach]
+    return {
+        "color": mark.colour,
+        "marker": mark.marker,
+        "label": mark.label,
+        "markersize": 5,
+        "linewidth": 1.2,
+    }
+
+
+def legend_above(figure: Figure, axes: Axes) -> None:
+    """One legend for the whole figure, with what is in these axes; each label once."""
+    handles, labels = axes.get_legend_handles_labels()
+    named = {label: handle for handle, label in zip(handles, labels, strict=True)}
+    figure.legend(
+        named.values(), named.keys(), loc="outside upper center", ncols=min(len(named), 3)
+    )
+
+
+def dodged(places: Sequence[float], number: int, count: int, apart: float = 0.1) -> list[float]:
+    """Places of the ``number``-th of ``count`` series, beside each other where they would meet."""
+    return [place + (number - (count - 1) / 2) * apart for place in places]

@@ -1,0 +1,128 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where shortcuts still help when tasks differ from those of training (SLAP Fig. 5).
+
+The library stays as it is; a setting of the preset at a time takes other values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from slap_ros.studies.comparison import Audience, Comparison, Measured, said
+from slap_ros.studies.figures import dodged, label, legend_above, plot_spreads, plot_values
+from slap_ros.studies.results import Report, Table
+from slap_ros.studies.variations import Variation
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+UNCHANGED = "unchanged"
+MEASURED = """\
+Pure planning and SLAP solve the same tasks, planned and executed in the world, while one setting
+varies and all others stay as in the preset; under *unchanged*, all do. The library is always the
+same one and nothing is trained anew. Length is the number of environment steps executed, mean ±
+sample standard deviation over the solved tasks; relative length is the mean over that of pure
+planning, on tasks that both solved. A task for which no plan is found counts as failed."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One value of one setting; neither, where the preset is unchanged."""
+
+    setting: str | None
+    value: str | None
+    preset: str
+    measured: tuple[Measured, ...]  # an approach each
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "setting": self.setting,
+            "value": self.value,
+            "preset": self.preset,
+            "approaches": [one.as_json() for one in self.measured],
+        }
+
+    def as_rows(self) -> Iterator[list[str]]:
+        """Rows of a table, one an approach."""
+        where = UNCHANGED if self.setting is None else f"{self.setting} {self.value}"
+        for one in self.measured:
+            summary = one.summary
+            relative = summary.relative_length
+            yield [
+                where,
+                label(summary.approach),
+                f"{summary.success_rate:.0%}",
+                said(summary.plan_length, 1),
+                "-" if relative is None else f"{relative:.2f}",
+            ]
+
+
+def study(comparison: Comparison, variations: Sequence[Variation], audience: Audience) -> Report:
+    """Measure under every value of every setting.
+
+    Raises:
+        InvalidParameterError: The domain has no such setting, or it cannot have that value.
+    """
+    base = comparison.domain.preset
+    planned = [(None, None, comparison)] + [
+        (one.setting, value, comparison.under(one.preset(base, value)))
+        for one in variations
+        for value in one.values
+    ]
+    conditions = [
+        Condition(setting, value, under.domain.preset, under.measure(audience))
+        for setting, value, under in planned
+    ]
+    return Report(
+        study="generalisation",
+        source="SLAP Fig. 5",
+        title=f"Generalisation: {comparison.domain.name}",
+        measured=MEASURED,
+        table=Table(
+            ["setting", "approach", "success", "length [steps]", "relative length"],
+            [row for condition in conditions for row in condition.as_rows()],
+        ),
+        found={"conditions": [condition.as_json() for condition in conditions]},
+        draw=lambda figure: draw(figure, conditions, variations),
+        size=(1.2 + 2.6 * len(variations), 3.8),
+    )
+
+
+def draw(figure: Figure, conditions: Sequence[Condition], variations: Sequence[Variation]) -> None:
+    """A column a setting: success above, length below; first, apart, the unchanged preset."""
+    unchanged, *others = conditions
+    grid = figure.subplots(
+        2, len(variations), squeeze=False, sharex="col", sharey="row", height_ratios=(1, 2.4)
+    )
+    for column, variation in zip(grid.T, variations, strict=True):
+        varied = [one for one in others if one.setting == variation.setting]
+        _plot(column, [0], [unchanged])
+        _plot(column, range(1, len(varied) + 1), varied)
+        for axes in column:
+            axes.axvspan(-0.5, 0.5, color="#f1f3f5", zorder=0)
+        ticks = ["as in\npreset", *(one.value or "" for one in varied)]
+        column[1].set_xticks(range(len(ticks)), ticks)
+        column[1].set_xlim(-0.5, len(varied) + 0.5)
+        column[1].set_xlabel(variation.label)
+    grid[0, 0].set_ylim(-8, 108)
+    grid[0, 0].set_ylabel("success [%]")
+    grid[1, 0].set_ylim(bottom=0)
+    grid[1, 0].set_ylabel("length of solved\ntasks [steps]")
+    legend_above(figure, grid[1, 0])
+
+
+def _plot(column: Sequence[Axes], places: Sequence[int], conditions: Sequence[Condition]) -> None:
+    """Success into the upper axes, length into the lower; approaches beside each other."""
+    above, below = column
+    count = len(conditions[0].measured)
+    for number in range(count):
+        summaries = [condition.measured[number].summary for condition in conditions]
+        beside = dodged(places, number, count)
+        name = summaries[0].approach
+        plot_values(above, beside, [100.0 * one.success_rate for one in summaries], name)
+        plot_spreads(below, beside, [one.plan_length for one in summaries], name)

@@ -1,0 +1,247 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Other goals with the same library (SLAP Fig. 9, D.1).
+
+Goals are sampled from what can be reached: a random node of a task's abstract graph, and one or
+two of the atoms that hold there and not at the start.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from itertools import combinations
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from slap_ros.domains import Domain, Task, get_domain
+from slap_ros.drawing.palette import MUTED
+from slap_ros.errors import PlanningLimitError, UnsolvableError
+from slap_ros.evaluation.approaches import Approach
+from slap_ros.evaluation.experiment import Trial, solve
+from slap_ros.evaluation.summary import Summary
+from slap_ros.planning.abstract_graph import build_abstract_graph
+from slap_ros.planning.planner import Problem
+from slap_ros.relational import AtomSpace, GroundAtom
+from slap_ros.shortcuts.workers import in_order
+from slap_ros.studies.comparison import Audience, Comparison, complaint, said
+from slap_ros.studies.figures import MARKS, label
+from slap_ros.studies.results import Report, Table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Goal = tuple[GroundAtom, ...]
+Named = tuple[tuple[str, tuple[str, ...]], ...]  # a goal as names, for another process
+
+GOALS = 9  # tells the random numbers of goals from those of tasks
+MOST_ATOMS = 2  # of a goal
+DOT = 20  # area of a dot in the picture, points squared
+MEASURED = """\
+Goals are sampled for each task: a random node of its abstract graph, and of the fluent atoms that
+hold there and not at the start one or two; no goal twice for a task. Pure planning and SLAP solve
+each, planned and executed in the world. Length is the number of environment steps executed, mean ±
+sample standard deviation over solved goals; relative length is the mean over that of pure
+planning, on goals that both solved, and so are the counts. The library was trained for the domain's
+own goal. A goal for which no plan is found counts as failed: an abstract state can be reached by
+operators and not in the world."""
+
+
+def sample_goals(domain: Domain, task: Task, count: int, rng: np.random.Generator) -> list[Goal]:
+    """Goals for a task's initial state, all different, none of which holds there.
+
+    Nodes of the abstract graph, which ends where the task's own goal first holds, are taken in
+    random order, each giving a goal that is not there yet, and again until there are ``count`` or
+    no node has another.
+
+    Raises:
+        UnsolvableError: Operators cannot reach the task's own goal.
+        PlanningLimitError: The graph is too large.
+    """
+    problem = Problem.of(domain, task.initial_state)
+    space = problem.model.space
+    start = space.abstract(task.initial_state)
+    graph = build_abstract_graph(start, space.mask(task.goal), problem.operators)
+    waiting = [_goals_of(space, node & ~start, rng) for node in graph.nodes]
+    sampled: dict[Goal, None] = {}  # a set that keeps its order
+    while waiting and len(sampled) < count:
+        rng.shuffle(waiting)
+        left = []
+        for goals in waiting:
+            new = next((goal for goal in goals if goal not in sampled), None)
+            if new is not None and len(sampled) < count:
+                sampled[new] = None
+                left.append(goals)
+        waiting = left
+    return list(sampled)
+
+
+def _goals_of(space: AtomSpace, atoms: int, rng: np.random.Generator) -> Iterator[Goal]:
+    """Every goal of one or two fluent atoms of a mask, in random order."""
+    fluent = tuple(space.decode(atoms & ~space.static))
+    goals = [goal for size in range(1, MOST_ATOMS + 1) for goal in combinations(fluent, size)]
+    order = rng.permutation(len(goals))
+    return (goals[i] for i in order)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A goal, and what came of it: a trial an approach, pure planning first."""
+
+    goal: Named
+    trials: tuple[Trial, ...]
+
+    @property
+    def lengths(self) -> tuple[int, int] | None:
+        """Environment steps of pure planning and of SLAP; None unless both solved it."""
+        pure, slap = self.trials[0], self.trials[-1]
+        return (pure.plan_length, slap.plan_length) if pure.success and slap.success else None
+
+
+def study(comparison: Comparison, count: int, audience: Audience) -> Report:
+    """Sample ``count`` goals for each task and solve them all in every way.
+
+    Raises:
+        UnsolvableError: No task has any goal that operators can reach.
+    """
+    jobs = [
+        (seed, index, goal)
+        for seed, index in comparison.experiment
+        for goal in _goals(comparison.domain, seed, index, count, audience)
+    ]
+    if not jobs:
+        raise UnsolvableError("operators can reach no goal in any of the tasks")
+    audience.begin("goals", len(jobs) * len(comparison.approaches))
+    trials = [
+        _solve_all(comparison, approach, jobs, audience) for approach in comparison.approaches
+    ]
+    outcomes = [
+        Outcome(goal, own) for (*_, goal), own in zip(jobs, zip(*trials, strict=True), strict=True)
+    ]
+    summaries = [
+        Summary.of(comparison.experiment, approach.name, own, trials[0])
+        for approach, own in zip(comparison.approaches, trials, strict=True)
+    ]
+    names = [approach.name for approach in comparison.approaches]
+    return Report(
+        study="goals",
+        source="SLAP Fig. 9",
+        title=f"Other goals: {comparison.domain.name}",
+        measured=f"{MEASURED}\n\n{_compared(outcomes)}",
+        table=_table(len(jobs), summaries),
+        found={
+            "approaches": [summary.as_row() for summary in summaries],
+            "goals": [_as_json(outcome, names) for outcome in outcomes],
+        },
+        draw=lambda figure: draw(figure, outcomes),
+        size=(4.6, 4.4),
+    )
+
+
+def _goals(domain: Domain, seed: int, index: int, count: int, audience: Audience) -> list[Named]:
+    """Goals for one task; none where its graph cannot be built."""
+    rng = np.random.default_rng([seed, index, GOALS])
+    try:
+        sampled = sample_goals(domain, domain.task(seed, index), count, rng)
+    except (UnsolvableError, PlanningLimitError) as error:
+        audience.failed(f"seed {seed}, task {index} has no goals: {error}")
+        return []
+    return [
+        tuple((atom.predicate.name, tuple(obj.name for obj in atom.objects)) for atom in goal)
+        for goal in sampled
+    ]
+
+
+def _solve_all(
+    comparison: Comparison,
+    approach: Approach,
+    jobs: Sequence[tuple[int, int, Named]],
+    audience: Audience,
+) -> list[Trial]:
+    """A trial a job."""
+    ended = []
+    for number, trial in comparison.each(_solve, approach, jobs):
+        ended.append((number, trial))
+        audience.done()
+        if not trial.success:
+            reason = f"{' and '.join(_words(jobs[number][2]))}: {trial.reason}"
+            audience.failed(complaint(approach, trial.seed, trial.index, reason))
+    return in_order(ended)
+
+
+def _solve(
+    domain: str, preset: str, planner: str, approach: Approach, seed: int, index: int, goal: Named
+) -> Trial:
+    """One task with another goal; the domain is made anew where this runs."""
+    chosen = get_domain(domain, preset)
+    task = chosen.task(seed, index)
+    space = chosen.atom_space(task.initial_state)
+    atoms = frozenset(space.atom(predicate, objects) for predicate, objects in goal)
+    return Trial.of(seed, index, solve(chosen, replace(task, goal=atoms), approach, planner))
+
+
+def _as_json(outcome: Outcome, names: Sequence[str]) -> dict[str, Any]:
+    first = outcome.trials[0]
+    whose = {"seed": first.seed, "index": first.index}
+    trials = [
+        {key: value for key, value in asdict(trial).items() if key not in whose}
+        for trial in outcome.trials
+    ]
+    return {**whose, "goal": _words(outcome.goal), **dict(zip(names, trials, strict=True))}
+
+
+def _words(goal: Named) -> list[str]:
+    return [f"{predicate}({', '.join(objects)})" for predicate, objects in goal]
+
+
+def _compared(outcomes: Sequence[Outcome]) -> str:
+    """How often SLAP's plans are shorter, in words."""
+    pairs = [outcome.lengths for outcome in outcomes if outcome.lengths is not None]
+    shorter = sum(slap < pure for pure, slap in pairs)
+    longer = sum(slap > pure for pure, slap in pairs)
+    return (
+        f"Of {len(outcomes)} goals both solved {len(pairs)}; SLAP was shorter for {shorter}, as "
+        f"long for {len(pairs) - shorter - longer} and longer for {longer}."
+    )
+
+
+def _table(goals: int, summaries: Sequence[Summary]) -> Table:
+    return Table(
+        ["approach", "goals", "success", "length [steps]", "relative length"],
+        [
+            [
+                label(summary.approach),
+                str(goals),
+                f"{summary.success_rate:.0%}",
+                said(summary.plan_length, 1),
+                "-" if summary.relative_length is None else f"{summary.relative_length:.2f}",
+            ]
+            for summary in summaries
+        ],
+    )
+
+
+def draw(figure: Figure, outcomes: Sequence[Outcome]) -> None:
+    """A dot for each pair of lengths, the larger the more goals have it."""
+    axes = figure.subplots()
+    counted = Counter(outcome.lengths for outcome in outcomes if outcome.lengths is not None)
+    longest = max((max(pair) for pair in counted), default=1)
+    limit = 1.08 * longest
+    axes.plot([0, limit], [0, limit], color=MUTED, linewidth=1, label="as long")
+    axes.scatter(
+        [pure for pure, _ in counted],
+        [slap for _, slap in counted],
+        [DOT * count for count in counted.values()],
+        color=MARKS["slap"].colour,
+        alpha=0.6,
+        linewidths=0,
+        label="goals; area: how many",
+    )
+    axes.set_xlim(0, limit)
+    axes.set_ylim(0, limit)
+    axes.set_aspect("equal")
+    axes.set_xlabel("length by pure planning [steps]")
+    axes.set_ylabel("length with SLAP [steps]")
+    axes.legend(loc="upper left")

@@ -1,0 +1,201 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What shortcuts do to the time that planning takes (SLAP Table 4).
+
+Tasks are planned and not executed. The graph grows with the number of objects.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from statistics import fmean
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+from slap_ros.domains import get_domain
+from slap_ros.errors import PlanningLimitError, UnsolvableError
+from slap_ros.evaluation.approaches import Approach
+from slap_ros.evaluation.summary import Spread
+from slap_ros.studies.comparison import Audience, Comparison, complaint, said, spread_of
+from slap_ros.studies.figures import dodged, label, legend_above, plot_spreads
+from slap_ros.studies.results import Report, Table
+from slap_ros.studies.variations import Variation
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MEASURED = """\
+Every task is planned once, with given skills alone and with shortcuts, and not executed. Seconds
+are of the whole of planning (graph, shortcut edges, search with all the rolling out in the model)
+on one core, of whatever machine made this page; they also depend on what else it was doing. An
+edge is rolled out at most once from a state; with more than one sample a shortcut edge is tried
+so often then. Nodes are abstract states, edges are options and
+shortcuts between them. Mean ± sample standard deviation over tasks; seconds are over all tasks,
+the rest over those for which a plan was found.
+
+The paper's figures, of its machine and start states: 15.2 s with shortcuts and 18.4 s without in
+Obstacle Tower."""
+
+
+@dataclass(frozen=True)
+class Planned:
+    """What planning for one task took."""
+
+    seed: int
+    index: int
+    success: bool
+    seconds: float
+    edges_rolled_out: int  # zero without a plan, like what follows
+    graph_nodes: int
+    graph_edges: int
+    predicted_steps: int  # environment steps of the plan
+    reason: str  # why there is none, unless it is a success
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What planning took an approach under one value of the setting."""
+
+    value: str
+    approach: str
+    planned: tuple[Planned, ...]  # by seed and index
+
+    @property
+    def success_rate(self) -> float:
+        """Part of the tasks for which a plan was found."""
+        return fmean(one.success for one in self.planned)
+
+    @property
+    def seconds(self) -> Spread:
+        """Of planning."""
+        return Spread.of([one.seconds for one in self.planned])
+
+    def spread(self, quantity: str) -> Spread | None:
+        """Of one of the fields of :class:`Planned`, over plans found."""
+        return spread_of([float(getattr(one, quantity)) for one in self.planned if one.success])
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain data."""
+        quantities = {name: self.spread(name) for name in QUANTITIES}
+        return {
+            "value": self.value,
+            "approach": self.approach,
+            "success_rate": self.success_rate,
+            "planning_seconds": asdict(self.seconds),
+            **{name: asdict(spread) if spread else None for name, spread in quantities.items()},
+            "tasks": [asdict(one) for one in self.planned],
+        }
+
+
+QUANTITIES = ("edges_rolled_out", "graph_nodes", "graph_edges", "predicted_steps")
+
+
+def study(comparison: Comparison, variation: Variation, audience: Audience) -> Report:
+    """Plan under every value of a setting.
+
+    Raises:
+        InvalidParameterError: The domain has no such setting, or it cannot have that value.
+    """
+    base = comparison.domain.preset
+    planned = [
+        (value, comparison.under(variation.preset(base, value))) for value in variation.values
+    ]
+    costs = [cost for value, under in planned for cost in _measure(value, under, audience)]
+    return Report(
+        study="planning_time",
+        source="SLAP Table 4",
+        title=f"Planning time: {comparison.domain.name}",
+        measured=MEASURED,
+        table=_table(variation, costs),
+        found={"setting": variation.setting, "costs": [cost.as_json() for cost in costs]},
+        draw=lambda figure: draw(figure, variation, costs),
+        size=(8.6, 3.2),
+    )
+
+
+def _measure(value: str, comparison: Comparison, audience: Audience) -> Iterator[Cost]:
+    """One approach after the other."""
+    tasks = list(comparison.experiment)
+    audience.begin(comparison.domain.preset, len(tasks) * len(comparison.approaches))
+    for approach in comparison.approaches:
+        planned = []
+        for _, one in comparison.each(plan_once, approach, tasks):
+            planned.append(one)
+            audience.done()
+            if not one.success:
+                audience.failed(complaint(approach, one.seed, one.index, one.reason))
+        planned.sort(key=lambda one: (one.seed, one.index))
+        yield Cost(value, approach.name, tuple(planned))
+
+
+def plan_once(
+    domain: str, preset: str, planner: str, approach: Approach, seed: int, index: int
+) -> Planned:
+    """Plan for one task; the domain is made anew where this runs."""
+    chosen = get_domain(domain, preset)
+    task = chosen.task(seed, index)
+    state = task.initial_state
+    goal = chosen.atom_space(state).mask(task.goal)
+    planning = approach.planner(planner, chosen, state)
+    began = perf_counter()
+    try:
+        result = planning.plan(state, goal)
+    except (UnsolvableError, PlanningLimitError) as error:
+        return Planned(seed, index, False, perf_counter() - began, 0, 0, 0, 0, str(error))
+    return Planned(
+        seed,
+        index,
+        True,
+        perf_counter() - began,
+        result.edges_rolled_out,
+        result.graph_nodes,
+        result.graph_edges,
+        result.plan.predicted_steps,
+        "",
+    )
+
+
+def _table(variation: Variation, costs: Sequence[Cost]) -> Table:
+    return Table(
+        [
+            variation.label,
+            "approach",
+            "planned",
+            "planning [s]",
+            "edges rolled out",
+            "nodes",
+            "edges",
+        ],
+        [
+            [
+                cost.value,
+                label(cost.approach),
+                f"{cost.success_rate:.0%}",
+                said(cost.seconds, 3),
+                *(said(cost.spread(name), 1) for name in QUANTITIES[:3]),
+            ]
+            for cost in costs
+        ],
+    )
+
+
+def draw(figure: Figure, variation: Variation, costs: Sequence[Cost]) -> None:
+    """Seconds, edges rolled out and the graph's edges beside each other, by the setting's value."""
+    panels = figure.subplots(1, 3)
+    places = range(len(variation.values))
+    names = list(dict.fromkeys(cost.approach for cost in costs))
+    for number, name in enumerate(names):
+        own = [cost for cost in costs if cost.approach == name]
+        beside = dodged(places, number, len(names))
+        plot_spreads(panels[0], beside, [cost.seconds for cost in own], name)
+        for axes, quantity in zip(panels[1:], ("edges_rolled_out", "graph_edges"), strict=True):
+            plot_spreads(axes, beside, [cost.spread(quantity) for cost in own], name)
+    labels = ("planning [s]", "edges rolled out", "edges of the graph")
+    for axes, quantity in zip(panels, labels, strict=True):
+        axes.set_xticks(places, variation.values)
+        axes.set_xlim(-0.5, len(places) - 0.5)
+        axes.set_ylim(bottom=0)
+        axes.set_xlabel(variation.label)
+        axes.set_ylabel(quantity)
+    legend_above(figure, panels[0])

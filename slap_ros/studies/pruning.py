@@ -1,0 +1,259 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How many candidate shortcuts random rollouts leave over (SLAP §4.2, B.1 and Table 2)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from slap_ros.drawing.palette import MUTED, PLAN
+from slap_ros.errors import InvalidParameterError, PlanningLimitError, UnsolvableError
+from slap_ros.evaluation.summary import Spread
+from slap_ros.shortcuts import jobs as training_jobs
+from slap_ros.shortcuts.explore import Explored
+from slap_ros.shortcuts.jobs import Place
+from slap_ros.shortcuts.settings import Exploration
+from slap_ros.shortcuts.workers import in_order, local_workers
+from slap_ros.studies.comparison import Audience, said
+from slap_ros.studies.figures import legend_above
+from slap_ros.studies.results import Report, Table
+from slap_ros.studies.trainings import TrainingFolder
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MEASURED = """\
+Candidates are the pairs of abstract states of a task's graph, the later one second, that no option
+joins. Of N random rollouts from a state at least K must end up in the other one, or the pair is
+pruned. Here rollouts are made only from the abstract states that are cheapest to reach, and a pair
+remains only if its shortcut would also make the plan of the task shorter, so that more is pruned
+than in the paper. What remains of all tasks is then, up to objects, far fewer different things to
+learn. Tasks are those of training. Spread is the sample standard deviation over tasks.
+
+{settings} {overall}
+
+In the paper, K/N of 5 to 25 % gives plans of 167 to 202 steps, 30 % and more 333 to 349: whatever
+is pruned too eagerly is missing from the plans. Those are the paper's figures for plan length;
+here pairs are counted."""
+
+
+@dataclass(frozen=True)
+class Pruned:
+    """What is left of one task's candidates.
+
+    Args:
+        seed: Of the training.
+        index: Which of its tasks.
+        explored: What exploring it came to.
+    """
+
+    seed: int
+    index: int
+    explored: Explored
+
+    def remaining(self, hits: int) -> int:
+        """Pairs reached in at least so many rollouts."""
+        return sum(find.hits >= hits for find in self.explored.finds)
+
+    def percent(self, hits: int) -> float:
+        """The same as part of all candidates, in %; 0 where there are no candidates."""
+        return 100.0 * self.remaining(hits) / max(1, self.explored.candidates)
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "seed": self.seed,
+            "index": self.index,
+            "candidates": self.explored.candidates,
+            "environment_steps": self.explored.environment_steps,
+            "hits": sorted((find.hits for find in self.explored.finds), reverse=True),
+        }
+
+
+def explore(
+    domain: str,
+    preset: str,
+    seeds: int,
+    tasks: int,
+    settings: Exploration,
+    jobs: int,
+    audience: Audience,
+) -> tuple[Pruned, ...]:
+    """Explore the first ``tasks`` tasks of trainings with seeds from 0 on, as training does.
+
+    Raises:
+        UnsolvableError: No task can be planned for, so none can be explored.
+    """
+    work = [
+        (Place(domain, preset, seed), index, settings)
+        for seed in range(seeds)
+        for index in range(tasks)
+    ]
+    ended = []
+    audience.begin(f"exploring {domain}", len(work))
+    with local_workers(jobs) as workers:
+        for number, outcome in workers.run(_explore, work):
+            ended.append((number, outcome))
+            audience.done()
+            if isinstance(outcome, str):
+                place, index, _ = work[number]
+                audience.failed(f"seed {place.seed}, task {index} not explored: {outcome}")
+    explored = [outcome for outcome in in_order(ended) if isinstance(outcome, Pruned)]
+    if not explored:
+        raise UnsolvableError(f"none of the {len(work)} tasks could be explored")
+    return tuple(explored)
+
+
+def _explore(place: Place, index: int, settings: Exploration) -> Pruned | str:
+    """Explore one task, or say why it cannot be."""
+    try:
+        data = training_jobs.explore(place, index, settings)
+    except (UnsolvableError, PlanningLimitError) as error:
+        return str(error)
+    explored = Explored.from_json({k: v for k, v in data.items() if k != "cpu_s"})
+    return Pruned(place.seed, index, explored)
+
+
+def explored_in(
+    folders: Sequence[TrainingFolder], domain: str
+) -> tuple[tuple[Pruned, ...], Exploration]:
+    """What trainings have explored already, and how all of them did.
+
+    Raises:
+        InvalidParameterError: A folder has nothing explored, damaged files, another domain's, or
+            another way to explore than the first.
+    """
+    how = folders[0].exploration()
+    for folder in folders:
+        folder.require_domain(domain)
+        if folder.exploration() != how:
+            raise InvalidParameterError(
+                f"{folder.path} was explored in another way than {folders[0].path}; give trainings "
+                "that differ in their seeds alone"
+            )
+    pruned = tuple(
+        Pruned(folder.place()["seed"], index, explored)
+        for folder in folders
+        for index, explored in enumerate(folder.explored())
+    )
+    return pruned, how
+
+
+def study(domain: str, pruned: Sequence[Pruned], settings: Exploration) -> Report:
+    """What is left, by the number of rollouts that must succeed."""
+    thresholds = _thresholds(settings)
+    signatures = {
+        (find.signature.patterns, find.signature.context)
+        for one in pruned
+        for find in one.explored.finds
+    }
+    return Report(
+        study="pruning",
+        source="SLAP §4.2 and Table 2",
+        title=f"Pruning: {domain}",
+        measured=MEASURED.format(settings=_said(settings), overall=_overall(pruned, settings)),
+        table=_table(pruned, settings, len(signatures)),
+        found={
+            "exploration": asdict(settings),
+            "thresholds": [_at(hits, pruned, settings) for hits in thresholds],
+            "different_up_to_objects": len(signatures),
+            "tasks": [one.as_json() for one in pruned],
+        },
+        draw=lambda figure: draw(figure, pruned, settings),
+        size=(5.6, 3.4),
+    )
+
+
+def _said(settings: Exploration) -> str:
+    return (
+        f"N = {settings.rollouts} rollouts of {settings.length} environment steps from each of the "
+        f"{settings.nodes} cheapest abstract states; training prunes with K = {settings.hits}."
+    )
+
+
+def _overall(pruned: Sequence[Pruned], settings: Exploration) -> str:
+    candidates = sum(one.explored.candidates for one in pruned)
+    remaining = sum(one.remaining(settings.hits) for one in pruned)
+    part = 100.0 * remaining / max(1, candidates)
+    return (
+        f"Of {candidates:,} candidates in {len(pruned)} tasks {remaining} remain, {part:.1f} % of "
+        "them all."
+    )
+
+
+def _thresholds(settings: Exploration) -> list[int]:
+    """Hits to ask for: from what training asks for to all rollouts, doubled again and again."""
+    thresholds = [settings.hits]
+    while 2 * thresholds[-1] <= settings.rollouts:
+        thresholds.append(2 * thresholds[-1])
+    return thresholds
+
+
+def _at(hits: int, pruned: Sequence[Pruned], settings: Exploration) -> dict[str, Any]:
+    """What is left at one threshold."""
+    return {
+        "k": hits,
+        "k_over_n": hits / settings.rollouts,
+        "remaining": sum(one.remaining(hits) for one in pruned),
+        "remaining_percent": asdict(Spread.of([one.percent(hits) for one in pruned])),
+    }
+
+
+def _table(pruned: Sequence[Pruned], settings: Exploration, different: int) -> Table:
+    """A row a task, then all of them."""
+    hits = settings.hits
+    candidates = sum(one.explored.candidates for one in pruned)
+    remaining = sum(one.remaining(hits) for one in pruned)
+    rows = [
+        [
+            str(one.seed),
+            str(one.index),
+            f"{one.explored.candidates:,}",
+            str(one.remaining(hits)),
+            f"{one.percent(hits):.1f}",
+            "",
+        ]
+        for one in pruned
+    ]
+    percent = said(Spread.of([one.percent(hits) for one in pruned]), 1)
+    total = ["all", str(len(pruned)), f"{candidates:,}", str(remaining), percent, str(different)]
+    return Table(
+        ["seed", "task", "candidates", "remaining", "remaining [%]", "different up to objects"],
+        [*rows, [f"**{cell}**" for cell in total]],
+    )
+
+
+def draw(figure: Figure, pruned: Sequence[Pruned], settings: Exploration) -> None:
+    """What remains against K/N: a thin line a task, the mean with its spread."""
+    axes = figure.subplots()
+    thresholds = _thresholds(settings)
+    places = [100.0 * hits / settings.rollouts for hits in thresholds]
+    for number, one in enumerate(pruned):
+        axes.plot(
+            places,
+            [one.percent(hits) for hits in thresholds],
+            color=MUTED,
+            linewidth=0.6,
+            alpha=0.5,
+            label="a task" if number == 0 else None,
+        )
+    spreads = [Spread.of([one.percent(hits) for one in pruned]) for hits in thresholds]
+    axes.errorbar(
+        places,
+        [spread.mean for spread in spreads],
+        [spread.sd for spread in spreads],
+        color=PLAN,
+        marker="o",
+        markersize=5,
+        capsize=2.5,
+        label="mean ± standard deviation",
+    )
+    axes.set_xscale("log")
+    axes.set_xticks(places, [f"{place:.3g}" for place in places])
+    axes.minorticks_off()
+    axes.set_ylim(bottom=0)
+    axes.set_xlabel("rollouts that must succeed, K/N [%]")
+    axes.set_ylabel("candidates that remain [%]")
+    legend_above(figure, axes)

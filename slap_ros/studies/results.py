@@ -1,0 +1,169 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a study leaves behind: its data as JSON, a picture as SVG and a page as Markdown."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from slap_ros.shortcuts.library import Library
+from slap_ros.studies.figures import Size, picture
+from slap_ros.versions import versions
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Data = Mapping[str, Any]  # plain: what JSON can say
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of a page; every row has an entry a column."""
+
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+    def as_markdown(self) -> str:
+        """As Markdown, without a line break at the end."""
+        rule = ["---"] * len(self.columns)
+        return "\n".join(_row(cells) for cells in (self.columns, rule, *self.rows))
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a study came to.
+
+    Args:
+        study: Its name, as in ``slap study``.
+        source: The figure or table of the paper that it makes again.
+        title: Of the page.
+        measured: What the numbers are, and whatever must be known to read them; Markdown.
+        table: The numbers.
+        found: The numbers in full, plain data.
+        draw: Draws the picture.
+        size: Of the picture.
+    """
+
+    study: str
+    source: str
+    title: str
+    measured: str
+    table: Table
+    found: Data
+    draw: Callable[[Figure], None]
+    size: Size
+
+
+@dataclass(frozen=True)
+class Origin:
+    """From what a report was made.
+
+    Args:
+        domain: Name of the domain.
+        command: That makes it again.
+        settings: What else it depends on, plain data.
+    """
+
+    domain: str
+    command: str
+    settings: Data
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "domain": self.domain,
+            **self.settings,
+            "command": self.command,
+            "versions": dict(versions()),
+        }
+
+
+def write(folder: Path, report: Report, origin: Origin) -> list[Path]:
+    """Write a report's files, in place of those of an earlier one. Returns where they are."""
+    name = f"{report.study}_{origin.domain}"
+    data = {
+        "study": report.study,
+        "source": report.source,
+        **origin.as_json(),
+        "found": report.found,
+    }
+    contents = {
+        "json": pretty(data) + "\n",
+        "svg": picture(report.draw, report.size),
+        "md": _page(name, report, origin),
+    }
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = []
+    for ending, content in contents.items():
+        paths.append(folder / f"{name}.{ending}")
+        paths[-1].write_text(content, encoding="utf-8")
+    return paths
+
+
+def describe_library(folder: Path, library: Library) -> dict[str, Any]:
+    """Which library it is: the folder's name, the digest that bags have too, what it offers."""
+    return {
+        "name": folder.name,
+        "digest": library.digest,
+        "shortcuts": [shortcut.name for shortcut in library.shortcuts],
+    }
+
+
+def pretty(value: Any, indent: str = "") -> str:
+    """JSON, indented down to the innermost objects and lists, which have a line each."""
+    deeper = indent + "  "
+    parts: list[str]
+    if isinstance(value, Mapping) and any(map(_is_nested, value.values())):
+        parts = [f"{json.dumps(key)}: {pretty(part, deeper)}" for key, part in value.items()]
+        opening, closing = "{", "}"
+    elif isinstance(value, list | tuple) and any(map(_is_nested, value)):
+        parts = [pretty(part, deeper) for part in value]
+        opening, closing = "[", "]"
+    else:
+        return json.dumps(value, allow_nan=False, ensure_ascii=False)
+    lines = f",\n{deeper}".join(parts)
+    return f"{opening}\n{deeper}{lines}\n{indent}{closing}"
+
+
+def _is_nested(value: object) -> bool:
+    return isinstance(value, Mapping | list | tuple)
+
+
+def _page(name: str, report: Report, origin: Origin) -> str:
+    data = f"[{name}.json]({name}.json)"
+    settings = [f"- {key}: {_said(value)}" for key, value in origin.settings.items()]
+    listed = "\n".join([*settings, f"- versions and every number: {data}"])
+    return f"""\
+# {report.title}
+
+After {report.source}. Numbers are this system's unless they are said to be the paper's.
+
+![{report.title}]({name}.svg)
+
+{report.measured}
+
+{report.table.as_markdown()}
+
+## How to make it again
+
+    {origin.command}
+
+{listed}
+"""
+
+
+def _said(value: object) -> str:
+    """A setting in words."""
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key} {_said(part)}" for key, part in value.items())
+    if isinstance(value, list | tuple):
+        return "; ".join(map(_said, value))
+    return f"`{value}`"
+
+
+def _row(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cells)} |"

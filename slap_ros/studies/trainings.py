@@ -1,0 +1,174 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a training has kept in its work folder (``slap train --work``), read by studies."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from slap_ros.errors import InvalidParameterError
+from slap_ros.shortcuts.explore import Explored
+from slap_ros.shortcuts.settings import Exploration
+
+
+@dataclass(frozen=True)
+class Point:
+    """How learning stood at one time; success and length are over recent episodes, with noise."""
+
+    steps: int  # environment steps of all stages so far
+    success: float  # between 0 and 1
+    length: float | None  # environment steps of successful episodes; None where there is none
+
+
+@dataclass(frozen=True)
+class Curve:
+    """How one shortcut was learned.
+
+    Args:
+        shortcut: Its name.
+        points: In order of their steps.
+        stages: Where each stage but the first begins, in environment steps.
+    """
+
+    shortcut: str
+    points: tuple[Point, ...]
+    stages: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class TrainingFolder:
+    """The work folder of a training, done or under way."""
+
+    path: Path
+
+    def require_domain(self, domain: str) -> None:
+        """Refuse the training of another domain.
+
+        Raises:
+            InvalidParameterError: It is one, or no training at all.
+        """
+        trained = self._setting("place")["domain"]
+        if trained != domain:
+            raise InvalidParameterError(
+                f"{self.path} has a training of domain {trained!r}, not of {domain!r}"
+            )
+
+    def place(self) -> dict[str, Any]:
+        """Domain, preset and seed.
+
+        Raises:
+            InvalidParameterError: The folder has no training, or a damaged one.
+        """
+        return dict(self._setting("place"))
+
+    def exploration(self) -> Exploration:
+        """How candidates were found.
+
+        Raises:
+            InvalidParameterError: The folder has no training, or a damaged one.
+        """
+        settings = self._setting("exploration")
+        try:
+            return Exploration(**settings)
+        except TypeError as error:
+            raise _damaged(self.path / "settings.json", error) from error
+
+    def explored(self) -> tuple[Explored, ...]:
+        """What exploring came to, a task each.
+
+        Raises:
+            InvalidParameterError: Exploring is not over, or the file is damaged.
+        """
+        path = self.path / "explored.json"
+        tasks = _read(path)
+        try:
+            return tuple(
+                Explored.from_json({k: v for k, v in task.items() if k != "cpu_s"})
+                for task in tasks
+            )
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
+            raise _damaged(path, error) from error
+
+    def curves(self) -> tuple[Curve, ...]:
+        """Those of all shortcuts that were, or are being, learned; by name.
+
+        Raises:
+            InvalidParameterError: There are none, or a file is damaged.
+        """
+        paths = sorted(self.path.glob("*/progress.jsonl"))
+        if not paths:
+            raise InvalidParameterError(
+                f"{self.path}: no training that has begun to learn: no progress.jsonl in a folder "
+                "in it; give the work folder of `slap train`"
+            )
+        return tuple(read_curve(path) for path in paths)
+
+    def _setting(self, name: str) -> Mapping[str, Any]:
+        path = self.path / "settings.json"
+        settings = _read(path)
+        if not isinstance(settings, dict) or not isinstance(settings.get(name), dict):
+            raise _damaged(path, f"no {name} in it")
+        return dict(settings[name])
+
+
+def read_curve(path: Path) -> Curve:
+    """The curve in a progress file: a JSON object a line, as training appends them.
+
+    Stages are put one after the other. A training that was interrupted went on from a checkpoint:
+    what it did twice counts the second time. A last line that was not written out is left out.
+
+    Raises:
+        InvalidParameterError: A line is damaged, or there is none; names file and line.
+    """
+    stages: dict[int, list[Point]] = {}
+    complete = path.read_text(encoding="utf-8").split("\n")[:-1]
+    for number, line in enumerate(complete, start=1):
+        stage, point = _parse(line, f"{path}, line {number}")
+        points = stages.setdefault(stage, [])
+        while points and points[-1].steps >= point.steps:
+            points.pop()
+        points.append(point)
+    if not stages:
+        raise InvalidParameterError(f"{path}: nothing learned so far; try again later")
+    joined: list[Point] = []
+    begins: list[int] = []
+    for stage in sorted(stages):
+        before = joined[-1].steps if joined else 0
+        begins.append(before)
+        joined += [Point(before + p.steps, p.success, p.length) for p in stages[stage]]
+    return Curve(path.parent.name, tuple(joined), tuple(begins[1:]))
+
+
+def _parse(line: str, where: str) -> tuple[int, Point]:
+    """Stage, and point with the steps of that stage."""
+    try:
+        data = json.loads(line)
+        length = None if data["length"] is None else float(data["length"])
+        stage, point = int(data["stage"]), Point(int(data["steps"]), float(data["success"]), length)
+    except (KeyError, TypeError, ValueError) as error:
+        raise _damaged(where, error) from error
+    numbers = [point.success, *([] if length is None else [length])]
+    if not all(map(math.isfinite, numbers)) or not 0.0 <= point.success <= 1.0 or point.steps < 0:
+        raise _damaged(where, f"success {point.success}, length {length}, steps {point.steps}")
+    return stage, point
+
+
+def _read(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InvalidParameterError(
+            f"{path}: cannot be read: {error.strerror}; give the work folder of `slap train`"
+        ) from error
+    except ValueError as error:
+        raise _damaged(path, error) from error
+
+
+def _damaged(where: Path | str, why: Exception | str) -> InvalidParameterError:
+    reason = repr(why) if isinstance(why, Exception) else why
+    return InvalidParameterError(f"{where}: damaged: {reason}")

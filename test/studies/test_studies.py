@@ -1,0 +1,390 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The paper's figures: their numbers are those of experiments, their files are made again alike."""
+
+import json
+import xml.etree.ElementTree as ET
+from contextlib import nullcontext
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from slap_ros.cli import app
+from slap_ros.domains import get_domain
+from slap_ros.errors import InvalidParameterError
+from slap_ros.evaluation import experiment as experiments
+from slap_ros.evaluation.approaches import approaches
+from slap_ros.evaluation.experiment import Experiment
+from slap_ros.planning.planner import Problem, make_planner
+from slap_ros.shortcuts import jobs
+from slap_ros.shortcuts.jobs import Kept, Place
+from slap_ros.shortcuts.library import load_library
+from slap_ros.shortcuts.settings import training_settings
+from slap_ros.shortcuts.shortcut import Sampling
+from slap_ros.shortcuts.workers import NoWorkers
+from slap_ros.studies import comparison, pruning
+from slap_ros.studies.goals import sample_goals
+from slap_ros.studies.trainings import TrainingFolder, read_curve
+from slap_ros.studies.variations import Variation, offered, parse_variation
+
+LIBRARY = Path(__file__).parent.parent / "shortcuts" / "data" / "obstacle2d"
+DOMAIN = get_domain("obstacle2d")
+SAMPLES = 2
+PLANNING = ["--shortcuts", LIBRARY, "--samples", SAMPLES]
+
+
+@pytest.fixture(autouse=True)
+def _in_this_process(monkeypatch):
+    """Starting processes takes longer than what they would do here."""
+    for module in (experiments, comparison, pruning):
+        monkeypatch.setattr(module, "local_workers", lambda _: nullcontext(NoWorkers()))
+
+
+def study(folder, *arguments):
+    """Make a study; its data."""
+    name, domain, *_ = arguments
+    result = CliRunner().invoke(app, ["study", *map(str, arguments), "--output", str(folder)])
+    assert result.exit_code == 0, result.stderr
+    return json.loads((folder / f"{name}_{domain}.json").read_text())
+
+
+def refusal(*arguments):
+    """How a study is refused: exit code and message."""
+    result = CliRunner().invoke(app, ["study", *map(str, arguments)])
+    return result.exit_code, " ".join(result.stderr.split())
+
+
+def without_seconds(data):
+    """Data without measured times."""
+    if isinstance(data, dict):
+        return {k: without_seconds(v) for k, v in data.items() if not k.endswith("seconds")}
+    return [without_seconds(part) for part in data] if isinstance(data, list) else data
+
+
+def compared(preset="fair"):
+    """The domain, and each approach by name."""
+    domain = get_domain("obstacle2d", preset)
+    chosen = approaches(load_library(LIBRARY, domain), Sampling(samples=SAMPLES))
+    return domain, {approach.name: approach for approach in chosen}
+
+
+# -- generalisation -------------------------------------------------------------------------------
+
+
+def test_generalisation_has_the_numbers_of_the_experiments(tmp_path):
+    data = study(tmp_path, "generalisation", "obstacle2d", "--tasks", 2, "--seeds", 2, *PLANNING)
+    conditions = {one["preset"]: one for one in data["found"]["conditions"]}
+    assert list(conditions) == ["fair", *(f"fair:bystanders={count}" for count in (0, 1, 2))]
+    for preset in ("fair", "fair:bystanders=2"):
+        domain, by_name = compared(preset)
+        experiment = Experiment(domain, 2, 2)
+        rows = conditions[preset]["approaches"]
+        assert [row["approach"] for row in rows] == ["pure_planning", "slap"]
+        for row in rows:
+            episodes = [experiment.run(*which, by_name[row["approach"]]) for which in experiment]
+            lengths = [episode.plan_length for episode in episodes]
+            assert [trial["plan_length"] for trial in row["trials"]] == lengths
+            assert row["plan_length"]["mean"] == pytest.approx(np.mean(lengths))
+            assert row["plan_length"]["sd"] == pytest.approx(np.std(lengths, ddof=1))
+            assert row["success_rate"] == np.mean([episode.success for episode in episodes])
+            pure = sum(trial["plan_length"] for trial in rows[0]["trials"])
+            assert row["relative_length"] == pytest.approx(sum(lengths) / pure)
+    assert conditions["fair"]["approaches"][-1]["relative_length"] < 1.0
+
+
+def test_a_task_without_a_plan_counts_as_failed_and_is_told_of(tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        "slap_ros.planning.abstract_graph.build_abstract_graph.__defaults__", (0, 9)
+    )
+    arguments = ["generalisation", "obstacle2d", "--tasks", 1, "--seeds", 3, *PLANNING]
+    arguments += ["--vary", "bystanders=0,1", "--output", tmp_path]
+    result = CliRunner().invoke(app, ["study", *map(str, arguments)])
+    assert result.exit_code == 0, result.stderr
+    assert "slap: seed 0, task 0 not solved: more than 9 abstract states" in result.stderr
+    data = json.loads((tmp_path / "generalisation_obstacle2d.json").read_text())
+    few, more = data["found"]["conditions"][1:]
+    assert [row["success_rate"] for row in few["approaches"]] == [1.0, 1.0]
+    assert [row["success_rate"] for row in more["approaches"]] == [0.0, 0.0]
+    assert more["approaches"][0]["plan_length"] == {"mean": None, "sd": None}
+    assert (
+        "| bystanders 1 | SLAP | 0% | - | - |"
+        in (tmp_path / "generalisation_obstacle2d.md").read_text()
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--preset", "hard"], "unknown preset 'hard'; there are fair, paper"),
+        (["--vary", "obstacles=1,2"], "unknown setting 'obstacles'; there are bystanders"),
+        (["--preset", "fair:mass=2"], "unknown setting 'mass'"),
+        (["--preset", "paper"], "preset paper of obstacle2d has none of the settings obstacles"),
+        (["--vary", "bystanders"], "is not of the form setting=value"),
+        (["--shortcuts", "none"], "give a shortcut library with --shortcuts"),
+    ],
+)
+@pytest.mark.parametrize("name", ["generalisation", "planning_time"])
+def test_what_the_domain_does_not_have_is_refused(tmp_path, name, arguments, words):
+    code, message = refusal(name, "obstacle2d", *arguments, "--output", tmp_path)
+    assert code == InvalidParameterError.code
+    assert words in message
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_variation_takes_the_place_of_the_setting_in_the_preset():
+    assert parse_variation("mass = 1.0, 2..3") == Variation("mass", ("1.0", "2..3"))
+    varied = parse_variation("mass=1,2").preset("fair:mass=5,obstacles=3", "2")
+    assert varied == "fair:mass=2,obstacles=3"
+    tower = get_domain("obstacle_tower")
+    assert [one.setting for one in offered(tower)] == [
+        "obstacles", "distractors", "mass", "friction",
+    ]  # fmt: skip
+
+
+# -- goals ----------------------------------------------------------------------------------------
+
+
+def goals_of(task, count, seed=0):
+    return sample_goals(DOMAIN, task, count, np.random.default_rng(seed))
+
+
+@pytest.mark.parametrize("index", range(4))
+def test_goals_are_different_not_there_yet_reachable_and_the_same_again(index):
+    task = DOMAIN.task(0, index)
+    goals = goals_of(task, 15)
+    assert len(goals) == len(set(goals)) == 15
+    assert goals == goals_of(task, 15) != goals_of(task, 15, seed=1)
+    space = Problem.of(DOMAIN, task.initial_state).model.space
+    start = space.abstract(task.initial_state)
+    planner = make_planner("lazy", DOMAIN, task.initial_state)
+    for goal in goals:
+        mask = space.mask(goal)
+        assert 1 <= len(goal) <= 2
+        assert mask & start == 0 == mask & space.static
+        assert planner.plan(task.initial_state, mask).plan.edges
+
+
+def test_where_there_are_fewer_goals_than_asked_for_all_of_them_are_taken():
+    task = DOMAIN.task(1)
+    every = goals_of(task, 1000)
+    assert 15 < len(every) == len(set(every)) < 1000
+    assert set(every) == set(goals_of(task, 1000, seed=1))
+
+
+def test_shortcuts_help_with_other_goals_and_never_harm(tmp_path):
+    data = study(tmp_path, "goals", "obstacle2d", "--goals", 10, "--seeds", 2, *PLANNING)
+    goals = data["found"]["goals"]
+    assert [(one["seed"], one["index"]) for one in goals] == [(0, 0)] * 10 + [(1, 0)] * 10
+    pairs = [(one["pure_planning"]["plan_length"], one["slap"]["plan_length"]) for one in goals]
+    assert all(slap <= pure for pure, slap in pairs)
+    pure, slap = data["found"]["approaches"]
+    assert slap["plan_length"]["mean"] < pure["plan_length"]["mean"]
+    assert pure["plan_length"]["mean"] == pytest.approx(np.mean([pure for pure, _ in pairs]))
+
+
+# -- planning time --------------------------------------------------------------------------------
+
+
+def test_planning_time_tells_of_the_graph_and_of_what_was_rolled_out(tmp_path):
+    data = study(tmp_path, "planning_time", "obstacle2d", "--tasks", 2, "--seeds", 1, *PLANNING)
+    costs = data["found"]["costs"]
+    names = ["pure_planning", "slap_1_sample", "slap"]
+    assert [(one["value"], one["approach"]) for one in costs] == list(product("012", names))
+    for cost in costs[-3:]:
+        domain, by_name = compared("fair:bystanders=2")
+        for row in cost["tasks"]:
+            task = domain.task(row["seed"], row["index"])
+            planner = by_name[cost["approach"]].planner("lazy", domain, task.initial_state)
+            goal = domain.atom_space(task.initial_state).mask(task.goal)
+            result = planner.plan(task.initial_state, goal)
+            assert row["graph_nodes"] == result.graph_nodes
+            assert row["graph_edges"] == result.graph_edges
+            assert row["edges_rolled_out"] == result.edges_rolled_out
+            assert row["predicted_steps"] == result.plan.predicted_steps
+            assert row["seconds"] > 0.0
+    pure, _, slap = costs[-3:]
+    assert pure["graph_nodes"] == slap["graph_nodes"]
+    assert pure["graph_edges"]["mean"] < slap["graph_edges"]["mean"]
+
+
+# -- trainings ------------------------------------------------------------------------------------
+
+
+def line(stage, steps, success=0.5, length=9.0):
+    return {"stage": stage, "steps": steps, "success": success, "length": length, "seconds": 1.0}
+
+
+@pytest.fixture
+def training(tmp_path):
+    """The work folder of a training of two stages, interrupted and resumed in the second."""
+    folder = tmp_path / "training"
+    kept = Kept(folder / "Clear_On-e41568a9")
+    for entry in (
+        line(0, 100, 0.0, float("nan")), line(0, 200), line(1, 100), line(1, 200, 0.6),
+        line(1, 150, 0.7), line(1, 250, 0.8, 7.0),
+    ):  # fmt: skip
+        kept.append(entry)
+    how = training_settings("ours", "obstacle2d")
+    settings = {"place": vars(Place("obstacle2d", "fair", 3)), **how.as_record()}
+    (folder / "settings.json").write_text(json.dumps(settings))
+    return folder
+
+
+def progress_of(folder):
+    (path,) = folder.glob("*/progress.jsonl")
+    return path
+
+
+def test_stages_follow_one_another_and_what_was_done_twice_counts_once(training):
+    curve = read_curve(progress_of(training))
+    assert [point.steps for point in curve.points] == [100, 200, 300, 350, 450]
+    assert [point.success for point in curve.points] == [0.0, 0.5, 0.5, 0.7, 0.8]
+    assert curve.points[0].length is None
+    assert curve.stages == (200,)
+
+
+def test_a_line_that_is_being_written_is_left_out(training):
+    before = read_curve(progress_of(training))
+    with progress_of(training).open("a") as file:
+        file.write('{"stage": 1, "st')
+    assert read_curve(progress_of(training)) == before
+
+
+def test_trainings_with_several_seeds_are_averaged(tmp_path, training):
+    other = tmp_path / "other"
+    kept = Kept(other / "Clear_On-e41568a9")
+    kept.append(line(0, 100, 0.2, 11.0))
+    kept.append(line(0, 200, 0.9, 5.0))
+    (other / "settings.json").write_bytes((training / "settings.json").read_bytes())
+    data = study(tmp_path, "dynamics", "obstacle2d", "--work", training, "--work", other)
+    (learned,) = data["found"]["shortcuts"]
+    assert learned["trainings"] == 2
+    first, second = learned["moments"]
+    assert (first["steps"], first["length_mean"], first["length_sd"]) == (100, 11.0, 0.0)
+    assert second["success_mean"] == pytest.approx(0.7)
+    assert second["success_sd"] == pytest.approx(np.std([0.5, 0.9], ddof=1))
+
+
+@pytest.mark.parametrize(
+    "damage",
+    ["not JSON", "[]", '{"stage": 0}', '{"stage": 0, "steps": 5, "success": "x", "length": 1}',
+     '{"stage": 0, "steps": 5, "success": NaN, "length": 1}',
+     '{"stage": 0, "steps": 5, "success": 7, "length": null}'],
+)  # fmt: skip
+def test_a_damaged_line_is_refused_and_named(tmp_path, training, damage):
+    path = progress_of(training)
+    lines = path.read_text().split("\n")
+    path.write_text("\n".join([lines[0], damage, *lines[1:]]))
+    code, message = refusal(
+        "dynamics", "obstacle2d", "--work", training, "--output", tmp_path / "out"
+    )
+    assert code == InvalidParameterError.code
+    assert "progress.jsonl, line 2: damaged" in message.replace("- ", "-")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["dynamics", "pruning"])
+def test_a_folder_without_a_training_or_with_another_domains_is_refused(tmp_path, name, training):
+    code, message = refusal(name, "obstacle2d", "--work", tmp_path / "nothing")
+    assert (code, "give the work folder" in message) == (InvalidParameterError.code, True)
+    code, message = refusal(name, "obstacle_tower", "--work", training)
+    assert (code, "a training of domain 'obstacle2d'" in message) == (
+        InvalidParameterError.code,
+        True,
+    )
+
+
+def test_pruning_counts_what_a_training_has_explored(tmp_path, training):
+    place, how = Place("obstacle2d", "fair", 3), training_settings("ours", "obstacle2d").exploration
+    explored = [jobs.explore(place, index, how) for index in range(2)]
+    (training / "explored.json").write_text(json.dumps(explored))
+    data = study(tmp_path / "kept", "pruning", "obstacle2d", "--work", training)
+    tasks = data["found"]["tasks"]
+    assert [task["candidates"] for task in tasks] == [one["candidates"] for one in explored]
+    assert [len(task["hits"]) for task in tasks] == [len(one["finds"]) for one in explored]
+    hits = [find["hits"] for one in explored for find in one["finds"]]
+    for row in data["found"]["thresholds"]:
+        assert row["remaining"] == sum(hit >= row["k"] for hit in hits)
+    assert data["found"]["thresholds"][0]["remaining"] == len(hits) > 0
+    fresh = pruning.explore("obstacle2d", "fair", 1, 1, how, 1, Deaf())
+    assert (
+        fresh[0].explored.candidates
+        == jobs.explore(Place("obstacle2d", "fair", 0), 0, how)["candidates"]
+    )
+
+
+class Deaf:
+    """Hears nothing."""
+
+    def begin(self, what, total):
+        pass
+
+    def done(self):
+        pass
+
+    def failed(self, complaint):
+        pass
+
+
+def test_another_kind_of_exploring_is_not_mixed_in(training, tmp_path):
+    other = tmp_path / "other"
+    other.mkdir()
+    settings = json.loads((training / "settings.json").read_text())
+    settings["exploration"]["rollouts"] = 7
+    (other / "settings.json").write_text(json.dumps(settings))
+    with pytest.raises(InvalidParameterError, match="explored in another way"):
+        pruning.explored_in([TrainingFolder(training), TrainingFolder(other)], "obstacle2d")
+
+
+# -- files ----------------------------------------------------------------------------------------
+
+
+def test_files_are_complete_and_made_again_byte_for_byte_but_for_times(tmp_path, training):
+    commands = [
+        ["generalisation", "obstacle2d", "--tasks", 1, "--seeds", 2, *PLANNING,
+         "--vary", "bystanders=0,1"],
+        ["goals", "obstacle2d", "--goals", 3, "--seeds", 1, *PLANNING],
+        ["planning_time", "obstacle2d", "--tasks", 1, "--seeds", 1, *PLANNING],
+        ["pruning", "obstacle2d", "--tasks", 1, "--seeds", 1],
+        ["dynamics", "obstacle2d", "--work", training],
+    ]  # fmt: skip
+    for command in commands:
+        name = f"{command[0]}_obstacle2d"
+        one, other = tmp_path / "one", tmp_path / "other"
+        data, again = study(one, *command), study(other, *command)
+        assert without_seconds(data) == without_seconds(again)
+        assert {"study", "source", "domain", "command", "versions", "found"} <= set(data)
+        picture = ET.parse(one / f"{name}.svg").getroot()
+        assert len(list(picture.iter("{http://www.w3.org/2000/svg}text"))) > 5
+        page = (one / f"{name}.md").read_text()
+        assert f"]({name}.svg)" in page
+        assert f"    {data['command']}\n" in page
+        if command[0] == "planning_time":
+            continue  # times are what it shows
+        for ending in ("svg", "md"):
+            file = f"{name}.{ending}"
+            assert (one / file).read_bytes() == (other / file).read_bytes()
+    assert {path.suffix for path in one.iterdir()} == {".json", ".svg", ".md"}
+    assert len(list(one.iterdir())) == 3 * len(commands)
+
+
+def test_data_tells_where_it_comes_from(tmp_path):
+    data = study(tmp_path, "goals", "obstacle2d", "--goals", 1, "--seeds", 1, *PLANNING)
+    assert data["command"] == (
+        f"slap study goals obstacle2d --goals 1 --shortcuts {LIBRARY} --preset fair --tasks 1 "
+        f"--seeds 1 --samples {SAMPLES}"
+    )
+    assert data["versions"]["slap_ros"]
+    library = data["library"]
+    assert (library["name"], library["shortcuts"]) == ("obstacle2d", ["Clear_On-e41568a9"])
+    assert len(library["digest"]) == 16
+
+
+def test_without_matplotlib_nothing_is_begun(monkeypatch):
+    monkeypatch.setattr("slap_ros.studies.figures.find_spec", lambda _: None)
+    code, message = refusal("pruning", "obstacle2d")
+    assert code == InvalidParameterError.code
+    assert "pip install 'slap_ros[studies]'" in message
