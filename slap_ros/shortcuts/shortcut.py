@@ -21,6 +21,7 @@ from slap_ros.shortcuts.sight import Sight
 from slap_ros.shortcuts.signature import Change, Signature
 
 HOPE = 3  # failures, on top of as many for each success, before a shortcut is given up
+WORTH = 2  # environment steps by which a noisy attempt must be shorter to be taken instead
 NARROWER = 0.7  # of the spread of variations from one round to the next
 SAME = 1e-6  # in any feature's unit: up to here a state is the one that was foreseen
 
@@ -176,8 +177,12 @@ class Rehearsal:
 
 
 def _limit(best: Attempt) -> int | None:
-    """Longer attempts than the best are of no use."""
-    return best.steps - 1 if best.reached else None
+    """Longer attempts than the best are of no use.
+
+    Nor are those a step shorter: without noise, a policy ends where training did, mostly well for
+    what comes next; noise ends anywhere.
+    """
+    return best.steps - WORTH if best.reached else None
 
 
 def _scripted(script: Weights) -> Choose:

@@ -128,6 +128,9 @@ class Sight:
         self._about = np.array(  # (atoms, objects): which atoms are about which objects
             [[obj in atom.objects for obj in self.objects] for _, atom in change.atoms(space)]
         )
+        self._about_places = np.array(
+            [atom.predicate not in self.view.grasping for _, atom in change.atoms(space)]
+        )
         self._kinds = self._of_kinds()
         self.actions = action_map(domain, signature)
 
@@ -187,7 +190,7 @@ class Sight:
         """
         missing: Array = (deficits[:, :, None] * self._about).max(axis=1)
         can_go = np.isfinite(ways[0])
-        orphans = ~(self._about & can_go).any(axis=1)
+        orphans = self._about_places & ~(self._about & can_go).any(axis=1)
         if not orphans.any() or not can_go.any():
             return missing
         choice = np.flatnonzero(can_go)

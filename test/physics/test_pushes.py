@@ -73,7 +73,7 @@ def test_nothing_tunnels_sinks_or_explodes_however_wild_the_arm(world):
                 require_sound(world.step(action))
                 world.reset(world.state)  # what a world makes, it accepts
         moved += bool(np.abs(blocks(world.state)[:, :3] - blocks(start)[:, :3]).max() > 0.01)
-    assert moved > 25
+    assert moved > 20
 
 
 def test_what_was_pushed_lies_on_the_table_or_on_the_floor(world):

@@ -18,7 +18,7 @@ from slap_ros.shortcuts.library import load_library, save_library
 from slap_ros.shortcuts.settings import Exploration, training_settings
 from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.training import Training, rank
-from slap_ros.shortcuts.workers import NoWorkers
+from slap_ros.shortcuts.workers import NoWorkers, ray_workers
 
 PLACE = Place("obstacle2d", "fair", 5)
 OURS = training_settings("ours", "obstacle2d")
@@ -52,9 +52,9 @@ class Audience:
         self.verdicts.append((name, before, after, kept))
 
 
-def train(folder, settings=SMALL, audience=None):
+def train(folder, settings=SMALL, audience=None, workers=None):
     audience = audience or Audience()
-    return Training(PLACE, settings, folder, NoWorkers(), audience).run(), audience
+    return Training(PLACE, settings, folder, workers or NoWorkers(), audience).run(), audience
 
 
 def files(folder):
@@ -86,6 +86,16 @@ def test_pushing_is_discovered_learned_and_worth_it_and_twice_the_same(tmp_path)
     loaded = load_library(tmp_path / "first", get_domain("obstacle2d"))
     assert [shortcut.name for shortcut in loaded.shortcuts] == [name]
     assert not loaded.refused
+
+
+def test_a_ray_cluster_learns_the_same(tmp_path):
+    """Where Ray is installed: ``pip install -e '.[ray]'``."""
+    pytest.importorskip("ray")
+    brief = replace(SMALL, ppo=replace(OURS.ppo, total_steps=1_024))
+    here, _ = train(tmp_path / "here", brief)
+    with ray_workers("local") as workers:
+        there, _ = train(tmp_path / "there", brief, workers=workers)
+    assert there.digest == here.digest
 
 
 def test_it_goes_on_where_it_was_interrupted(tmp_path):
