@@ -21,7 +21,9 @@ from slap_ros.shortcuts.sight import Sight
 from slap_ros.shortcuts.signature import Change, Signature
 
 HOPE = 3  # failures, on top of as many for each success, before a shortcut is given up
-WORTH = 2  # environment steps by which a noisy attempt must be shorter to be taken instead
+# Environment steps by which another attempt must be shorter to be taken instead: without noise a
+# policy ends where training did, mostly well for what comes next; noise ends anywhere.
+WORTH = 2
 NARROWER = 0.7  # of the spread of variations from one round to the next
 SAME = 1e-6  # in any feature's unit: up to here a state is the one that was foreseen
 
@@ -56,19 +58,21 @@ class Sampling:
         samples: Attempts, the first without noise. The shortest that succeeds is used.
         refinements: Rounds of random variations of the best, a cross-entropy search's last ones.
         horizon: Environment steps of an attempt (the paper's T_eval).
+        temperature: Of the noise, against training's: in a model, daring costs nothing.
         patience: Failed attempts after which, without any success, it is given up.
         spread: Standard deviation of the first refinement, of actions from -1 to 1.
     """
 
     samples: int = 16
     refinements: int = 1
+    temperature: float = 2.0
     horizon: int = 40
     patience: int = 16
     spread: float = 0.35
 
 
 DEFAULT = Sampling()
-PAPER = Sampling(samples=1, refinements=0, horizon=100)
+PAPER = Sampling(samples=1, refinements=0, temperature=1.0, horizon=100)
 
 
 @dataclass(frozen=True)
@@ -125,13 +129,15 @@ class Rehearsal:
     def _sample(
         self, policy: Policy, sight: Sight, state: State, rng: np.random.Generator
     ) -> Attempt:
+        def choose(_: int, seen: Weights) -> Weights:
+            noisy: Weights = policy.sample(seen, rng, self.sampling.temperature)[0]
+            return noisy
+
         best = self._attempt(sight, state, lambda _, seen: policy.mean(seen)[0])
         for failures in range(1, self.sampling.samples):
             if not best.reached and failures >= self.sampling.patience:
                 break
-            noisy = self._attempt(
-                sight, state, lambda _, seen: policy.sample(seen, rng)[0], _limit(best)
-            )
+            noisy = self._attempt(sight, state, choose, _shorter(best))
             best = noisy if noisy.reached else best
         return best
 
@@ -144,7 +150,7 @@ class Rehearsal:
             middle = np.clip(np.array(best.choices), -1.0, 1.0)
             for _ in range(sampling.samples):
                 varied = middle + spread * rng.standard_normal(middle.shape, dtype=np.float32)
-                attempt = self._attempt(sight, state, _scripted(varied), _limit(best))
+                attempt = self._attempt(sight, state, _scripted(varied), _shorter(best))
                 best = attempt if attempt.reached else best
             spread *= NARROWER
         return best
@@ -176,12 +182,8 @@ class Rehearsal:
         return Attempt(tuple(choices), tuple(states), False)
 
 
-def _limit(best: Attempt) -> int | None:
-    """Longer attempts than the best are of no use.
-
-    Nor are those a step shorter: without noise, a policy ends where training did, mostly well for
-    what comes next; noise ends anywhere.
-    """
+def _shorter(best: Attempt) -> int | None:
+    """How long an attempt may be to be worth taking instead of the best; None: any length."""
     return best.steps - WORTH if best.reached else None
 
 
