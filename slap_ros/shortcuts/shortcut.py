@@ -35,7 +35,7 @@ class Shortcut:
     Args:
         signature: What it changes.
         policy: How.
-        shortest: Environment steps of the shortest success in training: the lower bound in search.
+        shortest: Environment steps of the shortest success in training; half is the lower bound.
         record: How it was trained: figures and settings by name.
     """
 

@@ -208,7 +208,7 @@ class Sight:
         every, first = np.arange(len(left)), left.argmax(axis=-1)
         way = np.where(left.any(axis=-1), ways[every, first] / self.view.length_m, 0.0)
         queue = QUEUE * np.maximum(left.sum(axis=-1) - 1, 0)
-        potential: Array = -(WEIGHT * deficits.sum(axis=-1) + np.nan_to_num(way) + queue)
+        potential: Array = -(WEIGHT * deficits.sum(axis=-1) + way + queue)
         return potential
 
     def _observe(self, state: State, hand: Array, missing: Array) -> NDArray[np.float32]:
