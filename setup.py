@@ -43,6 +43,7 @@ PHYSICS = [
 TRAIN = ["torch>=2.4", "stable-baselines3>=2.3", "tensorboard>=2.15"]
 RAY = ["ray>=2.40"]
 STUDIES = ["matplotlib>=3.8"]
+DOCS = ["mkdocs>=1.6,<2"]
 TEST = [
     "pytest>=8",
     "pytest-timeout>=2.3",
@@ -52,6 +53,7 @@ TEST = [
     "setuptools>=68,<80",  # for colcon, as in pyproject.toml; what follows would raise it
     *TRAIN,
     *STUDIES,
+    *DOCS,
     "unified-planning>=1.1",
     "up-aries>=0.4",
     "colcon-common-extensions>=0.3",
@@ -114,6 +116,7 @@ setup(
         "train": TRAIN,
         "ray": RAY,
         "studies": STUDIES,
+        "docs": DOCS,
         "test": TEST,
     },
     entry_points={
