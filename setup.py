@@ -32,6 +32,7 @@ RUNTIME = [
     "lz4>=4",
     "safetensors>=0.4",
     "backports.zstd>=1; python_version < '3.14'",
+    "jinja2>=3.1",  # escapes whatever a report says
 ]
 PHYSICS = [
     # Upstream has wheels up to CPython 3.11; the fork is a drop-in with wheels for 3.12.
@@ -98,7 +99,7 @@ setup(
         "msg_schemas",
     ],
     package_data={
-        "slap_ros": ["py.typed"],
+        "slap_ros": ["py.typed", "report/page.css", "report/page.html.j2", "report/page.js"],
         "msg_schemas": ["msg/*.msg", "srv/*.srv", "action/*.action"],
     },
     data_files=[
