@@ -50,6 +50,8 @@ TEST = [
     "pytest-xdist>=3.6",
     "hypothesis>=6.100",
     "mcap>=1.2",
+    "selenium>=4.20",  # drives a Chromium, where there is one, through the pages of reports
+    "axe-core-python>=0.1",  # axe-core (MPL-2.0), which that Chromium checks them with
     "setuptools>=68,<80",  # for colcon, as in pyproject.toml; what follows would raise it
     *TRAIN,
     *STUDIES,
