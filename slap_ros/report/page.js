@@ -56,7 +56,8 @@
 
   function tick(now) {
     if (!started) return;
-    const steps = Math.floor(((now - started.at) / 1000 / data.period) * Number(speed.value));
+    const passed = Math.max(0, now - started.at); // ms; a frame's time may lie before the click
+    const steps = Math.floor((passed / 1000 / data.period) * Number(speed.value));
     const step = Math.min(started.step + steps, data.last);
     if (step !== Number(slider.value)) show(step);
     if (step >= data.last) pause();
