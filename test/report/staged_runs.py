@@ -7,6 +7,7 @@ from __future__ import annotations
 import copy
 import itertools
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -48,10 +49,10 @@ def with_markers(script: Script) -> list[Published]:
 
 
 def with_a_shortcut(script: Script) -> list[Published]:
-    """The run as if its second option were learned, with a plan that broke before it."""
+    """The run as if its second option were learned, and the plan had broken just before it."""
     messages = copy.deepcopy(script.messages)
-    (plan,) = (item.message for item in messages if item.type_name == interfaces.PLAN)
-    plan.edges[1].kind = 1
+    first = next(item for item in messages if item.type_name == interfaces.PLAN)
+    first.message.edges[1].kind = 1
     at = next(
         i
         for i, item in enumerate(messages)
@@ -59,18 +60,25 @@ def with_a_shortcut(script: Script) -> list[Published]:
         and (item.message.kind, item.message.edge) == (PlanEventKind.EDGE_STARTED, 1)
     )
     started = messages[at]
+    second = replace(first, message=copy.deepcopy(first.message))
+    second.message.header, second.message.number = started.message.header, 1
+    del second.message.edges[0]
     broken = []
-    for kind, error, text in (
-        (PlanEventKind.EDGE_STARTED, 0, ""),
-        (PlanEventKind.DIVERGED, 53, "it ended elsewhere"),
-        (PlanEventKind.PLANNING_STARTED, 0, ""),
-        (PlanEventKind.PLANNED, 0, ""),
+    for kind, plan, error, text in (
+        (PlanEventKind.EDGE_STARTED, 0, 0, ""),
+        (PlanEventKind.DIVERGED, 0, 53, "it ended elsewhere"),
+        (PlanEventKind.PLANNING_STARTED, 1, 0, ""),
+        (PlanEventKind.PLANNED, 1, 0, ""),
     ):
         event = copy.deepcopy(started)
-        event.message.kind, event.message.error_code = int(kind), error
-        event.message.error_msg = text
+        event.message.kind, event.message.plan_number = int(kind), plan
+        event.message.error_code, event.message.error_msg = error, text
         broken.append(event)
-    return [*messages[:at], *broken, *messages[at:]]
+    for item in messages[at:]:
+        if item.type_name == interfaces.PLAN_EVENT:
+            item.message.plan_number = 1
+            item.message.edge = max(0, item.message.edge - 1)
+    return [*messages[:at], *broken, second, *messages[at:]]
 
 
 def tower() -> list[Published]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import json
+import os
 import re
 import subprocess
 import sys
@@ -52,6 +54,10 @@ def test_a_run_is_told_from_its_first_step_to_its_last(bags: Bags) -> None:
     (incident,) = run.incidents
     assert (incident.kind, incident.reason) == ("diverged", "it ended elsewhere")
     assert incident.step == run.spans[1].start
+    assert run.replan_steps == (incident.step,)
+    outcomes = [[link.outcome for link in chain.links] for chain in run.chains]
+    rest = len(run.spans) - 1
+    assert outcomes == [["reached", "diverged"] + ["not begun"] * (rest - 1), ["reached"] * rest]
     assert run.scene is not None
     assert len(run.scene.frames) == metrics.plan_length + 1
 
@@ -206,6 +212,22 @@ def test_a_tower_is_told_without_pybullet(bags: Bags, tmp_path: Path) -> None:
     page = Page(output.read_text())
     assert page.data("metrics") == [evaluate_bag(bags["tower"]).runs[0].as_json()]
     assert [words for words in page.texts["li"] if "not checked" in words]
+
+
+def test_a_run_can_be_told_without_keeping_its_bag(network: int, tmp_path: Path) -> None:
+    scratch, output = tmp_path / "scratch", tmp_path / "page.html"
+    scratch.mkdir()
+    command = [sys.executable, "-m", "slap_ros.cli", "run", "obstacle2d", "--in-process", "--json"]
+    ran = subprocess.run(
+        [*command, "--seed", "3", "--shortcuts", "none", "--report", output],
+        capture_output=True,
+        text=True,
+        timeout=90,
+        env=os.environ | {"TMPDIR": str(scratch)},
+    )
+    assert ran.returncode == 0, ran.stderr
+    assert Page(output.read_text()).data("metrics") == [json.loads(ran.stdout)]
+    assert list(scratch.iterdir()) == []
 
 
 def test_a_bag_without_a_run_says_so(script: Script, tmp_path: Path) -> None:
