@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import typer
 
@@ -23,6 +23,7 @@ from slap_ros.cli.console import (
     console,
     print_json,
 )
+from slap_ros.cli.live import Dashboard
 from slap_ros.cli.render import check_renderable
 from slap_ros.cli.render import render as write_animation
 from slap_ros.cli.report import write_report
@@ -65,6 +66,9 @@ def run(
     report: Annotated[
         Path | None, typer.Option(help="Tell the run on a page, as `slap report` does: a .html.")
     ] = None,
+    live: Annotated[
+        bool, typer.Option("--live", help="Show plan and progress in place, on a terminal.")
+    ] = False,
     json: Json = False,
 ) -> int:
     """Run the whole ensemble on one task: simulator, perception, planner, skills, recorder."""
@@ -86,7 +90,8 @@ def run(
     from ensemble.run import RunRequest
     from ensemble.run import run as run_ensemble
 
-    narrator, states = Narrator(), []
+    narrator = Dashboard(console) if live and console.is_terminal else Narrator()
+    states = []
 
     def follow(type_name: str, message: Any) -> None:
         narrator(type_name, message)
@@ -98,7 +103,8 @@ def run(
             domain, preset, seed, index, planner, bag, pace, shortcuts or "", samples
         )
         request = RunRequest(settings, atoms, 0, max_replans, timeout, in_process)
-        metrics = run_ensemble(request, follow)
+        with narrator:
+            metrics = run_ensemble(request, follow)
         if json:
             print_json(metrics.as_json())
         _conclude(metrics, record)
@@ -124,6 +130,12 @@ class Narrator:
 
     def __init__(self) -> None:
         self._started = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Nothing is left to be told."""
 
     def __call__(self, type_name: str, message: Any) -> None:
         """Take a message of the run."""
