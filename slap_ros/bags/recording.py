@@ -14,7 +14,15 @@ from slap_ros.domains.domain import Action
 from slap_ros.errors import ForeignBagError
 from slap_ros.evaluation.metrics import AtomNames, atom_names
 from slap_ros.messages.decode import decode_command, decode_state, stamp_ns
-from slap_ros.messages.interfaces import ATOMS, COMMAND, DOMAIN_INFO, MARKERS, STATE, TASK
+from slap_ros.messages.interfaces import (
+    ATOMS,
+    BODIES,
+    COMMAND,
+    DOMAIN_INFO,
+    MARKERS,
+    STATE,
+    TASK,
+)
 from slap_ros.messages.protocols import (
     AtomsMessage,
     CommandMessage,
@@ -85,7 +93,7 @@ class Recording:
         commands.setdefault(msg.step, []).append(decode_command(msg))
 
     def _add_markers(self, msg: MarkersMessage) -> None:
-        if len(msg.markers):
+        if any(marker.ns == BODIES for marker in msg.markers):
             self.markers.setdefault(stamp_ns(msg.markers[0].header), msg)
 
     def domain(self) -> Domain | None:

@@ -33,8 +33,9 @@ def write_report(bags: Sequence[Path], output: Path) -> int:
     Raises:
         SlapError: A bag cannot be read, or the page not be written; there is no page then.
     """
-    found = [read_report(bag) for bag in bags]
-    write_page(output, render(found))
+    with console.status("writing the report"):
+        found = [read_report(bag) for bag in bags]
+        write_page(output, render(found))
     console.print(f"report: {output}", highlight=False)
     for bag in found:
         if bag.evaluation.damage is not None:

@@ -4,11 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 import typer
 
@@ -90,20 +90,19 @@ def run(
     from ensemble.run import RunRequest
     from ensemble.run import run as run_ensemble
 
-    narrator = Dashboard(console) if live and console.is_terminal else Narrator()
     states = []
-
-    def follow(type_name: str, message: Any) -> None:
-        narrator(type_name, message)
-        if type_name == STATE and render is not None:
-            states.append(message)
-
     with _bag(record, report, f"{domain}-{seed}") as bag:
         settings = RunSettings(
             domain, preset, seed, index, planner, bag, pace, shortcuts or "", samples
         )
         request = RunRequest(settings, atoms, 0, max_replans, timeout, in_process)
-        with narrator:
+        with _narrator(live) as narrate:
+
+            def follow(type_name: str, message: Any) -> None:
+                narrate(type_name, message)
+                if type_name == STATE and render is not None:
+                    states.append(message)
+
             metrics = run_ensemble(request, follow)
         if json:
             print_json(metrics.as_json())
@@ -125,17 +124,16 @@ def _bag(record: Path | None, report: Path | None, name: str) -> Iterator[Path |
         yield Path(folder) / name
 
 
+def _narrator(live: bool) -> AbstractContextManager[Callable[[str, Any], None]]:
+    """Whoever tells the run: in place on a terminal, in lines elsewhere."""
+    return Dashboard(console) if live and console.is_terminal else nullcontext(Narrator())
+
+
 class Narrator:
     """Tells the run as it goes, a line for each event."""
 
     def __init__(self) -> None:
         self._started = 0
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Nothing is left to be told."""
 
     def __call__(self, type_name: str, message: Any) -> None:
         """Take a message of the run."""

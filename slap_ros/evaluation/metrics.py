@@ -100,6 +100,7 @@ class RunTrace:
     first_step: int
     last_step: int
     starts: tuple[int, ...]  # the step at which each of the metrics' options began
+    goal: AtomNames | None  # None: neither a plan nor the task is known
     plans: tuple[PlanMessage, ...]  # in order
     events: tuple[PlanEventMessage, ...]  # in order
 
@@ -236,6 +237,7 @@ class RunLog:
             first_step=run.start.step,
             last_step=self._last_step(run),
             starts=tuple(execution.start.step for execution in executions),
+            goal=self._goal(run),
             plans=tuple(self._plans_of(run)),
             events=tuple(run.events),
         )

@@ -192,6 +192,7 @@ class MarkerMessage(Protocol):
     """``visualization_msgs/Marker``."""
 
     header: Header
+    ns: str
     type: int
     pose: PoseMessage
     scale: PointMessage

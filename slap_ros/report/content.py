@@ -13,7 +13,7 @@ from slap_ros.bags.evaluate import BagEvaluation, Reading, evaluate, read_runs
 from slap_ros.bags.recording import Episode, Recording
 from slap_ros.domains import Domain
 from slap_ros.errors import InvalidDomainError
-from slap_ros.evaluation.metrics import AtomNames, RunMetrics, RunTrace, atom_names, describe
+from slap_ros.evaluation.metrics import RunMetrics, RunTrace, describe
 from slap_ros.messages.protocols import KeyValueMessage
 from slap_ros.report.chain import Chain, chains
 from slap_ros.report.scene import Scene, scene
@@ -103,7 +103,7 @@ def _report(name: str, reading: Reading, trace: RunTrace, domain: Domain | None)
         bag=name,
         metrics=trace.metrics,
         task=_task(episode, trace),
-        goal=describe(_goal(episode, trace)),
+        goal=describe(trace.goal or ()),
         length=trace.last_step - trace.first_step,
         spans=spans(trace),
         incidents=incidents(trace),
@@ -117,21 +117,13 @@ def _report(name: str, reading: Reading, trace: RunTrace, domain: Domain | None)
     )
 
 
-def _goal(episode: Episode, trace: RunTrace) -> AtomNames:
-    """What was to be reached: the goal of the plans, or else the task's own."""
-    for plan in reversed(trace.plans):
-        if len(plan.goal):
-            return atom_names(plan.goal)
-    return atom_names(episode.task.goal) if episode.task is not None else frozenset()
-
-
 def _task(episode: Episode, trace: RunTrace) -> object:
     """Where a run began and what it was to reach; of an unknown start, equal to nothing else."""
     start = episode.states.get(trace.first_step)
     if start is None:
         return object()
     objects = tuple((o.name, o.type, tuple(map(float, o.features))) for o in start.objects)
-    return objects, _goal(episode, trace)
+    return objects, trace.goal
 
 
 def _period(recording: Recording) -> float:

@@ -19,9 +19,8 @@
 
   function draw(picture, step) {
     const { run, shapes, view } = picture;
-    const frames = view.orderAt.length;
     const shown = Math.min(step, run.last);
-    const frame = shown === run.last ? frames - 1 : Math.min(Math.floor(shown / run.stride), frames - 1);
+    const frame = Math.max(0, run.frames.findLastIndex((at) => at <= shown));
     view.shapes.forEach((shape, i) => {
       const paths = shape.poses[shape.at[frame]];
       paths.forEach((d, k) => shapes[i].children[k].setAttribute("d", d));

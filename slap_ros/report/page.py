@@ -201,7 +201,9 @@ def _player(shown: Sequence[Shown], last: int) -> dict[str, Any]:
         "runs": [
             {
                 "last": one.run.length,
-                "stride": one.run.scene.stride if one.run.scene is not None else 1,
+                "frames": [frame.step for frame in one.run.scene.frames]
+                if one.run.scene is not None
+                else [],
                 "spans": [
                     [span.start, span.end, _readable(f"{span.number} {span.text}")]
                     for span in one.run.spans

@@ -7,13 +7,14 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Iterable
 from dataclasses import dataclass
-from math import hypot, isfinite
+from math import hypot, nan
 
 from slap_ros.bags.recording import Episode, Recording
 from slap_ros.domains import Domain
 from slap_ros.domains.domain import VisibleBody
 from slap_ros.evaluation.metrics import RunTrace
 from slap_ros.messages.decode import decode_state, stamp_ns
+from slap_ros.messages.interfaces import BODIES
 from slap_ros.messages.protocols import MarkersMessage, StateMessage
 from slap_ros.physics.links import LINK_SHAPES
 from slap_ros.physics.panda import HAND, JOINTS, LINKS, link_poses
@@ -22,6 +23,8 @@ from slap_ros.report.traces import ROBOT
 
 CUBE = 1  # Marker.CUBE
 MAX_BODIES = 64  # a frame
+FARTHEST_M = 1e4
+LEAST_LENGTH = 0.5  # of a quaternion that is meant to be one
 MAX_FRAMES = 600  # a run; of a longer one, every second or third step and so on
 WRIST_M = 0.04  # m, above the hand's frame: where the round end of the arm meets the hand
 METAL = (0.62, 0.65, 0.69, 1.0)  # of the hand
@@ -31,6 +34,7 @@ METAL = (0.62, 0.65, 0.69, 1.0)  # of the hand
 class Frame:
     """A moment."""
 
+    step: int  # from the run's start
     bodies: tuple[VisibleBody, ...]  # in the world frame; the n-th is the same in every frame
     arm: tuple[Vector, ...]  # m: where its joints are, from the base to the hand; may be empty
 
@@ -39,8 +43,7 @@ class Frame:
 class Scene:
     """A run to be watched."""
 
-    frames: tuple[Frame, ...]
-    stride: int  # steps from one frame to the next; the last frame shows the last step
+    frames: tuple[Frame, ...]  # in the order of their steps
 
     @property
     def ends(self) -> list[tuple[VisibleBody, VisibleBody]]:
@@ -61,16 +64,15 @@ def scene(
     steps = sorted(s for s in episode.states if trace.first_step <= s <= trace.last_step)
     if not steps:
         return None
-    length = steps[-1] - steps[0]
-    stride = max(1, -(-length // MAX_FRAMES))
-    chosen = [s for s in steps if (s - steps[0]) % stride == 0]
+    chosen = steps[:: 1 + len(steps) // MAX_FRAMES]
     if chosen[-1] != steps[-1]:
         chosen.append(steps[-1])
     pictures, frames = _Pictures(recording, domain), []
     for step in chosen:
         hand, arm = _arm(episode.states[step], recording)
-        frames.append(Frame((*hand, *pictures.of(episode.states[step])), arm))
-    return Scene(tuple(frames), stride) if any(f.bodies or f.arm for f in frames) else None
+        bodies = (*hand, *pictures.of(episode.states[step]))
+        frames.append(Frame(step - trace.first_step, bodies, arm))
+    return Scene(tuple(frames)) if any(f.bodies or f.arm for f in frames) else None
 
 
 class _Pictures:
@@ -90,12 +92,12 @@ class _Pictures:
             shown = _of_markers(self._markers[newest])
         elif self._domain is not None:
             shown = self._domain.bodies(decode_state(state, self._domain.types_by_name))
-        return tuple(_finite(shown))[:MAX_BODIES]
+        return tuple(_drawable(shown))[:MAX_BODIES]
 
 
 def _of_markers(message: MarkersMessage) -> Iterable[VisibleBody]:
     for marker in message.markers:
-        if marker.type == CUBE:
+        if marker.ns == BODIES and marker.type == CUBE:
             p, q, s, c = marker.pose.position, marker.pose.orientation, marker.scale, marker.color
             yield VisibleBody(
                 marker.text,
@@ -106,11 +108,16 @@ def _of_markers(message: MarkersMessage) -> Iterable[VisibleBody]:
             )
 
 
-def _finite(bodies: Iterable[VisibleBody]) -> Iterable[VisibleBody]:
+def _is_near(number: float) -> bool:
+    """Whether something in m, or of magnitude 1, can be drawn; False for NaN."""
+    return abs(number) <= FARTHEST_M
+
+
+def _drawable(bodies: Iterable[VisibleBody]) -> Iterable[VisibleBody]:
     """Those that can be drawn: anyone may have recorded anything."""
     for body in bodies:
         numbers = (*body.position, *body.quaternion, *body.size, *body.colour)
-        if all(map(isfinite, numbers)) and hypot(*body.quaternion) > 0.5:
+        if all(map(_is_near, numbers)) and hypot(*body.quaternion) > LEAST_LENGTH:
             yield body
 
 
@@ -124,7 +131,7 @@ def _arm(
     """The hand's parts and the points of the arm, of a robot that has the Panda's joints."""
     features = _robot_features(state, recording)
     names = [*(f"joint{i + 1}" for i in range(JOINTS)), "finger"]
-    if not all(name in features and isfinite(features[name]) for name in names):
+    if not all(_is_near(features.get(name, nan)) for name in names):
         return (), ()
     *joints, finger = (features[name] for name in names)
     links = link_poses(joints, finger)

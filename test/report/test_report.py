@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import math
 import os
 import re
 import subprocess
@@ -12,14 +13,14 @@ from pathlib import Path
 
 import pytest
 from page_reader import Page
-from staged_runs import HOSTILE
+from staged_runs import HOSTILE, with_markers
 from truthful_run import Script, record
 from typer.testing import CliRunner
 
 from slap_ros.bags import evaluate_bag
 from slap_ros.cli import app
 from slap_ros.errors import InvalidParameterError, StorageFullError
-from slap_ros.messages.interfaces import ATOMS, DOMAIN_INFO
+from slap_ros.messages.interfaces import ATOMS, DOMAIN_INFO, MARKERS
 from slap_ros.report import check_output, read_report, render, write_page
 
 MIB = 2**20
@@ -90,6 +91,37 @@ def test_markers_show_what_the_domain_would(script: Script, bags: Bags, tmp_path
     for one, other in zip(with_markers.scene.frames, without.scene.frames, strict=True):
         assert [b.position for b in one.bodies] == [b.position for b in other.bodies]
         assert [b.name for b in one.bodies] == [b.name for b in other.bodies]
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -1e300])
+def test_what_cannot_be_drawn_is_left_out(script: Script, tmp_path: Path, number: float) -> None:
+    messages = with_markers(script)
+    for item in messages:
+        if item.type_name == MARKERS:
+            item.message.markers[0].pose.position.x = number
+            item.message.markers[1].scale.z = number
+    record(tmp_path / "bag", messages)
+    (run,) = read_report(tmp_path / "bag").runs
+    assert run.scene is not None
+    left = {body.name for frame in run.scene.frames for body in frame.bodies}
+    shown = script.domain.bodies(script.domain.task(7).initial_state)
+    assert left == {body.name for body in shown[2:]}
+    page_of(tmp_path / "bag")
+
+
+def test_steps_that_were_not_recorded_are_not_drawn(script: Script, tmp_path: Path) -> None:
+    gap = range(5, 9)
+    messages = [
+        item
+        for item in script.messages
+        if item.topic not in ("/slap/state", "/slap/atoms") or item.message.step not in gap
+    ]
+    record(tmp_path / "bag", messages)
+    (run,) = read_report(tmp_path / "bag").runs
+    assert run.scene is not None
+    drawn = [frame.step for frame in run.scene.frames]
+    assert drawn == [step for step in range(run.length + 1) if step not in gap]
+    assert page_of(tmp_path / "bag").data("frames")["runs"][0]["frames"] == drawn
 
 
 def test_two_runs_of_one_task_are_compared(bags: Bags) -> None:
