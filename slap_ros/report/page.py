@@ -12,10 +12,10 @@ import re
 from base64 import b64encode
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -63,19 +63,14 @@ def write_page(path: Path, text: str) -> None:
     Raises:
         StorageFullError: It cannot be written; what was there before is left alone.
     """
-    draft: Path | None = None
+    draft = path.with_name(f".{path.name}.tmp")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with NamedTemporaryFile(
-            "w", encoding="utf-8", dir=path.parent, prefix=f".{path.name}.", delete=False
-        ) as file:
-            draft = Path(file.name)
-            file.write(text)
-        draft.chmod(0o644)
+        draft.write_text(text, encoding="utf-8")
         draft.replace(path)
     except OSError as error:
-        if draft is not None:
-            draft.unlink(missing_ok=True)
+        with suppress(OSError):  # there may not even be a folder
+            draft.unlink()
         raise StorageFullError(f"cannot write {path}: {error.strerror}") from error
 
 
