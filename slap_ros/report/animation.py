@@ -33,7 +33,6 @@ T = TypeVar("T")
 class Shape:
     """A body or the arm in one view."""
 
-    name: str
     fill: str  # colour of a body; empty: the arm
     poses: tuple[tuple[str, ...], ...]  # paths, one for each element that draws it
     at: tuple[int, ...]  # which of the poses, by frame
@@ -93,7 +92,12 @@ def _moving(scene: Scene) -> frozenset[int]:
         for i, (body, start) in enumerate(zip(frame.bodies, first, strict=False))
         if any(abs(a - b) > STILL for a, b in zip(body.position, start.position, strict=True))
     )
-    return moving or frozenset(range(len(first)))
+    return moving or frozenset(range(_count(scene)))
+
+
+def _count(scene: Scene) -> int:
+    """How many bodies there are: as many as in the fullest frame."""
+    return max(len(frame.bodies) for frame in scene.frames)
 
 
 def _reach(scene: Scene, moving: frozenset[int]) -> Iterable[Vector]:
@@ -105,11 +109,10 @@ def _reach(scene: Scene, moving: frozenset[int]) -> Iterable[Vector]:
 
 
 def _draw(scene: Scene, view: View, canvas: Canvas, moving: frozenset[int]) -> Drawing:
-    count = max(len(frame.bodies) for frame in scene.frames)
-    samples = [next(f.bodies[i] for f in scene.frames if i < len(f.bodies)) for i in range(count)]
+    numbers = range(_count(scene))
+    samples = [next(f.bodies[i] for f in scene.frames if i < len(f.bodies)) for i in numbers]
     shapes = [
         _shape(
-            body.name,
             _hex(body),
             [
                 box_paths(frame.bodies[i], view, canvas) if i < len(frame.bodies) else NOTHING
@@ -121,7 +124,7 @@ def _draw(scene: Scene, view: View, canvas: Canvas, moving: frozenset[int]) -> D
     has_arm = any(frame.arm for frame in scene.frames)
     if has_arm:
         lines = [_line(frame, view, canvas) for frame in scene.frames]
-        shapes.append(_shape("arm", "", lines))
+        shapes.append(_shape("", lines))
     orders, order_at = _unique([_order(f, view, moving, samples, has_arm) for f in scene.frames])
     return Drawing(
         view.name,
@@ -133,8 +136,8 @@ def _draw(scene: Scene, view: View, canvas: Canvas, moving: frozenset[int]) -> D
     )
 
 
-def _shape(name: str, fill: str, poses: Sequence[tuple[str, ...]]) -> Shape:
-    return Shape(name, fill, *_unique(poses))
+def _shape(fill: str, poses: Sequence[tuple[str, ...]]) -> Shape:
+    return Shape(fill, *_unique(poses))
 
 
 def _unique(values: Sequence[T]) -> tuple[tuple[T, ...], tuple[int, ...]]:

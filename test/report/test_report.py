@@ -109,6 +109,17 @@ def test_what_cannot_be_drawn_is_left_out(script: Script, tmp_path: Path, number
     page_of(tmp_path / "bag")
 
 
+def test_a_run_whose_first_markers_are_nowhere_is_told(script: Script, tmp_path: Path) -> None:
+    messages = with_markers(script)
+    first = next(item.message for item in messages if item.type_name == MARKERS)
+    for marker in first.markers:
+        marker.pose.position.x = math.nan
+    record(tmp_path / "bag", messages)
+    drawn = page_of(tmp_path / "bag").data("frames")["runs"][0]["views"][0]["shapes"]
+    assert all(shape["poses"][shape["at"][0]] == ["", "", ""] for shape in drawn)
+    assert any(shape["poses"][shape["at"][1]] != ["", "", ""] for shape in drawn)
+
+
 def test_steps_that_were_not_recorded_are_not_drawn(script: Script, tmp_path: Path) -> None:
     gap = range(5, 9)
     messages = [
