@@ -32,6 +32,7 @@ RUNTIME = [
     "lz4>=4",
     "safetensors>=0.4",
     "backports.zstd>=1; python_version < '3.14'",
+    "jinja2>=3.1",  # escapes whatever a report says
 ]
 PHYSICS = [
     # Upstream has wheels up to CPython 3.11; the fork is a drop-in with wheels for 3.12.
@@ -50,6 +51,8 @@ TEST = [
     "pytest-xdist>=3.6",
     "hypothesis>=6.100",
     "mcap>=1.2",
+    "selenium>=4.20",  # drives a Chromium, where there is one, through the pages of reports
+    "axe-core-python>=0.1",  # axe-core (MPL-2.0), which that Chromium checks them with
     "setuptools>=68,<80",  # for colcon, as in pyproject.toml; what follows would raise it
     *TRAIN,
     *STUDIES,
@@ -100,7 +103,7 @@ setup(
         "msg_schemas",
     ],
     package_data={
-        "slap_ros": ["py.typed"],
+        "slap_ros": ["py.typed", "report/page.css", "report/page.html.j2", "report/page.js"],
         "msg_schemas": ["msg/*.msg", "srv/*.srv", "action/*.action"],
     },
     data_files=[
