@@ -13,6 +13,7 @@ from gymnasium.spaces import Box
 MAX_STEP = 0.1  # displacement along each axis in a step
 PERIOD = 0.1  # s, a step; nominal, as nothing moves by itself
 LOW = 0.02  # height of the hand below which it touches marbles
+HIGHEST = (1.0, 1.0, 0.2)  # of the hand, which is above the tray
 GRASP_REACH = 0.03  # from the hand to a marble, seen from above
 FAN = 0.25  # half the width of the open fan, along y
 GUTTER = 0.9  # x from which on there is no tray
@@ -26,8 +27,8 @@ class MarblesEnv(gymnasium.Env[Features, Any]):
     """A hand (x, y, z) and marbles (x, y, held), each a dictionary entry by its name.
 
     Actions: displacement of the hand, then the gripper. The fan closes around a marble below it,
-    and otherwise stays open. Open and low, it pushes to the right what it meets. A marble that is let
-    go falls where it is; in the gutter it stays.
+    and otherwise stays open. Open and low, it pushes to the right what it meets. A marble that is
+    let go falls where it is; in the gutter it stays.
     """
 
     action_space = Box(np.float32([-MAX_STEP] * 3 + [-1]), np.float32([MAX_STEP] * 3 + [1]))
@@ -56,7 +57,7 @@ class MarblesEnv(gymnasium.Env[Features, Any]):
             held[:] = (IN_GUTTER if held[0] >= GUTTER else held[0], held[1], 0.0)
             held = None
         before = hand.copy()
-        hand[:] = np.clip(hand + displacement, 0.0, 1.0)
+        hand[:] = np.clip(hand + displacement, 0.0, HIGHEST)
         if held is not None:
             held[:2] = hand[:2]
         elif min(before[2], hand[2]) < LOW:
