@@ -43,6 +43,11 @@ PHYSICS = [
 TRAIN = ["torch>=2.4", "stable-baselines3>=2.3", "tensorboard>=2.15"]
 RAY = ["ray>=2.40"]
 STUDIES = ["matplotlib>=3.8"]
+MESHES = [  # other objects than those that come with it; Objaverse's own client
+    "coacd>=1.0.4",
+    "trimesh>=4.4",
+    "objaverse>=0.1.7",
+]
 TEST = [
     "pytest>=8",
     "pytest-timeout>=2.3",
@@ -98,7 +103,7 @@ setup(
         "msg_schemas",
     ],
     package_data={
-        "slap_ros": ["py.typed"],
+        "slap_ros": ["py.typed", "domains/cleanup_table/shapes/*.obj"],
         "msg_schemas": ["msg/*.msg", "srv/*.srv", "action/*.action"],
     },
     data_files=[
@@ -114,6 +119,7 @@ setup(
         "train": TRAIN,
         "ray": RAY,
         "studies": STUDIES,
+        "meshes": MESHES,
         "test": TEST,
     },
     entry_points={
