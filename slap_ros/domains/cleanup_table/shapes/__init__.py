@@ -12,7 +12,7 @@ from types import MappingProxyType
 from slap_ros.meshes.obj import from_obj
 from slap_ros.meshes.solid import Solid
 
-TOYS = ("duck", "robot", "dinosaur")
+TOYS = ("duck", "toy_robot", "dinosaur")
 WIPER = "wiper"
 
 

@@ -85,7 +85,7 @@ def duck() -> list[Piece]:
     return [stack(body), stack(head), stack(beak, sides=4), stack(tail, sides=4)]
 
 
-def robot() -> list[Piece]:
+def toy_robot() -> list[Piece]:
     """6 cm high, arms at its sides."""
     pieces = [
         block((-0.014, -0.018, 0.016), (0.014, 0.018, 0.042)),  # trunk
@@ -128,7 +128,7 @@ def wiper() -> list[Piece]:
 
 SHAPES: Mapping[str, list[Piece]] = {
     "duck": duck(),
-    "robot": robot(),
+    "toy_robot": toy_robot(),
     "dinosaur": dinosaur(),
     "wiper": wiper(),
 }
