@@ -70,6 +70,16 @@ class Solid:
         return np.concatenate([np.array(piece.vertices) for piece in self.pieces])
 
     @cached_property
+    def corners(self) -> tuple[Vector, ...]:
+        """Three vertices for each triangle of each piece, m."""
+        return tuple(
+            piece.vertices[index]
+            for piece in self.pieces
+            for triangle in piece.triangles
+            for index in triangle
+        )
+
+    @cached_property
     def bounds(self) -> OrientedBox:
         """The smallest box around it along its own axes."""
         return _around(self.points)

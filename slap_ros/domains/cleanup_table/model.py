@@ -185,7 +185,8 @@ def _all_of(*margins: Array) -> Array:
     """
     parts = np.stack(margins)
     missing = np.minimum(parts, 0.0).sum(axis=0)
-    return np.where(missing < 0.0, missing, np.minimum.reduce(parts))
+    together: Array = np.where(missing < 0.0, missing, np.minimum.reduce(parts))
+    return together
 
 
 def _idle(margin: Array, busy: Bools) -> Array:
