@@ -53,6 +53,7 @@ from slap_ros.relational import Object, State
 YAWS = 16  # of the hand, evenly round
 FINGER_ROOM = 0.005  # m, on each side of a block between the open fingers
 UNDER = 0.016  # m, from the table to the grasp point at least, for the fingers' ends
+HIGHER = 0.008  # m, of a grasp whose palm stays above what stands beside a block
 PALM = 0.036  # m, from the grasp point to a block's top at most
 LIFT_SLACK = 0.02  # m, by which a lifted block is higher than it need be
 READY_SLACK = 0.005  # m, the same of the hand where it lets go
@@ -166,12 +167,16 @@ def grasps(state: State, block: Object, table: Object) -> list[Pose]:
     frame, half = carried(state, block)
     box = Box(pose_of(state, block).compose(frame), half)
     x, y, z = pose_of(state, block).position
-    height = max(z, top_of(box_of(state, table)) + UNDER, top_of(box) - PALM)
-    if height - z >= GRASP_REACH:
-        return []
-    poses = [from_above((x, y, height), 2.0 * math.pi * k / YAWS) for k in range(YAWS)]
+    lowest = max(z, top_of(box_of(state, table)) + UNDER, top_of(box) - PALM)
     yaw = _yaw(pose_of(state, block))
-    poses += [from_above((x, y, height), yaw + k * math.pi / 2) for k in range(4)]
+    yaws = [2.0 * math.pi * k / YAWS for k in range(YAWS)]
+    yaws += [yaw + k * math.pi / 2 for k in range(4)]
+    poses = [
+        from_above((x, y, height), yaw)
+        for height in (lowest, lowest + HIGHER)
+        for yaw in yaws
+        if height - z < GRASP_REACH
+    ]
     return [pose for pose in poses if _fits(box, pose)]
 
 
@@ -243,14 +248,14 @@ def _to_over(state: State, block: Object, table: Object) -> Crossing:
     touching = SURROUNDINGS.checker(state, (block,))
     height = pose_of(state, block).position[2] + OVER
 
-    def comes_down(over: Pose, q: Joints) -> bool:
-        return linear_motion(q, ends[over], free=touching) is not None
+    below: dict[Pose, list[Pose]] = {}
+    for grasp in grasps(state, block, table):
+        below.setdefault(shifted(grasp, (0.0, 0.0, height - grasp.position[2])), []).append(grasp)
 
-    ends = {
-        shifted(grasp, (0.0, 0.0, height - grasp.position[2])): grasp
-        for grasp in grasps(state, block, table)
-    }
-    return Crossing(state, list(ends), comes_down)
+    def comes_down(over: Pose, q: Joints) -> bool:
+        return any(linear_motion(q, grasp, free=touching) is not None for grasp in below[over])
+
+    return Crossing(state, list(below), comes_down)
 
 
 @remembered
