@@ -59,12 +59,17 @@ def load_mesh(file: Path, size_m: float, fineness: Fineness = USUAL) -> Solid:
         content = file.read_bytes()
     except OSError as error:
         raise MeshUnavailableError(f"{file} cannot be read: {error.strerror}") from error
-    settings = repr((FORMAT, file.suffix.lower(), size_m, astuple(fineness))).encode()
-    digest = hashlib.blake2b(content, key=hashlib.blake2b(settings).digest(), digest_size=16)
-    kept = cache_folder() / f"{digest.hexdigest()}.obj"
+    kept = kept_at(content, file.suffix.lower(), size_m, fineness)
     if not kept.exists():
         keep(kept, to_obj(_decomposed(file, size_m, fineness)).encode())
     return Solid.of(from_obj(kept.read_text(encoding="utf-8")))
+
+
+def kept_at(content: bytes, suffix: str, size_m: float, fineness: Fineness = USUAL) -> Path:
+    """Where the pieces of a mesh are kept, for what its file has in it and how that ends."""
+    settings = repr((FORMAT, suffix, size_m, astuple(fineness))).encode()
+    digest = hashlib.blake2b(content, key=hashlib.blake2b(settings).digest(), digest_size=16)
+    return cache_folder() / f"{digest.hexdigest()}.obj"
 
 
 def _decomposed(file: Path, size_m: float, fineness: Fineness) -> list[Piece]:

@@ -8,6 +8,7 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +27,21 @@ class Piece(NamedTuple):
 
     vertices: tuple[Vector, ...]  # m
     triangles: tuple[tuple[int, int, int], ...]  # indices of vertices, anticlockwise from outside
+
+
+# Of a box whose corners come in the order of their coordinates, z the fastest.
+_FACES = (
+    *((0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5)),
+    *((0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6)),
+    *((0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)),
+)
+
+
+def cuboid(half: Vector) -> Piece:
+    """A box by half its edges, m."""
+    x, y, z = half
+    corners = product((-x, x), (-y, y), (-z, z))
+    return Piece(tuple(corners), _FACES)
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,7 +25,7 @@ from typing import NamedTuple
 import pybullet
 
 from slap_ros.meshes.obj import to_obj
-from slap_ros.meshes.solid import Solid
+from slap_ros.meshes.solid import Solid, cuboid
 from slap_ros.physics.links import LINK_SHAPES
 from slap_ros.physics.panda import CONTROL_PERIOD_S
 from slap_ros.physics.pose import NO_TURN, ORIGIN, Pose, Vector, conjugate, multiply
@@ -78,12 +78,8 @@ def _parking(index: int) -> Vector:
     return (20.0 + 3.0 * index, 20.0, 1.0)
 
 
-def _inertia(shape: Shape, mass_kg: float) -> dict[str, Vector]:
-    """What PyBullet, which takes pieces for the box around them, must be told; in kg m²."""
-    if not isinstance(shape, Solid):
-        return {}
-    x, y, z = shape.inertia
-    return {"localInertiaDiagonal": (mass_kg * x, mass_kg * y, mass_kg * z)}
+def _solid(shape: Shape) -> Solid:
+    return shape if isinstance(shape, Solid) else Solid.of([cuboid(shape)])
 
 
 class Simulation:
@@ -98,6 +94,9 @@ class Simulation:
         self.stepping = stepping
         self.client: int = pybullet.connect(pybullet.DIRECT)
         self._fixed_poses: tuple[Pose, ...] = ()
+        # Pieces rest on their faces only where both know them; else one point at a time is found
+        # in which they touch, and they rock on it. Boxes among themselves need no help.
+        self._faceted = any(isinstance(body.shape, Solid) for body in scene.bodies)
         pybullet.resetSimulation(pybullet.RESET_USE_SIMPLE_BROADPHASE, self.client)
         pybullet.setGravity(0.0, 0.0, -GRAVITY, self.client)
         pybullet.setPhysicsEngineParameter(
@@ -105,6 +104,7 @@ class Simulation:
             numSolverIterations=stepping.iterations,
             deterministicOverlappingPairs=1,
             collisionFilterMode=0,  # both bodies must want a contact, not either
+            enableSAT=int(self._faceted),
             physicsClientId=self.client,
         )
         self._parked = 0
@@ -147,7 +147,7 @@ class Simulation:
                     mass=material.mass_kg,
                     lateralFriction=material.friction,
                     physicsClientId=self.client,
-                    **_inertia(self.scene.free[i].shape, material.mass_kg),
+                    **self._inertia(self.scene.free[i].shape, material.mass_kg),
                 )
                 self._materials[i] = material
 
@@ -240,8 +240,8 @@ class Simulation:
     # -- building -------------------------------------------------------------------------------
 
     def _shape(self, shape: Shape) -> int:
-        if isinstance(shape, Solid):
-            return self._pieces(shape)
+        if self._faceted:
+            return self._pieces(_solid(shape))
         box: int = pybullet.createCollisionShape(
             pybullet.GEOM_BOX, halfExtents=shape, physicsClientId=self.client
         )
@@ -253,9 +253,19 @@ class Simulation:
             file = Path(folder) / f"{shape.digest.hex()}.obj"
             file.write_text(to_obj(shape.pieces), encoding="utf-8")
             compound: int = pybullet.createCollisionShape(
-                pybullet.GEOM_MESH, fileName=str(file), physicsClientId=self.client
+                pybullet.GEOM_MESH,
+                fileName=str(file),
+                flags=pybullet.URDF_INITIALIZE_SAT_FEATURES,
+                physicsClientId=self.client,
             )
         return compound
+
+    def _inertia(self, shape: Shape, mass_kg: float) -> dict[str, Vector]:
+        """What PyBullet, which takes pieces for the box around them, must be told; in kg m²."""
+        if not self._faceted:
+            return {}
+        x, y, z = _solid(shape).inertia
+        return {"localInertiaDiagonal": (mass_kg * x, mass_kg * y, mass_kg * z)}
 
     def _add(self, shape: int, mass: float, friction: float, group: int, meets: int) -> int:
         body: int = pybullet.createMultiBody(

@@ -33,7 +33,7 @@ from slap_ros.relational import GroundAtom, Object, State
 STEP_LIMIT = 600  # environment steps
 TRIES = 1_000  # places drawn for a toy before all are drawn anew
 ROUNDS = 100  # before there is said to be no room
-RESTING = 0.001  # over the table: what PyBullet keeps hulls apart
+
 
 Place = tuple[float, float, float]  # x, y, yaw
 Range = tuple[float, float]
@@ -144,7 +144,7 @@ def _names(shapes: Mapping[str, Solid], count: int) -> Sequence[str]:
 
 def _block(shape: Solid, material: Material, x: float, y: float, yaw: float) -> Mapping[str, float]:
     middle, half = shape.bounds
-    z = TABLE_TOP + half[2] - middle.position[2] + RESTING
+    z = TABLE_TOP + half[2] - middle.position[2]
     turn = (0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
     return {
         **body_features((x, y, z), turn),
