@@ -64,24 +64,48 @@ JOINTS = tuple(feature.name for feature in JOINT_FEATURES)
 GRASP = np.array((*GRASP_IN_LAST_LINK.position, 1.0))
 TINY = float(np.finfo(np.float64).tiny)
 
-Indices = NDArray[np.intp]
-
 
 # -- where everything is --------------------------------------------------------------------------
+
+Indices = NDArray[np.intp]
+X, Y, Z, W = range(4)
+
+
+def _to_up() -> Array:
+    """The linear map from the products of a quaternion's parts to how far its axes point up."""
+    to = np.zeros((4, 4, 3))
+    to[X, Z, 0], to[Y, W, 0] = 2.0, -2.0
+    to[Y, Z, 1], to[X, W, 1] = 2.0, 2.0
+    to[Z, Z, 2], to[W, W, 2], to[X, X, 2], to[Y, Y, 2] = 1.0, 1.0, -1.0, -1.0
+    return to.reshape(16, 3)
+
+
+TO_UP = _to_up()
+SUM = np.ones(3)
+BLOCK_READ = (*POSITION, *TURN, *VELOCITY, "held", *HALF, *MIDDLE)
+SURFACE_READ = ("x", "y", "qw", "qz", "z", *HALF, "is_drawer")  # complex numbers first
 
 
 @dataclass(frozen=True, eq=False)
 class Things:
-    """The blocks and surfaces of a layout, by their numbers."""
+    """The blocks and surfaces of a layout, and where their features are."""
 
     blocks: Column
     surfaces: Column
+    read: tuple[Indices, Indices]  # (blocks, BLOCK_READ), (surfaces, SURFACE_READ)
+    others: Bools  # of each block, shape (blocks, blocks)
 
     @staticmethod
     @lru_cache(maxsize=256)
     def of(layout: Layout) -> Things:
         """Those of a layout."""
-        return Things(layout.column_of(BLOCK), layout.column_of(SURFACE))
+        blocks, surfaces = layout.column_of(BLOCK), layout.column_of(SURFACE)
+        return Things(
+            blocks,
+            surfaces,
+            (layout.grid(blocks, BLOCK_READ), layout.grid(surfaces, SURFACE_READ)),
+            ~np.eye(len(blocks.objects), dtype=bool),
+        )
 
     @staticmethod
     @lru_cache(maxsize=4096)
@@ -104,23 +128,25 @@ class Scenery(NamedTuple):
 def scenery(state: State) -> Scenery:
     """How everything is: all at once, as predicates share most of it."""
     things = Things.of(state.layout)
-    place, bottom, top = _extents(state, things.blocks)
-    held = state.stack(things.blocks, "held") > 0.5
+    blocks, surfaces = (state.data.take(read, axis=-1) for read in things.read)
+    bottom, top = _extents(blocks)
+    held = blocks[..., 10] > 0.5
     full = np.logical_or.reduce(held, axis=-1)
-    table_top = _table_top(state, things.surfaces)
+    # The bin is lower than the table.
+    table_top = np.maximum.reduce(surfaces[..., 4] + surfaces[..., 7], axis=-1)
 
     # What is in the hand is in nobody's way, and need only be higher than what is not.
     tops = np.where(held, -np.inf, top)
-    others = np.where(np.eye(held.shape[-1], dtype=bool), -np.inf, tops[..., None, :])
+    others = np.where(things.others, tops[..., None, :], -np.inf)
     highest_other = np.maximum(np.maximum.reduce(others, axis=-1), table_top[..., None])
     highest = np.maximum(np.maximum.reduce(tops, axis=-1), table_top)
 
     hand = grasp_point(state)
-    way = hand[..., None, :] - place
-    aside = ASIDE - np.sqrt(np.square(way[..., :2]).sum(axis=-1))
-    ready = _all_of(aside, BAND - np.abs(way[..., 2] - OVER))
+    way = hand[..., None, :] - blocks[..., :3]
+    aside = ASIDE - np.hypot(way[..., 0], way[..., 1])
+    ready = _all_of(np.stack([aside, BAND - np.abs(way[..., 2] - OVER)]))
     return Scenery(
-        _on(state, things, place, bottom, held),
+        _on(blocks, surfaces, bottom, held),
         bottom - highest_other - CLEAR,
         _idle(ready, full[..., None]),
         _idle(hand[..., 2] - TIP - highest - HAND_CLEAR, full),
@@ -136,57 +162,51 @@ def grasp_point(state: State) -> Array:
     return point.reshape(*joints.shape[:-1], 3)
 
 
-def _extents(state: State, blocks: Column) -> tuple[Array, Array, Array]:
-    """Blocks' origins, shape (..., blocks, 3), and heights of their lowest and highest points."""
-    place = state.gather(blocks, POSITION)
-    x, y, z, w = np.moveaxis(state.gather(blocks, TURN), -1, 0)
-    up = np.stack([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], axis=-1)
-    middle = place[..., 2] + (up * state.gather(blocks, MIDDLE)).sum(axis=-1)
-    reach = (np.abs(up) * state.gather(blocks, HALF)).sum(axis=-1)
-    return place, middle - reach, middle + reach
+def _extents(blocks: Array) -> tuple[Array, Array]:
+    """Heights of the lowest and highest points of the boxes around blocks, shape (..., blocks)."""
+    q = blocks[..., 3:7]
+    up = (q[..., :, None] * q[..., None, :]).reshape(*q.shape[:-1], 16) @ TO_UP
+    middle = blocks[..., 2] + (up * blocks[..., 14:17]) @ SUM
+    reach = (np.abs(up) * blocks[..., 11:14]) @ SUM
+    return middle - reach, middle + reach
 
 
-def _table_top(state: State, surfaces: Column) -> Array:
-    """Height of the highest surface: the bin is lower than the table."""
-    top: Array = np.maximum.reduce(
-        state.stack(surfaces, "z") + state.stack(surfaces, "half_z"), axis=-1
-    )
-    return top
-
-
-def _on(state: State, things: Things, place: Array, bottom: Array, held: Bools) -> Array:
+def _on(blocks: Array, surfaces: Array, bottom: Array, held: Bools) -> Array:
     """Blocks are on the table as long as they are low; in the bin when they have landed in it."""
-    surfaces = things.surfaces
-    middle, half = state.gather(surfaces, POSITION), state.gather(surfaces, HALF)
-    sin, cos = state.stack(surfaces, "qz"), state.stack(surfaces, "qw")
-    sin, cos = 2 * sin * cos, cos * cos - sin * sin
-    way = place[..., :, None, :] - middle[..., None, :, :]
-    along = cos[..., None, :] * way[..., 0] + sin[..., None, :] * way[..., 1]
-    across = cos[..., None, :] * way[..., 1] - sin[..., None, :] * way[..., 0]
-    is_drawer = (state.stack(surfaces, "is_drawer") > 0.5)[..., None, :]
-    room = np.where(is_drawer, WALL, 0.0)
-    covers = (
-        half[..., None, :, 0] - room - np.abs(along),
-        half[..., None, :, 1] - room - np.abs(across),
+    is_drawer = (surfaces[..., 8] > 0.5)[..., None, :]
+    z, half_z = surfaces[..., None, :, 4], surfaces[..., None, :, 7]
+    walls = np.where(is_drawer, WALL, 0.0)[..., None]
+
+    # Sideways, vectors are complex numbers: turned by a product.
+    pairs = np.ascontiguousarray(surfaces[..., None, :, :4]).view(np.complex128)
+    place = np.ascontiguousarray(blocks[..., :2]).view(np.complex128)
+    way = (place - pairs[..., 0]) * np.square(pairs[..., 1].conj())
+    sideways = surfaces[..., None, :, 5:7] - walls - np.abs(way[..., None].view(np.float64))
+
+    gap = bottom[..., :, None] - z - half_z
+    inside = half_z - np.abs(blocks[..., 2, None] - z)
+    slow = SETTLING * (SLOW - np.sqrt(np.square(blocks[..., 7:10]) @ SUM))[..., None]
+    on = _all_of(
+        np.stack(
+            [
+                sideways[..., 0],
+                sideways[..., 1],
+                np.where(is_drawer, inside, LOW - np.abs(gap)),
+                np.where(is_drawer, slow, np.inf),
+            ]
+        )
     )
-    gap = bottom[..., :, None] - (middle + half)[..., None, :, 2]
-    inside = half[..., None, :, 2] - np.abs(way[..., 2])
-    speed = np.sqrt(np.square(state.gather(things.blocks, VELOCITY)).sum(axis=-1))
-    slow = np.broadcast_to(SETTLING * (SLOW - speed)[..., None], gap.shape)
-    on_table = _all_of(*covers, LOW - np.abs(gap))
-    in_bin = _idle(_all_of(*covers, inside, slow), held[..., :, None])
-    return np.where(is_drawer, in_bin, on_table)
+    return _idle(on, is_drawer & held[..., :, None])
 
 
-def _all_of(*margins: Array) -> Array:
-    """The least of some margins; where several are missing, all that is missing.
+def _all_of(margins: Array) -> Array:
+    """The least of margins along the first axis; where several are missing, all that is missing.
 
     So what is pushed towards the bin comes nearer to it even while it is too high.
     """
-    parts = np.stack(margins)
-    missing = np.minimum(parts, 0.0).sum(axis=0)
-    together: Array = np.where(missing < 0.0, missing, np.minimum.reduce(parts))
-    return together
+    missing: Array = np.add.reduce(np.minimum(margins, 0.0), axis=0)
+    least: Array = np.minimum.reduce(margins)
+    return np.where(missing < 0.0, missing, least)
 
 
 def _idle(margin: Array, busy: Bools) -> Array:

@@ -113,6 +113,8 @@ class Crossing:
     @cached_property
     def _goals(self) -> list[tuple[Path, Pose]]:
         """Straight ways to the ends, the nearest first."""
+        if not self.ends:
+            return []
         q = joints_of(self.state)
         found = nearest_configurations(self.ends, q, free=self.touching)
         ways = [
