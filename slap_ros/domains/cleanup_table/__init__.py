@@ -17,6 +17,7 @@ from types import MappingProxyType
 from slap_ros.domains.cleanup_table import model, skills, tasks
 from slap_ros.domains.cleanup_table.scenery import scene_of
 from slap_ros.domains.cleanup_table.shapes import shipped
+from slap_ros.domains.cleanup_table.view import VIEW
 from slap_ros.domains.domain import ActionSpace, Domain
 from slap_ros.domains.tabletop.showing import animation, visible_bodies
 from slap_ros.domains.tabletop.timing import AtSpeedLimit, InTens, Timing
@@ -71,6 +72,7 @@ def make(
         step_limit=tasks.STEP_LIMIT,
         bodies=lambda state: visible_bodies(scene(state), state),
         animate=animation(scene),
+        view=VIEW,
         learned_actions=ACTION_SPACE,
         configuration=settings.as_configuration(),
     )

@@ -52,8 +52,9 @@ THING_FEATURES = (
 )
 THING = Type("thing")
 BLOCK = Type("block", (*BODY_FEATURES, *MATERIAL_FEATURES, *THING_FEATURES), THING)
+TOOL = Type("tool", BLOCK.features, BLOCK)  # the wiper: what is learned with it is not with a toy
 SURFACE = Type("surface", (*POSE_FEATURES, *THING_FEATURES), THING)
-TYPES = (ROBOT, THING, BLOCK, SURFACE)
+TYPES = (ROBOT, THING, BLOCK, TOOL, SURFACE)
 
 POSITION = ("x", "y", "z")
 TURN = ("qx", "qy", "qz", "qw")

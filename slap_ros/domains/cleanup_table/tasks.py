@@ -11,7 +11,7 @@ from itertools import islice
 
 import numpy as np
 
-from slap_ros.domains.cleanup_table.model import BLOCK, HALF, IS_DRAWER, MIDDLE, ON, SURFACE
+from slap_ros.domains.cleanup_table.model import BLOCK, HALF, IS_DRAWER, MIDDLE, ON, SURFACE, TOOL
 from slap_ros.domains.cleanup_table.scenery import BIN, MATERIAL, TABLE, TABLE_TOP, kind_of
 from slap_ros.domains.cleanup_table.shapes import WIPER
 from slap_ros.domains.domain import Task
@@ -51,7 +51,7 @@ def make_task(
     """
     features: dict[Object, Mapping[str, float]] = {ROBOT("robot"): robot_features(HOME)}
     for name, place in places.items():
-        block = BLOCK(name)
+        block = (TOOL if name == WIPER else BLOCK)(name)
         features[block] = _block(shapes[kind_of(block)], material, *place)
     features[SURFACE("bin")] = _surface(BIN, is_drawer=1.0)
     features[SURFACE("table")] = _surface(TABLE, is_drawer=0.0)
