@@ -45,6 +45,11 @@ TRAIN = ["torch>=2.4", "stable-baselines3>=2.3", "tensorboard>=2.15"]
 RAY = ["ray>=2.40"]
 STUDIES = ["matplotlib>=3.8"]
 DOCS = ["mkdocs>=1.6,<2"]
+MESHES = [  # other objects than those that come with it; Objaverse's own client
+    "coacd>=1.0.4",
+    "trimesh>=4.4",
+    "objaverse>=0.1.7",
+]
 TEST = [
     "pytest>=8",
     "pytest-timeout>=2.3",
@@ -103,7 +108,13 @@ setup(
         "msg_schemas",
     ],
     package_data={
-        "slap_ros": ["py.typed", "report/page.css", "report/page.html.j2", "report/page.js"],
+        "slap_ros": [
+            "py.typed",
+            "domains/cleanup_table/shapes/*.obj",
+            "report/page.css",
+            "report/page.html.j2",
+            "report/page.js",
+        ],
         "msg_schemas": ["msg/*.msg", "srv/*.srv", "action/*.action"],
     },
     data_files=[
@@ -120,6 +131,7 @@ setup(
         "ray": RAY,
         "studies": STUDIES,
         "docs": DOCS,
+        "meshes": MESHES,
         "test": TEST,
     },
     entry_points={

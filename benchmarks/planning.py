@@ -14,7 +14,7 @@ from time import process_time
 
 from benchmarks.printing import show
 from slap_ros.domains import get_domain
-from slap_ros.domains.obstacle_tower.skills import forget
+from slap_ros.domains.tabletop.ways import forget
 from slap_ros.planning.plan import PlanningResult
 from slap_ros.planning.planner import make_planner
 

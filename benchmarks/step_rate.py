@@ -5,13 +5,15 @@
 Obstacle 2D: many worlds in one numpy batch against one world at a time, the same arithmetic.
 Obstacle Tower: the physics step against plain stepping (``benchmarks.physics_step``), random
 actions from home (away) and an arm kept in the tower (contact).
-Both: the atoms of a state that was not seen before.
+Cleanup Table: world and atoms against plain stepping alone, random actions from home.
+All: the atoms of a state that was not seen before.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Mapping
+from statistics import median
 from time import process_time
 from typing import Any
 
@@ -26,6 +28,7 @@ BATCH = 20_000  # worlds
 ROUNDS = 30
 SINGLE_STEPS = 3_000
 EPISODE = 50  # steps
+TURNS = 3  # of plain stepping and ours, as others share the machine
 
 
 def obstacle2d() -> dict[str, Any]:
@@ -73,6 +76,24 @@ def obstacle_tower() -> dict[str, Any]:
     }
 
 
+def cleanup_table() -> dict[str, Any]:
+    """World and atoms against a plain world without them."""
+    from benchmarks.physics_step import Plain, away, steps_per_second
+    from slap_ros.domains.cleanup_table.scenery import scene_of
+    from slap_ros.domains.cleanup_table.shapes import shipped
+
+    domain = get_domain("cleanup_table")
+    initial = get_domain("cleanup_table", "paper").task(0).initial_state
+    plain = Plain(scene_of(initial, shipped()), initial)
+    rates = [(steps_per_second(plain, away()), with_atoms(domain)) for _ in range(TURNS)]
+    return {
+        "plain_steps_per_s": max(rate for rate, _ in rates),
+        "with_atoms_steps_per_s": max(rate for _, rate in rates),
+        "ratio": median(ours / theirs for theirs, ours in rates),
+        "atoms_us": atoms_us(domain),
+    }
+
+
 def with_atoms(domain: Domain) -> float:
     """Steps a second of world and perception, random actions from the start of a task."""
     initial = get_domain(domain.name, "paper").task(0).initial_state
@@ -105,6 +126,7 @@ def atoms_us(domain: Domain) -> float:
 BENCHMARKS: Mapping[str, Callable[[], dict[str, Any]]] = {
     "obstacle2d": obstacle2d,
     "obstacle_tower": obstacle_tower,
+    "cleanup_table": cleanup_table,
 }
 
 

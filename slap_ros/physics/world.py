@@ -9,7 +9,6 @@ action, bit for bit (``docs/physics.md`` says how, and what it costs).
 
 from __future__ import annotations
 
-import math
 import weakref
 from dataclasses import replace
 from types import TracebackType
@@ -71,7 +70,7 @@ class PandaWorld:
         self._reader = Reader.of(scene, state.layout)
         self._standing: dict[object, bool] = {}
         self._solid = [i for i, body in enumerate(scene.fixed) if body.solid]
-        self._radii = [math.hypot(*body.half_extents_m) for body in scene.free]
+        self._radii = [body.radius for body in scene.free]
         self._adopt(state)
         self._simulation = borrow(scene, stepping)
         self._closing = weakref.finalize(self, give_back, self._simulation)

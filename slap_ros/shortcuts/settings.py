@@ -123,6 +123,15 @@ SETTINGS: Mapping[str, Mapping[str, TrainingSettings]] = {
             horizon=30,
             starts=200,
         ),
+        "cleanup_table": replace(
+            OURS,
+            exploration=Exploration(nodes=13),  # all that is grasped, and lifted
+            ppo=replace(LEARN, total_steps=150_000),
+            polish=replace(POLISH, total_steps=100_000),
+            horizon=60,
+            starts=150,
+            shortcuts=2,
+        ),
         "": OURS,
     },
     "paper": {

@@ -16,8 +16,10 @@ from types import MappingProxyType
 
 from slap_ros.domains.domain import ActionSpace, Domain
 from slap_ros.domains.obstacle_tower import model, skills, tasks
-from slap_ros.domains.obstacle_tower.scenery import animate, scene_of, visible_bodies
+from slap_ros.domains.obstacle_tower.scenery import scene_of
 from slap_ros.domains.obstacle_tower.view import VIEW
+from slap_ros.domains.tabletop.showing import animation, visible_bodies
+from slap_ros.domains.tabletop.timing import AtSpeedLimit, InTens, Timing
 from slap_ros.domains.variation import varied
 from slap_ros.physics.features import ROBOT
 from slap_ros.physics.panda import CONTROL_PERIOD_S
@@ -30,7 +32,7 @@ SETTINGS: Mapping[str, tasks.RandomTasks | tasks.PaperTasks] = {
 # The reference has no limit to what its planned motions do in a step, and jumps by 3 rad.
 WHATEVER = replace(ACTION_SPACE, low=(*(-math.pi,) * 7, -1.0), high=(*(math.pi,) * 7, 1.0))
 ACTIONS: Mapping[str, ActionSpace] = {"fair": ACTION_SPACE, "paper": WHATEVER}
-TIMINGS: Mapping[str, skills.Timing] = {"fair": skills.AtSpeedLimit(), "paper": skills.InTens()}
+TIMINGS: Mapping[str, Timing] = {"fair": AtSpeedLimit(), "paper": InTens()}
 
 
 def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Domain:
@@ -50,8 +52,8 @@ def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Doma
         default_goal=tasks.target_block_on_target,
         step_limit=tasks.STEP_LIMIT,
         unread_types=frozenset({ROBOT}),
-        bodies=visible_bodies,
-        animate=animate,
+        bodies=lambda state: visible_bodies(scene_of(state), state),
+        animate=animation(scene_of),
         view=VIEW,
         learned_actions=ACTION_SPACE,
         configuration=settings.as_configuration(),

@@ -12,6 +12,7 @@ import numpy as np
 
 from slap_ros.domains.domain import Task
 from slap_ros.domains.obstacle_tower.model import BLOCK, NOT_IS_TARGET, ON, SURFACE
+from slap_ros.domains.tabletop.places import GAP
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.physics.features import (
     ROBOT,
@@ -28,7 +29,6 @@ from slap_ros.relational import GroundAtom, Object, State
 STEP_LIMIT = 500  # environment steps (SLAP Table 8)
 TRIES = 10_000  # places drawn before there is said to be no room
 PLATE_HALF = (0.026, 0.026, 0.0005)  # the target: a plate for one block, flush with the table
-GAP = 0.1  # between the middles of things that stand apart at least, so that fingers fit between
 
 Range = tuple[float, float]
 

@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from slap_ros.domains.obstacle_tower.model import (
@@ -15,55 +13,17 @@ from slap_ros.domains.obstacle_tower.model import (
     NOT_HOLDING,
     SURFACE,
 )
+from slap_ros.domains.tabletop import seeing
 from slap_ros.domains.view import View
-from slap_ros.motion.kinematics import GRASP_IN_LAST_LINK, arm_frames, matrix
-from slap_ros.physics.features import GRASP_FEATURES, JOINT_FEATURES, ROBOT
-from slap_ros.physics.panda import GRASP_POINT, JOINT_HIGH, JOINT_LOW
+from slap_ros.physics.features import ROBOT
 from slap_ros.physics.scene import CUBE_EDGE, TABLE_TOP
-from slap_ros.relational import Column, Object, State
-from slap_ros.relational.predicates import Bools
+from slap_ros.relational import Column, State
 from slap_ros.relational.state import Array
 
-FAR = 0.2  # m, the scale of what is seen
 NEAR = 0.1  # m, the scale of what is beside the target
-FAST = 0.5  # m/s
-STILL = 0.05  # m/s and rad/s, along each axis: a block so slow stays where it is
 FALLEN = TABLE_TOP - 0.05  # m, below which a block's centre is off the table
 FINGER_ROOM = 0.02  # m, between the target and what lies beside it, to put a block down there
-
-JOINTS = tuple(feature.name for feature in JOINT_FEATURES)
-GRASP_POSITION = tuple(feature.name for feature in GRASP_FEATURES[:3])
-POSITION = ("x", "y", "z")
-VELOCITY = ("vx", "vy", "vz")
-TWIST = (*VELOCITY, "wx", "wy", "wz")
-_MIDDLE = (np.array(JOINT_HIGH) + JOINT_LOW) / 2
-_HALF_RANGE = (np.array(JOINT_HIGH) - JOINT_LOW) / 2
-_GRASP_FRAME = matrix(GRASP_IN_LAST_LINK)
-_GRASP_OFFSET = np.array([0.0, 0.0, GRASP_POINT])
 BESIDE, OVER = CUBE_EDGE / 2, CUBE_EDGE  # m, of the hand over a block's middle and a target's
-OFF_CENTRE = 0.02  # m, the scale of where in the fingers a block is held
-
-
-def _joints(state: State) -> Array:
-    joints: Array = state.gather(state.layout.column_of(ROBOT), JOINTS)[:, 0]
-    return joints
-
-
-def _hand(state: State) -> Array:
-    """Frame of the point between the fingertips, shape (n, 4, 4)."""
-    hand: Array = arm_frames(_joints(state))[:, -1] @ _GRASP_FRAME
-    return hand
-
-
-def _robot(state: State, hand: Array) -> Array:
-    """Joints over their ranges; hand: x and z axes, height; what it holds, from the hand."""
-    layout = state.layout
-    held = state.stack(layout.column_of(BLOCK), "held").max(axis=-1, keepdims=True)
-    offset = state.gather(layout.column_of(ROBOT), GRASP_POSITION)[:, 0] - _GRASP_OFFSET
-    joints = (_joints(state) - _MIDDLE) / _HALF_RANGE
-    height = (hand[:, 2, 3:] - TABLE_TOP) / FAR
-    axes = (hand[:, :3, 0], hand[:, :3, 2])
-    return np.concatenate([joints, *axes, height, held, held * offset / OFF_CENTRE], axis=-1)
 
 
 def _things(state: State, hand: Array, column: Column) -> Array:
@@ -72,11 +32,11 @@ def _things(state: State, hand: Array, column: Column) -> Array:
     Of blocks also: how fast, and where over the target. Of what is fixed: which way it is turned.
     """
     if column.objects[0].type.is_a(ROBOT):
-        return np.zeros((*state.data.shape[:-1], len(column.objects), 0))  # it is seen already
-    place = _from(hand, state, column) / FAR
+        return seeing.nothing(state, column)
+    place = seeing.place(state, hand, column)
     if column.objects[0].type.is_a(BLOCK):
-        speed = np.clip(state.gather(column, VELOCITY) / FAST, -3, 3)
-        return np.concatenate([place, speed, _over_target(state, column) / NEAR], axis=-1)
+        over = _over_target(state, column) / NEAR
+        return np.concatenate([place, seeing.speed(state, column), over], axis=-1)
     turn = state.gather(column, ("qz", "qw"))
     yaw = 8.0 * np.arctan2(turn[..., 0], turn[..., 1])  # a square looks the same four times
     return np.concatenate([place, np.sin(yaw)[..., None], np.cos(yaw)[..., None]], axis=-1)
@@ -96,12 +56,7 @@ def _target(state: State) -> Column:
     surfaces = state.layout.column_of(SURFACE)
     first = state.data.reshape(-1, state.data.shape[-1])[0]
     labels = first[state.layout.grid(surfaces, ("is_target",))[:, 0]]
-    return _alone(surfaces.objects[int(np.argmax(labels))])
-
-
-@lru_cache(maxsize=256)
-def _alone(obj: Object) -> Column:
-    return Column((obj,))
+    return seeing.alone(surfaces.objects[int(np.argmax(labels))])
 
 
 def _distance(state: State, hand: Array, column: Column) -> Array:
@@ -111,47 +66,21 @@ def _distance(state: State, hand: Array, column: Column) -> Array:
     """
     thing = column.objects[0].type
     if thing.is_a(ROBOT):
-        return np.full((*state.data.shape[:-1], len(column.objects)), np.inf)
-    height = BESIDE if thing.is_a(BLOCK) else OVER
-    way = _from(hand, state, column) + np.array([0.0, 0.0, height])
-    distance: Array = np.sqrt(np.square(way).sum(axis=-1))
+        return seeing.never_near(state, column)
     if thing.is_a(BLOCK):
-        return distance
+        return seeing.to_over(state, hand, column, BESIDE)
+    distance = seeing.to_over(state, hand, column, OVER)
     return np.where(state.stack(column, "is_target") > 0.5, distance, np.inf)
 
 
-def _apart(state: State, thing: Object, column: Column) -> Array:
-    """From middle to middle."""
-    way = state.gather(column, POSITION) - state.gather(_alone(thing), POSITION)
-    apart: Array = np.sqrt(np.square(way).sum(axis=-1))
-    return apart
-
-
-def _from(hand: Array, state: State, column: Column) -> Array:
-    """Positions less that of the hand, m, shape (n, objects, 3)."""
-    seen: Array = state.gather(column, POSITION) - hand[:, None, :3, 3]
-    return seen
-
-
-def _settled(state: State) -> Bools:
-    twists = np.abs(state.gather(state.layout.column_of(BLOCK), TWIST))
-    settled: Bools = twists.max(axis=(-2, -1)) < STILL
-    return settled
-
-
-def _lost(state: State) -> Bools:
-    lost: Bools = state.stack(state.layout.column_of(BLOCK), "z").min(axis=-1) < FALLEN
-    return lost
-
-
 VIEW = View(
-    hand=_hand,
-    robot=_robot,
+    hand=seeing.hand,
+    robot=seeing.robot,
     things=_things,
     distance=_distance,
-    apart=_apart,
-    settled=_settled,
-    lost=_lost,
+    apart=seeing.apart,
+    settled=seeing.settled,
+    lost=seeing.lower_than(FALLEN),
     slack={"NothingOn": FINGER_ROOM},
     grasping=frozenset({HOLDING, NOT_HOLDING, GRIPPER_EMPTY}),
 )

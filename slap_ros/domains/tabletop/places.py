@@ -1,0 +1,41 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Places on a level rectangle at which something can be put down. Lengths in m."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+GAP = 0.1  # between the middles of things that stand apart at least, so that fingers fit between
+SPACING = 0.05  # of the grid of places
+MOST = 40  # places, tried in order of distance
+
+Place = tuple[float, float]  # x, y
+
+
+def free_places(
+    near: Place, middle: Place, half: Place, taken: Iterable[Place], gap: float = GAP
+) -> list[Place]:
+    """Places of a grid that are free, the nearest first.
+
+    Args:
+        near: What they are to be near to.
+        middle: Of the rectangle, a place of the grid.
+        half: Half the edges of the rectangle that the places are in.
+        taken: Middles of what stands there.
+        gap: Distance from all of these at least.
+    """
+    (x, y), standing = near, list(taken)
+    places = [
+        (px, py)
+        for px in _grid(middle[0], half[0])
+        for py in _grid(middle[1], half[1])
+        if all(math.hypot(px - tx, py - ty) >= gap for tx, ty in standing)
+    ]
+    return sorted(places, key=lambda place: (math.hypot(place[0] - x, place[1] - y), place))[:MOST]
+
+
+def _grid(middle: float, half: float) -> list[float]:
+    count = math.floor(half / SPACING)
+    return [middle + i * SPACING for i in range(-count, count + 1)]

@@ -1,0 +1,93 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Reading a state of a Panda among bodies: plain floats and poses. Lengths in m, base frame."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from slap_ros.motion import Box, Joints
+from slap_ros.physics.features import (
+    BODY_FEATURES,
+    GRASP_FEATURES,
+    JOINT_FEATURES,
+    POSE_FEATURES,
+    ROBOT,
+)
+from slap_ros.physics.panda import GRASP_POINT
+from slap_ros.physics.pose import Pose, conjugate, rotate
+from slap_ros.relational import Column, Layout, Object, State
+
+JOINT_NAMES = tuple(feature.name for feature in JOINT_FEATURES)
+POSE_NAMES = tuple(feature.name for feature in POSE_FEATURES)
+GRASP_NAMES = tuple(feature.name for feature in GRASP_FEATURES)
+HALF_NAMES = ("half_x", "half_y", "half_z")  # of what is a box: half its edges
+
+
+@lru_cache(maxsize=256)
+def bodies(layout: Layout) -> Column:
+    """The objects that move by themselves and can be held."""
+    features = set(BODY_FEATURES)
+    return Column(tuple(obj for obj in layout.objects if features <= set(obj.type.features)))
+
+
+def held_body(state: State) -> Object | None:
+    """What is in the hand."""
+    for body in bodies(state.layout).objects:
+        if state.get(body, "held") > 0.5:
+            return body
+    return None
+
+
+def joints_of(state: State) -> Joints:
+    """Joint positions, rad, shape (7,)."""
+    return np.array(_features(state, _robot(state), JOINT_NAMES))
+
+
+def finger_of(state: State) -> float:
+    """Distance of each finger from the middle."""
+    return float(state.get(_robot(state), "finger"))
+
+
+def grasp_of(state: State) -> Pose:
+    """The held body's pose seen from the grasp point."""
+    x, y, z, qx, qy, qz, qw = _features(state, _robot(state), GRASP_NAMES)
+    return Pose((x, y, z - GRASP_POINT), (qx, qy, qz, qw))
+
+
+def pose_of(state: State, obj: Object) -> Pose:
+    """Where an object is."""
+    x, y, z, qx, qy, qz, qw = _features(state, obj, POSE_NAMES)
+    return Pose((x, y, z), (qx, qy, qz, qw))
+
+
+def box_of(state: State, obj: Object) -> Box:
+    """An object that is a box, and says so by its features."""
+    half_x, half_y, half_z = _features(state, obj, HALF_NAMES)
+    return Box(pose_of(state, obj), (half_x, half_y, half_z))
+
+
+def top_of(box: Box) -> float:
+    """Height of a box's highest point."""
+    up = rotate(conjugate(box.pose.quaternion), (0.0, 0.0, 1.0))
+    return box.pose.position[2] + sum(abs(u) * h for u, h in zip(up, box.half, strict=True))
+
+
+def yaw_of(pose: Pose) -> float:
+    """The turn about the vertical of a box that lies on a face, up to quarter turns, rad."""
+    axes = [rotate(pose.quaternion, axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))]
+    x, y, _ = min(axes, key=lambda axis: abs(axis[2]))  # one that lies flat
+    return math.atan2(y, x)
+
+
+def _robot(state: State) -> Object:
+    (robot,) = state.layout.of_type(ROBOT)
+    return robot
+
+
+def _features(state: State, obj: Object, names: Sequence[str]) -> list[float]:
+    return [float(state.get(obj, name)) for name in names]

@@ -1,0 +1,118 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a learner sees of a Panda among bodies: joints, and everything else from the hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+
+from slap_ros.domains.tabletop.reading import GRASP_NAMES, JOINT_NAMES, bodies
+from slap_ros.motion.kinematics import GRASP_IN_LAST_LINK, arm_frames, matrix
+from slap_ros.physics.features import ROBOT
+from slap_ros.physics.panda import GRASP_POINT, JOINT_HIGH, JOINT_LOW
+from slap_ros.physics.scene import TABLE_TOP
+from slap_ros.relational import Column, Object, State
+from slap_ros.relational.predicates import Bools
+from slap_ros.relational.state import Array
+
+FAR = 0.2  # m, the scale of what is seen
+FAST = 0.5  # m/s
+STILL = 0.05  # m/s and rad/s, along each axis: a body so slow stays where it is
+OFF_CENTRE = 0.02  # m, the scale of where in the fingers a body is held
+
+POSITION = ("x", "y", "z")
+VELOCITY = ("vx", "vy", "vz")
+TWIST = (*VELOCITY, "wx", "wy", "wz")
+_MIDDLE = (np.array(JOINT_HIGH) + JOINT_LOW) / 2
+_HALF_RANGE = (np.array(JOINT_HIGH) - JOINT_LOW) / 2
+_GRASP_FRAME = matrix(GRASP_IN_LAST_LINK)
+_GRASP_OFFSET = np.array([0.0, 0.0, GRASP_POINT])
+
+
+def hand(state: State) -> Array:
+    """Frame of the point between the fingertips, shape (n, 4, 4)."""
+    frame: Array = arm_frames(_joints(state))[:, -1] @ _GRASP_FRAME
+    return frame
+
+
+def robot(state: State, hand: Array) -> Array:
+    """Joints over their ranges; hand: x and z axes, height; what it holds, from the hand."""
+    layout = state.layout
+    held = state.stack(bodies(layout), "held").max(axis=-1, keepdims=True)
+    offset = state.gather(layout.column_of(ROBOT), GRASP_NAMES[:3])[:, 0] - _GRASP_OFFSET
+    joints = (_joints(state) - _MIDDLE) / _HALF_RANGE
+    height = (hand[:, 2, 3:] - TABLE_TOP) / FAR
+    axes = (hand[:, :3, 0], hand[:, :3, 2])
+    return np.concatenate([joints, *axes, height, held, held * offset / OFF_CENTRE], axis=-1)
+
+
+def place(state: State, hand: Array, column: Column) -> Array:
+    """Where things are from the hand, along the base's axes, shape (n, objects, 3)."""
+    seen: Array = from_hand(state, hand, column) / FAR
+    return seen
+
+
+def speed(state: State, column: Column) -> Array:
+    """How fast bodies move, shape (n, objects, 3)."""
+    return np.clip(state.gather(column, VELOCITY) / FAST, -3, 3)
+
+
+def nothing(state: State, column: Column) -> Array:
+    """No features, shape (n, objects, 0): of the robot, which is seen already."""
+    return np.zeros((*state.data.shape[:-1], len(column.objects), 0))
+
+
+def never_near(state: State, column: Column) -> Array:
+    """Distances to what there is no point in going to, m, shape (n, objects)."""
+    return np.full((*state.data.shape[:-1], len(column.objects)), np.inf)
+
+
+def to_over(state: State, hand: Array, column: Column, height: float) -> Array:
+    """From the hand to ``height`` m over the middles of things, m, shape (n, objects)."""
+    way = from_hand(state, hand, column) + np.array([0.0, 0.0, height])
+    distance: Array = np.sqrt(np.square(way).sum(axis=-1))
+    return distance
+
+
+def from_hand(state: State, hand: Array, column: Column) -> Array:
+    """Positions less that of the hand, m, shape (n, objects, 3)."""
+    seen: Array = state.gather(column, POSITION) - hand[:, None, :3, 3]
+    return seen
+
+
+def apart(state: State, thing: Object, column: Column) -> Array:
+    """From middle to middle, m, shape (n, objects)."""
+    way = state.gather(column, POSITION) - state.gather(alone(thing), POSITION)
+    distance: Array = np.sqrt(np.square(way).sum(axis=-1))
+    return distance
+
+
+def settled(state: State) -> Bools:
+    """Whether no body moves any more, shape (n,)."""
+    twists = np.abs(state.gather(bodies(state.layout), TWIST))
+    still: Bools = twists.max(axis=(-2, -1)) < STILL
+    return still
+
+
+def lower_than(height: float) -> Callable[[State], Bools]:
+    """Whether a body's middle is lower than so many m, as it is once it fell: shape (n,)."""
+
+    def lost(state: State) -> Bools:
+        fallen: Bools = state.stack(bodies(state.layout), "z").min(axis=-1) < height
+        return fallen
+
+    return lost
+
+
+@lru_cache(maxsize=256)
+def alone(obj: Object) -> Column:
+    """A column of one object."""
+    return Column((obj,))
+
+
+def _joints(state: State) -> Array:
+    joints: Array = state.gather(state.layout.column_of(ROBOT), JOINT_NAMES)[:, 0]
+    return joints

@@ -1,0 +1,45 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a person sees: bodies, and animations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from slap_ros.domains.domain import Animate, VisibleBody
+from slap_ros.domains.tabletop.reading import pose_of
+from slap_ros.meshes.solid import Solid
+from slap_ros.physics.pose import IDENTITY
+from slap_ros.physics.scene import Body, Scene
+from slap_ros.relational import State
+
+SceneOf = Callable[[State], Scene]
+
+
+def visible_bodies(scene: Scene, state: State) -> list[VisibleBody]:
+    """Everything that stands around the robot."""
+    return [_visible(body, state) for body in scene.bodies]
+
+
+def _visible(body: Body, state: State) -> VisibleBody:
+    """A body where the state has it, or else where the scene does."""
+    embodied = state.layout.by_name.get(body.name)
+    position, quaternion = body.pose if embodied is None else pose_of(state, embodied)
+    width, depth, height = (2.0 * half for half in body.at(IDENTITY).half)
+    triangles = body.shape.corners if isinstance(body.shape, Solid) else ()
+    return VisibleBody(
+        body.name, position, quaternion, (width, depth, height), body.colour, triangles
+    )
+
+
+def animation(scene_of: SceneOf) -> Animate:
+    """What writes states, one a control step, as an animation."""
+
+    def animate(path: Path, states: Sequence[State], progress: Callable[[int], None]) -> None:
+        from slap_ros.physics.rendering import Camera, write_animation  # only here are they needed
+
+        with Camera(scene_of(states[0])) as camera:
+            write_animation(path, camera, states, progress)
+
+    return animate

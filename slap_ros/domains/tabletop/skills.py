@@ -1,0 +1,111 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Skills that go one of several ways, then grip or let go, then lift."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from slap_ros.domains.domain import Action, Policy
+from slap_ros.domains.tabletop.reading import joints_of
+from slap_ros.domains.tabletop.timing import Timing
+from slap_ros.domains.tabletop.ways import Way
+from slap_ros.errors import SkillNotApplicableError
+from slap_ros.motion import Joints, linear_motion, shifted
+from slap_ros.physics.panda import grasp_pose
+from slap_ros.relational import Object, State
+
+STEP_LIMIT = 100  # environment steps
+GRIP, RELEASE = 1.0, -1.0  # gripper commands
+
+# To where it may go from a state, in the order in which it is tried.
+Ways = Callable[[State, tuple[Object, ...]], Iterable[Way]]
+
+
+class Follow:
+    """Go to positions one after the other, giving a gripper command with each.
+
+    Closed loop: each step is what is missing from where the arm is.
+    """
+
+    def __init__(self, script: Sequence[tuple[Joints, float]]) -> None:
+        """``script``: positions in rad with gripper commands."""
+        self._script = deque(script)
+
+    def __call__(self, state: State) -> Action | None:
+        """The next action; None at the end of the script."""
+        if not self._script:
+            return None
+        position, gripper = self._script.popleft()
+        return np.array([*(position - joints_of(state)), gripper])
+
+
+@dataclass(frozen=True)
+class WaySkill:
+    """Go the first way that can be gone; then grip or let go; then lift.
+
+    Args:
+        name: The operator's.
+        timing: How fast.
+        ways: Where to; see :data:`Ways`.
+        gripper: The gripper command at the end of the way.
+        lift: How far to go up after it, m.
+        step_limit: Environment steps.
+    """
+
+    name: str
+    timing: Timing
+    ways: Ways
+    gripper: float
+    lift: float = 0.0
+    step_limit: int = STEP_LIMIT
+
+    @property
+    def least_steps(self) -> int:
+        """There, grip, up."""
+        return 1 + self._after
+
+    def lower_bound(self, state: State, objects: tuple[Object, ...]) -> int:
+        """The shortest of the ways that it may be, and what comes after it."""
+        least, before = math.inf, None
+        for way in self.ways(state, objects):
+            if before is not None and before.is_open:
+                break
+            least, before = min(least, way.least_steps(self.timing)), way
+        # What cannot be gone is never too short.
+        return self.step_limit if math.isinf(least) else int(least) + self._after
+
+    def start(self, state: State, objects: tuple[Object, ...]) -> Policy:
+        """Plan the motion.
+
+        Raises:
+            SkillNotApplicableError: None of the ways can be gone.
+        """
+        for way in self.ways(state, objects):
+            try:
+                return Follow(self._script(way))
+            except SkillNotApplicableError:
+                continue
+        named = ", ".join(obj.name for obj in objects)
+        raise SkillNotApplicableError(f"{self.name}({named}): there is no way for the arm")
+
+    @property
+    def _after(self) -> int:
+        return 2 if self.lift > 0.0 else 1
+
+    def _script(self, way: Way) -> list[tuple[Joints, float]]:
+        pieces = way.pieces()
+        end = pieces[-1][-1]
+        script = [(position, 0.0) for position in self.timing.positions(pieces, way.touching)]
+        script.append((end, self.gripper))
+        if self.lift > 0.0:
+            up = linear_motion(end, shifted(grasp_pose(end), (0.0, 0.0, self.lift)))
+            if up is None:
+                raise SkillNotApplicableError("the arm cannot lift from the grasp")
+            script += [(position, 0.0) for position in self.timing.positions([up], way.touching)]
+        return script

@@ -1,0 +1,56 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the arm keeps clear of, and what it carries, as a domain says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from slap_ros.domains.tabletop.reading import finger_of, grasp_of, held_body
+from slap_ros.motion import Box, CollisionChecker
+from slap_ros.relational import Object, State
+
+# Distances in m that a held body keeps from others: so far away it may be turned as one likes,
+# on its way across, and when it is set down between others.
+AT_EASE, CARRYING, SETTING_DOWN = 0.02, 0.005, -0.001
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What is around the arm.
+
+    Args:
+        solid: The boxes that things fill in a state, base frame, each with the object that it is
+            a part of; one object may have several, and the held body's are left out by whoever
+            asks.
+        carried: The box around a body in that body's own frame, were it in the hand.
+    """
+
+    solid: Callable[[State], Iterable[tuple[Object, Box]]]
+    carried: Callable[[State, Object], Box]
+
+    def checker(
+        self, state: State, touched: tuple[Object, ...] = (), held_margin: float = SETTING_DOWN
+    ) -> CollisionChecker:
+        """What is free of collisions in a state.
+
+        Args:
+            state: Where everything is.
+            touched: What the arm, or what it holds, may touch.
+            held_margin: Distance that a held body keeps from the rest, m.
+        """
+        held = held_body(state)
+        obstacles = [
+            box for thing, box in self.solid(state) if thing != held and thing not in touched
+        ]
+        return CollisionChecker(
+            obstacles,
+            held=None if held is None else self._in_hand(state, held),
+            finger=finger_of(state),
+            held_margin=held_margin,
+        )
+
+    def _in_hand(self, state: State, held: Object) -> Box:
+        pose, half = self.carried(state, held)
+        return Box(grasp_of(state).compose(pose), half)
