@@ -16,11 +16,13 @@ from types import MappingProxyType
 
 from slap_ros.domains.cluttered_drawer import model, skills, tasks
 from slap_ros.domains.cluttered_drawer.scenery import scene_of
+from slap_ros.domains.cluttered_drawer.view import VIEW
 from slap_ros.domains.domain import ActionSpace, Domain
 from slap_ros.domains.tabletop.showing import animation, visible_bodies
 from slap_ros.domains.tabletop.timing import AtSpeedLimit, InTens, Timing
 from slap_ros.domains.variation import varied
 from slap_ros.physics.panda import CONTROL_PERIOD_S
+from slap_ros.physics.viewpoint import View
 from slap_ros.physics.world import ACTION_SPACE, PandaWorld
 
 SETTINGS: Mapping[str, tasks.RandomTasks | tasks.PaperTasks] = {
@@ -31,6 +33,8 @@ SETTINGS: Mapping[str, tasks.RandomTasks | tasks.PaperTasks] = {
 WHATEVER = replace(ACTION_SPACE, low=(*(-math.pi,) * 7, -1.0), high=(*(math.pi,) * 7, 1.0))
 ACTIONS: Mapping[str, ActionSpace] = {"fair": ACTION_SPACE, "paper": WHATEVER}
 TIMINGS: Mapping[str, Timing] = {"fair": AtSpeedLimit(), "paper": InTens()}
+
+LOOK = View(eye=(0.9, -1.3, 1.0), target=(0.3, 0.0, 0.28))  # into the drawer, past the hand
 
 
 def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Domain:
@@ -51,7 +55,8 @@ def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Doma
         default_goal=tasks.target_block_on_table,
         step_limit=tasks.STEP_LIMIT,
         bodies=lambda state: visible_bodies(scene_of(state), state),
-        animate=animation(scene_of),
+        animate=animation(scene_of, LOOK),
+        view=VIEW,
         learned_actions=ACTION_SPACE,
         configuration=settings.as_configuration(),
     )
