@@ -57,10 +57,11 @@ class AtomSpace:
         statics = {atom: bit for atom, bit in self._bits.items() if atom.predicate in static}
         self.static = sum(statics.values())
         self.static_truth = sum(bit for atom, bit in statics.items() if holds(atom))
+        about_something = {atom.predicate for atom in self.atoms} - self.static_predicates
         self._fluents = [
             _Block.of(predicate, self.atoms)
             for predicate in predicates
-            if predicate not in self.static_predicates
+            if predicate in about_something
         ]
         self._read = np.concatenate(
             [
@@ -165,7 +166,7 @@ class _Block:
     @classmethod
     def of(cls, predicate: Predicate, atoms: Sequence[GroundAtom]) -> _Block:
         numbers = [i for i, atom in enumerate(atoms) if atom.predicate == predicate]
-        start = numbers[0] if numbers else 0
+        start = numbers[0]
         columns = zip(*(atoms[i].objects for i in numbers), strict=True)
         return cls(
             predicate.classifier,

@@ -213,7 +213,7 @@ def _drops(state: State, block: Object, drawer: Object) -> Iterator[list[Pose]]:
     ]
     lying = [(px, py) for px, py, _ in taken]
     rectangle = (mx, my), (half_x - WALL - INSIDE, half_y - WALL - INSIDE)
-    places = free_places((x, y), *rectangle, lying, GAP)
+    places = free_places((x, y), *rectangle, [(place, GAP) for place in lying])
     places += [place for place in free_places((x, y), *rectangle, []) if place not in places]
     found: list[Pose] = []
     for number, place in enumerate(places, start=1):
