@@ -109,7 +109,7 @@ _PAPER = replace(
     exploration=Exploration(rollouts=100, length=300, hits=5, hold=1, nodes=1000),
     polish=None,
     ppo=replace(_PAPER_PPO, total_steps=300_000),
-    rewards=Rewards(done=100.0, shaping=0.0, discount=0.99, scale=1.0),
+    rewards=Rewards(step=-1.0, done=100.0, lost=0.0, shaping=0.0, discount=0.99, scale=1.0),
     horizon=100,
     sampling=PAPER,
 )
@@ -139,7 +139,7 @@ SETTINGS: Mapping[str, Mapping[str, TrainingSettings]] = {
             _PAPER,
             exploration=Exploration(rollouts=1000, length=100, hits=1, hold=1, nodes=1000),
             ppo=replace(_PAPER_PPO, rollout_steps=50, total_steps=50_000),
-            rewards=Rewards(step=-0.5, done=10.0, shaping=0.0, discount=0.99, scale=1.0),
+            rewards=Rewards(step=-0.5, done=10.0, lost=0.0, shaping=0.0, discount=0.99, scale=1.0),
             horizon=50,
             sampling=replace(PAPER, horizon=50),
         ),
