@@ -103,7 +103,11 @@ setup(
         "msg_schemas",
     ],
     package_data={
-        "slap_ros": ["py.typed", "domains/cleanup_table/shapes/*.obj"],
+        "slap_ros": [
+            "py.typed",
+            "domains/cleanup_table/shapes/*.obj",
+            "domains/cleanup_table/shapes/NOTICE",
+        ],
         "msg_schemas": ["msg/*.msg", "srv/*.srv", "action/*.action"],
     },
     data_files=[

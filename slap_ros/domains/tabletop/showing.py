@@ -11,6 +11,7 @@ from slap_ros.domains.domain import Animate, VisibleBody
 from slap_ros.domains.tabletop.reading import pose_of
 from slap_ros.meshes.solid import Solid
 from slap_ros.physics.pose import IDENTITY
+from slap_ros.physics.rendering import Camera, View, write_animation
 from slap_ros.physics.scene import Body, Scene
 from slap_ros.relational import State
 
@@ -33,13 +34,11 @@ def _visible(body: Body, state: State) -> VisibleBody:
     )
 
 
-def animation(scene_of: SceneOf) -> Animate:
-    """What writes states, one a control step, as an animation."""
+def animation(scene_of: SceneOf, view: View | None = None) -> Animate:
+    """What writes states, one a control step, as an animation, seen from where ``view`` says."""
 
     def animate(path: Path, states: Sequence[State], progress: Callable[[int], None]) -> None:
-        from slap_ros.physics.rendering import Camera, write_animation  # only here are they needed
-
-        with Camera(scene_of(states[0])) as camera:
+        with Camera(scene_of(states[0]), view) as camera:
             write_animation(path, camera, states, progress)
 
     return animate
