@@ -37,8 +37,8 @@ from slap_ros.physics.panda import (
     grasp_pose,
     jacobian,
 )
-from slap_ros.physics.pose import Pose, Vector, conjugate, multiply
-from slap_ros.physics.scene import CUBE_EDGE, CUBE_MATERIAL, FRICTION, TABLE, TABLE_TOP, Scene, cube
+from slap_ros.physics.pose import Pose, conjugate, multiply
+from slap_ros.physics.scene import CUBE_EDGE, FRICTION, TABLE, TABLE_TOP, Body, Scene, cube
 from slap_ros.physics.simulation import PANDA, Drive, Simulation, Stepping
 from slap_ros.physics.snapshot import Motion
 from slap_ros.physics.world import ACTION_SPACE, STEPPING, PandaWorld
@@ -213,44 +213,43 @@ class Plain:
     SUBSTEPS = 30  # of 1/240 s, PyBullet's own
     FINGERS = (9, 10)  # joint indices in the URDF
 
-    def __init__(self) -> None:
-        self._start = tower()
+    def __init__(self, scene: Scene = SCENE, start: State | None = None) -> None:
+        self._scene = scene
+        self._start = tower() if start is None else start
         self._client: int | None = None
 
     def reset(self, joints: Array) -> None:
-        """A new scene: this world keeps contacts, which a reset would not clear."""
+        """All as it was, the arm there: a new scene, as a reset would not clear contacts."""
         if self._client is None:
             self._client = pybullet.connect(pybullet.DIRECT)
         client = self._client
         pybullet.resetSimulation(physicsClientId=client)
         pybullet.setGravity(0.0, 0.0, -9.81, client)
-        for body in SCENE.fixed:
-            self._add(0.0, body.half_extents_m, body.pose.position)
-        self._cubes = [
-            self._add(
-                CUBE_MATERIAL.mass_kg,
-                (CUBE_EDGE / 2,) * 3,
-                self._start[self._start.layout.object(n)][:3],
-            )
-            for n in NAMES
-        ]
+        for body in self._scene.fixed:
+            self._add(body, body.pose.position, body.pose.quaternion)
+        self._cubes = []
+        for body in self._scene.free:
+            pose = self._start[self._start.layout.object(body.name)][:7]
+            self._cubes.append(self._add(body, pose[:3], pose[3:]))
         self._robot = pybullet.loadURDF(
             str(PANDA / "panda.urdf"), useFixedBase=True, physicsClientId=client
         )
         for link in range(-1, pybullet.getNumJoints(self._robot, client)):
-            for i in range(len(SCENE.fixed)):
+            for i in range(len(self._scene.fixed)):
                 pybullet.setCollisionFilterPair(self._robot, i, link, -1, 0, client)
         self._joints = np.array(joints)
         self._place()
 
-    def _add(self, mass: float, half: Vector, position: Vector | Array) -> int:
+    def _add(self, body: Body, position: Sequence[float], turn: Sequence[float]) -> int:
         client = self._client
         shape = pybullet.createCollisionShape(
-            pybullet.GEOM_BOX, halfExtents=half, physicsClientId=client
+            pybullet.GEOM_BOX, halfExtents=body.half_extents_m, physicsClientId=client
         )
-        body: int = pybullet.createMultiBody(mass, shape, -1, position, physicsClientId=client)
-        pybullet.changeDynamics(body, -1, lateralFriction=FRICTION, physicsClientId=client)
-        return body
+        added: int = pybullet.createMultiBody(
+            body.mass_kg, shape, -1, position, turn, physicsClientId=client
+        )
+        pybullet.changeDynamics(added, -1, lateralFriction=FRICTION, physicsClientId=client)
+        return added
 
     def _place(self) -> None:
         for i, q in enumerate(self._joints.tolist()):

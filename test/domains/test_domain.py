@@ -51,7 +51,7 @@ def test_a_type_whose_parent_is_missing():
         replace(DOMAIN, types=(*DOMAIN.types, Type("cup", parent=Type("vessel"))))
 
 
-@pytest.mark.parametrize("name", ["obstacle2d", "obstacle_tower"])
+@pytest.mark.parametrize("name", ["obstacle2d", "obstacle_tower", "cluttered_drawer"])
 def test_what_is_said_to_be_unread_changes_no_atom(name):
     domain = get_domain(name)
     initial = domain.task(0).initial_state
