@@ -363,6 +363,9 @@ def predicates(room: FingerRoom) -> tuple[Predicate, ...]:
 
 BY_NAME = {predicate.name: predicate for predicate in predicates(FingerRoom())}
 ON = BY_NAME["On"]
+HAND_PREDICATES = frozenset(
+    BY_NAME[name] for name in ("ReadyPick", "NotReadyPick", "HandReadyPick")
+)
 GRASPING = frozenset(BY_NAME[name] for name in ("Holding", "NotHolding", "GripperEmpty"))
 
 
