@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
@@ -19,6 +18,7 @@ from slap_ros.physics.pose import Pose, Vector
 from slap_ros.physics.scene import Body, Box, Scene
 from slap_ros.physics.simulation import PANDA
 from slap_ros.physics.snapshot import Reader
+from slap_ros.physics.viewpoint import View
 from slap_ros.relational import State
 
 ARM_JOINTS = range(7)  # indices in the URDF
@@ -26,17 +26,6 @@ FINGER_JOINTS = (9, 10)
 STAND = Box("stand", (0.1, 0.1, 0.2125), pose=Pose((0.0, 0.0, -0.2125)))  # what the base is on
 UP: Vector = (0.0, 0.0, 1.0)
 NEAR, FAR = 0.05, 5.0  # m, what is closer or further is not drawn
-
-
-@dataclass(frozen=True)
-class View:
-    """Where the camera is and how it looks."""
-
-    eye: Vector = (1.45, -1.1, 0.85)  # m
-    target: Vector = (0.3, 0.0, 0.22)  # m
-    field_of_view: float = 42.0  # degrees, upright
-    width: int = 480  # pixels
-    height: int = 360
 
 
 class Camera:

@@ -34,6 +34,7 @@ class AtomSpace:
         layout: Layout,
         holds: Callable[[GroundAtom], bool],
         unread: Collection[Type] = (),
+        reading: Collection[Predicate] = (),
     ) -> None:
         """Enumerate the atoms over the objects of ``layout``.
 
@@ -42,8 +43,9 @@ class AtomSpace:
             static: Those that no operator changes.
             layout: The task's objects.
             holds: Whether an atom of a static predicate holds.
-            unread: Types of objects whose features no predicate reads, the robot as a rule:
-                states that differ only there are perceived once.
+            unread: Types of objects whose features few predicates read, the robot as a rule: of
+                states that differ only there, the others are perceived once.
+            reading: These few.
         """
         self.layout = layout
         self.predicates = {predicate.name: predicate for predicate in predicates}
@@ -57,10 +59,11 @@ class AtomSpace:
         statics = {atom: bit for atom, bit in self._bits.items() if atom.predicate in static}
         self.static = sum(statics.values())
         self.static_truth = sum(bit for atom, bit in statics.items() if holds(atom))
+        about_something = {atom.predicate for atom in self.atoms} - self.static_predicates
         self._fluents = [
             _Block.of(predicate, self.atoms)
             for predicate in predicates
-            if predicate not in self.static_predicates
+            if predicate in about_something
         ]
         self._read = np.concatenate(
             [
@@ -70,6 +73,12 @@ class AtomSpace:
             ]
             or [np.empty(0, np.intp)]
         )
+        self._rereading = [
+            _Block.of(predicate, self.atoms)
+            for predicate in reading
+            if predicate in about_something
+        ]
+        self._reread = self.mask(atom for atom in self.atoms if atom.predicate in reading)
         self._perceived: dict[bytes, int] = {}
         self._truth = np.array([bool(statics.get(a, 0) & self.static_truth) for a in self.atoms])
 
@@ -80,9 +89,12 @@ class AtomSpace:
         static: Collection[Predicate],
         state: State,
         unread: Collection[Type] = (),
+        reading: Collection[Predicate] = (),
     ) -> AtomSpace:
         """The space over a state's objects, static atoms as they are in that state."""
-        return cls(predicates, static, state.layout, lambda atom: atom.holds(state), unread)
+        return cls(
+            predicates, static, state.layout, lambda atom: atom.holds(state), unread, reading
+        )
 
     def abstract(self, state: State) -> int:
         """The abstract state of a single state."""
@@ -92,7 +104,9 @@ class AtomSpace:
             mask = _mask(self.truth(state))
             if len(self._perceived) == MOST_REMEMBERED:
                 self._perceived.clear()
-            self._perceived[read] = mask
+            self._perceived[read] = mask & ~self._reread
+        elif self._rereading:
+            mask |= _mask(self._evaluate(self._rereading, state, np.zeros_like(self._truth)))
         return mask
 
     def abstract_each(self, states: State) -> list[int]:
@@ -103,7 +117,14 @@ class AtomSpace:
         """Whether each atom holds, for a state or a batch of states, shape (..., atoms)."""
         truth = np.empty((*state.data.shape[:-1], len(self.atoms)), dtype=bool)
         truth[...] = self._truth
-        for block in self._fluents:
+        return self._evaluate(self._fluents, state, truth)
+
+    @staticmethod
+    def _evaluate(
+        blocks: Sequence[_Block], state: State, truth: NDArray[np.bool_]
+    ) -> NDArray[np.bool_]:
+        """Put in the truth of some of the atoms."""
+        for block in blocks:
             truth[..., block.where] = block.classifier(state, *block.columns)
         return truth
 
@@ -165,7 +186,7 @@ class _Block:
     @classmethod
     def of(cls, predicate: Predicate, atoms: Sequence[GroundAtom]) -> _Block:
         numbers = [i for i, atom in enumerate(atoms) if atom.predicate == predicate]
-        start = numbers[0] if numbers else 0
+        start = numbers[0]
         columns = zip(*(atoms[i].objects for i in numbers), strict=True)
         return cls(
             predicate.classifier,

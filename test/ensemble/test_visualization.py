@@ -13,7 +13,9 @@ from slap_ros.domains import get_domain
 STAMP = Time(sec=1, nanosec=2)
 
 
-@pytest.mark.parametrize("name", ["obstacle2d", "obstacle_tower", "cleanup_table"])
+@pytest.mark.parametrize(
+    "name", ["obstacle2d", "obstacle_tower", "cluttered_drawer", "cleanup_table"]
+)
 def test_every_object_but_the_arm_is_a_marker_and_a_frame(name):
     domain = get_domain(name)
     state = domain.task(0).initial_state

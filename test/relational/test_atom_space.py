@@ -134,3 +134,10 @@ def test_an_operator_with_a_foreign_variable_is_refused():
         LiftedOperator("Bad", (x,), frozenset({atom}), frozenset(), frozenset())
     with pytest.raises(InvalidDomainError, match="both adds and deletes"):
         LiftedOperator("Bad", (x, y), frozenset(), frozenset({atom}), frozenset({atom}))
+
+
+def test_a_predicate_of_more_objects_than_there_are_has_no_atoms():
+    initial = get_domain("cluttered_drawer", "fair:obstacles=0").task(0).initial_state
+    space = get_domain("cluttered_drawer", "fair:obstacles=0").atom_space(initial)
+    assert "BlockingLeft" not in {atom.predicate.name for atom in space.atoms}
+    assert space.atom("LeftClear", ["block1"]) in set(space.decode(space.abstract(initial)))

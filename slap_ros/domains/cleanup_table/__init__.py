@@ -24,8 +24,8 @@ from slap_ros.domains.tabletop.timing import AtSpeedLimit, InTens, Timing
 from slap_ros.domains.variation import varied
 from slap_ros.meshes.solid import Solid
 from slap_ros.physics.panda import CONTROL_PERIOD_S
-from slap_ros.physics.rendering import View
 from slap_ros.physics.scene import Scene
+from slap_ros.physics.viewpoint import View
 from slap_ros.physics.world import ACTION_SPACE, PandaWorld
 from slap_ros.relational import State
 

@@ -20,11 +20,11 @@ from slap_ros.domains.cleanup_table.model import (
     TIP,
     VELOCITY,
     WALL,
-    grasp_point,
     scenery,
 )
 from slap_ros.domains.cleanup_table.scenery import SURROUNDINGS, carried
 from slap_ros.domains.domain import Action, Policy, Skill
+from slap_ros.domains.tabletop import seeing
 from slap_ros.domains.tabletop.grasps import from_above
 from slap_ros.domains.tabletop.places import Place, free_places
 from slap_ros.domains.tabletop.reading import (
@@ -154,14 +154,11 @@ def _drops(state: State, block: Object, drawer: Object) -> Iterator[list[Pose]]:
     hand, space = grasp_pose(joints_of(state)), box_of(state, drawer)
     height = max(hand.position[2], float(scenery(state).highest) + HAND_CLEAR + TIP + READY_SLACK)
     (mx, my, _), (half_x, half_y, _) = space.pose.position, space.half
-    taken = [
-        pose_of(state, other).position
-        for other in state.layout.of_type(BLOCK)
-        if other != block and ON(other, drawer).holds(state)
-    ]
-    lying = [(px, py) for px, py, _ in taken]
+    others = [other for other in state.layout.of_type(BLOCK) if other != block]
+    lying = [pose_of(state, o).position for o in others if ON(o, drawer).holds(state)]
+    taken = [((px, py), GAP) for px, py, _ in lying]
     rectangle = (mx, my), (half_x - WALL - INSIDE, half_y - WALL - INSIDE)
-    places = free_places((x, y), *rectangle, lying, GAP)
+    places = free_places((x, y), *rectangle, taken)
     places += [place for place in free_places((x, y), *rectangle, []) if place not in places]
     found: list[Pose] = []
     for number, place in enumerate(places, start=1):
@@ -262,8 +259,8 @@ def _is_over(state: State, block: Object, positions: Joints) -> Bools:
 
 def _is_lifted(state: State, block: Object, positions: Joints) -> Bools:
     """Whether a block that is lifted without being turned is above everything."""
-    heights = grasp_point(_with_joints(state, positions))[:, 2]
-    rise = heights - grasp_pose(joints_of(state)).position[2]
+    before = seeing.grasp_point(joints_of(state))[..., 2]
+    rise = seeing.grasp_point(positions)[:, 2] - before
     lifted: Bools = rise + _above(state, block) > ROUNDING
     return lifted
 

@@ -9,8 +9,19 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from slap_ros.domains.tabletop.lying import (
+    HALVES,
+    PARTS,
+    TO_EDGES,
+    Indices,
+    along_axes,
+    complex_of,
+    strictly,
+    turned_back,
+    unpinched,
+    widths,
+)
 from slap_ros.physics.features import BODY_FEATURES, MATERIAL_FEATURES, POSE_FEATURES, ROBOT
 from slap_ros.relational import (
     Column,
@@ -30,8 +41,6 @@ from slap_ros.relational.state import Array
 TOUCHING = 0.004  # m, height over a thing at which a block still lies on it
 CENTRED = 0.015  # m, distance from the target's middle at which a block still is in it
 MOST_REMEMBERED = 1024  # columns of objects, a layout
-TINY = float(np.finfo(np.float64).tiny)
-STEEPNESS = 50.0  # 1, of tolerances in margins: all of TOUCHING counts as 20 cm sideways
 
 # Of blocks and surfaces alike, so that predicates can ask both at once.
 THING_FEATURES = (
@@ -44,33 +53,7 @@ BLOCK = Type("block", (*BODY_FEATURES, *MATERIAL_FEATURES, *THING_FEATURES), THI
 SURFACE = Type("surface", (*POSE_FEATURES, *THING_FEATURES), THING)
 TYPES = (ROBOT, THING, BLOCK, SURFACE)
 
-Complex = NDArray[np.complex128]
-
-
 # -- where things lie -----------------------------------------------------------------------------
-
-Indices = NDArray[np.intp]
-W, Z, X, Y = range(4)  # parts of a quaternion as they are read: (w, z) and (x, y) turn the plane
-
-
-def _to_edges() -> Array:
-    """The linear map from the products of a quaternion's parts to where a unit cube's edges point.
-
-    Returns:
-        Shape (16, 9): x and y of the first, second and third edge, then z of each.
-    """
-    to = np.zeros((4, 4, 9))
-    axes, place = (X, Y, Z), ((0, 2, 4), (1, 3, 5), (6, 7, 8))  # place[coordinate][edge]
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        a, b, c = axes[i], axes[j], axes[k]
-        to[[a, W, b, c], [a, W, b, c], place[i][i]] = 1.0, 1.0, -1.0, -1.0
-        to[a, b, place[i][j]], to[c, W, place[i][j]] = 2.0, -2.0
-        to[a, c, place[i][k]], to[b, W, place[i][k]] = 2.0, 2.0
-    return to.reshape(16, 9)
-
-
-TO_EDGES = _to_edges()
-HALVES = (*("half_x",) * 2, *("half_y",) * 2, *("half_z",) * 2, "half_x", "half_y", "half_z")
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +83,7 @@ class Things:
         return Things(
             len(blocks),
             objects,
-            where("qw", "qz", "qx", "qy").T,
+            where(*PARTS).T,
             where("x", "y").T,
             where(*HALVES).T,
             *where("z", "is_movable", "is_target"),
@@ -142,21 +125,21 @@ def lie(state: State) -> Lie:
     # A block touches what its lowest point is at the height of.
     z, height = data.take(things.z, axis=-1), np.add.reduce(np.abs(edges[..., 6:]), axis=-1)
     gap = (z - height)[..., blocks, None] - (z + height)[..., None, :]
-    touches = _unpinched(TOUCHING - np.abs(gap))
+    touches = unpinched(TOUCHING - np.abs(gap))
 
     # It covers what it is over, seen along the axes of that thing.
-    places = _complex(data.take(things.places, axis=-1))[..., 0]
+    places = complex_of(data.take(things.places, axis=-1))[..., 0]
     way = places[..., blocks, None] - places[..., None, :]
-    back = _turned_back(q, edges)[..., None, :]
-    width = _width(_complex(edges[..., :6])[..., None, :], back)
+    back = turned_back(q, edges)[..., None, :]
+    width = widths(complex_of(edges[..., :6])[..., None, :], back)
     own_width = np.diagonal(width, axis1=-3, axis2=-2).swapaxes(-1, -2)[..., None, :, :]
-    ahead_aside = width[..., blocks, :, :] + own_width - _along_axes(way * back)
+    ahead_aside = width[..., blocks, :, :] + own_width - along_axes(way * back)
     covers = np.minimum(ahead_aside[..., 0], ahead_aside[..., 1])
 
     # It lies in the middle of a target; elsewhere on the table; or on a part of another block.
     centred = CENTRED - np.abs(way)
     to_target = np.where(is_target[..., None, :], centred, -1.0)[..., things.blocks :]
-    elsewhere = _strictly(-np.maximum.reduce(to_target, axis=-1, initial=-1.0))[..., None]
+    elsewhere = strictly(-np.maximum.reduce(to_target, axis=-1, initial=-1.0))[..., None]
     on_table = np.minimum(covers, elsewhere)
     off_targets = np.where(is_movable[..., None, :], covers, on_table)
     sideways = np.where(is_target[..., None, :], centred, off_targets)
@@ -164,48 +147,8 @@ def lie(state: State) -> Lie:
 
     # On the table there is always room; on targets and blocks for one block only.
     over = np.maximum.reduce(np.minimum(touches, covers), axis=-2, initial=-1.0)
-    room = np.where(is_movable | is_target, _strictly(-over), 1.0)
+    room = np.where(is_movable | is_target, strictly(-over), 1.0)
     return Lie(things, on.reshape(*on.shape[:-2], -1), room)
-
-
-def _complex(pairs: Array) -> Complex:
-    """Numbers from their parts side by side, without copying."""
-    numbers: Complex = pairs.view(np.complex128)
-    return numbers
-
-
-def _along_axes(vectors: Complex) -> Array:
-    """How far vectors reach along the axes, shape (..., 2)."""
-    return np.abs(vectors[..., None].view(np.float64))
-
-
-def _turned_back(q: Array, edges: Array) -> Complex:
-    """What turns the plane so that things lie along its axes, by their yaw.
-
-    Of the two parts of a quaternion that have to do with the yaw, one is 0 for what lies on its
-    bottom, the other for what lies on its head. The larger one is taken.
-    """
-    parts = _complex(q)
-    part: Complex = np.where(edges[..., 8] > 0.0, parts[..., 0], parts[..., 1])
-    back: Complex = part.conj() / part
-    return back
-
-
-def _width(edges: Complex, back: Complex) -> Array:
-    """How far boxes reach from their centres along turned axes, shape (..., 2)."""
-    along = _along_axes(edges * back[..., None])
-    width: Array = along[..., 0, :] + along[..., 1, :] + along[..., 2, :]
-    return width
-
-
-def _unpinched(tolerance: Array) -> Array:
-    """A tolerance that, where it is kept, leaves a smallest margin to the distances sideways."""
-    return np.maximum(tolerance, STEEPNESS * tolerance)
-
-
-def _strictly(margin: Array) -> Array:
-    """Make a negated margin false at 0, where the original still holds."""
-    return margin - TINY
 
 
 # -- predicates -----------------------------------------------------------------------------------

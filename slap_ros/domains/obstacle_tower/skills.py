@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from slap_ros.domains.domain import Skill
 from slap_ros.domains.obstacle_tower.model import BLOCK, SURFACE
 from slap_ros.domains.tabletop.grasps import grasps_along_faces, grasps_to_stand, quarter_turns
-from slap_ros.domains.tabletop.places import Place, free_places
+from slap_ros.domains.tabletop.places import GAP, Place, free_places
 from slap_ros.domains.tabletop.reading import box_of, held_body, pose_of, top_of, yaw_of
 from slap_ros.domains.tabletop.skills import GRIP, RELEASE, WaySkill
 from slap_ros.domains.tabletop.surroundings import Surroundings
@@ -74,7 +74,7 @@ def _onto_table(state: State, objects: tuple[Object, ...]) -> Iterator[Way]:
     pose, board = pose_of(state, block), box_of(state, table)
     others = [b for b in state.layout.of_type(BLOCK) if b != block]
     others += [s for s in state.layout.of_type(SURFACE) if s != table]
-    taken = [pose_of(state, thing).position[:2] for thing in others]
+    taken = [(pose_of(state, thing).position[:2], GAP) for thing in others]
     half_x, half_y, _ = board.half
     margins = half_x - TABLE_MARGIN, half_y - TABLE_MARGIN
     for place in free_places(pose.position[:2], board.pose.position[:2], margins, taken):

@@ -15,7 +15,11 @@ Place = tuple[float, float]  # x, y
 
 
 def free_places(
-    near: Place, middle: Place, half: Place, taken: Iterable[Place], gap: float = GAP
+    near: Place,
+    middle: Place,
+    half: Place,
+    taken: Iterable[tuple[Place, float]],
+    spacing: float = SPACING,
 ) -> list[Place]:
     """Places of a grid that are free, the nearest first.
 
@@ -23,19 +27,19 @@ def free_places(
         near: What they are to be near to.
         middle: Of the rectangle, a place of the grid.
         half: Half the edges of the rectangle that the places are in.
-        taken: Middles of what stands there.
-        gap: Distance from all of these at least.
+        taken: Middles of what stands there, and the distance from each at least.
+        spacing: Of the grid.
     """
     (x, y), standing = near, list(taken)
     places = [
         (px, py)
-        for px in _grid(middle[0], half[0])
-        for py in _grid(middle[1], half[1])
-        if all(math.hypot(px - tx, py - ty) >= gap for tx, ty in standing)
+        for px in _grid(middle[0], half[0], spacing)
+        for py in _grid(middle[1], half[1], spacing)
+        if all(math.hypot(px - tx, py - ty) >= gap for (tx, ty), gap in standing)
     ]
     return sorted(places, key=lambda place: (math.hypot(place[0] - x, place[1] - y), place))[:MOST]
 
 
-def _grid(middle: float, half: float) -> list[float]:
-    count = math.floor(half / SPACING)
-    return [middle + i * SPACING for i in range(-count, count + 1)]
+def _grid(middle: float, half: float, spacing: float) -> list[float]:
+    count = math.floor(half / spacing)
+    return [middle + i * spacing for i in range(-count, count + 1)]

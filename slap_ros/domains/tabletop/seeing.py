@@ -12,7 +12,7 @@ import numpy as np
 from slap_ros.domains.tabletop.reading import GRASP_NAMES, JOINT_NAMES, bodies
 from slap_ros.motion.kinematics import GRASP_IN_LAST_LINK, arm_frames, matrix
 from slap_ros.physics.features import ROBOT
-from slap_ros.physics.panda import GRASP_POINT, JOINT_HIGH, JOINT_LOW
+from slap_ros.physics.panda import GRASP_POINT, JOINT_HIGH, JOINT_LOW, JOINTS
 from slap_ros.physics.scene import TABLE_TOP
 from slap_ros.relational import Column, Object, State
 from slap_ros.relational.predicates import Bools
@@ -36,6 +36,13 @@ def hand(state: State) -> Array:
     """Frame of the point between the fingertips, shape (n, 4, 4)."""
     frame: Array = arm_frames(_joints(state))[:, -1] @ _GRASP_FRAME
     return frame
+
+
+def grasp_point(joints: Array) -> Array:
+    """Where the point between the fingertips is, m: joint positions (..., 7) to (..., 3)."""
+    frames = arm_frames(joints.reshape(-1, JOINTS))[:, -1]
+    points: Array = (frames @ _GRASP_FRAME[:, 3])[:, :3]
+    return points.reshape(*joints.shape[:-1], 3)
 
 
 def robot(state: State, hand: Array) -> Array:
@@ -84,7 +91,9 @@ def from_hand(state: State, hand: Array, column: Column) -> Array:
 
 
 def apart(state: State, thing: Object, column: Column) -> Array:
-    """From middle to middle, m, shape (n, objects)."""
+    """From middle to middle, or from the robot's hand, m, shape (n, objects)."""
+    if thing.type.is_a(ROBOT):
+        return to_over(state, hand(state), column, 0.0)
     way = state.gather(column, POSITION) - state.gather(alone(thing), POSITION)
     distance: Array = np.sqrt(np.square(way).sum(axis=-1))
     return distance

@@ -11,8 +11,8 @@ from slap_ros.domains.domain import Animate, VisibleBody
 from slap_ros.domains.tabletop.reading import pose_of
 from slap_ros.meshes.solid import Solid
 from slap_ros.physics.pose import IDENTITY
-from slap_ros.physics.rendering import Camera, View, write_animation
 from slap_ros.physics.scene import Body, Scene
+from slap_ros.physics.viewpoint import View
 from slap_ros.relational import State
 
 SceneOf = Callable[[State], Scene]
@@ -35,9 +35,11 @@ def _visible(body: Body, state: State) -> VisibleBody:
 
 
 def animation(scene_of: SceneOf, view: View | None = None) -> Animate:
-    """What writes states, one a control step, as an animation, seen from where ``view`` says."""
+    """What writes states, one a control step, as an animation, seen from somewhere."""
 
     def animate(path: Path, states: Sequence[State], progress: Callable[[int], None]) -> None:
+        from slap_ros.physics.rendering import Camera, write_animation  # only here are they needed
+
         with Camera(scene_of(states[0]), view) as camera:
             write_animation(path, camera, states, progress)
 

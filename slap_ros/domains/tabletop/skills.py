@@ -91,8 +91,7 @@ class WaySkill:
                 return Follow(self._script(way))
             except SkillNotApplicableError:
                 continue
-        named = ", ".join(obj.name for obj in objects)
-        raise SkillNotApplicableError(f"{self.name}({named}): there is no way for the arm")
+        raise _no_way(self.name, objects)
 
     @property
     def _after(self) -> int:
@@ -109,3 +108,42 @@ class WaySkill:
                 raise SkillNotApplicableError("the arm cannot lift from the grasp")
             script += [(position, 0.0) for position in self.timing.positions([up], way.touching)]
         return script
+
+
+@dataclass(frozen=True)
+class ReachSkill:
+    """Go over what could be grasped, and stay there.
+
+    It is at its end as soon as it is over it as far as the domain cares, which may be some steps
+    before the end of its way: so that bounds its steps by little.
+    """
+
+    name: str
+    timing: Timing
+    ways: Ways
+    step_limit: int = STEP_LIMIT
+    least_steps: int = 1
+
+    def lower_bound(self, state: State, objects: tuple[Object, ...]) -> int:
+        """A step."""
+        del state, objects
+        return self.least_steps
+
+    def start(self, state: State, objects: tuple[Object, ...]) -> Policy:
+        """Plan the motion.
+
+        Raises:
+            SkillNotApplicableError: There is no way over it.
+        """
+        for way in self.ways(state, objects):
+            try:
+                positions = self.timing.positions(way.pieces_over(), way.free)
+            except SkillNotApplicableError:
+                continue
+            return Follow([(position, 0.0) for position in positions])
+        raise _no_way(self.name, objects)
+
+
+def _no_way(name: str, objects: tuple[Object, ...]) -> SkillNotApplicableError:
+    named = ", ".join(obj.name for obj in objects)
+    return SkillNotApplicableError(f"{name}({named}): there is no way for the arm")

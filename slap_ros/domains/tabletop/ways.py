@@ -79,12 +79,26 @@ class Way:
             if descent.down is None:
                 continue
             try:
-                start, above = descent.straight
-                across = PLANS.plan_path(start, above, self.free, seed=SEED)
+                across = self._across(descent)
             except MotionPlanningError:
                 continue
             return [descent.up, across, descent.down]
         raise SkillNotApplicableError(f"none of {len(self.ends)} grasps can be reached from here")
+
+    def pieces_over(self) -> list[Path]:
+        """Up and across alone, and then no way down: over an end that can be come down to, if any.
+
+        Raises:
+            SkillNotApplicableError: There is no way over any of the ends.
+        """
+        can_end = [descent for descent in self.descents if descent.down is not None]
+        for descent in can_end or self.descents:
+            try:
+                across = self._across(descent)
+            except MotionPlanningError:
+                continue
+            return [descent.up, across, across[-1:]]
+        raise SkillNotApplicableError(f"there is no way over any of {len(self.ends)} grasps")
 
     def least_steps(self, timing: Timing) -> float:
         """Control steps that it takes at least: across it may have to go round something.
@@ -99,6 +113,10 @@ class Way:
             if descent.down is not None:
                 least = min(least, timing.least_steps([*towards, descent.down]))
         return least
+
+    def _across(self, descent: Descent) -> Path:
+        start, above = descent.straight
+        return PLANS.plan_path(start, above, self.free, seed=SEED)
 
     @property
     def is_open(self) -> bool:

@@ -1,0 +1,65 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Cluttered Drawer: take a block out of a drawer in which other blocks hem it in (SLAP §5).
+
+A Panda at the origin, an open drawer before it, a table behind that; x to the front, z up, m and
+rad. Read on in this order: ``model`` (types, predicates, operators), ``scenery``, ``tasks``,
+``skills``. The world is that of ``slap_ros.physics``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
+
+from slap_ros.domains.cluttered_drawer import model, skills, tasks
+from slap_ros.domains.cluttered_drawer.scenery import scene_of
+from slap_ros.domains.cluttered_drawer.view import VIEW
+from slap_ros.domains.domain import ActionSpace, Domain
+from slap_ros.domains.tabletop.showing import animation, visible_bodies
+from slap_ros.domains.tabletop.timing import AtSpeedLimit, InTens, Timing
+from slap_ros.domains.variation import varied
+from slap_ros.physics.features import ROBOT
+from slap_ros.physics.panda import CONTROL_PERIOD_S
+from slap_ros.physics.viewpoint import View
+from slap_ros.physics.world import ACTION_SPACE, PandaWorld
+
+SETTINGS: Mapping[str, tasks.RandomTasks | tasks.PaperTasks] = {
+    "fair": tasks.RandomTasks(),
+    "paper": tasks.PaperTasks(),
+}
+# The reference has no limit to what its planned motions do in a step, and jumps by 3 rad.
+WHATEVER = replace(ACTION_SPACE, low=(*(-math.pi,) * 7, -1.0), high=(*(math.pi,) * 7, 1.0))
+ACTIONS: Mapping[str, ActionSpace] = {"fair": ACTION_SPACE, "paper": WHATEVER}
+TIMINGS: Mapping[str, Timing] = {"fair": AtSpeedLimit(), "paper": InTens()}
+
+LOOK = View(eye=(0.9, -1.3, 1.0), target=(0.3, 0.0, 0.28))  # into the drawer, past the hand
+
+
+def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Domain:
+    """The domain: preset ``fair`` samples different tasks, ``paper`` has the reference's one."""
+    settings, actions = varied(SETTINGS[preset], changes), ACTIONS[preset]
+    room = model.FingerRoom(settings.reach, settings.half_width)
+    return Domain(
+        name="cluttered_drawer",
+        preset=preset,
+        types=model.TYPES,
+        predicates=model.predicates(room),
+        operators=model.OPERATORS,
+        skills=skills.skills(TIMINGS[preset]),
+        action_space=actions,
+        control_period_s=CONTROL_PERIOD_S,
+        sample_task=settings.sample,
+        make_world=lambda state: PandaWorld(scene_of(state), state, actions=actions),
+        default_goal=tasks.target_block_on_table,
+        step_limit=tasks.STEP_LIMIT,
+        unread_types=frozenset({ROBOT}),
+        reading=model.HAND_PREDICATES,
+        bodies=lambda state: visible_bodies(scene_of(state), state),
+        animate=animation(scene_of, LOOK),
+        view=VIEW,
+        learned_actions=ACTION_SPACE,
+        configuration=settings.as_configuration(),
+    )

@@ -1,0 +1,117 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Cluttered Drawer: the given skills. Reach over a block, take it, put it elsewhere."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from slap_ros.domains.cluttered_drawer.model import BLOCK, DRAWER, SIDES, TABLE, TARGET, WALL
+from slap_ros.domains.cluttered_drawer.tasks import APART
+from slap_ros.domains.domain import Skill
+from slap_ros.domains.tabletop.grasps import from_above, grasps_to_stand, quarter_turns
+from slap_ros.domains.tabletop.places import GAP, free_places
+from slap_ros.domains.tabletop.reading import box_of, held_body, pose_of, top_of, yaw_of
+from slap_ros.domains.tabletop.skills import GRIP, RELEASE, ReachSkill, Ways, WaySkill
+from slap_ros.domains.tabletop.surroundings import Surroundings
+from slap_ros.domains.tabletop.timing import Timing
+from slap_ros.domains.tabletop.ways import Way, remembered
+from slap_ros.errors import SkillNotApplicableError
+from slap_ros.motion import Box
+from slap_ros.physics.pose import IDENTITY
+from slap_ros.relational import Object, State
+
+LIFT = 0.02  # m, of a block that counts as picked; it still blocks what it blocked
+TABLE_MARGIN = 0.05  # m, of places on the table from its edges
+SPACING = 0.025  # m, of the grid of places: the drawer is narrow
+WALL_MARGIN = 0.07  # m, of places in the drawer from its walls, so that fingers can open there
+
+# Turns of the hand against the target block: its fingers move along the hand's y.
+LEFT_RIGHT, FRONT_BACK = (0.0, math.pi), (math.pi / 2, -math.pi / 2)
+ANY = (*LEFT_RIGHT, *FRONT_BACK)
+
+
+def _solid(state: State) -> Iterator[tuple[Object, Box]]:
+    """Blocks, the table, and all of the drawer."""
+    for kind in (BLOCK, TABLE, DRAWER, WALL):
+        for thing in state.layout.of_type(kind):
+            yield thing, box_of(state, thing)
+
+
+SURROUNDINGS = Surroundings(_solid, lambda state, body: Box(IDENTITY, box_of(state, body).half))
+
+
+def _least_turned(yaw: float) -> float:
+    """The same up to quarter turns, as sides are named: from -45 to 45 degrees, rad."""
+    return yaw - round(yaw / (math.pi / 2)) * math.pi / 2
+
+
+@remembered
+def _way_to_grasp(state: State, block: Object, turns: Sequence[float]) -> Way:
+    pose = pose_of(state, block)
+    yaw = _least_turned(yaw_of(pose))
+    grasps = [from_above(pose.position, yaw + turn) for turn in turns]
+    return Way(SURROUNDINGS, state, grasps, touched=(block,))
+
+
+def _to_block(turns: Sequence[float]) -> Ways:
+    """To a grasp of the block, the hand turned so against it."""
+
+    def ways(state: State, objects: tuple[Object, ...]) -> Iterator[Way]:
+        yield _way_to_grasp(state, objects[1], turns)
+
+    return ways
+
+
+@remembered
+def _way_to_place(state: State, place: tuple[float, float], surface: Object) -> Way:
+    """The way on which the held block comes to stand on a surface at a place, turned as it is."""
+    block = held_body(state)
+    if block is None:
+        raise SkillNotApplicableError("nothing is held")
+    top, yaws = top_of(box_of(state, surface)), quarter_turns(yaw_of(pose_of(state, block)))
+    ends = grasps_to_stand(state, box_of(state, block), place, top, yaws)
+    return Way(SURROUNDINGS, state, ends, touched=(surface,))
+
+
+def _onto_surface(state: State, block: Object, surface: Object, margin: float) -> Iterator[Way]:
+    """To free places away from all sides of the target block, nearest to the held one first."""
+    board, near = box_of(state, surface), pose_of(state, block).position[:2]
+    taken = [
+        (pose_of(state, other).position[:2], APART if other.type.is_a(TARGET) else GAP)
+        for other in state.layout.of_type(BLOCK)
+        if other != block
+    ]
+    half_x, half_y, _ = board.half
+    halves = (half_x - margin, half_y - margin)
+    for place in free_places(near, board.pose.position[:2], halves, taken, SPACING):
+        yield _way_to_place(state, place, surface)
+
+
+def _into_drawer(state: State, objects: tuple[Object, ...]) -> Iterator[Way]:
+    _, block, _, drawer = objects
+    return _onto_surface(state, block, drawer, WALL_MARGIN)
+
+
+def _onto_table(state: State, objects: tuple[Object, ...]) -> Iterator[Way]:
+    _, block, table = objects
+    return _onto_surface(state, block, table, TABLE_MARGIN)
+
+
+def skills(timing: Timing) -> dict[str, Skill]:
+    """A skill for each operator."""
+
+    def grasp(name: str, turns: Sequence[float]) -> Skill:
+        return WaySkill(name, timing, _to_block(turns), GRIP, LIFT)
+
+    made = [
+        ReachSkill("Reach", timing, _to_block(ANY)),
+        grasp("GraspFrontBack", FRONT_BACK),
+        grasp("GraspLeftRight", LEFT_RIGHT),
+        grasp("GraspFullClear", ANY),
+        grasp("GraspNonTarget", ANY),
+        WaySkill("PlaceTarget", timing, _onto_table, RELEASE),
+        *(WaySkill(f"Place{side}Block", timing, _into_drawer, RELEASE) for side in SIDES),
+    ]
+    return {skill.name: skill for skill in made}

@@ -1,0 +1,201 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Cluttered Drawer: tasks, sampled, and the reference's single start state. Lengths in m."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+
+import numpy as np
+
+from slap_ros.domains.cluttered_drawer.model import (
+    BLOCK,
+    ON,
+    SIDES,
+    TABLE,
+    TARGET,
+    FingerRoom,
+    lie_with,
+)
+from slap_ros.domains.cluttered_drawer.scenery import BOTTOM, FIXED, HALF_WIDTH, MIDDLE, OPENING
+from slap_ros.domains.domain import Task
+from slap_ros.domains.tabletop.places import GAP
+from slap_ros.errors import InvalidParameterError, InvalidStateError
+from slap_ros.physics.features import (
+    ROBOT,
+    body_features,
+    material_features,
+    pose_features,
+    robot_features,
+)
+from slap_ros.physics.panda import HOME
+from slap_ros.physics.pose import Pose
+from slap_ros.physics.scene import CUBE_EDGE, CUBE_MATERIAL, Material
+from slap_ros.relational import GroundAtom, Object, State
+
+STEP_LIMIT = 500  # environment steps (SLAP Table 8)
+TRIES = 10_000  # arrangements drawn before there is said to be no room
+NEIGHBOUR = 0.0675  # between the middles of the target block and of a blocker (reference)
+APART = 0.15  # from the target block to a block that does not hem it in
+WALL_GAP = 0.04  # between a wall and a block's middle
+ENDS = 0.06  # along y: of the drawer's two ends, where blocks stand about that hem nothing in
+
+Range = tuple[float, float]
+Placed = tuple[float, float, float]  # x, y, yaw in rad
+
+
+@dataclass(frozen=True)
+class Scenery:
+    """Where the blocks stand, and what all of them are made of."""
+
+    target: Placed
+    blockers: tuple[Placed, ...]
+    others: tuple[Placed, ...] = ()
+    material: Material = CUBE_MATERIAL
+
+    def task(self) -> Task:
+        """The task to put the target block on the table."""
+        features: dict[Object, Mapping[str, float]] = {ROBOT("robot"): robot_features(HOME)}
+        for number, placed in enumerate((self.target, *self.blockers, *self.others), start=1):
+            kind = TARGET if number == 1 else BLOCK
+            features[kind(f"block{number}")] = _block(self.material, placed)
+        for thing, (middle, half) in FIXED.items():
+            features[thing] = {**pose_features(Pose(middle)), **_size(*half)}
+        state = State.build(features)
+        return Task(state, target_block_on_table(state), STEP_LIMIT)
+
+
+def target_block_on_table(state: State) -> frozenset[GroundAtom]:
+    """The goal: the target block stands on the table.
+
+    Raises:
+        InvalidStateError: The state has no target block or no table.
+    """
+    targets, tables = state.layout.of_type(TARGET), state.layout.of_type(TABLE)
+    if not targets or not tables:
+        raise InvalidStateError("a state of cluttered_drawer needs a target block and a table")
+    return frozenset({ON(targets[0], tables[0])})
+
+
+def _neighbour(target: Placed, side: complex, distance: float, aside: float, turn: float) -> Placed:
+    """A block beside another: at a side of it, at a distance, so far aside and so much turned."""
+    x, y, yaw = target
+    way = side * complex(distance, aside) * complex(math.cos(yaw), math.sin(yaw))
+    return x + way.real, y + way.imag, yaw + turn
+
+
+TOWARDS = (-1.0 + 0j, 1.0 + 0j, 1j, -1j)  # front, back, left, right
+
+
+@dataclass(frozen=True)
+class RandomTasks:
+    """Everything sampled anew for each task. Lengths in m, angles in rad, masses in kg."""
+
+    obstacles: tuple[int, int] = (4, 6)  # inclusive: four hem the target in, others stand about
+    target_x: Range = (MIDDLE - 0.01, MIDDLE + 0.01)
+    target_y: Range = (-0.04, 0.04)
+    yaw: Range = (-0.35, 0.35)
+    distance: Range = (NEIGHBOUR - 0.003, NEIGHBOUR + 0.007)
+    aside: float = 0.008
+    turn: float = 0.1
+    # Of all blocks of a task alike.
+    mass: Range = (CUBE_MATERIAL.mass_kg, CUBE_MATERIAL.mass_kg)
+    friction: Range = (CUBE_MATERIAL.friction, CUBE_MATERIAL.friction)
+    # What blocks: thresholds of the predicates, nothing that the tasks depend on.
+    reach: float = FingerRoom.reach
+    half_width: float = FingerRoom.half_width
+
+    def sample(self, rng: np.random.Generator) -> Task:
+        """A task."""
+        obstacles = int(rng.integers(self.obstacles[0], self.obstacles[1] + 1))
+        for _ in range(TRIES):
+            scenery = self._draw(rng, obstacles)
+            if scenery is not None:
+                return scenery.task()
+        raise InvalidParameterError(f"the drawer has no room for {obstacles} obstacles")
+
+    def _draw(self, rng: np.random.Generator, obstacles: int) -> Scenery | None:
+        """An arrangement; None where a block does not stand as it should."""
+        x, y, yaw = (float(rng.uniform(*r)) for r in (self.target_x, self.target_y, self.yaw))
+        target = (x, y, yaw)
+        hemming = min(obstacles, len(SIDES))
+        sides = sorted(rng.permutation(len(SIDES))[:hemming].tolist())
+        blockers = tuple(
+            _neighbour(
+                target,
+                TOWARDS[side],
+                float(rng.uniform(*self.distance)),
+                float(rng.uniform(-1, 1)) * self.aside,
+                float(rng.uniform(-1, 1)) * self.turn,
+            )
+            for side in sides
+        )
+        others: list[Placed] = []
+        for _ in range(obstacles - hemming):
+            other = (
+                MIDDLE + float(rng.uniform(-1, 1)) * (OPENING / 2 - WALL_GAP),
+                float(rng.choice([-1, 1]) * (HALF_WIDTH - WALL_GAP - rng.uniform(0, ENDS))),
+                float(rng.uniform(*self.yaw)),
+            )
+            if any(_between(other, thing) < GAP for thing in others):
+                return None
+            others.append(other)
+        # Last, so that where things stand does not depend on it.
+        material = Material(float(rng.uniform(*self.mass)), float(rng.uniform(*self.friction)))
+        scenery = Scenery(target, blockers, tuple(others), material)
+        return scenery if _blocked_sides(scenery) == [[side] for side in sides] else None
+
+    def as_configuration(self) -> Mapping[str, str | int | float]:
+        """The settings by name."""
+        return {name: str(value) for name, value in asdict(self).items()}
+
+
+@dataclass(frozen=True)
+class PaperTasks:
+    """The single start state of the reference."""
+
+    scenery: Scenery = field(
+        default_factory=lambda: Scenery(
+            target=(MIDDLE, 0.0, 0.0),
+            blockers=tuple(
+                _neighbour((MIDDLE, 0.0, 0.0), side, NEIGHBOUR, 0.0, 0.0) for side in TOWARDS
+            ),
+        )
+    )
+    reach: float = FingerRoom.reach
+    half_width: float = FingerRoom.half_width
+
+    def sample(self, _: np.random.Generator) -> Task:
+        """That state."""
+        return self.scenery.task()
+
+    def as_configuration(self) -> Mapping[str, str | int | float]:
+        """The settings by name."""
+        return {name: str(value) for name, value in asdict(self).items()}
+
+
+def _between(one: Placed, other: Placed) -> float:
+    return math.hypot(one[0] - other[0], one[1] - other[1])
+
+
+def _blocked_sides(scenery: Scenery) -> list[list[int]]:
+    """The sides of the target block that each blocker blocks."""
+    state = scenery.task().initial_state
+    blocking = lie_with(FingerRoom(), state).blocking[:, 1 : 1 + len(scenery.blockers)] >= 0.0
+    return [np.flatnonzero(sides).tolist() for sides in blocking.T]
+
+
+def _block(material: Material, placed: Placed) -> Mapping[str, float]:
+    x, y, yaw = placed
+    half = CUBE_EDGE / 2
+    return {
+        **body_features((x, y, BOTTOM + half), (0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))),
+        **material_features(material),
+        **_size(half, half, half),
+    }
+
+
+def _size(x: float, y: float, z: float) -> Mapping[str, float]:
+    return {"half_x": x, "half_y": y, "half_z": z}

@@ -1,0 +1,68 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Cluttered Drawer as a learner sees it: joints, and everything else from the hand."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from slap_ros.domains.cluttered_drawer.model import BLOCK, GRASPING, SIDES, SURFACE, TARGET
+from slap_ros.domains.cluttered_drawer.scenery import BOTTOM
+from slap_ros.domains.tabletop import seeing
+from slap_ros.domains.view import View
+from slap_ros.physics.scene import CUBE_EDGE
+from slap_ros.relational import Column, State
+from slap_ros.relational.state import Array
+
+NEAR = 0.1  # m, the scale of what is beside the target block
+BESIDE = CUBE_EDGE / 2  # m, of the hand over a block's middle
+FINGER_ROOM = 0.002  # m, more than blocks nothing: so much the next grasp may be off
+
+
+def _things(state: State, hand: Array, column: Column) -> Array:
+    """Where from the hand, in the base's axes.
+
+    Of blocks also: how fast, which way they are turned, and where beside the target block.
+    """
+    kind = column.objects[0].type
+    if kind.is_a(SURFACE):
+        return seeing.place(state, hand, column)
+    if not kind.is_a(BLOCK):
+        return seeing.nothing(state, column)
+    turn = state.gather(column, ("qz", "qw"))
+    yaw = 8.0 * np.arctan2(turn[..., 0], turn[..., 1])  # a square looks the same four times
+    parts = [
+        seeing.place(state, hand, column),
+        seeing.speed(state, column),
+        np.stack([np.sin(yaw), np.cos(yaw)], axis=-1),
+        _beside_target(state, column) / NEAR,
+    ]
+    return np.concatenate(parts, axis=-1)
+
+
+def _beside_target(state: State, column: Column) -> Array:
+    """Positions less that of the target block, m, shape (n, objects, 2)."""
+    target = seeing.alone(state.layout.of_type(TARGET)[0])
+    beside: Array = state.gather(column, ("x", "y")) - state.gather(target, ("x", "y"))
+    return beside
+
+
+def _distance(state: State, hand: Array, column: Column) -> Array:
+    """From the hand to the tops of blocks."""
+    if not column.objects[0].type.is_a(BLOCK):
+        return seeing.never_near(state, column)
+    return seeing.to_over(state, hand, column, BESIDE)
+
+
+VIEW = View(
+    hand=seeing.hand,
+    robot=seeing.robot,
+    things=_things,
+    distance=_distance,
+    apart=seeing.apart,
+    settled=seeing.settled,
+    lost=seeing.lower_than(BOTTOM),
+    slack={f"{side}Clear": FINGER_ROOM for side in SIDES},
+    grasping=GRASPING,
+    length_m=0.05,
+)

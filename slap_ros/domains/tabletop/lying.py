@@ -1,0 +1,81 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How boxes lie, many at once: where their edges point, how wide they are seen from above.
+
+Horizontal vectors are complex numbers: turned by a product, seen along both axes at once.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slap_ros.relational.state import Array
+
+TINY = float(np.finfo(np.float64).tiny)
+STEEPNESS = 50.0  # 1, of tolerances in margins: 4 mm count as 20 cm sideways
+
+Complex = NDArray[np.complex128]
+Indices = NDArray[np.intp]
+PARTS = ("qw", "qz", "qx", "qy")  # as they are read: (w, z) and (x, y) turn the plane
+W, Z, X, Y = range(4)
+
+
+def _to_edges() -> Array:
+    """The linear map from the products of a quaternion's parts to where a unit cube's edges point.
+
+    Returns:
+        Shape (16, 9): x and y of the first, second and third edge, then z of each.
+    """
+    to = np.zeros((4, 4, 9))
+    axes, place = (X, Y, Z), ((0, 2, 4), (1, 3, 5), (6, 7, 8))  # place[coordinate][edge]
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        a, b, c = axes[i], axes[j], axes[k]
+        to[[a, W, b, c], [a, W, b, c], place[i][i]] = 1.0, 1.0, -1.0, -1.0
+        to[a, b, place[i][j]], to[c, W, place[i][j]] = 2.0, -2.0
+        to[a, c, place[i][k]], to[b, W, place[i][k]] = 2.0, 2.0
+    return to.reshape(16, 9)
+
+
+TO_EDGES = _to_edges()
+HALVES = (*("half_x",) * 2, *("half_y",) * 2, *("half_z",) * 2, "half_x", "half_y", "half_z")
+
+
+def complex_of(pairs: Array) -> Complex:
+    """Numbers from their parts side by side, without copying."""
+    numbers: Complex = pairs.view(np.complex128)
+    return numbers
+
+
+def along_axes(vectors: Complex) -> Array:
+    """How far vectors reach along the axes, shape (..., 2)."""
+    return np.abs(vectors[..., None].view(np.float64))
+
+
+def turned_back(q: Array, edges: Array) -> Complex:
+    """What turns the plane so that things lie along its axes, by their yaw.
+
+    Of the two parts of a quaternion that have to do with the yaw, one is 0 for what lies on its
+    bottom, the other for what lies on its head. The larger one is taken.
+    """
+    parts = complex_of(q)
+    part: Complex = np.where(edges[..., 8] > 0.0, parts[..., 0], parts[..., 1])
+    back: Complex = part.conj() / part
+    return back
+
+
+def widths(edges: Complex, back: Complex) -> Array:
+    """How far boxes reach from their centres along turned axes, shape (..., 2)."""
+    along = along_axes(edges * back[..., None])
+    width: Array = along[..., 0, :] + along[..., 1, :] + along[..., 2, :]
+    return width
+
+
+def unpinched(tolerance: Array) -> Array:
+    """A tolerance that, where it is kept, leaves a smallest margin to the distances sideways."""
+    return np.maximum(tolerance, STEEPNESS * tolerance)
+
+
+def strictly(margin: Array) -> Array:
+    """Make a negated margin false at 0, where the original still holds."""
+    return margin - TINY

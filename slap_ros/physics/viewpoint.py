@@ -1,0 +1,20 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where a camera is, and how it looks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from slap_ros.physics.pose import Vector
+
+
+@dataclass(frozen=True)
+class View:
+    """By default from the front right, from above the arm."""
+
+    eye: Vector = (1.45, -1.1, 0.85)  # m
+    target: Vector = (0.3, 0.0, 0.22)  # m
+    field_of_view: float = 42.0  # degrees, upright
+    width: int = 480  # pixels
+    height: int = 360
