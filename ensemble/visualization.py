@@ -17,6 +17,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from ensemble import encode
 from ensemble.interfaces import JOINT_STATES, MARKERS, TF
 from slap_ros.domains.domain import Domain, VisibleBody
+from slap_ros.messages.interfaces import BODIES
 from slap_ros.relational import State
 
 UNSCALED = (1.0, 1.0, 1.0)
@@ -49,7 +50,7 @@ def markers(bodies: Sequence[VisibleBody], stamp: Time) -> MarkerArray:
         markers=[
             Marker(
                 header=encode.header(stamp),
-                ns="bodies",
+                ns=BODIES,
                 id=number,
                 type=Marker.TRIANGLE_LIST if body.triangles else Marker.CUBE,
                 action=Marker.ADD,

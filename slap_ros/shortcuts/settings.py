@@ -37,14 +37,14 @@ class Exploration:
     nodes: int = 6
 
 
-LEARN = PpoSettings(total_steps=400_000)
+LEARN = PpoSettings(total_steps=250_000)
 POLISH = PpoSettings(
     rollout_steps=128,
     batch_size=512,
     learning_rate=4e-4,
     gae_lambda=0.95,
     log_std=-1.3,
-    total_steps=300_000,
+    total_steps=250_000,
 )
 
 
