@@ -45,11 +45,8 @@ TRAIN = ["torch>=2.4", "stable-baselines3>=2.3", "tensorboard>=2.15"]
 RAY = ["ray>=2.40"]
 STUDIES = ["matplotlib>=3.8"]
 DOCS = ["mkdocs>=1.6,<2"]
-MESHES = [  # other objects than those that come with it; Objaverse's own client
-    "coacd>=1.0.4",
-    "trimesh>=4.4",
-    "objaverse>=0.1.7",
-]
+DECOMPOSITION = ["coacd>=1.0.4", "trimesh>=4.4"]  # of other objects than those that come with it
+MESHES = [*DECOMPOSITION, "objaverse>=0.1.7"]  # Objaverse's own client
 TEST = [
     "pytest>=8",
     "pytest-timeout>=2.3",
@@ -61,6 +58,7 @@ TEST = [
     "setuptools>=68,<80",  # for colcon, as in pyproject.toml; what follows would raise it
     *TRAIN,
     *STUDIES,
+    *DECOMPOSITION,
     *DOCS,
     "unified-planning>=1.1",
     "up-aries>=0.4",
@@ -111,6 +109,7 @@ setup(
         "slap_ros": [
             "py.typed",
             "domains/cleanup_table/shapes/*.obj",
+            "domains/cleanup_table/shapes/NOTICE",
             "report/page.css",
             "report/page.html.j2",
             "report/page.js",

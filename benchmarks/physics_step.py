@@ -218,11 +218,12 @@ class Plain:
 
     def __init__(self, scene: Scene = SCENE, start: State | None = None) -> None:
         """The bodies of a scene as they are in a state; without one, the tower."""
-        self._scene, self._start = scene, start or tower()
+        self._scene = scene
+        self._start = tower() if start is None else start
         self._client: int | None = None
 
     def reset(self, joints: Array) -> None:
-        """A new scene: this world keeps contacts, which a reset would not clear."""
+        """All as it was, the arm there: a new scene, as a reset would not clear contacts."""
         if self._client is None:
             self._client = pybullet.connect(pybullet.DIRECT)
         client = self._client

@@ -5,6 +5,8 @@
 Obstacle 2D: many worlds in one numpy batch against one world at a time, the same arithmetic.
 Obstacle Tower: the physics step against plain stepping (``benchmarks.physics_step``), random
 actions from home (away) and an arm kept in the tower (contact).
+Cluttered Drawer: the same, with atoms, against plain stepping without; the contact is that of an
+open hand around the target block that moves at random.
 Cleanup Table: world and atoms against plain stepping alone, random actions from home.
 All: the atoms of a state that was not seen before.
 """
@@ -12,6 +14,7 @@ All: the atoms of a state that was not seen before.
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Callable, Mapping
 from statistics import median
 from time import process_time
@@ -22,6 +25,7 @@ import numpy as np
 from benchmarks.printing import show
 from slap_ros.domains import Domain, get_domain
 from slap_ros.domains.obstacle2d.dynamics import step
+from slap_ros.physics.panda import MAX_STEP
 from slap_ros.relational import State
 
 BATCH = 20_000  # worlds
@@ -94,12 +98,39 @@ def cleanup_table() -> dict[str, Any]:
     }
 
 
-def with_atoms(domain: Domain) -> float:
-    """Steps a second of world and perception, random actions from the start of a task."""
-    initial = get_domain(domain.name, "paper").task(0).initial_state
+def cluttered_drawer() -> dict[str, Any]:
+    """Ratios to plain stepping, steps a second, both with atoms."""
+    from benchmarks.physics_step import EPISODES, Episode, Plain, steps_per_second, with_joints
+    from slap_ros.domains.cluttered_drawer.scenery import scene_of
+    from slap_ros.domains.tabletop.grasps import from_above
+    from slap_ros.domains.tabletop.reading import joints_of, pose_of
+    from slap_ros.motion import nearest_configurations
+
+    domain = get_domain("cluttered_drawer", "paper")
+    initial = domain.task(0).initial_state
+    target = pose_of(initial, initial.layout.object("block1")).position
+    between = from_above(target, math.pi / 4)  # the fingers, in the gaps between blockers
+    (around,) = nearest_configurations([between], joints_of(initial))
+    assert around is not None
+    figures: dict[str, Any] = {}
+    for name, joints in (("away", joints_of(initial)), ("contact", around)):
+        start, rng = with_joints(initial, joints), np.random.default_rng(0)
+        high = np.array([*MAX_STEP, 0.0])
+        episodes = [
+            Episode(joints, rng.uniform(-high, high, (EPISODE, 8))) for _ in range(EPISODES)
+        ]
+        plain = steps_per_second(Plain(scene_of(initial), initial), episodes)
+        ours = with_atoms(domain, start)
+        figures[name] = {"ratio": ours / plain, "with_atoms_steps_per_s": ours}
+    return {**figures, "atoms_us": atoms_us(domain)}
+
+
+def with_atoms(domain: Domain, initial: State | None = None) -> float:
+    """Steps a second of world and perception, random actions, by default from a task's start."""
+    initial = initial or get_domain(domain.name, "paper").task(0).initial_state
     space, world = domain.atom_space(initial), domain.make_world(initial)
     rng = np.random.default_rng(0)
-    high = np.array([*domain.action_space.high[:-1], 0.0])
+    high = np.array([*domain.shortcut_actions.high[:-1], 0.0])
     seconds = 0.0
     for _ in range(SINGLE_STEPS // EPISODE):
         world.reset(initial)
@@ -126,6 +157,7 @@ def atoms_us(domain: Domain) -> float:
 BENCHMARKS: Mapping[str, Callable[[], dict[str, Any]]] = {
     "obstacle2d": obstacle2d,
     "obstacle_tower": obstacle_tower,
+    "cluttered_drawer": cluttered_drawer,
     "cleanup_table": cleanup_table,
 }
 

@@ -50,7 +50,7 @@ def test_colcon_sees_both_packages_with_their_build_types(checkout):
 
 
 @pytest.mark.parametrize("options", [[], ["--symlink-install"]], ids=["plain", "symlinks"])
-def test_colcon_builds_executables_where_ros2_run_looks_for_them(checkout, options):
+def test_colcon_builds_executables_where_ros2_run_looks_for_them(checkout, options, tmp_path):
     # slap_msgs needs ament_cmake to be built; colcon is content with a sign that it was.
     built = checkout / "install" / "slap_msgs" / "share" / "slap_msgs"
     built.mkdir(parents=True)
@@ -65,6 +65,9 @@ def test_colcon_builds_executables_where_ros2_run_looks_for_them(checkout, optio
     for name in (*NODES, "slap"):
         assert (installed / "lib/slap_ros" / name).exists()
     (packages,) = installed.glob("lib/python3.*/site-packages")
+    shapes = "from slap_ros.domains.cleanup_table.shapes import shipped; shipped()"
+    away = {**os.environ, "PYTHONPATH": str(packages)}
+    subprocess.run([sys.executable, "-c", shapes], env=away, cwd=tmp_path.root, check=True)
     if not options:  # symlinks lead to the sources, with all that is in them
         report = packages / "slap_ros" / "report"
         assert {path.suffix for path in report.glob("page.*")} == {".py", ".css", ".js", ".j2"}

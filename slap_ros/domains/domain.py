@@ -168,6 +168,7 @@ class Domain:
     default_goal: Callable[[State], frozenset[GroundAtom]]  # of a state given without a goal
     step_limit: int  # environment steps of a task
     unread_types: frozenset[Type] = frozenset()  # whose features no predicate reads: the robot's
+    reading: frozenset[Predicate] = frozenset()  # predicates that read them nevertheless
     bodies: Callable[[State], Sequence[VisibleBody]] = lambda _: ()  # to be shown
     animate: Animate | None = None
     view: View | None = None  # what a learner sees; without it there are no shortcuts
@@ -231,7 +232,7 @@ class Domain:
     def atom_space(self, initial: State) -> AtomSpace:
         """The ground atoms over a task's objects."""
         return AtomSpace.of_state(
-            self.predicates, self.static_predicates, initial, self.unread_types
+            self.predicates, self.static_predicates, initial, self.unread_types, self.reading
         )
 
     def ground(self, space: AtomSpace) -> tuple[GroundOperator, ...]:

@@ -34,6 +34,7 @@ class AtomSpace:
         layout: Layout,
         holds: Callable[[GroundAtom], bool],
         unread: Collection[Type] = (),
+        reading: Collection[Predicate] = (),
     ) -> None:
         """Enumerate the atoms over the objects of ``layout``.
 
@@ -42,8 +43,9 @@ class AtomSpace:
             static: Those that no operator changes.
             layout: The task's objects.
             holds: Whether an atom of a static predicate holds.
-            unread: Types of objects whose features no predicate reads, the robot as a rule:
-                states that differ only there are perceived once.
+            unread: Types of objects whose features few predicates read, the robot as a rule: of
+                states that differ only there, the others are perceived once.
+            reading: These few.
         """
         self.layout = layout
         self.predicates = {predicate.name: predicate for predicate in predicates}
@@ -71,6 +73,12 @@ class AtomSpace:
             ]
             or [np.empty(0, np.intp)]
         )
+        self._rereading = [
+            _Block.of(predicate, self.atoms)
+            for predicate in reading
+            if predicate in about_something
+        ]
+        self._reread = self.mask(atom for atom in self.atoms if atom.predicate in reading)
         self._perceived: dict[bytes, int] = {}
         self._truth = np.array([bool(statics.get(a, 0) & self.static_truth) for a in self.atoms])
 
@@ -81,9 +89,12 @@ class AtomSpace:
         static: Collection[Predicate],
         state: State,
         unread: Collection[Type] = (),
+        reading: Collection[Predicate] = (),
     ) -> AtomSpace:
         """The space over a state's objects, static atoms as they are in that state."""
-        return cls(predicates, static, state.layout, lambda atom: atom.holds(state), unread)
+        return cls(
+            predicates, static, state.layout, lambda atom: atom.holds(state), unread, reading
+        )
 
     def abstract(self, state: State) -> int:
         """The abstract state of a single state."""
@@ -93,7 +104,9 @@ class AtomSpace:
             mask = _mask(self.truth(state))
             if len(self._perceived) == MOST_REMEMBERED:
                 self._perceived.clear()
-            self._perceived[read] = mask
+            self._perceived[read] = mask & ~self._reread
+        elif self._rereading:
+            mask |= _mask(self._evaluate(self._rereading, state, np.zeros_like(self._truth)))
         return mask
 
     def abstract_each(self, states: State) -> list[int]:
@@ -104,7 +117,14 @@ class AtomSpace:
         """Whether each atom holds, for a state or a batch of states, shape (..., atoms)."""
         truth = np.empty((*state.data.shape[:-1], len(self.atoms)), dtype=bool)
         truth[...] = self._truth
-        for block in self._fluents:
+        return self._evaluate(self._fluents, state, truth)
+
+    @staticmethod
+    def _evaluate(
+        blocks: Sequence[_Block], state: State, truth: NDArray[np.bool_]
+    ) -> NDArray[np.bool_]:
+        """Put in the truth of some of the atoms."""
+        for block in blocks:
             truth[..., block.where] = block.classifier(state, *block.columns)
         return truth
 

@@ -125,11 +125,12 @@ SETTINGS: Mapping[str, Mapping[str, TrainingSettings]] = {
         ),
         "cleanup_table": replace(
             OURS,
-            exploration=Exploration(nodes=13),  # all that is grasped, and lifted
-            ppo=replace(LEARN, total_steps=150_000),
-            polish=replace(POLISH, total_steps=100_000),
-            horizon=60,
-            starts=150,
+            # Nodes: everything over which the hand can be, that it can grasp, and lift.
+            exploration=Exploration(tasks=3, rollouts=32, length=40, nodes=13),
+            ppo=replace(LEARN, total_steps=100_000),
+            polish=replace(POLISH, total_steps=80_000),
+            horizon=40,
+            starts=120,
             shortcuts=2,
         ),
         "": OURS,

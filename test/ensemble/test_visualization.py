@@ -5,6 +5,7 @@
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
+from visualization_msgs.msg import Marker
 
 from ensemble.visualization import frames, joint_state, markers
 from slap_ros.domains import get_domain
@@ -12,7 +13,9 @@ from slap_ros.domains import get_domain
 STAMP = Time(sec=1, nanosec=2)
 
 
-@pytest.mark.parametrize("name", ["obstacle2d", "obstacle_tower"])
+@pytest.mark.parametrize(
+    "name", ["obstacle2d", "obstacle_tower", "cluttered_drawer", "cleanup_table"]
+)
 def test_every_object_but_the_arm_is_a_marker_and_a_frame(name):
     domain = get_domain(name)
     state = domain.task(0).initial_state
@@ -21,7 +24,7 @@ def test_every_object_but_the_arm_is_a_marker_and_a_frame(name):
     framed = {frame.child_frame_id for frame in frames(bodies, STAMP).transforms}
     everything = {obj.name for obj in state.objects}
     assert shown == framed
-    assert everything - shown <= {"robot"}
+    assert everything - shown <= {"robot", "bin"}  # a bin is shown by its parts
 
 
 def test_blocks_of_the_tower_are_where_they_are_and_as_large():
@@ -32,6 +35,19 @@ def test_blocks_of_the_tower_are_where_they_are_and_as_large():
         position = [marker.pose.position.x, marker.pose.position.y, marker.pose.position.z]
         assert np.array_equal(position, state[obj][:3])
         assert marker.scale.z == pytest.approx(2 * float(state.get(obj, "half_z")))
+
+
+def test_meshes_are_shown_by_their_triangles():
+    domain = get_domain("cleanup_table", "paper")
+    state = domain.task(0).initial_state
+    shown = {marker.text: marker for marker in markers(domain.bodies(state), STAMP).markers}
+    duck, table = shown["duck"], shown["table"]
+    assert (duck.type, table.type) == (Marker.TRIANGLE_LIST, Marker.CUBE)
+    assert (duck.scale.x, duck.scale.y, duck.scale.z) == (1.0, 1.0, 1.0)
+    assert len(duck.points) % 3 == 0
+    lowest = duck.pose.position.z + min(point.z for point in duck.points)
+    assert lowest == pytest.approx(0.0)  # it stands on the table
+    assert table.points == []
 
 
 def test_joint_states_are_those_of_the_arm_and_only_of_an_arm():

@@ -11,11 +11,12 @@ import pytest
 from slap_ros.domains.cleanup_table.shapes import make
 from slap_ros.errors import InvalidMeshError, MeshUnavailableError
 from slap_ros.meshes.cache import cache_folder, keep
-from slap_ros.meshes.decomposition import kept_at, load_mesh
+from slap_ros.meshes.decomposition import Fineness, kept_at, load_mesh
 from slap_ros.meshes.obj import to_obj
 from slap_ros.meshes.objaverse import load_objaverse
 from slap_ros.meshes.solid import Solid
 
+ROUGH = Fineness(threshold=0.3, pieces=6)  # quick
 IDENTIFIER = "0123456789abcdef0123456789abcdef"
 PIECES = make.duck()
 DUCK = Solid.of(PIECES)
@@ -38,16 +39,16 @@ def test_a_mesh_that_is_not_convex_comes_apart_and_is_kept(tmp_path, monkeypatch
     trimesh = pytest.importorskip("trimesh")
     file = tmp_path / "ring.glb"
     trimesh.creation.torus(3.0, 1.0, major_sections=12, minor_sections=8).export(file)
-    solid = load_mesh(file, size_m=0.08)
-    assert len(solid.pieces) > 3
+    solid = load_mesh(file, 0.08, ROUGH)
+    assert len(solid.pieces) > 2
     x, y, z = (2 * half for half in solid.bounds.half)
     assert max(x, y, z) == pytest.approx(0.08, rel=0.03)
     assert y == pytest.approx(0.02, rel=0.1)  # y is up in the file, z here: it stands on its edge
     for name in ("coacd", "trimesh"):
         monkeypatch.setitem(sys.modules, name, None)
-    assert load_mesh(file, size_m=0.08) == solid
+    assert load_mesh(file, 0.08, ROUGH) == solid
     with pytest.raises(MeshUnavailableError):
-        load_mesh(file, size_m=0.09)  # is another mesh
+        load_mesh(file, 0.09, ROUGH)  # is another mesh
 
 
 def test_what_is_kept_is_found_by_content_without_any_library(tmp_path, without_libraries):

@@ -25,6 +25,7 @@ from slap_ros.domains.variation import varied
 from slap_ros.meshes.solid import Solid
 from slap_ros.physics.panda import CONTROL_PERIOD_S
 from slap_ros.physics.scene import Scene
+from slap_ros.physics.viewpoint import View
 from slap_ros.physics.world import ACTION_SPACE, PandaWorld
 from slap_ros.relational import State
 
@@ -35,6 +36,7 @@ SETTINGS: Mapping[str, tasks.RandomTasks | tasks.PaperTasks] = {
 # The reference has no limit to what its planned motions do in a step, and jumps by 3 rad.
 WHATEVER = replace(ACTION_SPACE, low=(*(-math.pi,) * 7, -1.0), high=(*(math.pi,) * 7, 1.0))
 ACTIONS: Mapping[str, ActionSpace] = {"fair": ACTION_SPACE, "paper": WHATEVER}
+FROM_THE_LEFT = View(eye=(1.7, 1.15, 0.95), target=(0.33, 0.13, 0.13))  # m, into the bin
 TIMINGS: Mapping[str, Timing] = {"fair": AtSpeedLimit(), "paper": InTens()}
 
 
@@ -71,7 +73,7 @@ def make(
         default_goal=tasks.everything_in_the_bin,
         step_limit=tasks.STEP_LIMIT,
         bodies=lambda state: visible_bodies(scene(state), state),
-        animate=animation(scene),
+        animate=animation(scene, FROM_THE_LEFT),
         view=VIEW,
         learned_actions=ACTION_SPACE,
         configuration=settings.as_configuration(),

@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.motion.kinematics import GRASP_IN_LAST_LINK, arm_frames
+from slap_ros.domains.tabletop import seeing
+from slap_ros.domains.tabletop.reading import JOINT_NAMES
 from slap_ros.physics.features import (
     BODY_FEATURES,
-    JOINT_FEATURES,
     MATERIAL_FEATURES,
     POSE_FEATURES,
     ROBOT,
@@ -61,8 +61,6 @@ TURN = ("qx", "qy", "qz", "qw")
 VELOCITY = ("vx", "vy", "vz")
 HALF = ("half_x", "half_y", "half_z")
 MIDDLE = ("middle_x", "middle_y", "middle_z")
-JOINTS = tuple(feature.name for feature in JOINT_FEATURES)
-GRASP = np.array((*GRASP_IN_LAST_LINK.position, 1.0))
 TINY = float(np.finfo(np.float64).tiny)
 
 
@@ -142,7 +140,7 @@ def scenery(state: State) -> Scenery:
     highest_other = np.maximum(np.maximum.reduce(others, axis=-1), table_top[..., None])
     highest = np.maximum(np.maximum.reduce(tops, axis=-1), table_top)
 
-    hand = grasp_point(state)
+    hand = seeing.grasp_point(state.gather(state.layout.column_of(ROBOT), JOINT_NAMES)[..., 0, :])
     way = hand[..., None, :] - blocks[..., :3]
     aside = ASIDE - np.hypot(way[..., 0], way[..., 1])
     ready = _all_of(np.stack([aside, BAND - np.abs(way[..., 2] - OVER)]))
@@ -153,14 +151,6 @@ def scenery(state: State) -> Scenery:
         _idle(hand[..., 2] - TIP - highest - HAND_CLEAR, full),
         highest,
     )
-
-
-def grasp_point(state: State) -> Array:
-    """The point between the fingertips, shape (..., 3)."""
-    joints = state.gather(state.layout.column_of(ROBOT), JOINTS)[..., 0, :]
-    frames = arm_frames(joints.reshape(-1, len(JOINTS)))[:, -1]
-    point: Array = (frames @ GRASP)[:, :3]
-    return point.reshape(*joints.shape[:-1], 3)
 
 
 def _extents(blocks: Array) -> tuple[Array, Array]:

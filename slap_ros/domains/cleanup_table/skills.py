@@ -7,8 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,9 +24,17 @@ from slap_ros.domains.cleanup_table.model import (
 )
 from slap_ros.domains.cleanup_table.scenery import SURROUNDINGS, carried
 from slap_ros.domains.domain import Action, Policy, Skill
+from slap_ros.domains.tabletop import seeing
 from slap_ros.domains.tabletop.grasps import from_above
 from slap_ros.domains.tabletop.places import Place, free_places
-from slap_ros.domains.tabletop.reading import box_of, grasp_of, joints_of, pose_of, top_of
+from slap_ros.domains.tabletop.reading import (
+    JOINT_NAMES,
+    box_of,
+    grasp_of,
+    joints_of,
+    pose_of,
+    top_of,
+)
 from slap_ros.domains.tabletop.skills import GRIP, RELEASE, STEP_LIMIT, Follow
 from slap_ros.domains.tabletop.surroundings import CARRYING
 from slap_ros.domains.tabletop.timing import Timing
@@ -35,7 +42,6 @@ from slap_ros.domains.tabletop.ways import CLEARANCE, PLANS, SEED, remembered
 from slap_ros.errors import SkillNotApplicableError
 from slap_ros.motion import (
     Box,
-    CollisionChecker,
     Free,
     Joints,
     MotionPlanningError,
@@ -45,10 +51,12 @@ from slap_ros.motion import (
     path_steps,
     shifted,
 )
+from slap_ros.physics.features import ROBOT
 from slap_ros.physics.gripper import GRASP_REACH
 from slap_ros.physics.panda import FINGER_OPEN, JOINTS, grasp_pose
 from slap_ros.physics.pose import Pose, Vector, conjugate, rotate
 from slap_ros.relational import Object, State
+from slap_ros.relational.predicates import Bools
 
 YAWS = 16  # of the hand, evenly round
 FINGER_ROOM = 0.005  # m, on each side of a block between the open fingers
@@ -59,106 +67,46 @@ LIFT_SLACK = 0.02  # m, by which a lifted block is higher than it need be
 READY_SLACK = 0.005  # m, the same of the hand where it lets go
 INSIDE = 0.02  # m, between a block and the walls of the bin it is dropped into
 PLACES = 3  # in the bin, the nearest, that are looked at together
+ROUNDING = 1e-9  # m
 GAP = 0.1  # m, between what is dropped and what lies there, where there is room
 
 
 # -- motions --------------------------------------------------------------------------------------
 
 
-class Motion(Protocol):
-    """Paths of the arm one after the other, bounded before they are planned."""
+class Motion(NamedTuple):
+    """Paths of the arm one after the other, in rad, shape (k, 7)."""
 
-    @property
-    def touching(self) -> Free:
-        """Where corners may be cut."""
-        ...
-
-    def least_steps(self, timing: Timing) -> float:
-        """Control steps that it takes at least; infinite where there is none."""
-        ...
-
-    def pieces(self) -> list[Path]:
-        """Paths in rad, shape (k, 7), each from where the last one ends.
-
-        Raises:
-            SkillNotApplicableError: There is none.
-        """
-        ...
+    pieces: Sequence[Path]
+    free: Free  # where corners may be cut
 
 
-@dataclass(frozen=True, eq=False)
-class Crossing:
-    """To the nearest of some poses of the grasp point, on a planned path.
+def _across(state: State, ends: Sequence[Pose], accepts: Callable[[Pose, Joints], bool]) -> Motion:
+    """To the nearest of some poses of the grasp point that will do, on a planned path.
 
     Args:
         state: Where it begins.
-        ends: Poses, any of which will do.
-        accepts: Whether an end will do in a configuration.
+        ends: Poses.
+        accepts: Whether one will do in a configuration.
+
+    Raises:
+        SkillNotApplicableError: None of them can be reached.
     """
-
-    state: State
-    ends: Sequence[Pose]
-    accepts: Callable[[Pose, Joints], bool]
-
-    @cached_property
-    def touching(self) -> CollisionChecker:
-        """See :class:`Motion`; nothing may be touched."""
-        return SURROUNDINGS.checker(self.state, held_margin=CARRYING)
-
-    @property
-    def is_possible(self) -> bool:
-        """Whether one of the ends can be reached, if nothing is in between."""
-        return bool(self._goals)
-
-    @cached_property
-    def _goals(self) -> list[tuple[Path, Pose]]:
-        """Straight ways to the ends, the nearest first."""
-        if not self.ends:
-            return []
-        q = joints_of(self.state)
-        found = nearest_configurations(self.ends, q, free=self.touching)
-        ways = [
-            (np.stack([q, goal]), end)
-            for end, goal in zip(self.ends, found, strict=True)
-            if goal is not None
-        ]
-        return sorted(ways, key=lambda way: path_steps(way[0]))
-
-    def least_steps(self, timing: Timing) -> float:
-        """See :class:`Motion`."""
-        return min(
-            (timing.least_steps([straight]) for straight, _ in self._goals), default=math.inf
-        )
-
-    def pieces(self) -> list[Path]:
-        """See :class:`Motion`."""
-        for (start, goal), end in self._goals:
-            if not self.accepts(end, goal):
-                continue
-            try:
-                across = PLANS.plan_path(start, goal, self.touching, seed=SEED)
-            except MotionPlanningError:
-                continue
-            return [start[None], across, goal[None]]
-        raise SkillNotApplicableError(f"none of {len(self.ends)} poses can be reached from here")
-
-
-@dataclass(frozen=True, eq=False)
-class Straight:
-    """Straight ways of the grasp point, known from the beginning."""
-
-    found: list[Path] | None
-    touching: Free
-
-    def least_steps(self, timing: Timing) -> float:
-        """See :class:`Motion`."""
-        return math.inf if self.found is None else timing.least_steps(self.found)
-
-    def pieces(self) -> list[Path]:
-        """See :class:`Motion`."""
-        if self.found is None:
-            raise SkillNotApplicableError("the arm cannot go straight there")
-        return self.found
+    q, free = joints_of(state), SURROUNDINGS.checker(state, held_margin=CARRYING)
+    goals = nearest_configurations(ends, q, free=free) if ends else []
+    ways = [
+        (np.stack([q, goal]), end)
+        for end, goal in zip(ends, goals, strict=True)
+        if goal is not None
+    ]
+    for (_, goal), end in sorted(ways, key=lambda way: path_steps(way[0])):
+        if not accepts(end, goal):
+            continue
+        try:
+            return Motion([q[None], PLANS.plan_path(q, goal, free, seed=SEED), goal[None]], free)
+        except MotionPlanningError:
+            continue
+    raise SkillNotApplicableError(f"none of {len(ends)} poses can be reached from here")
 
 
 # -- grasps and places ----------------------------------------------------------------------------
@@ -206,14 +154,11 @@ def _drops(state: State, block: Object, drawer: Object) -> Iterator[list[Pose]]:
     hand, space = grasp_pose(joints_of(state)), box_of(state, drawer)
     height = max(hand.position[2], float(scenery(state).highest) + HAND_CLEAR + TIP + READY_SLACK)
     (mx, my, _), (half_x, half_y, _) = space.pose.position, space.half
-    taken = [
-        pose_of(state, other).position
-        for other in state.layout.of_type(BLOCK)
-        if other != block and ON(other, drawer).holds(state)
-    ]
-    lying = [(px, py) for px, py, _ in taken]
+    others = [other for other in state.layout.of_type(BLOCK) if other != block]
+    lying = [pose_of(state, o).position for o in others if ON(o, drawer).holds(state)]
+    taken = [((px, py), GAP) for px, py, _ in lying]
     rectangle = (mx, my), (half_x - WALL - INSIDE, half_y - WALL - INSIDE)
-    places = free_places((x, y), *rectangle, [(place, GAP) for place in lying])
+    places = free_places((x, y), *rectangle, taken)
     places += [place for place in free_places((x, y), *rectangle, []) if place not in places]
     found: list[Pose] = []
     for number, place in enumerate(places, start=1):
@@ -241,15 +186,13 @@ def _over(state: State, block: Object, space: Box, place: Place, height: float) 
     return poses
 
 
-# -- skills ---------------------------------------------------------------------------------------
+# -- ways -----------------------------------------------------------------------------------------
 
 
-@remembered
-def _to_over(state: State, block: Object, table: Object) -> Crossing:
+def _to_over(state: State, block: Object, table: Object) -> Motion:
     """Over a block, where the hand can go straight down to grasp it."""
     touching = SURROUNDINGS.checker(state, (block,))
     height = pose_of(state, block).position[2] + OVER
-
     below: dict[Pose, list[Pose]] = {}
     for grasp in grasps(state, block, table):
         below.setdefault(shifted(grasp, (0.0, 0.0, height - grasp.position[2])), []).append(grasp)
@@ -257,50 +200,80 @@ def _to_over(state: State, block: Object, table: Object) -> Crossing:
     def comes_down(over: Pose, q: Joints) -> bool:
         return any(linear_motion(q, grasp, free=touching) is not None for grasp in below[over])
 
-    return Crossing(state, list(below), comes_down)
+    return _across(state, list(below), comes_down)
 
 
-@remembered
-def _down(state: State, block: Object, table: Object) -> Straight:
+def _down(state: State, block: Object, table: Object) -> Motion:
     """Down to the grasp that takes the least turning."""
     q, touching = joints_of(state), SURROUNDINGS.checker(state, (block,))
     for grasp in sorted(grasps(state, block, table), key=grasp_pose(q).angle_to):
         down = linear_motion(q, grasp, free=touching)
         if down is not None:
-            return Straight([q[None], down], touching)
-    return Straight(None, touching)
+            return Motion([q[None], down], touching)
+    raise SkillNotApplicableError(f"the hand cannot go straight down to {block}")
 
 
-@remembered
-def _up(state: State, block: Object, table: Object) -> Straight:
+def _up(state: State, block: Object, table: Object) -> Motion:
     """Up until what is held is above everything, 5 cm after 5 cm."""
     touching = SURROUNDINGS.checker(state, (table,))
-    number = state.layout.of_type(BLOCK).index(block)
-    rise = max(LIFT_SLACK - float(scenery(state).above[number]), 0.0)
+    rise = LIFT_SLACK - _above(state, block)
     stages = max(1, math.ceil(rise / CLEARANCE))
     q, pieces = joints_of(state), []
     for _ in range(stages):
         up = linear_motion(q, shifted(grasp_pose(q), (0.0, 0.0, rise / stages)), free=touching)
         if up is None:
-            return Straight(None, touching)
+            raise SkillNotApplicableError(f"the arm cannot lift {block}")
         pieces.append(up[[0, -1]])
         q = up[-1]
-    return Straight(pieces, touching)
+    return Motion(pieces, touching)
 
 
-@remembered
-def _to_bin(state: State, block: Object, drawer: Object) -> Crossing:
-    """Over the nearest places in the bin that can be reached."""
+def _to_bin(state: State, block: Object, drawer: Object) -> Motion:
+    """Over one of the nearest places in the bin that can be reached."""
     for ends in _drops(state, block, drawer):
-        crossing = Crossing(state, ends, _any)
-        if crossing.is_possible:
-            return crossing
-    return Crossing(state, [], _any)
+        try:
+            return _across(state, ends, lambda *_: True)
+        except SkillNotApplicableError:
+            continue
+    raise SkillNotApplicableError(f"there is no place in {drawer} over which {block} can be held")
 
 
-def _any(end: Pose, q: Joints) -> bool:
-    del end, q
-    return True
+def _above(state: State, block: Object) -> float:
+    """Margin of a block over everything else, m."""
+    return float(scenery(state).above[state.layout.of_type(BLOCK).index(block)])
+
+
+# -- where a skill has done its work --------------------------------------------------------------
+
+# Whether it has, at each of some positions of the joints, shape (n, 7) to (n,).
+Until = Callable[[State, Object, Joints], Bools]
+
+
+def _is_over(state: State, block: Object, positions: Joints) -> Bools:
+    """Whether the hand is ready to pick a block, and no more above everything."""
+    seen = scenery(_with_joints(state, positions))
+    number = state.layout.of_type(BLOCK).index(block)
+    over: Bools = (seen.ready[..., number] >= 0.0) & (seen.hand_ready < 0.0)
+    return over
+
+
+def _is_lifted(state: State, block: Object, positions: Joints) -> Bools:
+    """Whether a block that is lifted without being turned is above everything."""
+    before = seeing.grasp_point(joints_of(state))[..., 2]
+    rise = seeing.grasp_point(positions)[:, 2] - before
+    lifted: Bools = rise + _above(state, block) > ROUNDING
+    return lifted
+
+
+def _with_joints(state: State, positions: Joints) -> State:
+    """States that differ in the arm alone."""
+    data = np.repeat(state.data[None], len(positions), axis=0)
+    columns = state.layout.grid(state.layout.column_of(ROBOT), JOINT_NAMES)[0]
+    data[:, columns] = positions
+    return State(state.layout, data)
+
+
+# -- skills ---------------------------------------------------------------------------------------
 
 
 def _landed(state: State, block: Object, drawer: Object) -> bool:
@@ -325,19 +298,21 @@ class ThenWait:
 
 @dataclass(frozen=True)
 class MotionSkill:
-    """Go; then grip or let go, if need be.
+    """Go; then grip or let go, if need be. How long that takes is known once it is planned.
 
     Args:
         name: The operator's.
         timing: How fast.
         motion: Where to: of a state, a block and a surface.
-        grip: Gripper commands at the end of the motion.
+        until: Where on the way that is enough; None: at its end.
+        grip: Gripper commands there.
         step_limit: Environment steps.
     """
 
     name: str
     timing: Timing
     motion: Callable[[State, Object, Object], Motion]
+    until: Until | None = None
     grip: tuple[float, ...] = ()
     step_limit: int = STEP_LIMIT
 
@@ -347,10 +322,11 @@ class MotionSkill:
         return 1 + len(self.grip)
 
     def lower_bound(self, state: State, objects: tuple[Object, ...]) -> int:
-        """The straight way, and the gripper; what cannot be gone is never too short."""
-        _, block, surface = objects
-        least = self.motion(state, block, surface).least_steps(self.timing)
-        return self.step_limit if math.isinf(least) else max(1, int(least)) + len(self.grip)
+        """As many as it takes; what cannot be gone is never too short."""
+        try:
+            return max(1, len(_script(self, state, objects)))
+        except SkillNotApplicableError:
+            return self.step_limit
 
     def start(self, state: State, objects: tuple[Object, ...]) -> Policy:
         """Plan the motion.
@@ -358,11 +334,28 @@ class MotionSkill:
         Raises:
             SkillNotApplicableError: There is no way for the arm.
         """
-        _, block, surface = objects
-        motion = self.motion(state, block, surface)
-        pieces = motion.pieces()
-        script = [(q, 0.0) for q in self.timing.positions(pieces, motion.touching)]
-        return Follow([*script, *((pieces[-1][-1], command) for command in self.grip)])
+        return Follow(_script(self, state, objects))
+
+
+@remembered
+def _script(
+    skill: MotionSkill, state: State, objects: tuple[Object, ...]
+) -> Sequence[tuple[Joints, float]]:
+    """Positions with gripper commands.
+
+    Raises:
+        SkillNotApplicableError: There is no way for the arm.
+    """
+    _, block, surface = objects
+    pieces, free = skill.motion(state, block, surface)
+    positions = skill.timing.positions(pieces, free)
+    if skill.until is not None:
+        there = skill.until(state, block, positions)
+        if not there.any():
+            raise SkillNotApplicableError(f"{skill.name} of {block} does not get where it should")
+        positions = positions[: int(there.argmax()) + 1]
+    end = positions[-1] if len(positions) else joints_of(state)
+    return [*((q, 0.0) for q in positions), *((end, command) for command in skill.grip)]
 
 
 @dataclass(frozen=True)
@@ -379,8 +372,8 @@ class DropSkill(MotionSkill):
 def skills(timing: Timing) -> dict[str, Skill]:
     """A skill for each operator."""
     return {
-        "Reach": MotionSkill("Reach", timing, _to_over),
-        "Grasp": MotionSkill("Grasp", timing, _down, (GRIP,)),
-        "Lift": MotionSkill("Lift", timing, _up),
-        "Drop": DropSkill("Drop", timing, _to_bin, (RELEASE,)),
+        "Reach": MotionSkill("Reach", timing, _to_over, _is_over),
+        "Grasp": MotionSkill("Grasp", timing, _down, grip=(GRIP,)),
+        "Lift": MotionSkill("Lift", timing, _up, _is_lifted),
+        "Drop": DropSkill("Drop", timing, _to_bin, grip=(RELEASE,)),
     }

@@ -21,6 +21,7 @@ from slap_ros.domains.domain import ActionSpace, Domain
 from slap_ros.domains.tabletop.showing import animation, visible_bodies
 from slap_ros.domains.tabletop.timing import AtSpeedLimit, InTens, Timing
 from slap_ros.domains.variation import varied
+from slap_ros.physics.features import ROBOT
 from slap_ros.physics.panda import CONTROL_PERIOD_S
 from slap_ros.physics.viewpoint import View
 from slap_ros.physics.world import ACTION_SPACE, PandaWorld
@@ -54,6 +55,8 @@ def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Doma
         make_world=lambda state: PandaWorld(scene_of(state), state, actions=actions),
         default_goal=tasks.target_block_on_table,
         step_limit=tasks.STEP_LIMIT,
+        unread_types=frozenset({ROBOT}),
+        reading=model.HAND_PREDICATES,
         bodies=lambda state: visible_bodies(scene_of(state), state),
         animate=animation(scene_of, LOOK),
         view=VIEW,

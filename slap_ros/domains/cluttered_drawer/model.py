@@ -70,17 +70,17 @@ MOST_REMEMBERED = 1024  # columns of objects, a layout
 
 SIZE_FEATURES = tuple(Feature(name, "m") for name in HALF_NAMES)  # half its edges
 THING = Type("thing")
-BLOCK = Type(
-    "block", (*BODY_FEATURES, *MATERIAL_FEATURES, *SIZE_FEATURES, Feature("is_target", "1")), THING
-)
+BLOCK = Type("block", (*BODY_FEATURES, *MATERIAL_FEATURES, *SIZE_FEATURES), THING)
+TARGET = Type("target_block", BLOCK.features, BLOCK)
 SURFACE = Type("surface", (*POSE_FEATURES, *SIZE_FEATURES), THING)
 TABLE = Type("table", SURFACE.features, SURFACE)
 DRAWER = Type("drawer", SURFACE.features, SURFACE)  # its floor
 WALL = Type("wall", (*POSE_FEATURES, *SIZE_FEATURES))  # of the drawer; no predicate asks for it
-TYPES = (ROBOT, THING, BLOCK, SURFACE, TABLE, DRAWER, WALL)
+TYPES = (ROBOT, THING, BLOCK, TARGET, SURFACE, TABLE, DRAWER, WALL)
 
 SIDES = ("Front", "Back", "Left", "Right")
 TOWARDS = np.array([-1.0, 1.0, 1.0j, -1.0j])  # each side, seen from a block that is not turned
+AXES = np.array([0, 0, 1, 1])  # along which they lie
 
 
 @dataclass(frozen=True)
@@ -101,48 +101,64 @@ class Things:
     """The blocks and surfaces of a layout, and where their features are."""
 
     blocks: tuple[Object, ...]
+    targets: tuple[Object, ...]
     surfaces: tuple[Object, ...]
     quaternions: Indices  # (blocks, 4), parts as in PARTS
     places: Indices  # (blocks, 2): x, y
     halves: Indices  # (blocks, 9), as in TO_EDGES
     z: Indices  # (blocks,)
-    is_target: Indices  # (blocks,)
-    bounds: Indices  # (surfaces, 6): pose's x, y, z, half its edges
+    middles: Indices  # (surfaces, 2): x, y
+    levels: Indices  # (surfaces, 4): z and half the edges
     is_drawer: Bools  # (surfaces,)
     joints: Indices  # (7,)
-    _numbers: dict[Column, Indices] = field(default_factory=dict)
+    which: Indices  # (targets,): of the blocks
+    same: Bools  # (blocks, targets)
+    _numbers: dict[tuple[Column, ...], Indices] = field(default_factory=dict)
 
     @staticmethod
     @lru_cache(maxsize=256)
     def of(layout: Layout) -> Things:
         """Those of a layout."""
         blocks, surfaces = layout.of_type(BLOCK), layout.of_type(SURFACE)
+        targets = layout.of_type(TARGET)
 
         def where(objects: Sequence[Object], *features: str) -> Indices:
             return np.array([layout.columns(objects, name) for name in features]).T
 
         return Things(
             blocks,
+            targets,
             surfaces,
             where(blocks, *PARTS),
             where(blocks, "x", "y"),
             where(blocks, *HALVES),
             layout.columns(blocks, "z"),
-            layout.columns(blocks, "is_target"),
-            where(surfaces, "x", "y", "z", *HALF_NAMES),
+            where(surfaces, "x", "y"),
+            where(surfaces, "z", *HALF_NAMES),
             np.array([surface.type.is_a(DRAWER) for surface in surfaces]),
             where(layout.of_type(ROBOT), *JOINT_NAMES).reshape(-1),
+            np.array([blocks.index(target) for target in targets], dtype=np.intp),
+            np.array([[block == target for target in targets] for block in blocks]),
         )
 
-    def numbers(self, column: Column) -> Indices:
-        """The blocks or surfaces of a column as numbers."""
-        numbers = self._numbers.get(column)
+    def target_numbers(self, column: Column) -> Indices:
+        """Target blocks as numbers among these."""
+        return self.numbers(column, column) % max(len(self.targets), 1)
+
+    def numbers(self, *columns: Column) -> Indices:
+        """Blocks as numbers; of blocks beside surfaces or targets, the number of the pair."""
+        numbers = self._numbers.get(columns)
         if numbers is None:
-            among = self.blocks if column.objects[0].type.is_a(BLOCK) else self.surfaces
-            numbers = np.array([among.index(obj) for obj in column.objects])
+            first, *others = columns
+            numbers = np.array([self.blocks.index(obj) for obj in first.objects])
+            for column in others:
+                kind = column.objects[0].type
+                among = self.targets if kind.is_a(TARGET) else self.surfaces
+                second = np.array([among.index(obj) for obj in column.objects])
+                numbers = numbers * len(among) + second
             if len(self._numbers) == MOST_REMEMBERED:
                 self._numbers.clear()
-            self._numbers[column] = numbers
+            self._numbers[columns] = numbers
         return numbers
 
 
@@ -154,8 +170,26 @@ class Lie(NamedTuple):
 
     things: Things
     on: Array  # of blocks on surfaces, shape (..., blocks * surfaces)
-    blocking: Array  # of blocks at sides of blocks, shape (..., sides, blocks * blocks)
-    clear: Array  # of sides of blocks, shape (..., sides, blocks)
+    blocking: Array  # of blocks at sides of target blocks, shape (..., sides, blocks * targets)
+    clear: Array  # of these sides, shape (..., sides, targets)
+
+
+class Rooms(NamedTuple):
+    """The rooms for fingers at all sides, seen along the faces of the block that they are at."""
+
+    depth: float  # half the reach
+    halves: Array  # half their edges, shape (sides, 1, 1, 2)
+    spans: Array  # from |cos| and |sin| of a turn to half their spans then, (sides, 1, 2, 2)
+
+    @staticmethod
+    @lru_cache(maxsize=64)
+    def of(room: FingerRoom) -> Rooms:
+        """Those that have to be so large."""
+        depth = room.reach / 2
+        ahead, aside = (depth, room.half_width), (room.half_width, depth)
+        halves = np.array([aside if side.imag else ahead for side in TOWARDS])
+        spans = np.stack([halves, halves[:, ::-1]], axis=-1)
+        return Rooms(depth, halves[:, None, None], spans[:, None])
 
 
 def lie_with(room: FingerRoom, state: State) -> Lie:
@@ -167,76 +201,48 @@ def lie_with(room: FingerRoom, state: State) -> Lie:
     q = data.take(things.quaternions, axis=-1)
     products = (q[..., None] * q[..., None, :]).reshape(*q.shape[:-1], 16)
     edges = products @ TO_EDGES * data.take(things.halves, axis=-1)
+    flat, height = complex_of(edges[..., :6]), np.add.reduce(np.abs(edges[..., 6:]), axis=-1)
     places = complex_of(data.take(things.places, axis=-1))[..., 0]
-    z, height = data.take(things.z, axis=-1), np.add.reduce(np.abs(edges[..., 6:]), axis=-1)
+    z = data.take(things.z, axis=-1)
 
-    # On a surface it touches what its lowest point is at the height of, its middle over it.
-    bounds = data.take(things.bounds, axis=-1)
-    gap = (z - height)[..., None] - (bounds[..., 2] + bounds[..., 5])[..., None, :]
-    middles = complex_of(np.ascontiguousarray(bounds[..., :2]))[..., 0]
-    inside = bounds[..., None, :, 3:5] - along_axes(places[..., None] - middles[..., None, :])
-    within = np.minimum(inside[..., 0], inside[..., 1])
-    on = np.minimum(unpinched(TOUCHING - np.abs(gap)), within)
-    in_drawer = np.maximum.reduce(np.where(things.is_drawer, on, -1.0), axis=-1)
+    # On a surface is what touches it with its lowest point, its middle over it.
+    levels = data.take(things.levels, axis=-1)[..., None, :, :]
+    middles = complex_of(data.take(things.middles, axis=-1))[..., 0]
+    within = levels[..., 1:3] - along_axes(places[..., None] - middles[..., None, :])
+    gap = (z - height)[..., None] - levels[..., 0] - levels[..., 3]
+    touches = unpinched(TOUCHING - np.abs(gap))
+    on = np.minimum(touches, np.minimum(within[..., 0], within[..., 1]))
 
-    # It blocks a side where no line separates it from the room for a finger there: neither one
-    # along the target block's faces nor one along its own.
-    flat, back = complex_of(edges[..., :6]), turned_back(q, edges)
-    named = _towards_base(back)
-    own_width = widths(flat, named)
-    rooms = _rooms(own_width, room)
-    way = (places[..., :, None] - places[..., None, :]) * named[..., None, :]
-    off = way[..., None, :, :] - rooms.middles[..., None, :]
-    width = widths(flat[..., :, None, :], named[..., None, :])
-    overlap = width[..., None, :, :, :] + rooms.halves[:, None, None, :] - along_axes(off)
-    turn = back[..., :, None] * named[..., None, :].conj()
-    turned_rooms = _turned(rooms.halves, turn)
-    own_overlap = (
-        widths(flat, back)[..., None, :, None, :]
-        + turned_rooms
-        - along_axes(off * turn[..., None, :, :])
-    )
-    sideways = np.minimum.reduce(np.minimum(overlap, own_overlap), axis=-1)
-    level = height[..., :, None] + height[..., None, :]
-    level = level - np.abs(z[..., :, None] - z[..., None, :])
-    applies = np.minimum(level, in_drawer[..., None, :])[..., None, :, :]
-    is_target = data.take(things.is_target, axis=-1)[..., None, None, :] > 0.5
-    others = ~np.eye(len(things.blocks), dtype=bool)
-    blocking = np.where(is_target & others, np.minimum(sideways, applies), -1.0)
-    worst = np.maximum.reduce(blocking, axis=-2, initial=-1.0)
-    clear = np.where(is_target[..., 0, :], strictly(-worst), -1.0)
-    shape = blocking.shape
+    # A block blocks a side where no line separates it from the room for a finger there: neither
+    # one along the target block's faces nor one along its own.
+    rooms, back, which = Rooms.of(room), turned_back(q, edges), things.which
+    named = _towards_base(back.take(which, axis=-1))
+    own = widths(flat.take(which, axis=-2), named)
+    faces = (own.take(AXES, axis=-1).swapaxes(-1, -2) + rooms.depth) * TOWARDS[:, None]
+    way = (places[..., None] - places.take(which, axis=-1)[..., None, :]) * named[..., None, :]
+    off = way[..., None, :, :] - faces[..., None, :]
+    width = widths(flat[..., :, None, :], named[..., None, :])[..., None, :, :, :]
+    gaps = along_axes(off) - width - rooms.halves
+    turn = (back[..., None] * named[..., None, :].conj())[..., None, :, :]
+    own_gaps = along_axes(off * turn) - along_axes(turn) @ rooms.spans
+    own_gaps -= widths(flat, back)[..., None, :, None, :]
+    apart = np.maximum(gaps, own_gaps)
+    sideways = -np.maximum(apart[..., 0], apart[..., 1])
+
+    # That is so at the height of a target block that stands in the drawer.
+    off_level = np.abs(z[..., None] - z.take(which, axis=-1)[..., None, :])
+    level = height[..., None] + height.take(which, axis=-1)[..., None, :] - off_level
+    standing = np.maximum.reduce(np.where(things.is_drawer, on, -1.0), axis=-1, initial=-1.0)
+    applies = np.minimum(level, standing.take(which, axis=-1)[..., None, :])
+    applies = np.where(things.same, -1.0, applies)[..., None, :, :]
+    blocking = np.minimum(sideways, applies)
+    clear = strictly(-np.maximum.reduce(blocking, axis=-2, initial=-1.0))
     return Lie(
         things,
         on.reshape(*on.shape[:-2], -1),
-        blocking.reshape(*shape[:-2], -1),
+        blocking.reshape(*blocking.shape[:-2], -1),
         clear,
     )
-
-
-class _Rooms(NamedTuple):
-    """The rooms for fingers beside blocks, seen along the axes of these."""
-
-    middles: Complex  # from the block's, shape (..., sides, blocks)
-    halves: Array  # half their edges, shape (sides, 2)
-
-
-def _rooms(own_width: Array, room: FingerRoom) -> _Rooms:
-    ahead, aside = own_width[..., None, :, 0], own_width[..., None, :, 1]
-    face = np.where(TOWARDS.real[:, None] != 0.0, ahead, aside)
-    depth = room.reach / 2
-    halves = np.where(
-        TOWARDS.real[:, None] != 0.0, [depth, room.half_width], [room.half_width, depth]
-    )
-    return _Rooms((face + depth) * TOWARDS[:, None], halves)
-
-
-def _turned(halves: Array, turn: Complex) -> Array:
-    """How far rooms reach along axes turned against theirs, (..., sides, blocks, blocks, 2)."""
-    cos, sin = np.abs(turn.real), np.abs(turn.imag)
-    ahead, aside = halves[:, 0, None, None], halves[:, 1, None, None]
-    cos, sin = cos[..., None, :, :], sin[..., None, :, :]
-    return np.stack([cos * ahead + sin * aside, cos * aside + sin * ahead], axis=-1)
 
 
 def _towards_base(back: Complex) -> Complex:
@@ -300,8 +306,7 @@ def _hand_ready_margin(state: State, _: Column) -> Array:
 def _on_margin(lie: Perceive) -> Margin:
     def margin(state: State, block: Column, surface: Column) -> Array:
         things, on, _, _ = lie(state)
-        number = things.numbers(block) * len(things.surfaces) + things.numbers(surface)
-        return on.take(number, axis=-1)
+        return on.take(things.numbers(block, surface), axis=-1)
 
     return margin
 
@@ -309,8 +314,7 @@ def _on_margin(lie: Perceive) -> Margin:
 def _blocking_margin(lie: Perceive, side: int) -> Margin:
     def margin(state: State, block: Column, blocked: Column) -> Array:
         things, _, blocking, _ = lie(state)
-        number = things.numbers(block) * len(things.blocks) + things.numbers(blocked)
-        return blocking[..., side, :].take(number, axis=-1)
+        return blocking[..., side, :].take(things.numbers(block, blocked), axis=-1)
 
     return margin
 
@@ -318,7 +322,7 @@ def _blocking_margin(lie: Perceive, side: int) -> Margin:
 def _clear_margin(lie: Perceive, side: int) -> Margin:
     def margin(state: State, block: Column) -> Array:
         things, _, _, clear = lie(state)
-        return clear[..., side, :].take(things.numbers(block), axis=-1)
+        return clear[..., side, :].take(things.target_numbers(block), axis=-1)
 
     return margin
 
@@ -337,8 +341,8 @@ def predicates(room: FingerRoom) -> tuple[Predicate, ...]:
         Predicate("IsDrawer", (SURFACE,), _is_a(DRAWER)),
         Predicate("IsMovable", (THING,), _is_a(BLOCK)),
         Predicate("NotIsMovable", (THING,), _is_none(BLOCK)),
-        Predicate("IsTargetBlock", (BLOCK,), lambda state, b: _is(state, b, "is_target")),
-        Predicate("NotIsTargetBlock", (BLOCK,), lambda state, b: ~_is(state, b, "is_target")),
+        Predicate("IsTargetBlock", (BLOCK,), _is_a(TARGET)),
+        Predicate("NotIsTargetBlock", (BLOCK,), _is_none(TARGET)),
         Predicate.threshold("ReadyPick", (ROBOT, BLOCK), _ready_margin),
         Predicate.threshold("NotReadyPick", (ROBOT, BLOCK), _not_ready_margin),
         Predicate.threshold("HandReadyPick", (ROBOT,), _hand_ready_margin),
@@ -347,11 +351,11 @@ def predicates(room: FingerRoom) -> tuple[Predicate, ...]:
         Predicate("NotHolding", (ROBOT, BLOCK), lambda state, _, b: ~_is(state, b, "held")),
         Predicate("GripperEmpty", (ROBOT,), _gripper_empty),
         *(
-            Predicate.threshold(f"Blocking{name}", (BLOCK, BLOCK), _blocking_margin(lie, side))
+            Predicate.threshold(f"Blocking{name}", (BLOCK, TARGET), _blocking_margin(lie, side))
             for side, name in enumerate(SIDES)
         ),
         *(
-            Predicate.threshold(f"{name}Clear", (BLOCK,), _clear_margin(lie, side))
+            Predicate.threshold(f"{name}Clear", (TARGET,), _clear_margin(lie, side))
             for side, name in enumerate(SIDES)
         ),
     )
@@ -359,6 +363,9 @@ def predicates(room: FingerRoom) -> tuple[Predicate, ...]:
 
 BY_NAME = {predicate.name: predicate for predicate in predicates(FingerRoom())}
 ON = BY_NAME["On"]
+HAND_PREDICATES = frozenset(
+    BY_NAME[name] for name in ("ReadyPick", "NotReadyPick", "HandReadyPick")
+)
 GRASPING = frozenset(BY_NAME[name] for name in ("Holding", "NotHolding", "GripperEmpty"))
 
 
@@ -366,7 +373,7 @@ GRASPING = frozenset(BY_NAME[name] for name in ("Holding", "NotHolding", "Grippe
 
 Sketch = tuple[str, *tuple[Variable, ...]]  # a predicate's name, and variables
 
-R, B, T = Variable("?r", ROBOT), Variable("?b", BLOCK), Variable("?t", BLOCK)
+R, B, T = Variable("?r", ROBOT), Variable("?b", BLOCK), Variable("?t", TARGET)
 S, D = Variable("?s", TABLE), Variable("?d", DRAWER)
 B1, B2 = Variable("?b1", BLOCK), Variable("?b2", BLOCK)
 
@@ -384,7 +391,7 @@ def _operator(
     """An operator whose parameters are also what the static predicates call them."""
     kinds: list[Sketch] = []
     for parameter in parameters:
-        if parameter.type == BLOCK:
+        if parameter.type.is_a(BLOCK):
             label = "IsTargetBlock" if parameter == T else "NotIsTargetBlock"
             kinds += [("IsBlock", parameter), ("IsMovable", parameter), (label, parameter)]
         else:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from slap_ros.domains.cluttered_drawer.model import BLOCK, DRAWER, TABLE, WALL
+from slap_ros.domains.cluttered_drawer.model import BLOCK, DRAWER, TABLE, TARGET, WALL
 from slap_ros.physics import scene
 from slap_ros.physics.pose import Pose, Vector
 from slap_ros.physics.scene import TABLE_TOP, WOOD, Box, Colour, Scene, cube
@@ -59,7 +59,7 @@ def scene_of(state: State) -> Scene:
         for obj, (middle, half) in FIXED.items()
     ]
     bodies += [
-        cube(block.name, RED if state.get(block, "is_target") > 0.5 else BLUE)
+        cube(block.name, RED if block.type.is_a(TARGET) else BLUE)
         for block in state.layout.of_type(BLOCK)
     ]
     return Scene(tuple(bodies))

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from slap_ros.domains.cluttered_drawer.model import BLOCK, DRAWER, SIDES, TABLE, WALL
+from slap_ros.domains.cluttered_drawer.model import BLOCK, DRAWER, SIDES, TABLE, TARGET, WALL
 from slap_ros.domains.cluttered_drawer.tasks import APART
 from slap_ros.domains.domain import Skill
 from slap_ros.domains.tabletop.grasps import from_above, grasps_to_stand, quarter_turns
@@ -79,7 +79,7 @@ def _onto_surface(state: State, block: Object, surface: Object, margin: float) -
     """To free places away from all sides of the target block, nearest to the held one first."""
     board, near = box_of(state, surface), pose_of(state, block).position[:2]
     taken = [
-        (pose_of(state, other).position[:2], APART if state.get(other, "is_target") > 0.5 else GAP)
+        (pose_of(state, other).position[:2], APART if other.type.is_a(TARGET) else GAP)
         for other in state.layout.of_type(BLOCK)
         if other != block
     ]

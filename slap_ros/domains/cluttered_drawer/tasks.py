@@ -10,7 +10,15 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
-from slap_ros.domains.cluttered_drawer.model import BLOCK, ON, SIDES, TABLE, FingerRoom, lie_with
+from slap_ros.domains.cluttered_drawer.model import (
+    BLOCK,
+    ON,
+    SIDES,
+    TABLE,
+    TARGET,
+    FingerRoom,
+    lie_with,
+)
 from slap_ros.domains.cluttered_drawer.scenery import BOTTOM, FIXED, HALF_WIDTH, MIDDLE, OPENING
 from slap_ros.domains.domain import Task
 from slap_ros.domains.tabletop.places import GAP
@@ -51,7 +59,8 @@ class Scenery:
         """The task to put the target block on the table."""
         features: dict[Object, Mapping[str, float]] = {ROBOT("robot"): robot_features(HOME)}
         for number, placed in enumerate((self.target, *self.blockers, *self.others), start=1):
-            features[BLOCK(f"block{number}")] = _block(self.material, placed, number == 1)
+            kind = TARGET if number == 1 else BLOCK
+            features[kind(f"block{number}")] = _block(self.material, placed)
         for thing, (middle, half) in FIXED.items():
             features[thing] = {**pose_features(Pose(middle)), **_size(*half)}
         state = State.build(features)
@@ -64,8 +73,7 @@ def target_block_on_table(state: State) -> frozenset[GroundAtom]:
     Raises:
         InvalidStateError: The state has no target block or no table.
     """
-    targets = [b for b in state.layout.of_type(BLOCK) if state.get(b, "is_target") > 0.5]
-    tables = state.layout.of_type(TABLE)
+    targets, tables = state.layout.of_type(TARGET), state.layout.of_type(TABLE)
     if not targets or not tables:
         raise InvalidStateError("a state of cluttered_drawer needs a target block and a table")
     return frozenset({ON(targets[0], tables[0])})
@@ -175,20 +183,17 @@ def _between(one: Placed, other: Placed) -> float:
 def _blocked_sides(scenery: Scenery) -> list[list[int]]:
     """The sides of the target block that each blocker blocks."""
     state = scenery.task().initial_state
-    count = len(state.layout.of_type(BLOCK))
-    lie = lie_with(FingerRoom(), state)
-    blocking = lie.blocking.reshape(len(SIDES), count, count)[:, 1:, 0] >= 0.0
-    return [np.flatnonzero(sides).tolist() for sides in blocking.T[: len(scenery.blockers)]]
+    blocking = lie_with(FingerRoom(), state).blocking[:, 1 : 1 + len(scenery.blockers)] >= 0.0
+    return [np.flatnonzero(sides).tolist() for sides in blocking.T]
 
 
-def _block(material: Material, placed: Placed, is_target: bool) -> Mapping[str, float]:
+def _block(material: Material, placed: Placed) -> Mapping[str, float]:
     x, y, yaw = placed
     half = CUBE_EDGE / 2
     return {
         **body_features((x, y, BOTTOM + half), (0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))),
         **material_features(material),
         **_size(half, half, half),
-        "is_target": float(is_target),
     }
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from slap_ros.domains.cluttered_drawer.model import BLOCK, GRASPING, SIDES, SURFACE
+from slap_ros.domains.cluttered_drawer.model import BLOCK, GRASPING, SIDES, SURFACE, TARGET
 from slap_ros.domains.cluttered_drawer.scenery import BOTTOM
 from slap_ros.domains.tabletop import seeing
 from slap_ros.domains.view import View
@@ -42,10 +42,7 @@ def _things(state: State, hand: Array, column: Column) -> Array:
 
 def _beside_target(state: State, column: Column) -> Array:
     """Positions less that of the target block, m, shape (n, objects, 2)."""
-    blocks = state.layout.column_of(BLOCK)
-    first = state.data.reshape(-1, state.data.shape[-1])[0]
-    labels = first[state.layout.grid(blocks, ("is_target",))[:, 0]]  # which stay as they are
-    target = seeing.alone(blocks.objects[int(np.argmax(labels))])
+    target = seeing.alone(state.layout.of_type(TARGET)[0])
     beside: Array = state.gather(column, ("x", "y")) - state.gather(target, ("x", "y"))
     return beside
 

@@ -91,7 +91,9 @@ def from_hand(state: State, hand: Array, column: Column) -> Array:
 
 
 def apart(state: State, thing: Object, column: Column) -> Array:
-    """From middle to middle, m, shape (n, objects)."""
+    """From middle to middle, or from the robot's hand, m, shape (n, objects)."""
+    if thing.type.is_a(ROBOT):
+        return to_over(state, hand(state), column, 0.0)
     way = state.gather(column, POSITION) - state.gather(alone(thing), POSITION)
     distance: Array = np.sqrt(np.square(way).sum(axis=-1))
     return distance
