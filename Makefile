@@ -25,7 +25,7 @@ $(VENV)/.tested: $(VENV)/.installed
 	$(BIN)/pip install --quiet --disable-pip-version-check '$(strip $(TORCH))' -e '.[test]'
 	@touch $@
 
-demo: install  ## Run the whole ensemble, record bags, replay them, measure
+demo: install  ## Run the whole ensemble, record bags, replay them, measure, report
 	@set -e; export PATH="$(abspath $(BIN)):$$PATH"; bag=runs/demo-$$(date +%Y%m%d-%H%M%S); \
 	echo "== one task, every node a process"; \
 	slap run obstacle2d --seed 1 --record $$bag; \
@@ -40,11 +40,13 @@ demo: install  ## Run the whole ensemble, record bags, replay them, measure
 	slap evaluate obstacle2d --tasks 10 --seeds 5; \
 	slap evaluate obstacle2d --tasks 10 --seeds 5 --preset paper; \
 	echo "== a Panda takes a tower apart, block by block"; \
-	slap run obstacle_tower --seed 1 --shortcuts none; \
+	slap run obstacle_tower --seed 1 --shortcuts none --record $$bag-tower-pure; \
 	echo "== and with what it learned"; \
 	slap run obstacle_tower --seed 1 --record $$bag-tower --render $$bag-tower.gif; \
 	slap bag replay $$bag-tower; \
-	echo "bag: $$bag   abstract graph: $$bag-plan/graph.svg   animation: $$bag-tower.gif"
+	echo "== both on one page, for any browser"; \
+	slap report $$bag-tower-pure $$bag-tower --output $$bag.html; \
+	echo "bag: $$bag   abstract graph: $$bag-plan/graph.svg   animation: $$bag-tower.gif   report: $$bag.html"
 
 test: $(VENV)/.tested lint  ## Run every test
 	$(BIN)/pytest -q -n 2 --dist worksteal

@@ -32,6 +32,7 @@ RUNTIME = [
     "lz4>=4",
     "safetensors>=0.4",
     "backports.zstd>=1; python_version < '3.14'",
+    "jinja2>=3.1",  # escapes whatever a report says
 ]
 PHYSICS = [
     # Upstream has wheels up to CPython 3.11; the fork is a drop-in with wheels for 3.12.
@@ -43,15 +44,24 @@ PHYSICS = [
 TRAIN = ["torch>=2.4", "stable-baselines3>=2.3", "tensorboard>=2.15"]
 RAY = ["ray>=2.40"]
 STUDIES = ["matplotlib>=3.8"]
+DOCS = ["mkdocs>=1.6,<2"]
+MESHES = [  # other objects than those that come with it; Objaverse's own client
+    "coacd>=1.0.4",
+    "trimesh>=4.4",
+    "objaverse>=0.1.7",
+]
 TEST = [
     "pytest>=8",
     "pytest-timeout>=2.3",
     "pytest-xdist>=3.6",
     "hypothesis>=6.100",
     "mcap>=1.2",
+    "selenium>=4.20",  # drives a Chromium, where there is one, through the pages of reports
+    "axe-core-python>=0.1",  # axe-core (MPL-2.0), which that Chromium checks them with
     "setuptools>=68,<80",  # for colcon, as in pyproject.toml; what follows would raise it
     *TRAIN,
     *STUDIES,
+    *DOCS,
     "unified-planning>=1.1",
     "up-aries>=0.4",
     "colcon-common-extensions>=0.3",
@@ -98,7 +108,13 @@ setup(
         "msg_schemas",
     ],
     package_data={
-        "slap_ros": ["py.typed"],
+        "slap_ros": [
+            "py.typed",
+            "domains/cleanup_table/shapes/*.obj",
+            "report/page.css",
+            "report/page.html.j2",
+            "report/page.js",
+        ],
         "msg_schemas": ["msg/*.msg", "srv/*.srv", "action/*.action"],
     },
     data_files=[
@@ -114,6 +130,8 @@ setup(
         "train": TRAIN,
         "ray": RAY,
         "studies": STUDIES,
+        "docs": DOCS,
+        "meshes": MESHES,
         "test": TEST,
     },
     entry_points={

@@ -18,6 +18,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from time import process_time
 from typing import Protocol
 
@@ -25,6 +26,8 @@ import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
+from slap_ros.meshes.obj import to_obj
+from slap_ros.meshes.solid import Solid
 from slap_ros.physics.arm import Arm
 from slap_ros.physics.features import BODY_FEATURES, ROBOT, body_features, robot_features
 from slap_ros.physics.panda import (
@@ -40,7 +43,7 @@ from slap_ros.physics.panda import (
 from slap_ros.physics.pose import Pose, conjugate, multiply
 from slap_ros.physics.scene import CUBE_EDGE, FRICTION, TABLE, TABLE_TOP, Body, Scene, cube
 from slap_ros.physics.simulation import PANDA, Drive, Simulation, Stepping
-from slap_ros.physics.snapshot import Motion
+from slap_ros.physics.snapshot import Motion, Reader
 from slap_ros.physics.world import ACTION_SPACE, STEPPING, PandaWorld
 from slap_ros.relational import Object, State, Type
 
@@ -214,42 +217,54 @@ class Plain:
     FINGERS = (9, 10)  # joint indices in the URDF
 
     def __init__(self, scene: Scene = SCENE, start: State | None = None) -> None:
-        self._scene = scene
-        self._start = tower() if start is None else start
+        """The bodies of a scene as they are in a state; without one, the tower."""
+        self._scene, self._start = scene, start or tower()
         self._client: int | None = None
 
     def reset(self, joints: Array) -> None:
-        """All as it was, the arm there: a new scene, as a reset would not clear contacts."""
+        """A new scene: this world keeps contacts, which a reset would not clear."""
         if self._client is None:
             self._client = pybullet.connect(pybullet.DIRECT)
         client = self._client
         pybullet.resetSimulation(physicsClientId=client)
         pybullet.setGravity(0.0, 0.0, -9.81, client)
-        for body in self._scene.fixed:
-            self._add(body, body.pose.position, body.pose.quaternion)
-        self._cubes = []
-        for body in self._scene.free:
-            pose = self._start[self._start.layout.object(body.name)][:7]
-            self._cubes.append(self._add(body, pose[:3], pose[3:]))
+        scene, reader = self._scene, Reader.of(self._scene, self._start.layout)
+        for body, pose in zip(scene.fixed, reader.fixed_poses(scene, self._start), strict=True):
+            self._add(body, pose)
+        motions = reader.read(self._start).bodies
+        self._blocks = [
+            self._add(body, motion.pose) for body, motion in zip(scene.free, motions, strict=True)
+        ]
         self._robot = pybullet.loadURDF(
             str(PANDA / "panda.urdf"), useFixedBase=True, physicsClientId=client
         )
         for link in range(-1, pybullet.getNumJoints(self._robot, client)):
-            for i in range(len(self._scene.fixed)):
+            for i in range(len(scene.fixed)):
                 pybullet.setCollisionFilterPair(self._robot, i, link, -1, 0, client)
         self._joints = np.array(joints)
         self._place()
 
-    def _add(self, body: Body, position: Sequence[float], turn: Sequence[float]) -> int:
+    def _add(self, body: Body, pose: Pose) -> int:
         client = self._client
-        shape = pybullet.createCollisionShape(
-            pybullet.GEOM_BOX, halfExtents=body.half_extents_m, physicsClientId=client
-        )
         added: int = pybullet.createMultiBody(
-            body.mass_kg, shape, -1, position, turn, physicsClientId=client
+            body.mass_kg, self._shape(body), -1, *pose, physicsClientId=client
         )
         pybullet.changeDynamics(added, -1, lateralFriction=FRICTION, physicsClientId=client)
         return added
+
+    def _shape(self, body: Body) -> int:
+        if isinstance(body.shape, Solid):
+            with TemporaryDirectory() as folder:
+                file = Path(folder) / f"{body.name}.obj"
+                file.write_text(to_obj(body.shape.pieces), encoding="utf-8")
+                hulls: int = pybullet.createCollisionShape(
+                    pybullet.GEOM_MESH, fileName=str(file), physicsClientId=self._client
+                )
+            return hulls
+        box: int = pybullet.createCollisionShape(
+            pybullet.GEOM_BOX, halfExtents=body.shape, physicsClientId=self._client
+        )
+        return box
 
     def _place(self) -> None:
         for i, q in enumerate(self._joints.tolist()):
@@ -266,9 +281,9 @@ class Plain:
         self._place()
 
     def blocks(self) -> Array:
-        """Position, quaternion, velocity and spin of each block, (4, 13)."""
+        """Position, quaternion, velocity and spin of each block, (blocks, 13)."""
         rows = []
-        for body in self._cubes:
+        for body in self._blocks:
             position, quaternion = pybullet.getBasePositionAndOrientation(body, self._client)
             velocity, spin = pybullet.getBaseVelocity(body, self._client)
             rows.append([*position, *quaternion, *velocity, *spin])

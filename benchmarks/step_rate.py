@@ -7,6 +7,7 @@ Obstacle Tower: the physics step against plain stepping (``benchmarks.physics_st
 actions from home (away) and an arm kept in the tower (contact).
 Cluttered Drawer: the same, with atoms, against plain stepping without; the contact is that of an
 open hand around the target block that moves at random.
+Cleanup Table: world and atoms against plain stepping alone, random actions from home.
 All: the atoms of a state that was not seen before.
 """
 
@@ -15,6 +16,7 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable, Mapping
+from statistics import median
 from time import process_time
 from typing import Any
 
@@ -30,6 +32,7 @@ BATCH = 20_000  # worlds
 ROUNDS = 30
 SINGLE_STEPS = 3_000
 EPISODE = 50  # steps
+TURNS = 3  # of plain stepping and ours, as others share the machine
 
 
 def obstacle2d() -> dict[str, Any]:
@@ -104,6 +107,24 @@ def cluttered_drawer() -> dict[str, Any]:
     return {**figures, "atoms_us": atoms_us(domain)}
 
 
+def cleanup_table() -> dict[str, Any]:
+    """World and atoms against a plain world without them."""
+    from benchmarks.physics_step import Plain, away, steps_per_second
+    from slap_ros.domains.cleanup_table.scenery import scene_of
+    from slap_ros.domains.cleanup_table.shapes import shipped
+
+    domain = get_domain("cleanup_table")
+    initial = get_domain("cleanup_table", "paper").task(0).initial_state
+    plain = Plain(scene_of(initial, shipped()), initial)
+    rates = [(steps_per_second(plain, away()), with_atoms(domain)) for _ in range(TURNS)]
+    return {
+        "plain_steps_per_s": max(rate for rate, _ in rates),
+        "with_atoms_steps_per_s": max(rate for _, rate in rates),
+        "ratio": median(ours / theirs for theirs, ours in rates),
+        "atoms_us": atoms_us(domain),
+    }
+
+
 def with_atoms(domain: Domain, initial: State | None = None) -> float:
     """Steps a second of world and perception, random actions, by default from a task's start."""
     initial = initial or get_domain(domain.name, "paper").task(0).initial_state
@@ -137,6 +158,7 @@ BENCHMARKS: Mapping[str, Callable[[], dict[str, Any]]] = {
     "obstacle2d": obstacle2d,
     "obstacle_tower": obstacle_tower,
     "cluttered_drawer": cluttered_drawer,
+    "cleanup_table": cleanup_table,
 }
 
 

@@ -117,6 +117,7 @@ def plan_edge(edge: PlanEdge, space: AtomSpace) -> msgs.PlanEdge:
     return msgs.PlanEdge(
         kind=edge.option.kind.value,
         name=edge.option.skill.name,
+        attempt=edge.option.attempt,
         objects=[obj.name for obj in edge.option.objects],
         expected_atoms=atoms(space.decode(edge.target)),
         predicted_steps=edge.predicted_steps,

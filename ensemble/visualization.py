@@ -17,8 +17,10 @@ from visualization_msgs.msg import Marker, MarkerArray
 from ensemble import encode
 from ensemble.interfaces import JOINT_STATES, MARKERS, TF
 from slap_ros.domains.domain import Domain, VisibleBody
+from slap_ros.messages.interfaces import BODIES
 from slap_ros.relational import State
 
+UNSCALED = (1.0, 1.0, 1.0)
 JOINT_PREFIX = "panda_"  # of joint names in the robot description
 
 
@@ -43,17 +45,18 @@ class Visualizer:
 
 
 def markers(bodies: Sequence[VisibleBody], stamp: Time) -> MarkerArray:
-    """A box for each body."""
+    """A box or triangles for each body."""
     return MarkerArray(
         markers=[
             Marker(
                 header=encode.header(stamp),
-                ns="bodies",
+                ns=BODIES,
                 id=number,
-                type=Marker.CUBE,
+                type=Marker.TRIANGLE_LIST if body.triangles else Marker.CUBE,
                 action=Marker.ADD,
                 pose=Pose(position=Point(**_xyz(body.position)), orientation=_turn(body)),
-                scale=Vector3(**_xyz(body.size)),
+                scale=Vector3(**_xyz(UNSCALED if body.triangles else body.size)),
+                points=[Point(**_xyz(corner)) for corner in body.triangles],
                 color=ColorRGBA(**dict(zip("rgba", body.colour, strict=True))),
                 lifetime=Duration(),
                 text=body.name,

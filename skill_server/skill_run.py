@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from rclpy.action.server import ServerGoalHandle
 from rclpy.task import Future
 from slap_msgs.action import ExecuteSkill
+from slap_msgs.msg import PlanEdge
 
 from ensemble.observation import Observation
 from ensemble.shortcuts import Repertoires
@@ -62,25 +63,25 @@ def requested_option(
     objects = [episode.space.layout.object(name) for name in edge.objects]
     target = decode_atoms(edge.expected_atoms, episode.space)
     if edge.kind == OptionKind.SHORTCUT.value:
-        return _shortcut(edge.name, objects, start, target, repertoires), target
+        return _shortcut(edge, objects, start, target, repertoires), target
     return given_option(episode.domain, edge.name, objects), target
 
 
 def _shortcut(
-    name: str,
+    edge: PlanEdge,
     objects: Sequence[Object],
     start: Observation,
     target: int,
     repertoires: Repertoires,
 ) -> Option:
     """A shortcut from where the robot is."""
-    episode = start.episode
+    episode, name = start.episode, edge.name
     known = [shortcut.name for shortcut in repertoires.shortcuts(episode.domain)]
     repertoire = repertoires.of(episode)
     if repertoire is None or name not in known:
         loaded = f"there are {', '.join(known)}" if known else "no shortcut library is loaded"
         raise UnknownSkillError(f"unknown shortcut {name!r}: {loaded}")
-    option = repertoire.option(name, start.abstract, target)
+    option = repertoire.option(name, start.abstract, target, edge.attempt)
     if option is None:
         raise UnknownSkillError(
             f"{name} does not lead from here to the expected atoms: what they change is not what "

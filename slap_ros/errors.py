@@ -27,6 +27,8 @@ class ErrorCode(IntEnum):
     INVALID_STATE = 16
     INVALID_LIBRARY = 17
     MISMATCHED_ATOM = 18
+    INVALID_MESH = 19
+    MESH_UNAVAILABLE = 20
 
     # 30-49: planner
     UNSOLVABLE = 30
@@ -129,6 +131,18 @@ class InvalidLibraryError(SlapError):
     """A shortcut library that is missing, damaged or of another version."""
 
     code = ErrorCode.INVALID_LIBRARY
+
+
+class InvalidMeshError(SlapError):
+    """A mesh that is no solid body, or a file that holds none."""
+
+    code = ErrorCode.INVALID_MESH
+
+
+class MeshUnavailableError(SlapError):
+    """A mesh that is not on this machine and cannot be had, or a library that it takes."""
+
+    code = ErrorCode.MESH_UNAVAILABLE
 
 
 class UnsolvableError(SlapError):

@@ -65,6 +65,9 @@ def test_colcon_builds_executables_where_ros2_run_looks_for_them(checkout, optio
     for name in (*NODES, "slap"):
         assert (installed / "lib/slap_ros" / name).exists()
     (packages,) = installed.glob("lib/python3.*/site-packages")
+    if not options:  # symlinks lead to the sources, with all that is in them
+        report = packages / "slap_ros" / "report"
+        assert {path.suffix for path in report.glob("page.*")} == {".py", ".css", ".js", ".j2"}
     refused = subprocess.run(
         [installed / "lib/slap_ros/sim_node", "--ros-args", "-p", "domain:=moon"],
         env={**os.environ, "PYTHONPATH": str(packages)},

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from slap_ros.bags.reader import read_bag
+from slap_ros.bags.reader import Bag, read_bag
 from slap_ros.bags.recording import Episode, Recording, initial_state
 from slap_ros.domains import Domain
 from slap_ros.evaluation.metrics import AtomNames, RunLog, RunMetrics
@@ -36,6 +36,29 @@ class BagEvaluation:
     damage: str | None  # where reading had to stop and why
 
 
+@dataclass(frozen=True)
+class Reading:
+    """A bag's messages, sorted by what they tell."""
+
+    bag: Bag
+    log: RunLog
+    recording: Recording
+
+
+def read_runs(path: Path | str) -> Reading:
+    """Read a bag once, for everything that is to be known of its runs.
+
+    Raises:
+        DamagedBagError: Nothing in it can be read.
+        ForeignBagError: It is not of an ensemble, or of another version of one.
+    """
+    reading = Reading(read_bag(path), RunLog(), Recording())
+    for _, type_name, _, message in reading.bag:
+        reading.log.add(type_name, message)
+        reading.recording.add(type_name, message)
+    return reading
+
+
 def evaluate_bag(path: Path | str) -> BagEvaluation:
     """Compute the metrics of every run in a bag and recompute the atoms of every state.
 
@@ -45,16 +68,21 @@ def evaluate_bag(path: Path | str) -> BagEvaluation:
         UnknownDomainError: Its domain is not known here.
         InvalidStateError: It has a state that its domain cannot have.
     """
-    bag, log, recording = read_bag(path), RunLog(), Recording()
-    for _, type_name, _, message in bag:
-        log.add(type_name, message)
-        recording.add(type_name, message)
-    domain = recording.domain()
-    episodes = recording.episodes
+    reading = read_runs(path)
+    return evaluate(reading, reading.recording.domain())
+
+
+def evaluate(reading: Reading, domain: Domain | None) -> BagEvaluation:
+    """What a bag tells; without its domain, no atoms are recomputed.
+
+    Raises:
+        InvalidStateError: It has a state that its domain cannot have.
+    """
+    episodes = reading.recording.episodes
     perceived = [(e, s) for e, episode in episodes.items() for s in episode.states]
     comparable = [(e, s) for e, s in perceived if s in episodes[e].atoms]
     return BagEvaluation(
-        runs=log.runs(),
+        runs=reading.log.runs(),
         mismatches=[
             mismatch
             for number, episode in episodes.items()
@@ -63,7 +91,7 @@ def evaluate_bag(path: Path | str) -> BagEvaluation:
         ],
         states=len(perceived),
         compared=len(comparable) if domain is not None else 0,
-        damage=bag.damage,
+        damage=reading.bag.damage,
     )
 
 

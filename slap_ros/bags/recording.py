@@ -13,12 +13,21 @@ from slap_ros.domains import Domain, get_domain
 from slap_ros.domains.domain import Action
 from slap_ros.errors import ForeignBagError
 from slap_ros.evaluation.metrics import AtomNames, atom_names
-from slap_ros.messages.decode import decode_command, decode_state
-from slap_ros.messages.interfaces import ATOMS, COMMAND, DOMAIN_INFO, STATE, TASK
+from slap_ros.messages.decode import decode_command, decode_state, stamp_ns
+from slap_ros.messages.interfaces import (
+    ATOMS,
+    BODIES,
+    COMMAND,
+    DOMAIN_INFO,
+    MARKERS,
+    STATE,
+    TASK,
+)
 from slap_ros.messages.protocols import (
     AtomsMessage,
     CommandMessage,
     DomainInfoMessage,
+    MarkersMessage,
     StateMessage,
     TaskMessage,
 )
@@ -41,12 +50,14 @@ class Recording:
     def __init__(self) -> None:
         self.episodes: dict[int, Episode] = {}
         self.domain_info: DomainInfoMessage | None = None
+        self.markers: dict[int, MarkersMessage] = {}  # by stamp, ns
         self._add: Mapping[str, Callable[[Any], None]] = {
             DOMAIN_INFO: self._add_domain,
             TASK: self._add_task,
             STATE: self._add_state,
             ATOMS: self._add_atoms,
             COMMAND: self._add_command,
+            MARKERS: self._add_markers,
         }
 
     @classmethod
@@ -80,6 +91,10 @@ class Recording:
     def _add_command(self, msg: CommandMessage) -> None:
         commands = self._episode(msg.episode).commands
         commands.setdefault(msg.step, []).append(decode_command(msg))
+
+    def _add_markers(self, msg: MarkersMessage) -> None:
+        if any(marker.ns == BODIES for marker in msg.markers):
+            self.markers.setdefault(stamp_ns(msg.markers[0].header), msg)
 
     def domain(self) -> Domain | None:
         """The domain that was recorded; None where the bag breaks off before naming it.

@@ -7,7 +7,7 @@ from __future__ import annotations
 import typer
 
 from slap_ros import __version__
-from slap_ros.cli import bag, domains, evaluate, plan, run, study, train
+from slap_ros.cli import bag, domains, evaluate, plan, report, run, study, train
 from slap_ros.cli import doctor as doctor_command
 from slap_ros.cli.console import exits
 
@@ -25,6 +25,7 @@ app = typer.Typer(
 app.command("run")(exits(run.run))
 app.command("plan")(exits(plan.plan))
 app.command("evaluate")(exits(evaluate.evaluate))
+app.command("report")(exits(report.report))
 app.command("train")(exits(train.train))
 app.add_typer(study.app, name="study")
 app.add_typer(bag.app, name="bag")

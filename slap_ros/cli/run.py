@@ -4,7 +4,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 import typer
@@ -20,8 +23,10 @@ from slap_ros.cli.console import (
     console,
     print_json,
 )
+from slap_ros.cli.live import Dashboard
 from slap_ros.cli.render import check_renderable
 from slap_ros.cli.render import render as write_animation
+from slap_ros.cli.report import write_report
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts
 from slap_ros.domains import get_domain
 from slap_ros.evaluation.metrics import RunMetrics
@@ -31,6 +36,7 @@ from slap_ros.messages.interfaces import PLAN, PLAN_EVENT, SKILL_EVENT, STATE
 from slap_ros.planning.execution import MAX_REPLANS
 from slap_ros.planning.planner import make_planner
 from slap_ros.relational.pddl import parse_goal
+from slap_ros.report import check_output
 from slap_ros.shortcuts.shipped import chosen_library
 
 
@@ -57,6 +63,12 @@ def run(
     render: Annotated[
         Path | None, typer.Option(help="Write an animation of the run: a .gif or .mp4.")
     ] = None,
+    report: Annotated[
+        Path | None, typer.Option(help="Tell the run on a page, as `slap report` does: a .html.")
+    ] = None,
+    live: Annotated[
+        bool, typer.Option("--live", help="Show plan and progress in place, on a terminal.")
+    ] = False,
     json: Json = False,
 ) -> int:
     """Run the whole ensemble on one task: simulator, perception, planner, skills, recorder."""
@@ -70,31 +82,51 @@ def run(
         require_new(record)
     if render is not None:
         check_renderable(chosen, render)
+    if report is not None:
+        check_output(report)
 
     # ROS is needed only here: every other command works without it.
     from ensemble.nodes import RunSettings
     from ensemble.run import RunRequest
     from ensemble.run import run as run_ensemble
 
-    settings = RunSettings(
-        domain, preset, seed, index, planner, record, pace, shortcuts or "", samples
-    )
-    request = RunRequest(settings, atoms, 0, max_replans, timeout, in_process)
-    narrator, states = Narrator(), []
+    states = []
+    with _bag(record, report, f"{domain}-{seed}") as bag:
+        settings = RunSettings(
+            domain, preset, seed, index, planner, bag, pace, shortcuts or "", samples
+        )
+        request = RunRequest(settings, atoms, 0, max_replans, timeout, in_process)
+        with _narrator(live) as narrate:
 
-    def follow(type_name: str, message: Any) -> None:
-        narrator(type_name, message)
-        if type_name == STATE and render is not None:
-            states.append(message)
+            def follow(type_name: str, message: Any) -> None:
+                narrate(type_name, message)
+                if type_name == STATE and render is not None:
+                    states.append(message)
 
-    metrics = run_ensemble(request, follow)
-    if json:
-        print_json(metrics.as_json())
-    _conclude(metrics, record)
+            metrics = run_ensemble(request, follow)
+        if json:
+            print_json(metrics.as_json())
+        _conclude(metrics, record)
+        code = write_report([bag], report) if bag is not None and report is not None else 0
     if render is not None:
         decoded = [decode_state(message, chosen.types_by_name) for message in states]
         write_animation(chosen, decoded, render)
-    return int(metrics.error_code)
+    return int(metrics.error_code) or code
+
+
+@contextmanager
+def _bag(record: Path | None, report: Path | None, name: str) -> Iterator[Path | None]:
+    """Where to record: where the user wants it, or for the time that a report needs it."""
+    if record is not None or report is None:
+        yield record
+        return
+    with TemporaryDirectory(prefix="slap-") as folder:
+        yield Path(folder) / name
+
+
+def _narrator(live: bool) -> AbstractContextManager[Callable[[str, Any], None]]:
+    """Whoever tells the run: in place on a terminal, in lines elsewhere."""
+    return Dashboard(console) if live and console.is_terminal else nullcontext(Narrator())
 
 
 class Narrator:

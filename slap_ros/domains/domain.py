@@ -136,13 +136,15 @@ class Skill(Protocol):
 
 @dataclass(frozen=True)
 class VisibleBody:
-    """A box to be shown; pose in the world frame."""
+    """A box to be shown, or a body of triangles; pose in the world frame."""
 
     name: str
     position: tuple[float, float, float]  # m, of its centre
     quaternion: tuple[float, float, float, float]  # x y z w
     size: tuple[float, float, float]  # m, its edges
     colour: tuple[float, float, float, float]  # red green blue opacity, 0 to 1
+    # Three corners each, m, in the body's own frame; without any it is a box.
+    triangles: tuple[tuple[float, float, float], ...] = ()
 
 
 # Writes states, one a control step, as a GIF or MP4; tells how many frames are done.

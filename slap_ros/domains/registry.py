@@ -25,6 +25,7 @@ OURS = {
     "obstacle2d": "slap_ros.domains.obstacle2d",
     "obstacle_tower": "slap_ros.domains.obstacle_tower",
     "cluttered_drawer": "slap_ros.domains.cluttered_drawer",
+    "cleanup_table": "slap_ros.domains.cleanup_table",
 }
 
 

@@ -92,6 +92,20 @@ class RunMetrics:
 
 
 @dataclass(frozen=True)
+class RunTrace:
+    """A run together with the messages that tell when what happened in it."""
+
+    metrics: RunMetrics
+    episode: int
+    first_step: int
+    last_step: int
+    starts: tuple[int, ...]  # the step at which each of the metrics' options began
+    goal: AtomNames | None  # None: neither a plan nor the task is known
+    plans: tuple[PlanMessage, ...]  # in order
+    events: tuple[PlanEventMessage, ...]  # in order
+
+
+@dataclass(frozen=True)
 class _Run:
     """The plan events of a run, in order."""
 
@@ -182,13 +196,17 @@ class RunLog:
 
     def runs(self) -> list[RunMetrics]:
         """The metrics of every run so far, in order."""
+        return [trace.metrics for trace in self.traces()]
+
+    def traces(self) -> list[RunTrace]:
+        """Every run so far, in order."""
         runs = _split(self._plan_events)
         executions: list[list[_Execution]] = [[] for _ in runs]
         for execution in _pair(self._skill_events):
             position = _position(execution.start, runs, self._last_step)
             if position is not None:
                 executions[position].append(execution)
-        return [self._measure(run, own) for run, own in zip(runs, executions, strict=True)]
+        return [self._trace(run, own) for run, own in zip(runs, executions, strict=True)]
 
     @property
     def complete(self) -> bool:
@@ -211,6 +229,18 @@ class RunLog:
         planned = [stamp_ns(e.header) for e in run.events if e.kind == PlanEventKind.PLANNED]
         plans = self._plans.get(run.episode, ())
         return not planned or any(stamp_ns(plan.header) >= planned[-1] for plan in plans)
+
+    def _trace(self, run: _Run, executions: Sequence[_Execution]) -> RunTrace:
+        return RunTrace(
+            metrics=self._measure(run, executions),
+            episode=run.episode,
+            first_step=run.start.step,
+            last_step=self._last_step(run),
+            starts=tuple(execution.start.step for execution in executions),
+            goal=self._goal(run),
+            plans=tuple(self._plans_of(run)),
+            events=tuple(run.events),
+        )
 
     def _measure(self, run: _Run, executions: Iterable[_Execution]) -> RunMetrics:
         task = self._tasks.get(run.episode)

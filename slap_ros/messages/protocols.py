@@ -74,6 +74,14 @@ class TypeInfoMessage(Protocol):
     name: str
     parent: str
     feature_names: Sequence[str]
+    feature_units: Sequence[str]
+
+
+class KeyValueMessage(Protocol):
+    """``diagnostic_msgs/KeyValue``."""
+
+    key: str
+    value: str
 
 
 class DomainInfoMessage(Protocol):
@@ -83,6 +91,9 @@ class DomainInfoMessage(Protocol):
     name: str
     preset: str
     types: Sequence[TypeInfoMessage]
+    control_period: float
+    configuration: Sequence[KeyValueMessage]
+    versions: Sequence[KeyValueMessage]
 
 
 class TaskMessage(Protocol):
@@ -95,6 +106,7 @@ class TaskMessage(Protocol):
     index: int
     initial_state: StateMessage
     goal: Sequence[GroundAtomMessage]
+    step_limit: int
 
 
 class PlanEdgeMessage(Protocol):
@@ -102,6 +114,9 @@ class PlanEdgeMessage(Protocol):
 
     kind: int
     name: str
+    objects: Sequence[str]
+    expected_atoms: Sequence[GroundAtomMessage]
+    predicted_steps: int
 
 
 class PlanMessage(Protocol):
@@ -109,8 +124,10 @@ class PlanMessage(Protocol):
 
     header: Header
     episode: int
+    number: int
     goal: Sequence[GroundAtomMessage]
     edges: Sequence[PlanEdgeMessage]
+    predicted_steps: int
     planner: str
     library: str
     samples: int
@@ -123,6 +140,8 @@ class PlanEventMessage(Protocol):
     episode: int
     step: int
     kind: int
+    plan_number: int
+    edge: int
     edges_rolled_out: int
     error_code: int
     error_msg: str
@@ -137,3 +156,51 @@ class SkillEventMessage(Protocol):
     kind: int
     skill: str
     objects: Sequence[str]
+
+
+class PointMessage(Protocol):
+    """``geometry_msgs/Point`` or ``geometry_msgs/Vector3``."""
+
+    x: float
+    y: float
+    z: float
+
+
+class QuaternionMessage(PointMessage, Protocol):
+    """``geometry_msgs/Quaternion``."""
+
+    w: float
+
+
+class PoseMessage(Protocol):
+    """``geometry_msgs/Pose``."""
+
+    position: PointMessage
+    orientation: QuaternionMessage
+
+
+class ColourMessage(Protocol):
+    """``std_msgs/ColorRGBA``."""
+
+    r: float
+    g: float
+    b: float
+    a: float
+
+
+class MarkerMessage(Protocol):
+    """``visualization_msgs/Marker``."""
+
+    header: Header
+    ns: str
+    type: int
+    pose: PoseMessage
+    scale: PointMessage
+    color: ColourMessage
+    text: str
+
+
+class MarkersMessage(Protocol):
+    """``visualization_msgs/MarkerArray``."""
+
+    markers: Sequence[MarkerMessage]

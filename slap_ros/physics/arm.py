@@ -52,8 +52,9 @@ class Arm:
         radii = _RADII
         if held is not None:
             links.append(poses[HAND].compose(grasp))
-            centres.append(links[-1].position)
-            radii = (*_RADII, math.hypot(*held.half_extents_m))
+            box = held.at(links[-1])
+            centres.append(box.pose.position)
+            radii = (*_RADII, box.radius)
         return cls(tuple(links), tuple(centres), radii, held)
 
     @property

@@ -56,8 +56,7 @@ def finger_around(body: Body, grasp: Pose) -> float:
     """Where the fingers stand at a held body's sides, m from the middle."""
     # The way the fingers move, seen from the body.
     along = rotate(conjugate(grasp.quaternion), (0.0, 1.0, 0.0))
-    width = sum(abs(a) * half for a, half in zip(along, body.half_extents_m, strict=True))
-    return min(FINGER_OPEN, width + abs(grasp.position[1]))
+    return min(FINGER_OPEN, body.extent(along) + abs(grasp.position[1]))
 
 
 def _normalised(q: tuple[float, float, float, float]) -> tuple[float, float, float, float]:

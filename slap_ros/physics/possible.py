@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 from slap_ros.errors import InvalidStateError
 from slap_ros.physics.arm import Arm, Obstacle, Sweep
+from slap_ros.physics.boxes import OrientedBox
 from slap_ros.physics.panda import FINGER_CLOSED, FINGER_OPEN, JOINT_HIGH, JOINT_LOW
 from slap_ros.physics.pose import Pose
 from slap_ros.physics.scene import Material, Scene
@@ -88,16 +89,22 @@ def _require_in_hand(scene: Scene, snapshot: Snapshot, arm: Arm) -> None:
 
 def _require_apart(scene: Scene, snapshot: Snapshot, obstacles: Sequence[Obstacle]) -> None:
     placed = [
-        (body.name, body.at(motion.pose).shrunk(OVERLAP / 2), i == snapshot.held)
+        (body.name, [core.shrunk(OVERLAP / 2) for core in body.cores(motion.pose)])
         for i, (body, motion) in enumerate(zip(scene.free, snapshot.bodies, strict=True))
+        if i != snapshot.held
     ]
-    for i, (name, box, held) in enumerate(placed):
-        for other, place, other_held in placed[:i]:
-            near = box.near(place.pose.position, place.radius)
-            if near and not (held or other_held) and box.overlaps(place):
+    fixed = [box.shrunk(OVERLAP / 2) for box, _ in obstacles]
+    for i, (name, cores) in enumerate(placed):
+        for other, others in placed[:i]:
+            if _share_space(cores, others):
                 raise InvalidStateError(f"{name} and {other} are inside one another")
-        if not held and any(
-            place.near(box.pose.position, box.radius) and place.shrunk(OVERLAP / 2).overlaps(box)
-            for place, _ in obstacles
-        ):
+        if _share_space(cores, fixed):
             raise InvalidStateError(f"{name} is inside a fixed body")
+
+
+def _share_space(some: Sequence[OrientedBox], others: Sequence[OrientedBox]) -> bool:
+    return any(
+        other.near(box.pose.position, box.radius) and other.overlaps(box)
+        for box in some
+        for other in others
+    )

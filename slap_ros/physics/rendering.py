@@ -11,10 +11,11 @@ from types import TracebackType
 import numpy as np
 import pybullet
 
+from slap_ros.meshes.solid import Piece, Solid
 from slap_ros.physics.animation import Picture, write_pictures
 from slap_ros.physics.panda import CONTROL_PERIOD_S
 from slap_ros.physics.pose import Pose, Vector
-from slap_ros.physics.scene import Body, Scene
+from slap_ros.physics.scene import Body, Box, Scene
 from slap_ros.physics.simulation import PANDA
 from slap_ros.physics.snapshot import Reader
 from slap_ros.physics.viewpoint import View
@@ -22,7 +23,7 @@ from slap_ros.relational import State
 
 ARM_JOINTS = range(7)  # indices in the URDF
 FINGER_JOINTS = (9, 10)
-STAND = Body("stand", (0.1, 0.1, 0.2125), pose=Pose((0.0, 0.0, -0.2125)))  # what the base is on
+STAND = Box("stand", (0.1, 0.1, 0.2125), pose=Pose((0.0, 0.0, -0.2125)))  # what the base is on
 UP: Vector = (0.0, 0.0, 1.0)
 NEAR, FAR = 0.05, 5.0  # m, what is closer or further is not drawn
 
@@ -87,20 +88,39 @@ class Camera:
             pybullet.resetJointState(self._robot, joint, snapshot.finger, 0.0, self.client)
         poses = [motion.pose for motion in snapshot.bodies]
         poses += reader.fixed_poses(self._scene, state)
-        for body, pose in zip([*self._free, *self._fixed], poses, strict=True):
-            pybullet.resetBasePositionAndOrientation(body, *pose, self.client)
+        for pieces, pose in zip([*self._free, *self._fixed], poses, strict=True):
+            for piece in pieces:
+                pybullet.resetBasePositionAndOrientation(piece, *pose, self.client)
 
-    def _add(self, body: Body) -> int:
-        shape = pybullet.createVisualShape(
-            pybullet.GEOM_BOX,
-            halfExtents=body.half_extents_m,
-            rgbaColor=body.colour,
-            physicsClientId=self.client,
+    def _add(self, body: Body) -> list[int]:
+        """What a body looks like: one thing, or its pieces."""
+        if isinstance(body.shape, Solid):
+            looks = [self._piece(piece, body) for piece in body.shape.pieces]
+        else:
+            looks = [self._visual(body, pybullet.GEOM_BOX, halfExtents=body.shape)]
+        return [
+            pybullet.createMultiBody(0.0, -1, look, *body.pose, physicsClientId=self.client)
+            for look in looks
+        ]
+
+    def _piece(self, piece: Piece, body: Body) -> int:
+        """A piece with corners of their own for each triangle, so that faces look flat."""
+        corners = np.array(piece.vertices)[np.array(piece.triangles)]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        return self._visual(
+            body,
+            pybullet.GEOM_MESH,
+            vertices=corners.reshape(-1, 3).tolist(),
+            indices=list(range(3 * len(corners))),
+            normals=np.repeat(normals, 3, axis=0).tolist(),
         )
-        added: int = pybullet.createMultiBody(
-            0.0, -1, shape, *body.pose, physicsClientId=self.client
+
+    def _visual(self, body: Body, kind: int, **geometry: object) -> int:
+        shape: int = pybullet.createVisualShape(
+            kind, rgbaColor=body.colour, physicsClientId=self.client, **geometry
         )
-        return added
+        return shape
 
 
 def write_animation(

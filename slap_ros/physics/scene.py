@@ -4,15 +4,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
 from slap_ros.errors import InvalidDomainError
+from slap_ros.meshes.solid import Solid
 from slap_ros.physics.boxes import OrientedBox
 from slap_ros.physics.pose import IDENTITY, Pose, Vector
 
 Colour = tuple[float, float, float, float]  # red green blue opacity, 0 to 1
+Shape = Vector | Solid  # half the edges of a box, m; or convex pieces
 
 FRICTION = 0.9  # 1, the reference's, of everything it has
 GREY: Colour = (0.6, 0.6, 0.6, 1.0)
@@ -62,8 +65,72 @@ class Box:
         """The space it fills at a pose."""
         return OrientedBox(pose, self.half_extents_m)
 
+    def cores(self, pose: Pose) -> tuple[OrientedBox, ...]:
+        """Boxes inside it at a pose."""
+        return (self.at(pose),)
 
-Body = Box  # the union of all kinds of bodies; meshes will be the next
+    @property
+    def shape(self) -> Shape:
+        """Alike for boxes of one size."""
+        return self.half_extents_m
+
+    @property
+    def radius(self) -> float:
+        """How far it reaches from its origin, m."""
+        return math.hypot(*self.half_extents_m)
+
+    def extent(self, axis: Vector) -> float:
+        """How far it reaches from its origin along an axis of length 1, m."""
+        return sum(abs(a) * half for a, half in zip(axis, self.half_extents_m, strict=True))
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A body of convex pieces, whose origin is its centre of mass.
+
+    Args:
+        name: See :class:`Box`, also for all but the next.
+        shape: Its pieces; alike for meshes of one shape.
+        mass_kg: Spread evenly.
+    """
+
+    name: str
+    shape: Solid
+    mass_kg: float = 0.0
+    friction: float = FRICTION
+    colour: Colour = GREY
+    pose: Pose = IDENTITY
+    solid: bool = True
+
+    @property
+    def material(self) -> Material:
+        """What it is made of, unless the state says otherwise."""
+        return Material(self.mass_kg, self.friction)
+
+    def of(self, material: Material) -> Mesh:
+        """The same mesh of another material."""
+        return replace(self, mass_kg=material.mass_kg, friction=material.friction)
+
+    def at(self, pose: Pose) -> OrientedBox:
+        """A box around it at a pose: the space that the arm takes it to fill."""
+        frame, half = self.shape.bounds
+        return OrientedBox(pose.compose(frame), half)
+
+    def cores(self, pose: Pose) -> tuple[OrientedBox, ...]:
+        """Boxes inside it at a pose."""
+        return tuple(OrientedBox(pose.compose(core.pose), core.half) for core in self.shape.cores)
+
+    @property
+    def radius(self) -> float:
+        """How far it reaches from its origin, m."""
+        return self.shape.radius
+
+    def extent(self, axis: Vector) -> float:
+        """How far it reaches from its origin along an axis of length 1, m."""
+        return self.shape.extent(axis)
+
+
+Body = Box | Mesh
 
 CUBE_EDGE = 0.05  # m
 CUBE_MATERIAL = Material(mass_kg=0.5, friction=FRICTION)

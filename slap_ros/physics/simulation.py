@@ -19,14 +19,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import pybullet
 
+from slap_ros.meshes.obj import to_obj
+from slap_ros.meshes.solid import Solid, cuboid
 from slap_ros.physics.links import LINK_SHAPES
 from slap_ros.physics.panda import CONTROL_PERIOD_S
 from slap_ros.physics.pose import NO_TURN, ORIGIN, Pose, Vector, conjugate, multiply
-from slap_ros.physics.scene import FRICTION, Body, Material, Scene
+from slap_ros.physics.scene import FRICTION, Body, Material, Scene, Shape
 from slap_ros.physics.snapshot import Motion
 
 GRAVITY = 9.81  # m/s², downwards
@@ -75,6 +78,10 @@ def _parking(index: int) -> Vector:
     return (20.0 + 3.0 * index, 20.0, 1.0)
 
 
+def _solid(shape: Shape) -> Solid:
+    return shape if isinstance(shape, Solid) else Solid.of([cuboid(shape)])
+
+
 class Simulation:
     """A PyBullet client with the bodies of a scene.
 
@@ -87,6 +94,9 @@ class Simulation:
         self.stepping = stepping
         self.client: int = pybullet.connect(pybullet.DIRECT)
         self._fixed_poses: tuple[Pose, ...] = ()
+        # Pieces rest on their faces only where both know them; else one point at a time is found
+        # in which they touch, and they rock on it. Boxes among themselves need no help.
+        self._faceted = any(isinstance(body.shape, Solid) for body in scene.bodies)
         pybullet.resetSimulation(pybullet.RESET_USE_SIMPLE_BROADPHASE, self.client)
         pybullet.setGravity(0.0, 0.0, -GRAVITY, self.client)
         pybullet.setPhysicsEngineParameter(
@@ -94,6 +104,7 @@ class Simulation:
             numSolverIterations=stepping.iterations,
             deterministicOverlappingPairs=1,
             collisionFilterMode=0,  # both bodies must want a contact, not either
+            enableSAT=int(self._faceted),
             physicsClientId=self.client,
         )
         self._parked = 0
@@ -103,8 +114,8 @@ class Simulation:
         self.make_of([body.material for body in scene.free])
         self._links = [self._add_link(i) for i in range(len(LINK_SHAPES))]
         # A held body is one more link. Bodies of one shape share it, as one is held at a time.
-        shapes = dict.fromkeys(body.half_extents_m for body in scene.free)
-        self._ghosts = {shape: self._add_driven(self._box(shape), FRICTION) for shape in shapes}
+        shapes = dict.fromkeys(body.shape for body in scene.free)
+        self._ghosts = {shape: self._add_driven(self._shape(shape), FRICTION) for shape in shapes}
         self._ghost_frictions = dict.fromkeys(shapes, FRICTION)
         self._driven = [*self._links, *self._ghosts.values()]
         self._parking = {body: _parking(i) for i, body in enumerate([*self._free, *self._driven])}
@@ -136,6 +147,7 @@ class Simulation:
                     mass=material.mass_kg,
                     lateralFriction=material.friction,
                     physicsClientId=self.client,
+                    **self._inertia(self.scene.free[i].shape, material.mass_kg),
                 )
                 self._materials[i] = material
 
@@ -213,7 +225,7 @@ class Simulation:
 
     def _ghost(self, held: int) -> int:
         """The driven body that stands for a held one, as rough as that is."""
-        shape, material = self.scene.free[held].half_extents_m, self._materials[held]
+        shape, material = self.scene.free[held].shape, self._materials[held]
         assert material is not None
         if material.friction != self._ghost_frictions[shape]:
             pybullet.changeDynamics(
@@ -227,11 +239,33 @@ class Simulation:
 
     # -- building -------------------------------------------------------------------------------
 
-    def _box(self, half: Vector) -> int:
-        shape: int = pybullet.createCollisionShape(
-            pybullet.GEOM_BOX, halfExtents=half, physicsClientId=self.client
+    def _shape(self, shape: Shape) -> int:
+        if self._faceted:
+            return self._pieces(_solid(shape))
+        box: int = pybullet.createCollisionShape(
+            pybullet.GEOM_BOX, halfExtents=shape, physicsClientId=self.client
         )
-        return shape
+        return box
+
+    def _pieces(self, shape: Solid) -> int:
+        """A compound of hulls, which PyBullet makes of a file only. It keeps what it has read."""
+        with TemporaryDirectory() as folder:
+            file = Path(folder) / f"{shape.digest.hex()}.obj"
+            file.write_text(to_obj(shape.pieces), encoding="utf-8")
+            compound: int = pybullet.createCollisionShape(
+                pybullet.GEOM_MESH,
+                fileName=str(file),
+                flags=pybullet.URDF_INITIALIZE_SAT_FEATURES,
+                physicsClientId=self.client,
+            )
+        return compound
+
+    def _inertia(self, shape: Shape, mass_kg: float) -> dict[str, Vector]:
+        """What PyBullet, which takes pieces for the box around them, must be told; in kg m²."""
+        if not self._faceted:
+            return {}
+        x, y, z = _solid(shape).inertia
+        return {"localInertiaDiagonal": (mass_kg * x, mass_kg * y, mass_kg * z)}
 
     def _add(self, shape: int, mass: float, friction: float, group: int, meets: int) -> int:
         body: int = pybullet.createMultiBody(
@@ -256,10 +290,10 @@ class Simulation:
     def _add_fixed(self, body: Body) -> int | None:
         if not body.solid:
             return None
-        return self._add(self._box(body.half_extents_m), 0.0, body.friction, FIXED, FREE)
+        return self._add(self._shape(body.shape), 0.0, body.friction, FIXED, FREE)
 
     def _add_free(self, body: Body) -> int:
-        shape = self._box(body.half_extents_m)
+        shape = self._shape(body.shape)
         return self._add(shape, body.mass_kg, body.friction, FREE, FREE | FIXED | ARM)
 
     def _add_link(self, index: int) -> int:

@@ -9,7 +9,6 @@ action, bit for bit (``docs/physics.md`` says how, and what it costs).
 
 from __future__ import annotations
 
-import math
 import weakref
 from dataclasses import replace
 from types import TracebackType
@@ -40,7 +39,7 @@ REST_SHIFT = 2e-4  # m, along each axis
 REST_TURN = 1e-3  # 1, of each component of the quaternion
 PRESSED = 0.006  # m, how far the arm may press bodies into one another; deeper, it yields
 JAMMED = 0.02  # m, where no body moves: between two immovable ones the solver has no answer
-RAISED = 4  # times that the arm is raised at most, lest it enters a fixed body
+RAISED = 8  # times that the arm is raised at most, lest it enters a fixed body
 CLEAR = 1e-4  # m, over where it just does not
 MOST_REMEMBERED = 256  # arrangements of bodies known to stand or not
 
@@ -71,7 +70,7 @@ class PandaWorld:
         self._reader = Reader.of(scene, state.layout)
         self._standing: dict[object, bool] = {}
         self._solid = [i for i, body in enumerate(scene.fixed) if body.solid]
-        self._radii = [math.hypot(*body.half_extents_m) for body in scene.free]
+        self._radii = [body.radius for body in scene.free]
         self._adopt(state)
         self._simulation = borrow(scene, stepping)
         self._closing = weakref.finalize(self, give_back, self._simulation)
@@ -134,9 +133,9 @@ class PandaWorld:
         """Act for one control period.
 
         Where a motion would drive the arm into a fixed body, the arm slides along the top of it.
-        Where it would press bodies into one another, the hand yields upwards. Where that does
-        not help, the motion is not carried out: the arm stays, the bodies go on. Nor does the
-        gripper act where its fingers would enter a fixed body.
+        Where it would press bodies into one another, the hand yields upwards, or the arm goes half
+        as far. Where that does not help, the motion is not carried out: the arm stays, the bodies
+        go on. Nor does the gripper act where its fingers would enter a fixed body.
 
         Raises:
             InvalidCommandError: The action is not in the action space; nothing moved.
@@ -171,7 +170,7 @@ class PandaWorld:
             goal = self._sliding(now, goal, start)
             sweep = Sweep(start, self._arm(goal))
         bodies, depth = self._bodies_after(now, sweep)
-        for softer in (_hand_raised, _stay):
+        for softer in (_hand_raised, _half_way, _stay):
             if depth <= PRESSED or goal is now:
                 break
             other = softer(now, goal, depth)
@@ -252,6 +251,13 @@ def _within_limits(joints: tuple[float, ...], displacement: list[float]) -> tupl
     return tuple(
         min(max(q, low), high) for low, q, high in zip(JOINT_LOW, moved, JOINT_HIGH, strict=True)
     )
+
+
+def _half_way(now: Snapshot, goal: Snapshot, depth: float) -> Snapshot:
+    """The goal half as far away: what is pressed has more time to give way."""
+    del depth
+    joints = tuple((a + b) / 2.0 for a, b in zip(now.joints, goal.joints, strict=True))
+    return replace(goal, joints=joints)
 
 
 def _stay(now: Snapshot, goal: Snapshot, depth: float) -> Snapshot:

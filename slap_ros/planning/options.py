@@ -29,6 +29,10 @@ def _never() -> bool:
     return False
 
 
+def _none() -> Option | None:
+    return None
+
+
 @dataclass(frozen=True)
 class Option:
     """A skill applied to objects.
@@ -39,6 +43,8 @@ class Option:
         objects: What it is applied to.
         accepts: Whether it may end in a state in which its target's atoms hold. A shortcut may
             not while things still move or lie where the next option could not be executed.
+        attempt: Which of the ways in which the skill may do it, the shortest first.
+        another: The same, done in the next way; it fails where there is none.
         given_up: Whether it need not be tried any more in this task: its like failed too often.
     """
 
@@ -46,6 +52,8 @@ class Option:
     skill: Skill
     objects: tuple[Object, ...]
     accepts: Callable[[State], bool] = field(default=_any, compare=False, repr=False)
+    attempt: int = 0
+    another: Callable[[], Option | None] = field(default=_none, compare=False, repr=False)
     given_up: Callable[[], bool] = field(default=_never, compare=False, repr=False)
 
     def __str__(self) -> str:

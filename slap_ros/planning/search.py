@@ -16,12 +16,13 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import count
 
 from slap_ros.errors import UnsolvableError
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge
-from slap_ros.planning.model import Model
+from slap_ros.planning.model import Model, Rollout
+from slap_ros.planning.options import Option
 from slap_ros.planning.plan import Plan, PlanEdge
 from slap_ros.relational import State
 
@@ -67,13 +68,25 @@ def build_bottom_level(graph: AbstractGraph, state: State, model: Model) -> LowL
             continue
         for vertex in vertices.values():
             found = bottom.successors.setdefault(vertex.key, [])
-            for edge in forward[node]:
-                rollout = model.roll_out(edge.option, vertex.state, graph.nodes[edge.target])
-                if rollout.reached:
+            for each in forward[node]:
+                for edge, rollout in _ways(each, vertex.state, graph, model):
                     successor = Vertex(edge.target, rollout.final, 0)
                     reached[edge.target].setdefault(successor.key, successor)
                     found.append((edge, rollout.steps, successor))
     return bottom
+
+
+def _ways(
+    edge: Edge, state: State, graph: AbstractGraph, model: Model
+) -> Iterator[tuple[Edge, Rollout]]:
+    """All ways in which an edge can be run, the shortest first."""
+    option: Option | None = edge.option
+    while option is not None:
+        rollout = model.roll_out(option, state, graph.nodes[edge.target])
+        if not rollout.reached:
+            return
+        yield replace(edge, option=option), rollout
+        option = option.another()
 
 
 def search_exhaustively(graph: AbstractGraph, state: State, model: Model) -> Plan:
@@ -179,6 +192,9 @@ def search_lazily(graph: AbstractGraph, state: State, model: Model) -> Plan:
                 if cost < cheapest.get(reached.key, cost + 1):
                     cheapest[reached.key] = cost
                     frontier.push(reached)
+                another = edge.option.another()
+                if another is not None:  # it takes longer, but what comes next may take less
+                    frontier.push(vertex, replace(edge, option=another), rollout.steps)
             elif edge.option.given_up():
                 frontier.give_up()
         elif edge is None and vertex.node in goals:

@@ -51,6 +51,10 @@ class Rewards:
     def of(self, gain: Array, done: Bools, lost: Bools) -> Array:
         """Rewards of steps that raised the potential by ``gain``, shape (n,).
 
+        The gain is not discounted. Discounted (Ng et al. 1999), shaping changes no return but by
+        a constant of the state, which the critic learns; what remains is what there is without
+        shaping, and a policy that never succeeded yet finds that nothing is better than nothing.
+
         Losing ends the episode, so it must cost more than all steps that it saves.
         """
         worst = self.step / (1.0 - self.discount)
@@ -119,8 +123,7 @@ class Practice:
         done, lost, before, after, last, now = (
             np.concatenate(values) for values in zip(*parts, strict=True)
         )
-        after = np.where(done | lost, 0.0, after)
-        gain = self._rewards.discount * after - before
+        gain = np.where(done, 0.0, after) - before
         lengths = self._lengths.copy()
         self._lengths[done | lost | late] = 0
         rewards = self._rewards.of(gain, done, lost)

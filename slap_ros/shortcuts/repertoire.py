@@ -46,23 +46,28 @@ class Repertoire:
                     found.append(Edge(i, j, self._option(shortcut, change)))
         return found
 
-    def option(self, name: str, source: int, target: int) -> Option | None:
-        """The shortcut of that name from an abstract state to another; None if it does not fit."""
+    def option(self, name: str, source: int, target: int, attempt: int = 0) -> Option | None:
+        """The shortcut of that name from an abstract state to another; None if it does not fit.
+
+        ``attempt``: which of its attempts, the shortest first.
+        """
         change = Change.between(source, target)
         for shortcut in self.shortcuts:
             if shortcut.name == name and shortcut.signature.suits(change, self._space):
-                return self._option(shortcut, change)
+                return self._option(shortcut, change, attempt)
         return None
 
-    def _option(self, shortcut: Shortcut, change: Change) -> Option:
+    def _option(self, shortcut: Shortcut, change: Change, attempt: int = 0) -> Option:
         key = (shortcut.name, change)
         if key not in self._sights:
             self._sights[key] = Sight(self._domain, self._space, shortcut.signature, change)
         sight = self._sights[key]
         return Option(
             OptionKind.SHORTCUT,
-            GroundShortcut(shortcut, change, sight, self._rehearsal),
+            GroundShortcut(shortcut, change, attempt, sight, self._rehearsal),
             concerned(change, self._space),
             accepts=sight.may_end,
+            attempt=attempt,
+            another=lambda: self._option(shortcut, change, attempt + 1),
             given_up=lambda: self._rehearsal.gave_up(shortcut),
         )

@@ -37,14 +37,14 @@ class Exploration:
     nodes: int = 6
 
 
-LEARN = PpoSettings(total_steps=400_000)
+LEARN = PpoSettings(total_steps=250_000)
 POLISH = PpoSettings(
     rollout_steps=128,
     batch_size=512,
     learning_rate=4e-4,
     gae_lambda=0.95,
     log_std=-1.3,
-    total_steps=300_000,
+    total_steps=250_000,
 )
 
 
@@ -122,6 +122,22 @@ SETTINGS: Mapping[str, Mapping[str, TrainingSettings]] = {
             polish=None,
             horizon=30,
             starts=200,
+        ),
+        "cluttered_drawer": replace(
+            OURS,
+            ppo=replace(LEARN, total_steps=120_000),
+            polish=replace(POLISH, total_steps=80_000),
+            horizon=40,
+            starts=150,
+        ),
+        "cleanup_table": replace(
+            OURS,
+            exploration=Exploration(nodes=13),  # all that is grasped, and lifted
+            ppo=replace(LEARN, total_steps=150_000),
+            polish=replace(POLISH, total_steps=100_000),
+            horizon=60,
+            starts=150,
+            shortcuts=2,
         ),
         "": OURS,
     },

@@ -21,9 +21,6 @@ from slap_ros.shortcuts.sight import Sight
 from slap_ros.shortcuts.signature import Change, Signature
 
 HOPE = 3  # failures, on top of as many for each success, before a shortcut is given up
-# Environment steps by which another attempt must be shorter to be taken instead: without noise a
-# policy ends where training did, mostly well for what comes next; noise ends anywhere.
-WORTH = 2
 NARROWER = 0.7  # of the spread of variations from one round to the next
 SAME = 1e-6  # in any feature's unit: up to here a state is the one that was foreseen
 
@@ -55,7 +52,9 @@ class Sampling:
     """How a shortcut is tried out when planning; ``PAPER`` is what the paper does.
 
     Args:
-        samples: Attempts, the first without noise. The shortest that succeeds is used.
+        samples: Attempts, the first without noise.
+        ends: Attempts kept besides that without noise: each ends in a state of its own, and what
+            comes next may take less from where a longer one ends.
         refinements: Rounds of random variations of the best, a cross-entropy search's last ones.
         horizon: Environment steps of an attempt (the paper's T_eval).
         temperature: Of the noise, against training's: in a model, daring costs nothing.
@@ -64,6 +63,7 @@ class Sampling:
     """
 
     samples: int = 16
+    ends: int = 3
     refinements: int = 1
     temperature: float = 2.0
     horizon: int = 40
@@ -89,6 +89,34 @@ class Attempt:
         return len(self.choices)
 
 
+@dataclass
+class _Found:
+    """Attempts that succeeded: that without noise, and the shortest others."""
+
+    ends: int  # others at most
+    calm: Attempt | None
+    others: list[Attempt] = field(default_factory=list)  # the shortest first
+
+    @property
+    def attempts(self) -> list[Attempt]:
+        """All of them, the shortest first."""
+        calm = [] if self.calm is None else [self.calm]
+        return sorted((*calm, *self.others), key=_steps)
+
+    def limit(self, most: int) -> int:
+        """Environment steps, of at most so many, that one more may take to be kept."""
+        return most if len(self.others) < self.ends else min(most, self.others[-1].steps - 1)
+
+    def add(self, attempt: Attempt) -> None:
+        """Keep it, if it is worth keeping."""
+        if attempt.reached:
+            self.others = sorted((*self.others, attempt), key=_steps)[: self.ends]
+
+
+def _steps(attempt: Attempt) -> int:
+    return attempt.steps
+
+
 Choose = Callable[[int, Weights], Weights]  # step and observation, (1, size), to (actions,)
 
 
@@ -103,68 +131,61 @@ class Rehearsal:
         """Rehearse in ``world``, which nobody else may use."""
         self.sampling = sampling
         self._world = world
-        self._memory: dict[tuple[str, Change, bytes], Attempt] = {}
+        self._memory: dict[tuple[str, Change, bytes], tuple[Attempt, ...]] = {}
         self._failures: Counter[str] = Counter()  # more than expected, of each shortcut
 
-    def best(self, shortcut: Shortcut, sight: Sight, state: State) -> Attempt:
-        """The shortest attempt that succeeded; if none did, any.
-
-        One that was given up is not tried.
-        """
+    def attempts(self, shortcut: Shortcut, sight: Sight, state: State) -> tuple[Attempt, ...]:
+        """Attempts that succeeded, the shortest first; none of one that was given up."""
         key = (shortcut.name, sight.change, state.key)
         if key not in self._memory and self.gave_up(shortcut):
-            return Attempt((), (), False)
+            return ()
         if key not in self._memory:
             seed = sha256(repr(key[:2]).encode() + state.key).digest()[:8]
             rng = np.random.default_rng(int.from_bytes(seed, "little"))
-            best = self._sample(shortcut.policy, sight, state, rng)
-            self._memory[key] = self._refine(best, sight, state, rng)
-            self._failures[shortcut.name] += -HOPE if best.reached else 1
+            self._memory[key] = self._try(shortcut.policy, sight, state, rng)
+            self._failures[shortcut.name] += -HOPE if self._memory[key] else 1
         return self._memory[key]
 
     def gave_up(self, shortcut: Shortcut) -> bool:
         """Whether it failed again and again in this task: a useless one shall not cost much."""
         return self._failures[shortcut.name] >= HOPE
 
-    def _sample(
+    def _try(
         self, policy: Policy, sight: Sight, state: State, rng: np.random.Generator
-    ) -> Attempt:
+    ) -> tuple[Attempt, ...]:
         def choose(_: int, seen: Weights) -> Weights:
             noisy: Weights = policy.sample(seen, rng, self.sampling.temperature)[0]
             return noisy
 
-        best = self._attempt(sight, state, lambda _, seen: policy.mean(seen)[0])
-        for failures in range(1, self.sampling.samples):
-            if not best.reached and failures >= self.sampling.patience:
+        sampling = self.sampling
+        calm = self._attempt(sight, state, lambda _, seen: policy.mean(seen)[0], sampling.horizon)
+        found = _Found(sampling.ends, calm if calm.reached else None)
+        for failures in range(1, sampling.samples):
+            if not found.attempts and failures >= sampling.patience:
                 break
-            noisy = self._attempt(sight, state, choose, _shorter(best))
-            best = noisy if noisy.reached else best
-        return best
+            found.add(self._attempt(sight, state, choose, found.limit(sampling.horizon)))
+        for number in range(sampling.refinements if found.attempts else 0):
+            self._refine(found, sight, state, sampling.spread * NARROWER**number, rng)
+        return tuple(found.attempts)
 
     def _refine(
-        self, best: Attempt, sight: Sight, state: State, rng: np.random.Generator
-    ) -> Attempt:
-        """The shortest of random variations of the best, then of that one, and so on."""
-        sampling, spread = self.sampling, self.sampling.spread
-        for _ in range(sampling.refinements if best.reached else 0):
-            middle = np.clip(np.array(best.choices), -1.0, 1.0)
-            for _ in range(sampling.samples):
-                varied = middle + spread * rng.standard_normal(middle.shape, dtype=np.float32)
-                attempt = self._attempt(sight, state, _scripted(varied), _shorter(best))
-                best = attempt if attempt.reached else best
-            spread *= NARROWER
-        return best
+        self, found: _Found, sight: Sight, state: State, spread: float, rng: np.random.Generator
+    ) -> None:
+        """Try random variations of the shortest: a round of a cross-entropy search."""
+        middle = np.clip(np.array(found.attempts[0].choices), -1.0, 1.0)
+        for _ in range(self.sampling.samples):
+            varied = middle + spread * rng.standard_normal(middle.shape, dtype=np.float32)
+            script = _scripted(varied)
+            found.add(self._attempt(sight, state, script, found.limit(len(varied))))
 
-    def _attempt(
-        self, sight: Sight, state: State, choose: Choose, limit: int | None = None
-    ) -> Attempt:
-        """Run for at most ``limit`` steps, the horizon if None."""
+    def _attempt(self, sight: Sight, state: State, choose: Choose, limit: int) -> Attempt:
+        """Run for at most ``limit`` steps."""
         target = sight.change.apply(sight.space.abstract(state))
         self._world.reset(state)
         seen = sight.look(state.alone()).observations
         choices: list[Weights] = []
         states: list[State] = []
-        for step in range(self.sampling.horizon if limit is None else limit):
+        for step in range(limit):
             choice = choose(step, seen)
             states.append(state)
             choices.append(choice)
@@ -182,21 +203,21 @@ class Rehearsal:
         return Attempt(tuple(choices), tuple(states), False)
 
 
-def _shorter(best: Attempt) -> int | None:
-    """How long an attempt may be to be worth taking instead of the best; None: any length."""
-    return best.steps - WORTH if best.reached else None
-
-
 def _scripted(script: Weights) -> Choose:
     return lambda step, _: script[step]
 
 
 @dataclass(frozen=True)
 class GroundShortcut:
-    """A shortcut for given objects: the skill behind a shortcut edge."""
+    """A shortcut for given objects: the skill behind a shortcut edge.
+
+    Args:
+        attempt: Which of its attempts, the shortest first.
+    """
 
     shortcut: Shortcut
     change: Change
+    attempt: int
     sight: Sight = field(compare=False, repr=False)
     rehearsal: Rehearsal = field(compare=False, repr=False)
 
@@ -221,18 +242,19 @@ class GroundShortcut:
         return self.least_steps
 
     def start(self, state: State, objects: tuple[Object, ...]) -> Control:
-        """Try it out, and follow the best attempt.
+        """Try it out, and follow an attempt.
 
         Raises:
-            SkillNotApplicableError: No attempt succeeded.
+            SkillNotApplicableError: Not so many attempts succeeded.
         """
-        attempt = self.rehearsal.best(self.shortcut, self.sight, state)
-        if not attempt.reached:
+        attempts = self.rehearsal.attempts(self.shortcut, self.sight, state)
+        if self.attempt >= len(attempts):
             raise SkillNotApplicableError(
-                f"{self.name}({', '.join(obj.name for obj in objects)}) does not reach its target "
-                f"within {self.step_limit} steps in the model"
+                f"{self.name}({', '.join(obj.name for obj in objects)}) reaches its target "
+                f"{len(attempts)} times within {self.step_limit} steps in the model; attempt "
+                f"{self.attempt + 1} was asked for"
             )
-        return Performance(self, attempt)
+        return Performance(self, attempts[self.attempt])
 
     def act(self, choice: Weights) -> Action:
         """The robot's action for a choice of the policy."""

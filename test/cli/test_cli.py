@@ -171,6 +171,9 @@ def test_plan_writes_pddl_that_it_can_plan_for_and_a_picture(tmp_path):
         ),
         (["bag", "info", "nowhere"], 90, "nowhere"),
         (["bag", "evaluate", "/dev/null"], 90, "/dev/null"),
+        (["report", "nowhere", "--output", "page.html"], 90, "nowhere"),
+        (["report", "nowhere", "--output", "page.txt"], 15, "ends in .html, not 'page.txt'"),
+        (["run", "obstacle2d", "--report", "page.txt"], 15, "ends in .html, not 'page.txt'"),
         (["plan", "absent.pddl", "problem.pddl"], 15, "absent.pddl"),
     ],
 )
@@ -209,7 +212,9 @@ def test_a_bag_is_never_overwritten(tmp_path):
     assert list((tmp_path / "bag").iterdir()) == []
 
 
-@pytest.mark.parametrize("command", [[], ["run"], ["evaluate"], ["plan"], ["bag"], ["doctor"]])
+@pytest.mark.parametrize(
+    "command", [[], ["run"], ["evaluate"], ["plan"], ["bag"], ["report"], ["doctor"]]
+)
 def test_help_is_there(command):
     result = slap(*command, "--help")
     assert result.returncode == 0

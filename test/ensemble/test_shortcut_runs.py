@@ -25,9 +25,10 @@ from ensemble.shortcuts import Repertoires, ShortcutParameters
 from skill_server.skill_run import requested_option
 from slap_ros.bags import evaluate_bag, replay_bag
 from slap_ros.domains import get_domain
-from slap_ros.errors import InvalidLibraryError, UnknownSkillError
+from slap_ros.errors import InvalidLibraryError, SkillNotApplicableError, UnknownSkillError
 from slap_ros.evaluation.approaches import approaches
 from slap_ros.evaluation.experiment import Experiment
+from slap_ros.planning.model import Model
 from slap_ros.planning.options import OptionExecution, OptionKind
 from slap_ros.planning.plan import PlanEdge
 from slap_ros.planning.planner import Problem
@@ -160,12 +161,13 @@ def repertoires(observation, choice=DATA):
     return made
 
 
-def goal(observation, target, name=SHORTCUT, objects=("block2", "target", "table")):
+def goal(observation, target, name=SHORTCUT, objects=("block2", "target", "table"), attempt=0):
     space = observation.episode.space
     option = SimpleNamespace(
         kind=OptionKind.SHORTCUT,
         skill=SimpleNamespace(name=name),
         objects=[space.layout.object(o) for o in objects],
+        attempt=attempt,
     )
     edge = encode.plan_edge(PlanEdge(option, target, 0), space)
     return SimpleNamespace(episode=1, edge=edge)
@@ -181,6 +183,28 @@ def test_a_fitting_request_is_the_shortcut_itself(observed):
     actions = observation.episode.domain.action_space
     execution = OptionExecution(option, target, actions, observation.state)
     assert len(execution.advance(observation.state, observation.abstract)) == len(actions.axes)
+
+
+def test_the_attempt_that_was_planned_is_the_one_that_runs(observed):
+    """Each ends elsewhere, and the rest of the plan counts on where."""
+    observation, target = observed
+    model, rollouts = Model.of(observation.episode.domain, observation.state), []
+    for attempt in range(3):
+        asked = goal(observation, target, attempt=attempt)
+        option, _ = requested_option(asked, observation, repertoires(observation))
+        rollouts.append(model.roll_out(option, observation.state, target))
+    assert all(rollout.reached for rollout in rollouts)
+    assert len({rollout.final.key for rollout in rollouts}) == 3
+    steps = [rollout.steps for rollout in rollouts]
+    assert steps == sorted(steps)
+
+
+def test_an_attempt_that_never_was_is_refused(observed):
+    observation, target = observed
+    asked = goal(observation, target, attempt=50)
+    option, _ = requested_option(asked, observation, repertoires(observation))
+    with pytest.raises(SkillNotApplicableError, match="attempt 51 was asked for"):
+        option.skill.start(observation.state, option.objects)
 
 
 def test_a_request_that_does_not_fit_says_why(observed):

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """States in the thick of it, what was done in them, and what came of it.
 
-All blocks are alike, or each is of a material of its own that differs from push to push.
+All blocks are alike, or each is of a material of its own that differs from push to push, or they
+are no blocks but toys of many pieces.
 
 ``python pairs.py FILE`` replays recorded pairs and prints how many come out differently.
 """
@@ -10,7 +11,7 @@ All blocks are alike, or each is of a material of its own that differs from push
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,40 +20,51 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent.parent.parent))
 
 from materials import mixed
+from toys import TOYS, heap
 
 from benchmarks.physics_step import SCENE, pushes, tower, with_joints
 from slap_ros.physics.features import ROBOT, body_features, robot_features
 from slap_ros.physics.gripper import finger_around
 from slap_ros.physics.panda import GRASP_POINT, HOME, MAX_STEP, hand_pose
 from slap_ros.physics.pose import Pose
+from slap_ros.physics.scene import Scene
 from slap_ros.physics.world import PandaWorld
 from slap_ros.relational import State
 
 HIGH = np.array([*MAX_STEP, 1.0])
 GRASP = Pose((0.002, -0.003, GRASP_POINT))  # not quite in the middle
+KINDS: dict[str, tuple[Scene, Callable[[np.random.Generator], State]]] = {
+    "alike": (SCENE, lambda _: tower()),
+    "mixed": (SCENE, mixed),
+    "toys": (TOYS, heap),
+}
 
 
 @dataclass(frozen=True)
 class Pairs:
     """``after[i]`` is what ``actions[i]`` makes of ``before[i]``."""
 
-    mixed: bool  # whether blocks differ in their materials
+    kind: str  # of KINDS
     before: np.ndarray  # (pairs, features)
     actions: np.ndarray  # (pairs, 8)
     after: np.ndarray
 
     def save(self, path: Path) -> None:
-        np.savez(path, mixed=self.mixed, before=self.before, actions=self.actions, after=self.after)
+        np.savez(path, kind=self.kind, before=self.before, actions=self.actions, after=self.after)
 
     @classmethod
     def load(cls, path: Path) -> Pairs:
         with np.load(path) as file:
-            return cls(bool(file["mixed"]), file["before"], file["actions"], file["after"])
+            return cls(str(file["kind"]), file["before"], file["actions"], file["after"])
+
+    @property
+    def scene(self) -> Scene:
+        return KINDS[self.kind][0]
 
     @property
     def start(self) -> State:
         """A state of the same objects."""
-        return mixed(np.random.default_rng(0)) if self.mixed else tower()
+        return KINDS[self.kind][1](np.random.default_rng(0))
 
     def state(self, i: int) -> State:
         return State(self.start.layout, self.before[i].copy())
@@ -67,12 +79,12 @@ class Pairs:
         return different
 
 
-def holding(state: State, name: str, joints=HOME) -> State:
+def holding(state: State, name: str, joints=HOME, scene: Scene = SCENE) -> State:
     """The state with one block in the hand."""
     (robot,) = state.layout.of_type(ROBOT)
     block = state.layout.object(name)
     pose = hand_pose(joints).compose(GRASP)
-    (body,) = (body for body in SCENE.free if body.name == name)
+    (body,) = (body for body in scene.free if body.name == name)
     features = {
         robot: robot_features(joints, finger_around(body, GRASP), GRASP),
         block: body_features(pose.position, pose.quaternion, held=True),
@@ -95,16 +107,17 @@ def in_the_air(state: State, rng: np.random.Generator) -> State:
     return state.replace({(block, name): value for name, value in features.items()})
 
 
-def record(count: int, seed: int, of_mixed: bool = False) -> Pairs:
+def record(count: int, seed: int, kind: str = "alike") -> Pairs:
     """Pairs from pushes with an empty and a full hand, throws, and a gripper that acts."""
     rng = np.random.default_rng(seed)
+    scene, make = KINDS[kind]
     rows: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
-    with PandaWorld(SCENE, mixed(rng) if of_mixed else tower()) as world:
+    with PandaWorld(scene, make(rng)) as world:
         for number, push in enumerate(pushes(count // 9, seed)):
-            standing = mixed(rng) if of_mixed else tower()
+            standing = make(rng)
             start = with_joints(standing, push.joints)
             if number % 3 == 1:
-                start = holding(standing, "T", tuple(push.joints.tolist()))
+                start = holding(standing, "T", tuple(push.joints.tolist()), scene)
             elif number % 3 == 2:
                 start = in_the_air(start, rng)
             world.reset(start)
@@ -116,13 +129,13 @@ def record(count: int, seed: int, of_mixed: bool = False) -> Pairs:
                 before = world.state
                 rows.append((before.data, noisy, world.step(noisy).data))
     chosen = rng.permutation(len(rows))[:count]
-    return Pairs(of_mixed, *(np.array([rows[i][part] for i in chosen]) for part in range(3)))
+    return Pairs(kind, *(np.array([rows[i][part] for i in chosen]) for part in range(3)))
 
 
 def main() -> None:
     pairs = Pairs.load(Path(sys.argv[1]))
     order = np.random.default_rng(77).permutation(len(pairs.before))
-    with PandaWorld(SCENE, pairs.start) as world:
+    with PandaWorld(pairs.scene, pairs.start) as world:
         for _ in range(20):
             world.step(HIGH * [1, 1, 1, 1, 1, 1, 1, 0])  # another history first
         differing = pairs.differing(world, order)

@@ -52,11 +52,22 @@ class MadeUpModel:
     def roll_out(self, option, state, target):
         self.executed += 1
         skill = option.skill
-        rng = np.random.default_rng([skill.seed, int(state.data[0]), 1])
+        rng = np.random.default_rng([skill.seed, int(state.data[0]), 1 + option.attempt])
         feasible = rng.random() > 0.15
         # Few distinct values, so that paths meet again in equal low-level states.
         final = State(LAYOUT, [float(rng.integers(0, 6))])
-        return Rollout(bool(feasible), skill.true_cost(state), final)
+        return Rollout(bool(feasible), skill.true_cost(state) + 2 * option.attempt, final)
+
+
+def in_ways(skill, count, attempt=0):
+    """An option that can be done in so many ways, each longer than the one before."""
+    return Option(
+        OptionKind.SHORTCUT,
+        skill,
+        (),
+        attempt=attempt,
+        another=lambda: in_ways(skill, count, attempt + 1) if attempt + 1 < count else None,
+    )
 
 
 @st.composite
@@ -72,7 +83,7 @@ def made_up_graphs(draw):
         draw(st.lists(st.sampled_from(pairs), max_size=25, unique=False))
     ):
         skill = MadeUpSkill(f"s{number}", draw(st.integers(0, 10**6)), tightness)
-        graph.edges.append(Edge(i, j, Option(OptionKind.OPERATOR, skill, ())))
+        graph.edges.append(Edge(i, j, in_ways(skill, draw(st.integers(1, 3)))))
     return graph
 
 
@@ -118,10 +129,15 @@ def brute_force(graph, model):
             return 0
         costs = []
         for edge in forward[node]:
-            rollout = model.roll_out(edge.option, state, edge.target)
-            rest = best(edge.target, rollout.final) if rollout.reached else None
-            if rest is not None:
-                costs.append(rollout.steps + rest)
+            option = edge.option
+            while option is not None:
+                rollout = model.roll_out(option, state, edge.target)
+                if not rollout.reached:
+                    break
+                rest = best(edge.target, rollout.final)
+                if rest is not None:
+                    costs.append(rollout.steps + rest)
+                option = option.another()
         return min(costs, default=None)
 
     return best(0, State(LAYOUT, [0.0]))

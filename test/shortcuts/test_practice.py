@@ -88,21 +88,31 @@ def test_the_horizon_is_told_apart_from_an_end():
 
 
 def test_shaping_telescopes():
-    """With shaping, a return differs by the potential at the start alone (Ng et al. 1999)."""
-    plain, shaped = Rewards(shaping=0.0, discount=0.9), Rewards(shaping=1.0, discount=0.9)
+    """Undiscounted, the rewards of a success differ by the potential at the start alone."""
+    plain, shaped = Rewards(shaping=0.0), Rewards(shaping=1.0)
     runs = [practice(rewards=rewards) for rewards in (plain, shaped)]
     potential = np.concatenate([group._potential for group in runs[1]._groups])
-    returns = np.zeros((2, 24))
+    sums = np.zeros((2, 24))
     alive = np.ones(24, dtype=bool)
     ended = np.zeros(24, dtype=bool)
-    for t, pair in enumerate(zip(*(random_steps(run, 25) for run in runs), strict=True)):
+    for pair in zip(*(random_steps(run, 25) for run in runs), strict=True):
         for i, steps in enumerate(pair):
-            returns[i] += np.where(alive, 0.9**t * steps.rewards, 0.0)
+            sums[i] += np.where(alive, steps.rewards, 0.0)
         ended |= alive & pair[0].done
         alive &= ~pair[0].ended
-    scale = plain.scale
     assert ended.any()
-    assert returns[1][ended] == pytest.approx(returns[0][ended] - scale * potential[ended])
+    assert sums[1][ended] == pytest.approx(sums[0][ended] - plain.scale * potential[ended])
+
+
+def test_standing_still_is_worth_the_same_everywhere():
+    """Else a critic that has learned the potential would find nothing worth while."""
+    rewards, run = Rewards(), practice(horizon=50)
+    random_steps(run, 10)
+    still = [run.step(np.zeros((24, run.actions.size))) for _ in range(5)]
+    for steps in still:
+        going = ~steps.ended
+        assert going.any()
+        assert steps.rewards[going] == pytest.approx(rewards.scale * rewards.step)
 
 
 def test_the_gripper_acts_only_where_what_is_held_is_to_change():

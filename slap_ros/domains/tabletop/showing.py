@@ -9,7 +9,9 @@ from pathlib import Path
 
 from slap_ros.domains.domain import Animate, VisibleBody
 from slap_ros.domains.tabletop.reading import pose_of
-from slap_ros.physics.scene import Box, Scene
+from slap_ros.meshes.solid import Solid
+from slap_ros.physics.pose import IDENTITY
+from slap_ros.physics.scene import Body, Scene
 from slap_ros.physics.viewpoint import View
 from slap_ros.relational import State
 
@@ -18,15 +20,18 @@ SceneOf = Callable[[State], Scene]
 
 def visible_bodies(scene: Scene, state: State) -> list[VisibleBody]:
     """Everything that stands around the robot."""
-    return [_visible(box, state) for box in scene.bodies]
+    return [_visible(body, state) for body in scene.bodies]
 
 
-def _visible(box: Box, state: State) -> VisibleBody:
+def _visible(body: Body, state: State) -> VisibleBody:
     """A body where the state has it, or else where the scene does."""
-    embodied = state.layout.by_name.get(box.name)
-    position, quaternion = box.pose if embodied is None else pose_of(state, embodied)
-    width, depth, height = (2.0 * half for half in box.half_extents_m)
-    return VisibleBody(box.name, position, quaternion, (width, depth, height), box.colour)
+    embodied = state.layout.by_name.get(body.name)
+    position, quaternion = body.pose if embodied is None else pose_of(state, embodied)
+    width, depth, height = (2.0 * half for half in body.at(IDENTITY).half)
+    triangles = body.shape.corners if isinstance(body.shape, Solid) else ()
+    return VisibleBody(
+        body.name, position, quaternion, (width, depth, height), body.colour, triangles
+    )
 
 
 def animation(scene_of: SceneOf, view: View | None = None) -> Animate:

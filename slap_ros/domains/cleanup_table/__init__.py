@@ -1,0 +1,78 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Cleanup Table: toys and a wiper from the table into a bin on the floor (SLAP §5).
+
+A Panda at the origin, a table before it and a bin to its left; x to the front, z up, m and rad.
+Read on in this order: ``shapes`` (what the toys look like), ``model`` (types, predicates,
+operators), ``scenery``, ``tasks``, ``skills``. The world is that of ``slap_ros.physics``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
+
+from slap_ros.domains.cleanup_table import model, skills, tasks
+from slap_ros.domains.cleanup_table.scenery import scene_of
+from slap_ros.domains.cleanup_table.shapes import shipped
+from slap_ros.domains.cleanup_table.view import VIEW
+from slap_ros.domains.domain import ActionSpace, Domain
+from slap_ros.domains.tabletop.showing import animation, visible_bodies
+from slap_ros.domains.tabletop.timing import AtSpeedLimit, InTens, Timing
+from slap_ros.domains.variation import varied
+from slap_ros.meshes.solid import Solid
+from slap_ros.physics.panda import CONTROL_PERIOD_S
+from slap_ros.physics.scene import Scene
+from slap_ros.physics.world import ACTION_SPACE, PandaWorld
+from slap_ros.relational import State
+
+SETTINGS: Mapping[str, tasks.RandomTasks | tasks.PaperTasks] = {
+    "fair": tasks.RandomTasks(),
+    "paper": tasks.PaperTasks(),
+}
+# The reference has no limit to what its planned motions do in a step, and jumps by 3 rad.
+WHATEVER = replace(ACTION_SPACE, low=(*(-math.pi,) * 7, -1.0), high=(*(math.pi,) * 7, 1.0))
+ACTIONS: Mapping[str, ActionSpace] = {"fair": ACTION_SPACE, "paper": WHATEVER}
+TIMINGS: Mapping[str, Timing] = {"fair": AtSpeedLimit(), "paper": InTens()}
+
+
+def make(
+    preset: str,
+    changes: Mapping[str, str] = MappingProxyType({}),
+    shapes: Mapping[str, Solid] | None = None,
+) -> Domain:
+    """The domain: preset ``fair`` samples different tasks, ``paper`` has a single one.
+
+    Args:
+        preset: ``fair`` or ``paper``.
+        changes: Settings of the preset to change.
+        shapes: Other toys by kind, and the ``wiper``; those that are shipped, if None. Any mesh
+            will do (``slap_ros.meshes``) that the fingers fit around from above.
+    """
+    shapes = shipped() if shapes is None else shapes
+    settings, actions = varied(SETTINGS[preset], changes), ACTIONS[preset]
+
+    def scene(state: State) -> Scene:
+        return scene_of(state, shapes)
+
+    return Domain(
+        name="cleanup_table",
+        preset=preset,
+        types=model.TYPES,
+        predicates=model.PREDICATES,
+        operators=model.OPERATORS,
+        skills=skills.skills(TIMINGS[preset]),
+        action_space=actions,
+        control_period_s=CONTROL_PERIOD_S,
+        sample_task=lambda rng: settings.sample(rng, shapes),
+        make_world=lambda state: PandaWorld(scene(state), state, actions=actions),
+        default_goal=tasks.everything_in_the_bin,
+        step_limit=tasks.STEP_LIMIT,
+        bodies=lambda state: visible_bodies(scene(state), state),
+        animate=animation(scene),
+        view=VIEW,
+        learned_actions=ACTION_SPACE,
+        configuration=settings.as_configuration(),
+    )

@@ -1,0 +1,171 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Cleanup Table: tasks, sampled, and a single start state. Lengths in m, angles in rad."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import islice
+
+import numpy as np
+
+from slap_ros.domains.cleanup_table.model import BLOCK, HALF, IS_DRAWER, MIDDLE, ON, SURFACE, TOOL
+from slap_ros.domains.cleanup_table.scenery import BIN, MATERIAL, TABLE, TABLE_TOP, kind_of
+from slap_ros.domains.cleanup_table.shapes import WIPER
+from slap_ros.domains.domain import Task
+from slap_ros.errors import InvalidParameterError, InvalidStateError
+from slap_ros.meshes.solid import Solid
+from slap_ros.motion import Box
+from slap_ros.physics.features import (
+    ROBOT,
+    body_features,
+    material_features,
+    pose_features,
+    robot_features,
+)
+from slap_ros.physics.panda import HOME
+from slap_ros.physics.pose import Vector
+from slap_ros.physics.scene import Material
+from slap_ros.relational import GroundAtom, Object, State
+
+STEP_LIMIT = 600  # environment steps
+TRIES = 1_000  # places drawn for a toy before all are drawn anew
+ROUNDS = 100  # before there is said to be no room
+
+
+Place = tuple[float, float, float]  # x, y, yaw
+Range = tuple[float, float]
+
+
+def make_task(
+    places: Mapping[str, Place], shapes: Mapping[str, Solid], material: Material = MATERIAL
+) -> Task:
+    """The task to put everything that stands on the table into the bin.
+
+    Args:
+        places: Where each block stands, by its name.
+        shapes: What each kind of block looks like.
+        material: Of all blocks.
+    """
+    features: dict[Object, Mapping[str, float]] = {ROBOT("robot"): robot_features(HOME)}
+    for name, place in places.items():
+        block = (TOOL if name == WIPER else BLOCK)(name)
+        features[block] = _block(shapes[kind_of(block)], material, *place)
+    features[SURFACE("bin")] = _surface(BIN, is_drawer=1.0)
+    features[SURFACE("table")] = _surface(TABLE, is_drawer=0.0)
+    state = State.build(features)
+    return Task(state, everything_in_the_bin(state), STEP_LIMIT)
+
+
+def everything_in_the_bin(state: State) -> frozenset[GroundAtom]:
+    """The goal: every block is in the bin.
+
+    Raises:
+        InvalidStateError: The state has no block or no bin.
+    """
+    blocks = state.layout.of_type(BLOCK)
+    bins = [s for s in state.layout.of_type(SURFACE) if IS_DRAWER(s).holds(state)]
+    if not blocks or not bins:
+        raise InvalidStateError("a state of cleanup_table needs a block and a bin")
+    return frozenset(ON(block, bins[0]) for block in blocks)
+
+
+@dataclass(frozen=True)
+class RandomTasks:
+    """Toys anywhere beside the bin, turned as they like; the wiper on the other side."""
+
+    toys: tuple[int, int] = (3, 3)  # inclusive
+    toy_x: Range = (0.38, 0.62)
+    toy_y: Range = (0.06, 0.25)
+    toy_yaw: Range = (-math.pi, math.pi)
+    gap: float = 0.1  # between the middles of toys at least
+    wiper_x: Range = (0.48, 0.52)
+    wiper_y: Range = (-0.14, -0.1)
+    wiper_yaw: Range = (-0.2, 0.2)
+    # Of all toys of a task, and the wiper.
+    mass: Range = (MATERIAL.mass_kg, MATERIAL.mass_kg)
+    friction: Range = (MATERIAL.friction, MATERIAL.friction)
+
+    def sample(self, rng: np.random.Generator, shapes: Mapping[str, Solid]) -> Task:
+        """A task with toys of these shapes, all kinds equally often.
+
+        Raises:
+            InvalidParameterError: There is no room for so many.
+        """
+        count = int(rng.integers(self.toys[0], self.toys[1] + 1))
+        places = dict(zip(_names(shapes, count), self._apart(rng, count), strict=True))
+        wiper = (self.wiper_x, self.wiper_y, self.wiper_yaw)
+        x, y, yaw = (rng.uniform(*r) for r in wiper)
+        material = Material(rng.uniform(*self.mass), rng.uniform(*self.friction))
+        return make_task({**places, WIPER: (x, y, yaw)}, shapes, material)
+
+    def _apart(self, rng: np.random.Generator, count: int) -> list[Place]:
+        """Places that keep their distance, drawn anew where the last toys find none."""
+        for _ in range(ROUNDS):
+            placed: list[Place] = []
+            for _ in range(TRIES):
+                if len(placed) == count:
+                    return placed
+                x, y = rng.uniform(*self.toy_x), rng.uniform(*self.toy_y)
+                if all(math.hypot(x - px, y - py) >= self.gap for px, py, _ in placed):
+                    placed.append((x, y, rng.uniform(*self.toy_yaw)))
+        raise InvalidParameterError(f"the table has no room for {count} toys {self.gap} m apart")
+
+    def as_configuration(self) -> Mapping[str, str | int | float]:
+        """The settings by name."""
+        return {name: str(value) for name, value in asdict(self).items()}
+
+
+@dataclass(frozen=True)
+class PaperTasks:
+    """One start state, as the reference has; toys in its ranges."""
+
+    toys: tuple[Place, ...] = ((0.40, 0.10, 0.0), (0.50, 0.20, 0.0), (0.60, 0.10, 0.0))
+    wiper: Place = (0.5, -0.12, 0.0)
+
+    def sample(self, _: np.random.Generator, shapes: Mapping[str, Solid]) -> Task:
+        """That state."""
+        names = _names(shapes, len(self.toys))
+        return make_task({**dict(zip(names, self.toys, strict=True)), WIPER: self.wiper}, shapes)
+
+    def as_configuration(self) -> Mapping[str, str | int | float]:
+        """The settings by name."""
+        return {name: str(value) for name, value in asdict(self).items()}
+
+
+def _names(shapes: Mapping[str, Solid], count: int) -> Sequence[str]:
+    """Names of toys of each kind in turn; numbered from the second of a kind on."""
+    kinds = [kind for kind in shapes if kind != WIPER]
+    rounds = [kinds, *([f"{kind}{n}" for kind in kinds] for n in range(2, count + 2))]
+    return list(islice((name for names in rounds for name in names), count))
+
+
+def _block(shape: Solid, material: Material, x: float, y: float, yaw: float) -> Mapping[str, float]:
+    middle, half = shape.bounds
+    z = TABLE_TOP + half[2] - middle.position[2]
+    turn = (0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
+    return {
+        **body_features((x, y, z), turn),
+        **material_features(material),
+        **_thing(middle.position, half, is_movable=1.0, is_drawer=0.0),
+    }
+
+
+def _surface(box: Box, is_drawer: float) -> Mapping[str, float]:
+    return {
+        **pose_features(box.pose),
+        **_thing((0.0, 0.0, 0.0), box.half, is_movable=0.0, is_drawer=is_drawer),
+    }
+
+
+def _thing(
+    middle: Vector, half: Vector, is_movable: float, is_drawer: float
+) -> Mapping[str, float]:
+    return {
+        **dict(zip(HALF, half, strict=True)),
+        **dict(zip(MIDDLE, middle, strict=True)),
+        "is_movable": is_movable,
+        "is_drawer": is_drawer,
+    }

@@ -1,0 +1,79 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Cleanup Table as a learner sees it: joints, and everything else from the hand and the bin."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from slap_ros.domains.cleanup_table.model import (
+    BLOCK,
+    GRIPPER_EMPTY,
+    HALF,
+    HOLDING,
+    NOT_HOLDING,
+    Things,
+)
+from slap_ros.domains.tabletop import seeing
+from slap_ros.domains.view import View
+from slap_ros.relational import Column, State
+from slap_ros.relational.predicates import Bools
+from slap_ros.relational.state import Array
+
+FALLEN = 0.05  # m, under the bin's rim, where what is not in the bin is beside it
+BEHIND = 0.05  # m, from a block away from the bin, where the hand, or what it holds, pushes it
+
+
+def _things(state: State, hand: Array, column: Column) -> Array:
+    """Of blocks, where from the hand, along the base's axes; how fast; where from the bin."""
+    kind = column.objects[0].type
+    if not kind.is_a(BLOCK):
+        return seeing.nothing(state, column)  # the robot is seen already, the rest stands still
+    place, speed = seeing.place(state, hand, column), seeing.speed(state, column)
+    return np.concatenate([place, speed, _from_bin(state, column) / seeing.FAR], axis=-1)
+
+
+def _from_bin(state: State, column: Column) -> Array:
+    """From the middle of the bin, m, shape (n, objects, 2)."""
+    seen: Array = state.gather(column, ("x", "y")) - state.gather(_bin(state), ("x", "y"))
+    return seen
+
+
+def _bin(state: State) -> Column:
+    """The bin, alone; it stays one, so that one state of a batch tells."""
+    surfaces = Things.of(state.layout).surfaces
+    first = state.data.reshape(-1, state.data.shape[-1])[0]
+    labels = first[state.layout.grid(surfaces, ("is_drawer",))[:, 0]]
+    return seeing.alone(surfaces.objects[int(np.argmax(labels))])
+
+
+def _distance(state: State, hand: Array, column: Column) -> Array:
+    """From the hand to where it pushes blocks towards the bin: across it, any place will do."""
+    if not column.objects[0].type.is_a(BLOCK):
+        return seeing.never_near(state, column)
+    way = seeing.from_hand(state, hand, column)
+    way[..., 1] += BEHIND * np.sign(_from_bin(state, column)[..., 1])
+    distance: Array = np.sqrt(np.square(way).sum(axis=-1))
+    return distance
+
+
+def _lost(state: State) -> Bools:
+    """Whether a block lies on the floor beside the bin."""
+    things = Things.of(state.layout)
+    box = state.gather(_bin(state), ("z", *HALF))[..., 0, :]
+    low = state.stack(things.blocks, "z") < (box[..., 0] + box[..., 3] - FALLEN)[..., None]
+    off: Bools = np.abs(_from_bin(state, things.blocks)) > box[..., None, 1:3]
+    lost: Bools = np.logical_or.reduce(low[..., None] & off, axis=(-2, -1))
+    return lost
+
+
+VIEW = View(
+    hand=seeing.hand,
+    robot=seeing.robot,
+    things=_things,
+    distance=_distance,
+    apart=seeing.apart,
+    settled=seeing.settled,
+    lost=_lost,
+    grasping=frozenset({HOLDING, NOT_HOLDING, GRIPPER_EMPTY}),
+)

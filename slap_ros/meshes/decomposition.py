@@ -1,0 +1,111 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Any mesh as a solid: taken apart into convex pieces by CoACD, once.
+
+X. Wei et al.: Approximate Convex Decomposition for 3D Meshes with Collision-Aware Concavity and
+Tree Search, SIGGRAPH 2022.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from dataclasses import astuple, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from slap_ros.errors import InvalidMeshError, MeshUnavailableError
+from slap_ros.meshes.cache import cache_folder, keep
+from slap_ros.meshes.obj import from_obj, to_obj
+from slap_ros.meshes.solid import Array, Piece, Solid
+
+Y_IS_UP = (".glb", ".gltf")  # by their standard; of other files z is taken to be
+TO_Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+FORMAT = 1  # of what is kept; a new one forgets what was kept before
+
+
+@dataclass(frozen=True)
+class Fineness:
+    """How closely convex pieces follow a mesh. Few are fast, and smooth where they rest."""
+
+    threshold: float = 0.05  # 1, concavity that is tolerated, of a mesh of size 1
+    pieces: int = 12  # at most
+    vertices: int = 24  # of a piece, at most
+    seed: int = 0  # of the search
+
+
+USUAL = Fineness()
+
+
+def load_mesh(file: Path, size_m: float, fineness: Fineness = USUAL) -> Solid:
+    """A mesh, of whatever size in its file, as a solid of a given size that stands upright.
+
+    The pieces are kept in the user's cache folder, by the content of the file and all that went
+    into them; what is kept there is read without any library.
+
+    Args:
+        file: OBJ, GLB, STL, PLY or what else trimesh reads.
+        size_m: The longest edge that the box around the solid is to have.
+        fineness: How closely to follow the mesh.
+
+    Raises:
+        MeshUnavailableError: The file cannot be read, or a library for it is not installed.
+        InvalidMeshError: There is no mesh in it, or it encloses no volume.
+    """
+    if not (math.isfinite(size_m) and size_m > 0.0):
+        raise InvalidMeshError(f"the size of a mesh must be above 0 m, not {size_m}")
+    try:
+        content = file.read_bytes()
+    except OSError as error:
+        raise MeshUnavailableError(f"{file} cannot be read: {error.strerror}") from error
+    kept = kept_at(content, file.suffix.lower(), size_m, fineness)
+    if not kept.exists():
+        keep(kept, to_obj(_decomposed(file, size_m, fineness)).encode())
+    return Solid.of(from_obj(kept.read_text(encoding="utf-8")))
+
+
+def kept_at(content: bytes, suffix: str, size_m: float, fineness: Fineness = USUAL) -> Path:
+    """Where the pieces of a mesh are kept, for what its file has in it and how that ends."""
+    settings = repr((FORMAT, suffix, size_m, astuple(fineness))).encode()
+    digest = hashlib.blake2b(content, key=hashlib.blake2b(settings).digest(), digest_size=16)
+    return cache_folder() / f"{digest.hexdigest()}.obj"
+
+
+def _decomposed(file: Path, size_m: float, fineness: Fineness) -> list[Piece]:
+    """The convex pieces of a file's mesh."""
+    try:
+        import coacd
+        import trimesh
+    except ImportError as error:
+        raise MeshUnavailableError(
+            f"to take {file.name} apart needs {error.name}; pip install 'slap_ros[meshes]'"
+        ) from error
+    try:
+        mesh = trimesh.load(file, force="mesh")
+    except (ValueError, TypeError, KeyError, IndexError, OSError) as error:  # as files are damaged
+        raise InvalidMeshError(f"{file} cannot be read as a mesh: {error}") from error
+    if not len(getattr(mesh, "faces", ())):
+        raise InvalidMeshError(f"{file} has no faces, and so is no solid")
+    vertices = np.asarray(mesh.vertices, dtype=np.float64)
+    scaled = _placed(vertices, size_m, file.suffix.lower() in Y_IS_UP)
+    coacd.set_log_level("error")
+    found = coacd.run_coacd(
+        coacd.Mesh(scaled, np.asarray(mesh.faces, dtype=np.int32)),
+        threshold=fineness.threshold,
+        max_convex_hull=fineness.pieces,
+        decimate=True,
+        max_ch_vertex=fineness.vertices,
+        seed=fineness.seed,
+    )
+    return [
+        Piece(tuple(map(tuple, points.tolist())), tuple(map(tuple, triangles.tolist())))
+        for points, triangles in found
+    ]
+
+
+def _placed(vertices: Array, size_m: float, y_is_up: bool) -> Array:
+    """Vertices in m, z up."""
+    turned = vertices @ TO_Z_UP.T if y_is_up else vertices
+    placed: Array = turned * (size_m / np.ptp(turned, axis=0).max())
+    return placed

@@ -1,0 +1,176 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Rigid shapes made of convex pieces, and what physics wants to know of them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slap_ros.errors import InvalidMeshError
+from slap_ros.physics.boxes import OrientedBox
+from slap_ros.physics.pose import Pose, Vector
+
+Array = NDArray[np.float64]
+LEAST_VOLUME = 1e-12  # m³: a cube of a tenth of a millimetre
+
+
+class Piece(NamedTuple):
+    """A convex polyhedron."""
+
+    vertices: tuple[Vector, ...]  # m
+    triangles: tuple[tuple[int, int, int], ...]  # indices of vertices, anticlockwise from outside
+
+
+# Of a box whose corners come in the order of their coordinates, z the fastest.
+_FACES = (
+    *((0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5)),
+    *((0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6)),
+    *((0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)),
+)
+
+
+def cuboid(half: Vector) -> Piece:
+    """A box by half its edges, m."""
+    x, y, z = half
+    corners = product((-x, x), (-y, y), (-z, z))
+    return Piece(tuple(corners), _FACES)
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """Convex pieces that move as one, of the same density; the origin is their centre of mass.
+
+    Where pieces overlap, what they share counts twice.
+    """
+
+    pieces: tuple[Piece, ...]
+
+    @staticmethod
+    def of(pieces: Sequence[Piece]) -> Solid:
+        """The solid of pieces that are seen from anywhere.
+
+        Raises:
+            InvalidMeshError: There is no piece, or one encloses nothing, as one does whose
+                triangles are turned inside out.
+        """
+        if not pieces:
+            raise InvalidMeshError("a solid needs at least one piece")
+        for number, piece in enumerate(pieces, start=1):
+            if not np.isfinite(piece.vertices).all():
+                raise InvalidMeshError(f"piece {number} has vertices that are not finite")
+            if _moments(piece)[0] < LEAST_VOLUME:
+                raise InvalidMeshError(
+                    f"piece {number} encloses no volume; are its triangles anticlockwise, seen "
+                    "from outside, and its lengths in metres?"
+                )
+        moments = [_moments(piece) for piece in pieces]
+        cx, cy, cz = (np.sum([m[1] for m in moments], 0) / sum(m[0] for m in moments)).tolist()
+        return Solid(
+            tuple(
+                Piece(tuple((x - cx, y - cy, z - cz) for x, y, z in vertices), triangles)
+                for vertices, triangles in pieces
+            )
+        )
+
+    @cached_property
+    def points(self) -> Array:
+        """The vertices of all pieces, m, shape (n, 3)."""
+        return np.concatenate([np.array(piece.vertices) for piece in self.pieces])
+
+    @cached_property
+    def corners(self) -> tuple[Vector, ...]:
+        """Three vertices for each triangle of each piece, m."""
+        return tuple(
+            piece.vertices[index]
+            for piece in self.pieces
+            for triangle in piece.triangles
+            for index in triangle
+        )
+
+    @cached_property
+    def bounds(self) -> OrientedBox:
+        """The smallest box around it along its own axes."""
+        return _around(self.points)
+
+    @cached_property
+    def radius(self) -> float:
+        """How far it reaches from its centre of mass, m."""
+        return float(np.linalg.norm(self.points, axis=1).max())
+
+    def extent(self, axis: Vector) -> float:
+        """How far it reaches from its centre of mass along an axis, to either side, m."""
+        return float(np.abs(self.points @ np.array(axis)).max())
+
+    @cached_property
+    def inertia(self) -> Vector:
+        """Moments about its own axes for a mass of 1 kg, m². Products of inertia are left out."""
+        moments = [_moments(piece) for piece in self.pieces]
+        xx, yy, zz = (np.sum([m[2] for m in moments], 0) / sum(m[0] for m in moments)).tolist()
+        return (yy + zz, xx + zz, xx + yy)
+
+    @cached_property
+    def cores(self) -> tuple[OrientedBox, ...]:
+        """A box inside each piece: what enters it surely enters the solid."""
+        return tuple(map(_inside, self.pieces))
+
+    @cached_property
+    def digest(self) -> bytes:
+        """Alike for the same pieces, in any process."""
+        digest = hashlib.blake2b(digest_size=16)
+        for piece in self.pieces:
+            for part in (np.array(piece.vertices), np.array(piece.triangles, dtype=np.int64)):
+                digest.update(str(part.shape).encode() + part.tobytes())
+        return digest.digest()
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Solid):
+            return NotImplemented
+        return self.digest == other.digest
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+
+def _corners(piece: Piece) -> Array:
+    """The corners of each triangle, shape (triangles, 3, 3)."""
+    corners: Array = np.array(piece.vertices)[np.array(piece.triangles, dtype=np.intp)]
+    return corners
+
+
+def _moments(piece: Piece) -> tuple[float, Array, Array]:
+    """Volume in m³; first moments in m⁴; second moments xx, yy, zz in m⁵: of tetrahedra summed."""
+    corners = _corners(piece)
+    volumes = np.linalg.det(corners) / 6.0  # of the tetrahedra from the origin
+    sums = corners.sum(1)
+    firsts = (volumes[:, None] * sums).sum(0) / 4.0
+    squares = np.square(sums) + np.square(corners).sum(1)
+    return float(volumes.sum()), firsts, (volumes[:, None] * squares).sum(0) / 20.0
+
+
+def _around(points: Array) -> OrientedBox:
+    low, high = points.min(0), points.max(0)
+    x, y, z = ((low + high) / 2).tolist()
+    u, v, w = ((high - low) / 2).tolist()
+    return OrientedBox(Pose((x, y, z)), (u, v, w))
+
+
+def _inside(piece: Piece) -> OrientedBox:
+    """The box around a piece, shrunk about the piece's centre until it is inside."""
+    corners = _corners(piece)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    volume, firsts, _ = _moments(piece)
+    centre = firsts / volume
+    half = np.array(_around(np.array(piece.vertices)).half)
+    room = ((corners[:, 0] - centre) * normals).sum(1)  # to each face, times its normal's length
+    share = max(0.0, float((room / (np.abs(normals) @ half)).min()))
+    x, y, z = centre.tolist()
+    u, v, w = (share * half).tolist()
+    return OrientedBox(Pose((x, y, z)), (u, v, w))

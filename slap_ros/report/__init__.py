@@ -1,0 +1,8 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A page that tells a run, or compares several, from their bags alone."""
+
+from slap_ros.report.content import BagReport, RunReport, read_report
+from slap_ros.report.page import check_output, render, write_page
+
+__all__ = ["BagReport", "RunReport", "check_output", "read_report", "render", "write_page"]

@@ -1,0 +1,138 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a report says of a run, gathered from its bag alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+
+from slap_ros.bags.evaluate import BagEvaluation, Reading, evaluate, read_runs
+from slap_ros.bags.recording import Episode, Recording
+from slap_ros.domains import Domain
+from slap_ros.errors import InvalidDomainError
+from slap_ros.evaluation.metrics import RunMetrics, RunTrace, describe
+from slap_ros.messages.protocols import KeyValueMessage
+from slap_ros.report.chain import Chain, chains
+from slap_ros.report.scene import Scene, scene
+from slap_ros.report.timeline import Incident, Span, incidents, spans
+from slap_ros.report.traces import Series, robot_series
+from slap_ros.report.truth import Truth, truth
+
+USUAL_PERIOD_S = 0.1  # of a control step, where the bag has none that could be
+LONGEST_PERIOD_S = 10.0
+PURE_PLANNING = "pure planning"
+
+
+@dataclass(frozen=True)
+class RunReport:
+    """One run."""
+
+    bag: str  # name of the bag
+    metrics: RunMetrics
+    task: object  # equal for runs of the same task
+    goal: str
+    length: int  # steps that its drawings show, from its start
+    spans: tuple[Span, ...]
+    incidents: tuple[Incident, ...]
+    chains: tuple[Chain, ...]
+    truth: Truth
+    series: tuple[Series, ...]
+    scene: Scene | None
+    control_period_s: float
+    configuration: dict[str, str]
+    versions: dict[str, str]
+
+    @property
+    def approach(self) -> str:
+        """How it was planned."""
+        if not self.metrics.planner:
+            return "no plan"
+        if not self.metrics.library:
+            return PURE_PLANNING
+        return "SLAP, 1 sample" if self.metrics.samples == 1 else "SLAP"
+
+    @property
+    def replan_steps(self) -> tuple[int, ...]:
+        """The steps at which plans after the first were made."""
+        return tuple(chain.step for chain in self.chains if chain.number > 0)
+
+
+@dataclass(frozen=True)
+class BagReport:
+    """A bag."""
+
+    name: str
+    runs: tuple[RunReport, ...]
+    evaluation: BagEvaluation
+    unchecked: str  # why no atoms were compared with recomputed ones; empty where they were
+
+
+def read_report(path: Path | str) -> BagReport:
+    """What a bag tells of its runs.
+
+    A domain that cannot be imported here, as one without its simulator, costs only the second
+    opinion on perception: all else is in the bag.
+
+    Raises:
+        DamagedBagError: Nothing in it can be read.
+        ForeignBagError: It is not of an ensemble, or of another version of one.
+        UnknownDomainError: Its domain is not known here.
+        InvalidStateError: It has a state that its domain cannot have.
+    """
+    reading = read_runs(path)
+    unchecked, domain = "", None
+    try:
+        domain = reading.recording.domain()
+    except InvalidDomainError as error:
+        unchecked = str(error)
+    if domain is None and not unchecked:
+        unchecked = "the recording does not name its domain"
+    name = Path(path).resolve().name
+    runs = tuple(_report(name, reading, trace, domain) for trace in reading.log.traces())
+    return BagReport(name, runs, evaluate(reading, domain), unchecked)
+
+
+def _report(name: str, reading: Reading, trace: RunTrace, domain: Domain | None) -> RunReport:
+    recording = reading.recording
+    episode = recording.episodes.get(trace.episode, Episode())
+    info = recording.domain_info
+    return RunReport(
+        bag=name,
+        metrics=trace.metrics,
+        task=_task(episode, trace),
+        goal=describe(trace.goal or ()),
+        length=trace.last_step - trace.first_step,
+        spans=spans(trace),
+        incidents=incidents(trace),
+        chains=chains(trace, episode),
+        truth=truth(trace, episode),
+        series=robot_series(trace, episode, recording),
+        scene=scene(trace, episode, recording, domain),
+        control_period_s=_period(recording),
+        configuration=_setting(episode, info.configuration if info is not None else ()),
+        versions={v.key: v.value for v in info.versions} if info is not None else {},
+    )
+
+
+def _task(episode: Episode, trace: RunTrace) -> object:
+    """Where a run began and what it was to reach; of an unknown start, equal to nothing else."""
+    start = episode.states.get(trace.first_step)
+    if start is None:
+        return object()
+    objects = tuple((o.name, o.type, tuple(map(float, o.features))) for o in start.objects)
+    return objects, trace.goal
+
+
+def _period(recording: Recording) -> float:
+    period = recording.domain_info.control_period if recording.domain_info is not None else 0.0
+    return period if isfinite(period) and 0.0 < period <= LONGEST_PERIOD_S else USUAL_PERIOD_S
+
+
+def _setting(episode: Episode, configuration: Iterable[KeyValueMessage]) -> dict[str, str]:
+    settings = {entry.key: entry.value for entry in configuration}
+    if episode.task is not None:
+        settings["step limit"] = str(episode.task.step_limit)
+    return settings

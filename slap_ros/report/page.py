@@ -1,0 +1,210 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Reports as one HTML file that needs nothing else: no network, no server, no script to be read.
+
+Whatever comes out of a bag is text to the page, never markup: the template escapes everything,
+and a content security policy lets no script run but the page's own.
+"""
+
+from __future__ import annotations
+
+import re
+from base64 import b64encode
+from collections import Counter
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+import slap_ros
+from slap_ros.drawing.svg import clean_value
+from slap_ros.drawing.words import counted
+from slap_ros.errors import InvalidParameterError, StorageFullError
+from slap_ros.report.animation import Drawing, draw
+from slap_ros.report.content import PURE_PLANNING, BagReport, RunReport
+
+HERE = Path(__file__).parent  # of the template, style and script
+ENDING = ".html"
+MOST_TICKS = 7  # on an axis
+# Characters that turn text around: what follows them would read otherwise than it is.
+TURNING = re.compile("[\u200e\u200f\u202a-\u202e\u2066-\u2069]")
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A run on the page."""
+
+    number: int  # from 1
+    label: str
+    run: RunReport
+    drawings: tuple[Drawing, ...]
+    relative_length: float | None  # against pure planning of the same task
+
+
+def check_output(path: Path) -> None:
+    """Refuse a place for a page before anything is run or read.
+
+    Raises:
+        InvalidParameterError: It is a folder, or has another ending than that of pages.
+    """
+    if path.suffix != ENDING:
+        raise InvalidParameterError(f"a report is a file that ends in {ENDING}, not {path.name!r}")
+    if path.is_dir():
+        raise InvalidParameterError(f"{path} is a folder; name a file for the report")
+
+
+def write_page(path: Path, text: str) -> None:
+    """Write a page, or nothing at all.
+
+    Raises:
+        StorageFullError: It cannot be written; what was there before is left alone.
+    """
+    draft = path.with_name(f".{path.name}.tmp")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        draft.write_text(text, encoding="utf-8")
+        draft.replace(path)
+    except OSError as error:
+        with suppress(OSError):  # there may not even be a folder
+            draft.unlink()
+        raise StorageFullError(f"cannot write {path}: {error.strerror}") from error
+
+
+def render(bags: Sequence[BagReport]) -> str:
+    """The page for the runs of some bags."""
+    runs = [run for bag in bags for run in bag.runs]
+    shown = _shown(runs)
+    script = _read("page.js")
+    environment = Environment(
+        loader=FileSystemLoader(HERE),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=_readable,
+    )
+    environment.filters["counted"] = counted
+    last = max((run.length for run in runs), default=0)
+    return environment.get_template("page.html.j2").render(
+        bags=bags,
+        shown=shown,
+        last=last,
+        ticks=_ticks(last),
+        same_task=len(runs) > 1 and all(run.task == runs[0].task for run in runs),
+        summary=_summary(shown),
+        differing=_differing(runs),
+        metrics=[run.metrics.as_json() for run in runs],
+        player=_player(shown, last),
+        style=_read("page.css"),
+        script=script,
+        script_digest=b64encode(sha256(script.encode()).digest()).decode(),
+        version=slap_ros.__version__,
+    )
+
+
+def _read(name: str) -> str:
+    return (HERE / name).read_text(encoding="utf-8")
+
+
+def _readable(value: object) -> object:
+    """Text as it can be shown, whoever wrote it."""
+    if type(value) is str:  # not Markup, which is ours
+        return TURNING.sub("\ufffd", clean_value(value))
+    return value
+
+
+def _shown(runs: Sequence[RunReport]) -> list[Shown]:
+    scenes = [run.scene for run in runs if run.scene is not None]
+    drawings = iter(draw(scenes) if scenes else [])
+    return [
+        Shown(
+            number=number,
+            label=label,
+            run=run,
+            drawings=next(drawings) if run.scene is not None else (),
+            relative_length=_relative_length(run, runs),
+        )
+        for number, (label, run) in enumerate(zip(_labels(runs), runs, strict=True), start=1)
+    ]
+
+
+def _labels(runs: Sequence[RunReport]) -> list[str]:
+    """Names of runs, as short as they can be told apart by."""
+    approaches = Counter(run.approach for run in runs)
+    bags = Counter((run.approach, run.bag) for run in runs)
+    labels = []
+    for number, run in enumerate(runs, start=1):
+        label = run.approach
+        if approaches[run.approach] > 1:
+            label += f", {run.bag}"
+        if bags[run.approach, run.bag] > 1:
+            label += f", run {number}"
+        labels.append(label)
+    return labels
+
+
+def _relative_length(run: RunReport, runs: Sequence[RunReport]) -> float | None:
+    """Plan length against that of pure planning, of the first such run of the same task."""
+    for other in runs if len(runs) > 1 else ():
+        if other.task == run.task and other.approach == PURE_PLANNING and other.metrics.success:
+            if not run.metrics.success or not other.metrics.plan_length:
+                return None
+            return run.metrics.plan_length / other.metrics.plan_length
+    return None
+
+
+def _summary(shown: Sequence[Shown]) -> list[str]:
+    """What came out, in a sentence each."""
+    sentences = []
+    for one in shown:
+        metrics = one.run.metrics
+        if not metrics.success:
+            sentences.append(f"{one.label}: not solved. {metrics.error_msg}")
+            continue
+        sentence = f"{one.label}: solved in {counted(metrics.plan_length, 'step')}"
+        if metrics.shortcut_steps:
+            sentence += f", {metrics.shortcut_steps} of them in shortcuts"
+        if one.relative_length is not None and one.run.approach != PURE_PLANNING:
+            sentence += f"; {one.relative_length:.2f} of the length by pure planning"
+        sentences.append(f"{sentence}.")
+    return sentences
+
+
+def _differing(runs: Sequence[RunReport]) -> set[str]:
+    """Names of settings and versions that are not the same in all runs."""
+    settings = [run.configuration | run.versions for run in runs]
+    names = {name for setting in settings for name in setting}
+    return {name for name in names if len({setting.get(name) for setting in settings}) > 1}
+
+
+def _ticks(last: int) -> list[int]:
+    """Round numbers for an axis from 0."""
+    spacing = next(s for n in range(10) for m in (1, 2, 5) if last / (s := m * 10**n) < MOST_TICKS)
+    return list(range(0, last + 1, spacing))
+
+
+def _player(shown: Sequence[Shown], last: int) -> dict[str, Any]:
+    """What the page's script plays."""
+    periods = [one.run.control_period_s for one in shown]
+    return {
+        "last": last,
+        "period": max(periods, default=1.0),
+        "runs": [
+            {
+                "last": one.run.length,
+                "frames": [frame.step for frame in one.run.scene.frames]
+                if one.run.scene is not None
+                else [],
+                "spans": [
+                    [span.start, span.end, _readable(f"{span.number} {span.text}")]
+                    for span in one.run.spans
+                ],
+                "views": [drawing.as_json() for drawing in one.drawings],
+            }
+            for one in shown
+        ],
+    }

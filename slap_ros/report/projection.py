@@ -1,0 +1,144 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Boxes seen from a direction, as SVG paths: lengths in m on one side, drawing units on the other.
+
+A drawing is UNITS wide; a box is drawn as those of its faces that can be seen, in three lights.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+from math import cos, hypot, radians, sin
+
+from slap_ros.domains.domain import VisibleBody
+from slap_ros.physics.pose import Pose, Vector, rotate
+
+UNITS = 1000  # width of a drawing; whole units are fine enough on any screen
+EDGE_ON = 1e-6  # cosine at which a face can no longer be seen
+LIGHT = (-0.35, -0.5, 0.79)  # where it comes from
+LIT, SHADED = 0.6, 0.2  # cosines of a face's normal with it
+AXES: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+Point = tuple[float, float]  # m, to the right and up
+Face = tuple[float, list[Vector]]  # cosine with the light; corners in order
+
+
+@dataclass(frozen=True)
+class View:
+    """A direction to look from."""
+
+    name: str
+    right: Vector  # of length 1, as is up
+    up: Vector
+
+    @property
+    def toward(self) -> Vector:
+        """Toward the viewer."""
+        (a, b, c), (d, e, f) = self.right, self.up
+        return (b * f - c * e, c * d - a * f, a * e - b * d)
+
+    def project(self, point: Vector) -> Point:
+        """Where a point of the world is seen."""
+        return _dot(self.right, point), _dot(self.up, point)
+
+    def depth(self, point: Vector) -> float:
+        """How near to the viewer it is, m."""
+        return _dot(self.toward, point)
+
+
+def _oblique(turn: float, height: float) -> View:
+    """From the right of the robot and above; rad from its right side, and from the ground."""
+    up = (-sin(turn) * sin(height), cos(turn) * sin(height), cos(height))
+    return View("From the front right", (cos(turn), sin(turn), 0.0), up)
+
+
+OBLIQUE = _oblique(radians(38.0), radians(28.0))
+SIDE = View("From the side", (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+TOP = View("From above", (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+
+
+@dataclass(frozen=True)
+class Canvas:
+    """The part of a view that is drawn, in m, with the scale."""
+
+    left: float
+    top: float
+    width: float
+    height: float
+
+    @classmethod
+    def around(cls, points: Iterable[Point], margin: float) -> Canvas:
+        """Room for points, and a share of the greater extent around them."""
+        xs, ys = zip(*points, strict=True)
+        width, height = max(xs) - min(xs), max(ys) - min(ys)
+        rim = margin * max(width, height) or 1.0
+        return cls(min(xs) - rim, max(ys) + rim, width + 2 * rim, height + 2 * rim)
+
+    @property
+    def scale(self) -> float:
+        """Units a metre."""
+        return UNITS / self.width
+
+    @property
+    def units_high(self) -> int:
+        """Its height."""
+        return round(self.height * self.scale)
+
+    def path(self, points: Iterable[Point], closed: bool = True) -> str:
+        """Straight lines through points."""
+        at = [
+            (round((x - self.left) * self.scale), round((self.top - y) * self.scale))
+            for x, y in points
+        ]
+        return "M" + " ".join(f"{x} {y}" for x, y in at) + ("Z" if closed else "")
+
+
+def box_paths(body: VisibleBody, view: View, canvas: Canvas) -> tuple[str, str, str]:
+    """The visible faces of a box; of them, those in the light, and those in the shade."""
+    drawn = [
+        (light, canvas.path(map(view.project, corners))) for light, corners in _seen(body, view)
+    ]
+    return (
+        "".join(path for _, path in drawn),
+        "".join(path for light, path in drawn if light > LIT),
+        "".join(path for light, path in drawn if light < SHADED),
+    )
+
+
+def corners(body: VisibleBody) -> list[Vector]:
+    """The corners of a box."""
+    x, y, z = (size / 2 for size in body.size)
+    pose = _pose(body)
+    return [pose.apply(corner) for corner in product((-x, x), (-y, y), (-z, z))]
+
+
+def _seen(body: VisibleBody, view: View) -> Iterator[Face]:
+    pose, toward = _pose(body), view.toward
+    half = [size / 2 for size in body.size]
+    for axis, sign in product(range(3), (-1.0, 1.0)):
+        normal = rotate(pose.quaternion, _scaled(AXES[axis], sign))
+        if _dot(normal, toward) > EDGE_ON:
+            across, along = (axis + 1) % 3, (axis + 2) % 3
+            local = []
+            for u, v in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
+                corner = [0.0, 0.0, 0.0]
+                corner[axis] = sign * half[axis]
+                corner[across], corner[along] = u * half[across], v * half[along]
+                local.append((corner[0], corner[1], corner[2]))
+            yield _dot(normal, LIGHT), [pose.apply(corner) for corner in local]
+
+
+def _pose(body: VisibleBody) -> Pose:
+    length = hypot(*body.quaternion)  # colours and poses of markers are what someone recorded
+    x, y, z, w = (part / length for part in body.quaternion)
+    return Pose(body.position, (x, y, z, w))
+
+
+def _dot(a: Sequence[float], b: Sequence[float]) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _scaled(v: Vector, factor: float) -> Vector:
+    return (v[0] * factor, v[1] * factor, v[2] * factor)

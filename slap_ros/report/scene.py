@@ -1,0 +1,154 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What stood where at each step: the bodies that were shown, and the arm."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import hypot, nan
+
+from slap_ros.bags.recording import Episode, Recording
+from slap_ros.domains import Domain
+from slap_ros.domains.domain import VisibleBody
+from slap_ros.evaluation.metrics import RunTrace
+from slap_ros.messages.decode import decode_state, stamp_ns
+from slap_ros.messages.interfaces import BODIES
+from slap_ros.messages.protocols import MarkersMessage, StateMessage
+from slap_ros.physics.links import LINK_SHAPES
+from slap_ros.physics.panda import HAND, JOINTS, LINKS, link_poses
+from slap_ros.physics.pose import Vector
+from slap_ros.report.traces import ROBOT
+
+CUBE = 1  # Marker.CUBE
+MAX_BODIES = 64  # a frame
+FARTHEST_M = 1e4
+LEAST_LENGTH = 0.5  # of a quaternion that is meant to be one
+MAX_FRAMES = 600  # a run; of a longer one, every second or third step and so on
+WRIST_M = 0.04  # m, above the hand's frame: where the round end of the arm meets the hand
+METAL = (0.62, 0.65, 0.69, 1.0)  # of the hand
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A moment."""
+
+    step: int  # from the run's start
+    bodies: tuple[VisibleBody, ...]  # in the world frame; the n-th is the same in every frame
+    arm: tuple[Vector, ...]  # m: where its joints are, from the base to the hand; may be empty
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A run to be watched."""
+
+    frames: tuple[Frame, ...]  # in the order of their steps
+
+    @property
+    def ends(self) -> list[tuple[VisibleBody, VisibleBody]]:
+        """Each body at the beginning and at the end."""
+        return list(zip(self.frames[0].bodies, self.frames[-1].bodies, strict=False))
+
+
+def scene(
+    trace: RunTrace, episode: Episode, recording: Recording, domain: Domain | None
+) -> Scene | None:
+    """The frames of a run; None where the bag does not tell what anything looks like.
+
+    Bodies are those of the recorded markers. Without markers the domain says what to show.
+
+    Raises:
+        InvalidStateError: It has a state that its domain cannot have.
+    """
+    steps = sorted(s for s in episode.states if trace.first_step <= s <= trace.last_step)
+    if not steps:
+        return None
+    chosen = steps[:: 1 + len(steps) // MAX_FRAMES]
+    if chosen[-1] != steps[-1]:
+        chosen.append(steps[-1])
+    pictures, frames = _Pictures(recording, domain), []
+    for step in chosen:
+        hand, arm = _arm(episode.states[step], recording)
+        bodies = (*hand, *pictures.of(episode.states[step]))
+        frames.append(Frame(step - trace.first_step, bodies, arm))
+    return Scene(tuple(frames)) if any(f.bodies or f.arm for f in frames) else None
+
+
+class _Pictures:
+    """Finds the bodies that were shown of a state."""
+
+    def __init__(self, recording: Recording, domain: Domain | None) -> None:
+        self._markers = recording.markers
+        self._stamps = sorted(recording.markers)
+        self._domain = domain
+
+    def of(self, state: StateMessage) -> tuple[VisibleBody, ...]:
+        """Those of the first markers since the state, for that is when they are published."""
+        shown: Iterable[VisibleBody] = ()
+        if self._stamps:
+            since = bisect_left(self._stamps, stamp_ns(state.header))
+            newest = self._stamps[min(since, len(self._stamps) - 1)]
+            shown = _of_markers(self._markers[newest])
+        elif self._domain is not None:
+            shown = self._domain.bodies(decode_state(state, self._domain.types_by_name))
+        return tuple(_drawable(shown))[:MAX_BODIES]
+
+
+def _of_markers(message: MarkersMessage) -> Iterable[VisibleBody]:
+    for marker in message.markers:
+        if marker.ns == BODIES and marker.type == CUBE:
+            p, q, s, c = marker.pose.position, marker.pose.orientation, marker.scale, marker.color
+            yield VisibleBody(
+                marker.text,
+                (float(p.x), float(p.y), float(p.z)),
+                (float(q.x), float(q.y), float(q.z), float(q.w)),
+                (float(s.x), float(s.y), float(s.z)),
+                (float(c.r), float(c.g), float(c.b), float(c.a)),
+            )
+
+
+def _is_near(number: float) -> bool:
+    """Whether something in m, or of magnitude 1, can be drawn; False for NaN."""
+    return abs(number) <= FARTHEST_M
+
+
+def _drawable(bodies: Iterable[VisibleBody]) -> Iterable[VisibleBody]:
+    """Those that can be drawn: anyone may have recorded anything."""
+    for body in bodies:
+        numbers = (*body.position, *body.quaternion, *body.size, *body.colour)
+        if all(map(_is_near, numbers)) and hypot(*body.quaternion) > LEAST_LENGTH:
+            yield body
+
+
+# The hand and the fingers; the links before them are drawn as lines.
+HAND_SHAPES = tuple(shape for shape in LINK_SHAPES if shape.link >= HAND)
+
+
+def _arm(
+    state: StateMessage, recording: Recording
+) -> tuple[tuple[VisibleBody, ...], tuple[Vector, ...]]:
+    """The hand's parts and the points of the arm, of a robot that has the Panda's joints."""
+    features = _robot_features(state, recording)
+    names = [*(f"joint{i + 1}" for i in range(JOINTS)), "finger"]
+    if not all(_is_near(features.get(name, nan)) for name in names):
+        return (), ()
+    *joints, finger = (features[name] for name in names)
+    links = link_poses(joints, finger)
+    parts = []
+    for shape in HAND_SHAPES:
+        box = shape.at(links[shape.link])
+        x, y, z = (2.0 * half for half in box.half)
+        name = LINKS[shape.link]
+        parts.append(VisibleBody(name, box.pose.position, box.pose.quaternion, (x, y, z), METAL))
+    wrist = links[HAND].apply((0.0, 0.0, -WRIST_M))
+    return tuple(parts), (*(link.position for link in links[:HAND]), wrist)
+
+
+def _robot_features(state: StateMessage, recording: Recording) -> dict[str, float]:
+    info = recording.domain_info
+    layouts = [t.feature_names for t in info.types if t.name == ROBOT] if info is not None else []
+    robots = [obj for obj in state.objects if obj.type == ROBOT]
+    if not layouts or not robots:
+        return {}
+    return dict(zip(layouts[0], map(float, robots[0].features), strict=False))

@@ -1,0 +1,68 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The robot's joints and gripper, or its position, over the steps of a run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+
+from slap_ros.bags.recording import Episode, Recording
+from slap_ros.evaluation.metrics import RunTrace
+
+ROBOT = "robot"  # the type of what acts, in every domain
+HELD = "grasp_"  # how a body lies in the hand: nothing that moves by itself
+DIMENSIONS = ("rad", "m")  # units of what moves
+FLAT = 1e-9  # rad or m: less than that is rounding
+
+
+@dataclass(frozen=True)
+class Series:
+    """One feature over time."""
+
+    name: str
+    unit: str
+    steps: tuple[int, ...]  # from the run's start
+    values: tuple[float, ...]
+
+    @property
+    def low(self) -> float:
+        """The least value."""
+        return min(self.values)
+
+    @property
+    def high(self) -> float:
+        """The greatest value."""
+        return max(self.values)
+
+    @property
+    def points(self) -> str:
+        """A polyline, x in steps, y from 0 (greatest) to 1 (least)."""
+        extent = self.high - self.low
+        level = [0.5 if extent < FLAT else (self.high - v) / extent for v in self.values]
+        return " ".join(f"{s},{y:.3f}" for s, y in zip(self.steps, level, strict=True))
+
+
+def robot_series(trace: RunTrace, episode: Episode, recording: Recording) -> tuple[Series, ...]:
+    """Every feature of the robot that moves, in the order of its type."""
+    info = recording.domain_info
+    steps = sorted(s for s in episode.states if trace.first_step <= s <= trace.last_step)
+    if info is None or not steps:
+        return ()
+    found = []
+    for message in (t for t in info.types if t.name == ROBOT):
+        for i, (name, unit) in enumerate(
+            zip(message.feature_names, message.feature_units, strict=False)
+        ):
+            if unit not in DIMENSIONS or name.startswith(HELD):
+                continue
+            values = {
+                step: float(obj.features[i])
+                for step in steps
+                for obj in episode.states[step].objects
+                if obj.type == ROBOT and i < len(obj.features) and isfinite(obj.features[i])
+            }
+            if values:
+                relative = tuple(step - trace.first_step for step in values)
+                found.append(Series(name, unit, relative, tuple(values.values())))
+    return tuple(found)
