@@ -123,12 +123,19 @@ SETTINGS: Mapping[str, Mapping[str, TrainingSettings]] = {
             horizon=30,
             starts=200,
         ),
+        "cluttered_drawer": replace(
+            OURS,
+            ppo=replace(LEARN, total_steps=160_000),
+            polish=replace(POLISH, total_steps=100_000),
+            horizon=40,
+            starts=150,
+        ),
         "cleanup_table": replace(
             OURS,
             # Nodes: everything over which the hand can be, that it can grasp, and lift.
             exploration=Exploration(tasks=3, rollouts=32, length=40, nodes=13),
-            ppo=replace(LEARN, total_steps=100_000),
-            polish=replace(POLISH, total_steps=80_000),
+            ppo=replace(LEARN, total_steps=160_000),
+            polish=replace(POLISH, total_steps=100_000),
             horizon=40,
             starts=120,
             shortcuts=2,

@@ -17,8 +17,8 @@ from slap_ros.domains.tabletop.grasps import from_above
 from slap_ros.domains.tabletop.reading import joints_of, pose_of
 from slap_ros.errors import InvalidParameterError, InvalidStateError, SkillNotApplicableError
 from slap_ros.motion import linear_motion, nearest_configurations, retime
-from slap_ros.physics.panda import MAX_STEP
-from slap_ros.physics.pose import multiply
+from slap_ros.physics.panda import MAX_STEP, grasp_pose
+from slap_ros.physics.pose import multiply, rotate
 from slap_ros.physics.scene import TABLE_TOP
 from slap_ros.planning.abstract_graph import build_abstract_graph
 from slap_ros.planning.execution import Executor
@@ -30,6 +30,7 @@ from slap_ros.relational import Column, State
 
 FAIR, PAPER = get_domain("cluttered_drawer"), get_domain("cluttered_drawer", "paper")
 HALF = 0.025  # m, half a block
+TURN = -math.pi / 2  # rad
 TARGET = (MIDDLE, 0.0, 0.0)
 LEFT_BLOCKER = (MIDDLE, NEIGHBOUR, 0.0)
 
@@ -302,8 +303,10 @@ def test_a_hand_that_turns_around_the_block_frees_two_sides_and_holds_nothing():
     state = problem.model.roll_out(option, task.initial_state, reach.apply(start)).final
     world = PAPER.make_world(state)
     x, y, z = pose_of(state, target).position
-    for height, turn in ((z + 0.05, 0.25), (z, 0.25), (z, 0.75)):
-        goal = from_above((x, y, height), turn * math.pi)
+    ahead = rotate(grasp_pose(joints_of(state)).quaternion, (1.0, 0.0, 0.0))
+    yaw = math.atan2(ahead[1], ahead[0])
+    for height, turn in ((z + 0.05, 0.0), (z, 0.0), (z, TURN)):
+        goal = from_above((x, y, height), yaw + turn)
         for position in retime(linear_motion(joints_of(state), goal)):
             action = np.clip(position - joints_of(state), -np.array(MAX_STEP), MAX_STEP)
             state = world.step(np.array([*action, 0.0]))
@@ -311,8 +314,10 @@ def test_a_hand_that_turns_around_the_block_frees_two_sides_and_holds_nothing():
         state = world.step(np.zeros(8))
     assert PAPER.view.settled(state.alone())[0]
     assert not PAPER.view.lost(state.alone())[0]
-    assert {"FrontClear(block1)", "BackClear(block1)", "BlockingLeft(block4, block1)"} <= sides(
-        state, PAPER
+    clear = {atom for atom in sides(state, PAPER) if "Clear" in atom}
+    assert clear in (
+        {"FrontClear(block1)", "BackClear(block1)"},
+        {"LeftClear(block1)", "RightClear(block1)"},
     )
     assert space.abstract(state) in graph.nodes
 

@@ -18,7 +18,7 @@ whose effects are exactly what their skills bring about, without conditional eff
 - Blockers go elsewhere in the drawer. A shortcut that only pushes them aside so reaches the same
   abstract state as skills do.
 - The hand is ready to pick a block when it is over it, and HandReadyPick when it is over none: then
-  it may be sent to any. Grasping ends either.
+  it may be sent to any. Grasping a block ends that it is over it.
 """
 
 from __future__ import annotations
@@ -192,48 +192,40 @@ class Rooms(NamedTuple):
         return Rooms(depth, halves[:, None, None], spans[:, None])
 
 
-def lie_with(room: FingerRoom, state: State) -> Lie:
-    """How everything lies, all at once, with so much room for a finger.
+class Blocks(NamedTuple):
+    """The blocks of a state. Horizontal vectors are complex numbers: turned by a product."""
 
-    Horizontal vectors are complex numbers: turned by a product, seen along both axes at once.
-    """
-    things, data = Things.of(state.layout), state.data
+    q: Array  # parts of their quaternions, shape (..., blocks, 4)
+    edges: Array  # shape (..., blocks, 9), as in TO_EDGES
+    flat: Complex  # their edges seen from above, shape (..., blocks, 3)
+    places: Complex  # shape (..., blocks), as those that follow
+    z: Array
+    height: Array  # half of it
+
+
+def _blocks(things: Things, data: Array) -> Blocks:
     q = data.take(things.quaternions, axis=-1)
     products = (q[..., None] * q[..., None, :]).reshape(*q.shape[:-1], 16)
     edges = products @ TO_EDGES * data.take(things.halves, axis=-1)
-    flat, height = complex_of(edges[..., :6]), np.add.reduce(np.abs(edges[..., 6:]), axis=-1)
+    height = np.add.reduce(np.abs(edges[..., 6:]), axis=-1)
     places = complex_of(data.take(things.places, axis=-1))[..., 0]
     z = data.take(things.z, axis=-1)
+    return Blocks(q, edges, complex_of(edges[..., :6]), places, z, height)
 
-    # On a surface is what touches it with its lowest point, its middle over it.
-    levels = data.take(things.levels, axis=-1)[..., None, :, :]
-    middles = complex_of(data.take(things.middles, axis=-1))[..., 0]
-    within = levels[..., 1:3] - along_axes(places[..., None] - middles[..., None, :])
-    gap = (z - height)[..., None] - levels[..., 0] - levels[..., 3]
-    touches = unpinched(TOUCHING - np.abs(gap))
-    on = np.minimum(touches, np.minimum(within[..., 0], within[..., 1]))
 
-    # A block blocks a side where no line separates it from the room for a finger there: neither
-    # one along the target block's faces nor one along its own.
-    rooms, back, which = Rooms.of(room), turned_back(q, edges), things.which
-    named = _towards_base(back.take(which, axis=-1))
-    own = widths(flat.take(which, axis=-2), named)
-    faces = (own.take(AXES, axis=-1).swapaxes(-1, -2) + rooms.depth) * TOWARDS[:, None]
-    way = (places[..., None] - places.take(which, axis=-1)[..., None, :]) * named[..., None, :]
-    off = way[..., None, :, :] - faces[..., None, :]
-    width = widths(flat[..., :, None, :], named[..., None, :])[..., None, :, :, :]
-    gaps = along_axes(off) - width - rooms.halves
-    turn = (back[..., None] * named[..., None, :].conj())[..., None, :, :]
-    own_gaps = along_axes(off * turn) - along_axes(turn) @ rooms.spans
-    own_gaps -= widths(flat, back)[..., None, :, None, :]
-    apart = np.maximum(gaps, own_gaps)
-    sideways = -np.maximum(apart[..., 0], apart[..., 1])
+def lie_with(room: FingerRoom, state: State) -> Lie:
+    """How everything lies, all at once, with so much room for a finger."""
+    things, data = Things.of(state.layout), state.data
+    blocks = _blocks(things, data)
+    on = _lying_on(things, data, blocks)
+    sideways = _sideways(Rooms.of(room), things, blocks)
 
-    # That is so at the height of a target block that stands in the drawer.
-    off_level = np.abs(z[..., None] - z.take(which, axis=-1)[..., None, :])
-    level = height[..., None] + height.take(which, axis=-1)[..., None, :] - off_level
+    # A block blocks at the height of a target block that stands in the drawer.
+    z, height = blocks.z, blocks.height
+    off_level = np.abs(z[..., None] - z.take(things.which, axis=-1)[..., None, :])
+    level = height[..., None] + height.take(things.which, axis=-1)[..., None, :] - off_level
     standing = np.maximum.reduce(np.where(things.is_drawer, on, -1.0), axis=-1, initial=-1.0)
-    applies = np.minimum(level, standing.take(which, axis=-1)[..., None, :])
+    applies = np.minimum(level, standing.take(things.which, axis=-1)[..., None, :])
     applies = np.where(things.same, -1.0, applies)[..., None, :, :]
     blocking = np.minimum(sideways, applies)
     clear = strictly(-np.maximum.reduce(blocking, axis=-2, initial=-1.0))
@@ -243,6 +235,38 @@ def lie_with(room: FingerRoom, state: State) -> Lie:
         blocking.reshape(*blocking.shape[:-2], -1),
         clear,
     )
+
+
+def _lying_on(things: Things, data: Array, blocks: Blocks) -> Array:
+    """How well blocks touch surfaces, their middles over them: shape (..., blocks, surfaces)."""
+    levels = data.take(things.levels, axis=-1)[..., None, :, :]
+    middles = complex_of(data.take(things.middles, axis=-1))[..., 0]
+    within = levels[..., 1:3] - along_axes(blocks.places[..., None] - middles[..., None, :])
+    gap = (blocks.z - blocks.height)[..., None] - levels[..., 0] - levels[..., 3]
+    touches = unpinched(TOUCHING - np.abs(gap))
+    return np.minimum(touches, np.minimum(within[..., 0], within[..., 1]))
+
+
+def _sideways(rooms: Rooms, things: Things, blocks: Blocks) -> Array:
+    """How far blocks are in the rooms for fingers, (..., sides, blocks, targets).
+
+    One is in a room that no line separates it from: neither one along the target block's faces nor
+    one along its own.
+    """
+    flat, places, which = blocks.flat, blocks.places, things.which
+    back = turned_back(blocks.q, blocks.edges)
+    named = _towards_base(back.take(which, axis=-1))
+    own = widths(flat.take(which, axis=-2), named)
+    middles = (own.take(AXES, axis=-1).swapaxes(-1, -2) + rooms.depth) * TOWARDS[:, None]
+    way = (places[..., None] - places.take(which, axis=-1)[..., None, :]) * named[..., None, :]
+    off = way[..., None, :, :] - middles[..., None, :]
+    width = widths(flat[..., :, None, :], named[..., None, :])[..., None, :, :, :]
+    gaps = along_axes(off) - width - rooms.halves
+    turn = (back[..., None] * named[..., None, :].conj())[..., None, :, :]
+    own_gaps = along_axes(off * turn) - along_axes(turn) @ rooms.spans
+    own_gaps -= widths(flat, back)[..., None, :, None, :]
+    apart = np.maximum(gaps, own_gaps)
+    return -np.maximum(apart[..., 0], apart[..., 1])
 
 
 def _towards_base(back: Complex) -> Complex:

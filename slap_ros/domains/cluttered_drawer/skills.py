@@ -30,6 +30,7 @@ WALL_MARGIN = 0.07  # m, of places in the drawer from its walls, so that fingers
 # Turns of the hand against the target block: its fingers move along the hand's y.
 LEFT_RIGHT, FRONT_BACK = (0.0, math.pi), (math.pi / 2, -math.pi / 2)
 ANY = (*LEFT_RIGHT, *FRONT_BACK)
+DIAGONALLY = tuple(turn + math.pi / 4 for turn in ANY)
 
 
 def _solid(state: State) -> Iterator[tuple[Object, Box]]:
@@ -62,6 +63,12 @@ def _to_block(turns: Sequence[float]) -> Ways:
         yield _way_to_grasp(state, objects[1], turns)
 
     return ways
+
+
+def _over_block(state: State, objects: tuple[Object, ...]) -> Iterator[Way]:
+    """Over a grasp of the block; where it is hemmed in, the fingers over the gaps at its edges."""
+    for turns in (ANY, DIAGONALLY):
+        yield _way_to_grasp(state, objects[1], turns)
 
 
 @remembered
@@ -106,7 +113,7 @@ def skills(timing: Timing) -> dict[str, Skill]:
         return WaySkill(name, timing, _to_block(turns), GRIP, LIFT)
 
     made = [
-        ReachSkill("Reach", timing, _to_block(ANY)),
+        ReachSkill("Reach", timing, _over_block),
         grasp("GraspFrontBack", FRONT_BACK),
         grasp("GraspLeftRight", LEFT_RIGHT),
         grasp("GraspFullClear", ANY),

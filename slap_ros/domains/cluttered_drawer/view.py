@@ -10,12 +10,11 @@ from slap_ros.domains.cluttered_drawer.model import BLOCK, GRASPING, SIDES, SURF
 from slap_ros.domains.cluttered_drawer.scenery import BOTTOM
 from slap_ros.domains.tabletop import seeing
 from slap_ros.domains.view import View
-from slap_ros.physics.scene import CUBE_EDGE
 from slap_ros.relational import Column, State
 from slap_ros.relational.state import Array
 
 NEAR = 0.1  # m, the scale of what is beside the target block
-BESIDE = CUBE_EDGE / 2  # m, of the hand over a block's middle
+AROUND = 0.01  # m, of the hand over the target block's middle: fingers halfway down beside it
 FINGER_ROOM = 0.002  # m, more than blocks nothing: so much the next grasp may be off
 
 
@@ -42,16 +41,20 @@ def _things(state: State, hand: Array, column: Column) -> Array:
 
 def _beside_target(state: State, column: Column) -> Array:
     """Positions less that of the target block, m, shape (n, objects, 2)."""
-    target = seeing.alone(state.layout.of_type(TARGET)[0])
-    beside: Array = state.gather(column, ("x", "y")) - state.gather(target, ("x", "y"))
+    beside: Array = state.gather(column, ("x", "y")) - state.gather(_target(state), ("x", "y"))
     return beside
 
 
 def _distance(state: State, hand: Array, column: Column) -> Array:
-    """From the hand to the tops of blocks."""
+    """From the hand to around the target block: from there its fingers push any of the blocks."""
     if not column.objects[0].type.is_a(BLOCK):
         return seeing.never_near(state, column)
-    return seeing.to_over(state, hand, column, BESIDE)
+    around = seeing.to_over(state, hand, _target(state), AROUND)
+    return np.repeat(around, len(column.objects), axis=-1)
+
+
+def _target(state: State) -> Column:
+    return seeing.alone(state.layout.of_type(TARGET)[0])
 
 
 VIEW = View(

@@ -114,6 +114,9 @@ class WaySkill:
 class ReachSkill:
     """Go over what could be grasped, and stay there.
 
+    Where none of its ways can be gone to the end, it goes over the ends of the last one: there the
+    domain says how to look at what cannot be grasped.
+
     It is at its end as soon as it is over it as far as the domain cares, which may be some steps
     before the end of its way: so that bounds its steps by little.
     """
@@ -135,9 +138,10 @@ class ReachSkill:
         Raises:
             SkillNotApplicableError: There is no way over it.
         """
-        for way in self.ways(state, objects):
+        ways = list(self.ways(state, objects))
+        for way, can_end in [*((way, True) for way in ways), (ways[-1], False)]:
             try:
-                positions = self.timing.positions(way.pieces_over(), way.free)
+                positions = self.timing.positions(way.pieces_over(can_end), way.free)
             except SkillNotApplicableError:
                 continue
             return Follow([(position, 0.0) for position in positions])

@@ -85,14 +85,18 @@ class Way:
             return [descent.up, across, descent.down]
         raise SkillNotApplicableError(f"none of {len(self.ends)} grasps can be reached from here")
 
-    def pieces_over(self) -> list[Path]:
-        """Up and across alone, and then no way down: over an end that can be come down to, if any.
+    def pieces_over(self, can_end: bool) -> list[Path]:
+        """Up and across alone, and then no way down.
+
+        Args:
+            can_end: Whether it must be over an end that can be come down to.
 
         Raises:
-            SkillNotApplicableError: There is no way over any of the ends.
+            SkillNotApplicableError: There is no such way.
         """
-        can_end = [descent for descent in self.descents if descent.down is not None]
-        for descent in can_end or self.descents:
+        for descent in self.descents:
+            if can_end and descent.down is None:
+                continue
             try:
                 across = self._across(descent)
             except MotionPlanningError:
