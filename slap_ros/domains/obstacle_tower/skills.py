@@ -37,7 +37,7 @@ from slap_ros.motion import (
     shifted,
 )
 from slap_ros.physics.features import GRASP_FEATURES, JOINT_FEATURES, POSE_FEATURES, ROBOT
-from slap_ros.physics.panda import GRASP_POINT, grasp_pose
+from slap_ros.physics.panda import GRASP_POINT, JOINTS, MAX_STEP, grasp_pose
 from slap_ros.physics.pose import ORIGIN, Pose, Vector, conjugate, rotate
 from slap_ros.relational import Object, State
 
@@ -57,6 +57,8 @@ ATTEMPTS = 2  # random paths for a motion that needs them; more shorten it by li
 PLANS = PlanCache(attempts=ATTEMPTS)
 REMEMBERED = 1024  # ways: bounded first, planned later
 ROUNDING = 1e-6  # control steps
+LAG = 0.005  # rad, by which an arm may be late without being waited for
+TRIES = 3  # for a position
 
 JOINT_NAMES = tuple(feature.name for feature in JOINT_FEATURES)
 POSE_NAMES = tuple(feature.name for feature in POSE_FEATURES)
@@ -257,23 +259,47 @@ def _checker(
 class Follow:
     """Go to positions one after the other, giving a gripper command with each.
 
-    Closed loop: each step is what is missing from where the arm is.
+    Closed loop: each step is what is missing from where the arm is. A real arm lags behind: what is
+    missing may then be more than a step may be, and is gone as far as one may, in a straight line.
+    Where that leaves a good deal, the same position is tried again, a few times at most, as an arm
+    that is held up never gets there.
     """
 
-    def __init__(self, script: Sequence[tuple[Joints, float]]) -> None:
-        """``script``: positions in rad with gripper commands."""
+    def __init__(self, script: Sequence[tuple[Joints, float]], step: Sequence[float]) -> None:
+        """``script``: positions in rad with gripper commands; ``step``: rad, the most in a step."""
         self._script = deque(script)
+        self._step = np.array(step)
+        self._tries = TRIES
 
     def __call__(self, state: State) -> Action | None:
         """The next action; None at the end of the script."""
         if not self._script:
             return None
-        position, gripper = self._script.popleft()
-        return np.array([*(position - _joints(state)), gripper])
+        position, gripper = self._script[0]
+        missing = position - _joints(state)
+        excess = float((np.abs(missing) / self._step).max())
+        if excess <= 1.0 + ROUNDING:
+            self._next()
+            return np.array([*missing, gripper])
+        self._tries -= 1
+        if self._tries == 0 or float(np.abs(missing).max()) * (1.0 - 1.0 / excess) <= LAG:
+            self._next()
+        else:
+            gripper = 0.0  # not yet
+        return np.array([*(missing / excess), gripper])
+
+    def _next(self) -> None:
+        self._script.popleft()
+        self._tries = TRIES
 
 
 class Timing(Protocol):
     """How paths become positions, one a control step."""
+
+    @property
+    def step(self) -> Sequence[float]:
+        """How far joints may go in a step, rad."""
+        ...
 
     def positions(self, pieces: Sequence[Joints], free: Free) -> Joints:
         """Positions in rad, shape (n, 7), without the start; corners may be cut where free."""
@@ -287,6 +313,8 @@ class Timing(Protocol):
 class AtSpeedLimit:
     """As fast as the joints may move, without stopping in between."""
 
+    step: Sequence[float] = MAX_STEP
+
     def positions(self, pieces: Sequence[Joints], free: Free) -> Joints:
         """See :class:`Timing`."""
         path = np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])])
@@ -299,6 +327,8 @@ class AtSpeedLimit:
 
 class InTens:
     """The paper's timing: ten steps up, ten down, ten for each straight piece across."""
+
+    step: Sequence[float] = (math.pi,) * JOINTS
 
     def positions(self, pieces: Sequence[Joints], free: Free) -> Joints:
         """See :class:`Timing`."""
@@ -357,7 +387,8 @@ class PickSkill:
         Raises:
             SkillNotApplicableError: The block cannot be reached.
         """
-        return Follow(_script(self._way(state, objects), self.timing, GRIP, LIFT))
+        script = _script(self._way(state, objects), self.timing, GRIP, LIFT)
+        return Follow(script, self.timing.step)
 
     def _way(self, state: State, objects: tuple[Object, ...]) -> Way:
         _, block, _ = objects
@@ -384,7 +415,8 @@ class PlaceOnSkill:
         Raises:
             SkillNotApplicableError: The place cannot be reached.
         """
-        return Follow(_script(self._way(state, objects), self.timing, RELEASE, 0.0))
+        script = _script(self._way(state, objects), self.timing, RELEASE, 0.0)
+        return Follow(script, self.timing.step)
 
     def _way(self, state: State, objects: tuple[Object, ...]) -> Way:
         _, _, thing = objects
@@ -420,7 +452,7 @@ class PlaceSkill:
         _, block, table = objects
         for way in _ways_to_table(state, block, table):
             try:
-                return Follow(_script(way, self.timing, RELEASE, 0.0))
+                return Follow(_script(way, self.timing, RELEASE, 0.0), self.timing.step)
             except SkillNotApplicableError:
                 continue
         raise SkillNotApplicableError(f"no place on the table can be reached with {block}")
