@@ -19,6 +19,7 @@ from ensemble.run import RunRequest, run
 from slap_ros.errors import ErrorCode, SlapError
 
 DETECTION_RATE = 30.0  # Hz, at the pace of a real robot
+IN_PROCESS_TIMEOUT = 3.0  # s, for joint positions: all nodes share one process, planning too
 
 
 def solve(seed: int, shortcuts: str, arguments: argparse.Namespace) -> tuple[ErrorCode, int, int]:
@@ -32,7 +33,16 @@ def solve(seed: int, shortcuts: str, arguments: argparse.Namespace) -> tuple[Err
         "noise_seed": seed,
     }
     settings = RunSettings(
-        "obstacle_tower", "fair", seed, 0, "lazy", None, shortcuts=shortcuts, world=MOCK, mock=mock
+        "obstacle_tower",
+        "fair",
+        seed,
+        0,
+        "lazy",
+        None,
+        shortcuts=shortcuts,
+        world=MOCK,
+        mock=mock,
+        bridge={"joint_timeout": IN_PROCESS_TIMEOUT},
     )
     try:
         metrics = run(RunRequest(settings, in_process=True), lambda _type, _message: None)

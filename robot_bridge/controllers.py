@@ -23,6 +23,15 @@ from slap_ros.errors import (
 )
 from slap_ros.robot.limits import Motion
 
+# As MoveIt's configurations of Franka's arms have them; ``ros2 action list`` tells.
+TRAJECTORY_ACTION = "ARM_arm_controller/follow_joint_trajectory"
+GRIPPER_ACTION = "franka_gripper/gripper_action"
+
+
+def action_name(name: str, arm: str) -> str:
+    """An action's name for an arm."""
+    return name.replace("ARM", arm)
+
 
 class Controllers:
     """Clients of the arm's and the gripper's controller."""

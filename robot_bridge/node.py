@@ -15,10 +15,11 @@ ROS Parameters:
     preset (string, "fair"): one that obeys the joints' speed limit.
     seed (int, 0), index (int, 0): the task whose objects there are, unless a scene says so.
     scene (string, ""): a scene file; empty: the sampled task's objects, in frames detected_NAME.
-    arm (string, "fr3"): fr3 or panda: limits, and the prefix of joints and frames.
+    arm (string, "panda"): panda or fr3: limits, and the prefix of joints and frames.
     speed (double, 0.5): fraction of the arm's velocity and acceleration limits, above 0 to 1.
     workspace (double[6]): lowest and highest x, y, z of the fingertips in m, base frame.
-    trajectory_action, gripper_action (string): names of the controllers' actions.
+    trajectory_action, gripper_action (string): names of the controllers' actions; ARM in them is
+        the arm's.
     gripper_scale (double, 0.5): position to be sent for each m between the fingers; Franka's
         action wants half the gap.
     gripper_effort (double, 20.0): N.
@@ -71,7 +72,12 @@ from ensemble.parameters import parameter, read_parameters
 from ensemble.running import run_node
 from ensemble.visualization import markers
 from ensemble.waiting import first_of, seconds
-from robot_bridge.controllers import Controllers
+from robot_bridge.controllers import (
+    GRIPPER_ACTION,
+    TRAJECTORY_ACTION,
+    Controllers,
+    action_name,
+)
 from robot_bridge.senses import Senses
 from slap_ros.domains import Task, get_domain
 from slap_ros.errors import (
@@ -108,13 +114,11 @@ class Parameters:
     seed: int = parameter(0, "samples the task whose objects there are")
     index: int = parameter(0, "which of the seed's tasks")
     scene: str = parameter("", "a scene file; empty: the sampled task's objects")
-    arm: str = parameter("fr3", "fr3 or panda")
+    arm: str = parameter("panda", "panda or fr3")
     speed: float = parameter(0.5, "fraction of the velocity and acceleration limits")
     workspace: tuple[float, ...] = parameter(WORKSPACE, "m, fingertips, lowest x y z, highest")
-    trajectory_action: str = parameter(
-        "fr3_arm_controller/follow_joint_trajectory", "the arm's controller"
-    )
-    gripper_action: str = parameter("franka_gripper/gripper_action", "the gripper's controller")
+    trajectory_action: str = parameter(TRAJECTORY_ACTION, "the arm's controller")
+    gripper_action: str = parameter(GRIPPER_ACTION, "the gripper's controller")
     gripper_scale: float = parameter(0.5, "position to be sent for each m between the fingers")
     gripper_effort: float = parameter(20.0, "N")
     position_noise: float = parameter(0.002, "m, of detections, along each axis")
@@ -149,8 +153,8 @@ class RobotBridge(Node):
         self._senses = Senses(self, self._cell, settings.arm, f"{settings.arm}_link0")
         self._controllers = Controllers(
             self,
-            settings.trajectory_action,
-            settings.gripper_action,
+            action_name(settings.trajectory_action, settings.arm),
+            action_name(settings.gripper_action, settings.arm),
             self._senses.joints,
             settings.controller_timeout,
         )
@@ -280,6 +284,8 @@ class RobotBridge(Node):
         if self._phase in (Phase.STARTING, Phase.FAULT):
             if self._phase is Phase.STARTING and self._controllers.ready:
                 self._start()
+        elif self._phase is Phase.READY:
+            pass  # it stands, whatever the sensors say
         elif now_s - max(self._cell.heard_s, self._since_s) > self._settings.joint_timeout:
             self._fail(NoJointStateError("the robot does not say where its joints are"))
         elif self._phase is Phase.LOOKING:

@@ -8,8 +8,8 @@ as anything moves. For tests, and for trying the bridge out before there is a ro
 ROS Parameters:
     domain (string, "obstacle_tower"), preset (string, "fair"), seed (int, 0), index (int, 0): the
         task in whose initial state the cell is.
-    arm (string, "fr3"): prefix of joints and frames.
-    trajectory_action, gripper_action (string): names of the actions.
+    arm (string, "panda"): prefix of joints and frames.
+    trajectory_action, gripper_action (string): names of the actions, as the bridge's.
     gripper_scale (double, 0.5): position that is sent for each m between the fingers.
     latency (double, 0.02), jitter (double, 0.0): s, of goals and detections.
     pose_noise (double, 0.002): m, standard deviation of detections along each axis.
@@ -57,6 +57,7 @@ from ensemble.interfaces import JOINT_STATES, TF
 from ensemble.parameters import parameter, read_parameters
 from ensemble.running import run_node
 from ensemble.waiting import seconds
+from robot_bridge.controllers import GRIPPER_ACTION, TRAJECTORY_ACTION, action_name
 from robot_bridge.mock.noise import Disturbance, Noise
 from robot_bridge.mock.plant import Plant
 from slap_ros.domains import get_domain
@@ -76,11 +77,9 @@ class Parameters:
     preset: str = parameter("fair", "as the bridge's")
     seed: int = parameter(0, "samples the task")
     index: int = parameter(0, "which of the seed's tasks")
-    arm: str = parameter("fr3", "prefix of joints and frames")
-    trajectory_action: str = parameter(
-        "fr3_arm_controller/follow_joint_trajectory", "the arm's controller"
-    )
-    gripper_action: str = parameter("franka_gripper/gripper_action", "the gripper's controller")
+    arm: str = parameter("panda", "prefix of joints and frames")
+    trajectory_action: str = parameter(TRAJECTORY_ACTION, "the arm's controller")
+    gripper_action: str = parameter(GRIPPER_ACTION, "the gripper's controller")
     gripper_scale: float = parameter(0.5, "position that is sent for each m between the fingers")
     latency: float = parameter(0.02, "s, of goals and detections")
     jitter: float = parameter(0.0, "s, at most, on top of the latency")
@@ -120,12 +119,17 @@ class MockRobot(Node):
         self._arm = ActionServer(
             self,
             FollowJointTrajectory,
-            settings.trajectory_action,
+            action_name(settings.trajectory_action, settings.arm),
             self._move,
             goal_callback=self._on_motion,
             cancel_callback=lambda _: CancelResponse.ACCEPT,
         )
-        self._gripper = ActionServer(self, GripperCommand, settings.gripper_action, self._grip)
+        self._gripper = ActionServer(
+            self,
+            GripperCommand,
+            action_name(settings.gripper_action, settings.arm),
+            self._grip,
+        )
         self.create_timer(1.0 / settings.joint_rate, self._tell_joints)
         self.create_timer(1.0 / settings.rate, self._detect)
         self.create_timer(POST_PERIOD, self._deliver)
