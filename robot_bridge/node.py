@@ -101,6 +101,7 @@ from slap_ros.robot.tracking import Sensing
 from slap_ros.robot.workplace import Workplace, read_workplace, sampled_workplace
 
 MEASURED = -1  # seed of a task that was not sampled
+GAP_AGE = 0.1  # s, by which told finger positions may be older than their stamp: drivers merge them
 LOOK_PERIOD = 0.02  # s, between two looks at what is measured
 WORKSPACE = (*Workspace().low, *Workspace().high)
 
@@ -262,7 +263,7 @@ class RobotBridge(Node):
         await self._controllers.grip(
             gap * settings.gripper_scale, settings.gripper_effort, settings.gripper_timeout
         )
-        done_s = seconds(self)
+        done_s = seconds(self) + GAP_AGE
         late_s = done_s + settings.joint_timeout
         await first_of(
             self,

@@ -37,7 +37,7 @@ GAP_OPEN = 2.0 * FINGER_OPEN  # m, between the fingers
 GAP_SHUT = 0.0  # m
 GRASPED = 0.5  # of the expected gap; with less there is nothing between the fingers
 FOLLOWS = 0.03  # m, between a held object and where the hand has it; further away it was lost
-STANDS = 0.02  # rad/s, of each joint of an arm at rest
+STANDS = 0.05  # rad/s, of each joint of an arm at rest
 
 
 class Grip(Enum):
