@@ -213,7 +213,10 @@ class RobotBridge(Node):
     def _on_command(self, message: RobotCommand) -> None:
         try:
             self._check_moment(message)
+            self._require_joints()
             step = self._cell.plan(decode_command(message))
+        except NoJointStateError as error:
+            self._fail(error)
         except StaleCommandError as error:
             self._refuse("stale_commands", error)
         except InvalidCommandError as error:
@@ -232,6 +235,11 @@ class RobotBridge(Node):
                 f"the robot is at episode {self._episode}, step {self._step}, "
                 f"{self._phase.value}"
             )
+
+    def _require_joints(self) -> None:
+        silence = seconds(self) - self._cell.heard_s
+        if silence > self._settings.joint_timeout:
+            raise NoJointStateError(f"no joint positions for {silence:.1f} s")
 
     def _refuse(self, kind: str, error: SlapError) -> None:
         self._counts[kind] += 1
@@ -288,7 +296,7 @@ class RobotBridge(Node):
         elif self._phase is Phase.READY:
             pass  # it stands, whatever the sensors say
         elif now_s - max(self._cell.heard_s, self._since_s) > self._settings.joint_timeout:
-            self._fail(NoJointStateError("the robot does not say where its joints are"))
+            self._fail(NoJointStateError(f"no joint positions: {self._phase.value}"))
         elif self._phase is Phase.LOOKING:
             self._measure(now_s)
 
@@ -394,8 +402,7 @@ class RobotBridge(Node):
             raise BusyError("the arm moves: cancel the task first")
         state = self._cell.look(self._since_s)
         if state is None:
-            if seconds(self) - self._cell.heard_s > self._settings.joint_timeout:
-                raise NoJointStateError("the robot does not say where its joints are")
+            self._require_joints()
             raise self._blind()
         self._goal = decode_goal(request.goal, self._domain.atom_space(state))
         self._open_episode(state)

@@ -9,9 +9,11 @@ from collections import Counter
 from geometry_msgs.msg import TransformStamped
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from ensemble.interfaces import JOINT_STATES, SENSED, TF, TF_STATIC
+from ensemble.waiting import seconds
 from slap_ros.errors import InvalidMeasurementError
 from slap_ros.messages.decode import NANOSECONDS, stamp_ns
 from slap_ros.physics.pose import Pose
@@ -20,6 +22,7 @@ from slap_ros.robot.frames import StaticFrames
 from slap_ros.robot.tracking import measured_pose
 
 FINGERS = 2
+AHEAD = 0.05  # s, by which clocks of machines may differ
 
 
 class Senses:
@@ -45,7 +48,9 @@ class Senses:
 
     def _on_joints(self, message: JointState) -> None:
         """The arm's joints, the fingers', or both; others are none of ours."""
-        stamp_s = stamp_ns(message.header) / NANOSECONDS
+        stamp_s = self._stamp_s(message.header)
+        if stamp_s is None:
+            return
         at = dict(zip(message.name, message.position, strict=False))
         speed = dict(zip(message.name, message.velocity, strict=False))
         if all(name in at for name in self._fingers):
@@ -76,7 +81,9 @@ class Senses:
             base = self._frames.in_base(item.header.frame_id)
             if base is None:
                 continue  # not seen from the robot
-            stamp_s = stamp_ns(item.header) / NANOSECONDS
+            stamp_s = self._stamp_s(item.header)
+            if stamp_s is None:
+                continue
             position, quaternion = _parts(item)
             try:
                 self._cell.see(item.child_frame_id, stamp_s, base, Pose(position, quaternion))
@@ -85,9 +92,23 @@ class Senses:
             else:
                 self.counts["detections"] += 1
 
+    def _stamp_s(self, header: Header) -> float | None:
+        """When something was measured; None where that is still to come.
+
+        From a clock that is ahead, what is older than the last motion would look newer.
+        """
+        stamp_s = stamp_ns(header) / NANOSECONDS
+        ahead_s = stamp_s - seconds(self._node)
+        if ahead_s <= AHEAD:
+            return stamp_s
+        self._refuse(
+            InvalidMeasurementError(f"a measurement of {header.frame_id} is {ahead_s:.3f} s ahead")
+        )
+        return None
+
     def _refuse(self, error: InvalidMeasurementError) -> None:
         self.counts["refused_measurements"] += 1
-        self._node.get_logger().debug(str(error))
+        self._node.get_logger().debug(f"refused: {error}")
 
 
 def _parts(

@@ -16,7 +16,12 @@ from enum import Enum
 
 from slap_ros.domains import Domain
 from slap_ros.domains.domain import Action
-from slap_ros.errors import InvalidMeasurementError, InvalidParameterError, InvalidStateError
+from slap_ros.errors import (
+    InvalidMeasurementError,
+    InvalidParameterError,
+    InvalidStateError,
+    UnsafeCommandError,
+)
 from slap_ros.physics.features import (
     GRASP_FEATURES,
     JOINT_FEATURES,
@@ -37,6 +42,7 @@ GAP_OPEN = 2.0 * FINGER_OPEN  # m, between the fingers
 GAP_SHUT = 0.0  # m
 GRASPED = 0.5  # of the expected gap; with less there is nothing between the fingers
 FOLLOWS = 0.03  # m, between a held object and where the hand has it; further away it was lost
+DRIFT = 0.02  # rad, of a joint of an arm that is taken to stand
 STANDS = 0.05  # rad/s, of each joint of an arm at rest
 
 
@@ -261,7 +267,8 @@ class Cell:
 
         Raises:
             InvalidCommandError: It is not in the domain's action space.
-            UnsafeCommandError: It would take the arm beyond its limits; see :class:`Limits`.
+            UnsafeCommandError: It would take the arm beyond its limits, see :class:`Limits`; or the
+                arm is no longer where it was measured.
             InvalidStateError: There is no state yet.
         """
         if self._state is None:
@@ -269,6 +276,11 @@ class Cell:
         self._world.reset(self._state)
         after = self._world.step(action)
         start, target = (_values(s, self._robot, JOINT_FEATURES) for s in (self._state, after))
+        moved = self.distance(start)
+        if moved > DRIFT:
+            raise UnsafeCommandError(
+                f"the arm was moved by {moved:.3f} rad since it was measured: call reset_task"
+            )
         motion = self.limits.motion(start, target, self.domain.control_period_s)
         return Step(self._grip(after), motion)
 

@@ -224,6 +224,19 @@ def test_poses_that_are_none_are_refused_and_counted(network):
         assert bench.states[-1].objects[1].features == bench.states[0].objects[1].features
 
 
+def test_a_clock_that_is_ahead_is_not_believed(network):
+    with lab() as bench:
+        publisher = bench.client.create_publisher(JOINT_STATES.type, JOINT_STATES.name, 10)
+        bench.until(lambda: publisher.get_subscription_count() >= 1)
+        ahead = bench.client.get_clock().now().to_msg()
+        ahead.sec += 60
+        names = [f"panda_joint{i + 1}" for i in range(7)]
+        publisher.publish(JointState(header=Header(stamp=ahead), name=names, position=STILL))
+        bench.until(lambda: int(bench.health.get("refused_measurements", 0)) > 0)
+        bench.step()
+        assert bench.states[-1].objects[0].features == bench.states[0].objects[0].features
+
+
 def test_a_reset_opens_an_episode_as_measured_and_ends_a_fault(network):
     with lab({"fault": "abort", "fault_after": 1}) as bench:
         bench.step()

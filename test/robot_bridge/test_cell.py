@@ -196,6 +196,17 @@ def test_commands_are_checked_twice():
     assert tight.cell.plan(STEPS).motion.target == pytest.approx(tight.joints())
 
 
+def test_an_arm_that_was_moved_by_hand_is_not_sent_on():
+    """The motion was timed for the way from where it was measured."""
+    bench = Bench()
+    bench.measure()
+    bench.cell.look(0.0)
+    elsewhere = tuple(q + 0.3 for q in bench.joints())
+    bench.cell.feel(Reading(bench.now + 0.1, elsewhere))
+    with pytest.raises(UnsafeCommandError, match=r"was moved by 0\.300 rad"):
+        bench.cell.plan(STEPS)
+
+
 def test_an_arm_never_enters_the_table_whatever_is_commanded():
     """Commands that go down and down end on it: a state with the arm in the table is refused."""
     bench = Bench(limits=PANDA.scaled(1.0, Workspace((0.0, -0.8, 0.0), (0.9, 0.8, 0.9))))
