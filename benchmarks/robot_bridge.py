@@ -19,7 +19,7 @@ from ensemble.run import RunRequest, run
 from slap_ros.errors import ErrorCode, SlapError
 
 DETECTION_RATE = 30.0  # Hz, at the pace of a real robot
-IN_PROCESS_TIMEOUT = 3.0  # s, for joint positions: all nodes share one process, planning too
+PATIENCE = 10.0  # s, for sensors and controllers: all nodes share one process, planning too
 
 
 def solve(seed: int, shortcuts: str, arguments: argparse.Namespace) -> tuple[ErrorCode, int, int]:
@@ -42,7 +42,11 @@ def solve(seed: int, shortcuts: str, arguments: argparse.Namespace) -> tuple[Err
         shortcuts=shortcuts,
         world=MOCK,
         mock=mock,
-        bridge={"joint_timeout": IN_PROCESS_TIMEOUT},
+        bridge={
+            "joint_timeout": PATIENCE,
+            "detection_timeout": PATIENCE,
+            "controller_timeout": PATIENCE,
+        },
     )
     try:
         metrics = run(RunRequest(settings, in_process=True), lambda _type, _message: None)
