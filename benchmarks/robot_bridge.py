@@ -14,9 +14,10 @@ import sys
 from statistics import mean
 
 from benchmarks.printing import show
-from ensemble.nodes import MOCK, RunSettings
+from ensemble.nodes import RunSettings
 from ensemble.run import RunRequest, run
 from slap_ros.errors import ErrorCode, SlapError
+from slap_ros.robot.worlds import MOCK
 
 DETECTION_RATE = 30.0  # Hz, at the pace of a real robot
 PATIENCE = 10.0  # s, for sensors and controllers: all nodes share one process, planning too

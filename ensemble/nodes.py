@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from slap_ros.robot.worlds import MOCK, SIM
 from slap_ros.shortcuts.shortcut import DEFAULT
 
 # A node is started by the name of its package.
@@ -22,7 +23,6 @@ CLASSES = {
 }
 
 
-SIM, ROBOT, MOCK = WORLDS = ("sim", "robot", "mock")
 # s without a state after which a skill is given up: a robot takes its time to move and to look.
 ROBOT_STATE_TIMEOUT = 8.0
 

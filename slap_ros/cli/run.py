@@ -38,9 +38,8 @@ from slap_ros.planning.execution import MAX_REPLANS
 from slap_ros.planning.planner import make_planner
 from slap_ros.relational.pddl import parse_goal
 from slap_ros.report import check_output
+from slap_ros.robot.worlds import MOCK, ROBOT, SIM, WORLDS
 from slap_ros.shortcuts.shipped import chosen_library
-
-SIM, ROBOT, MOCK = WORLDS = ("sim", "robot", "mock")
 
 
 def run(
@@ -77,7 +76,7 @@ def run(
         typer.Option(
             help="sim, robot (see docs/real-robot.md), or mock: a robot that is not there."
         ),
-    ] = "sim",
+    ] = SIM,
     scene: Annotated[
         Path | None, typer.Option(help="What stands around the robot: a scene file.")
     ] = None,
@@ -88,7 +87,7 @@ def run(
 ) -> int:
     """Run the whole ensemble on one task: simulator, perception, planner, skills, recorder."""
     # Everything that can be refused is refused before a node is started.
-    _check_world(world, scene, mock)
+    check_world(world, scene, mock)
     chosen = get_domain(domain, preset)
     task = chosen.task(seed, index)
     atoms = parse_goal(goal, chosen.atom_space(task.initial_state)) if goal else frozenset()
@@ -142,7 +141,12 @@ def run(
     return int(metrics.error_code) or code
 
 
-def _check_world(world: str, scene: Path | None, mock: str) -> None:
+def check_world(world: str, scene: Path | None, mock: str) -> None:
+    """Refuse a world that there is not, or what is meant for another one.
+
+    Raises:
+        InvalidParameterError: Says which.
+    """
     if world not in WORLDS:
         raise InvalidParameterError(f"--world must be one of {', '.join(WORLDS)}, not {world!r}")
     if scene is not None and world != ROBOT:

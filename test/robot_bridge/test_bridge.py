@@ -3,6 +3,7 @@
 """The whole ensemble on a mock robot; and whatever goes wrong there leaves the robot holding."""
 
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 import rclpy
@@ -22,6 +23,7 @@ from ensemble.nodes import RunSettings, node_parameters
 from ensemble.run import RunRequest, Spinner, run
 from robot_bridge.mock.options import mock_options
 from slap_ros.bags import evaluate_bag
+from slap_ros.cli.run import check_world
 from slap_ros.errors import ErrorCode, InvalidParameterError
 from slap_ros.messages.interfaces import STATE
 
@@ -287,3 +289,16 @@ def test_options_of_the_mock_robot_have_types_and_names():
     for wrong in ("speed=1", "latency=soon", "domain=obstacle2d"):
         with pytest.raises(InvalidParameterError, match="mock robot"):
             mock_options(wrong)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("moon", None, ""), "--world must be one of sim, robot, mock"),
+        (("sim", Path("x.yaml"), ""), "not for --world sim"),
+        (("robot", None, "latency=0.1"), "for --world mock"),
+    ],
+)
+def test_the_command_line_refuses_what_does_not_fit(arguments, words):
+    with pytest.raises(InvalidParameterError, match=words):
+        check_world(*arguments)
