@@ -19,6 +19,7 @@ PACKAGES = [
     "planner_node",
     "skill_server",
     "recorder_node",
+    "robot_bridge",
 ]
 NODES = [package for package in PACKAGES if package not in ("slap_ros", "ensemble")]
 
@@ -137,6 +138,7 @@ setup(
         "console_scripts": [
             "slap = slap_ros.cli:main",
             *(f"{node} = {node}.node:main" for node in NODES),
+            "mock_robot = robot_bridge.mock.node:main",
         ],
         "embedded_ros.interfaces": ["slap_msgs = msg_schemas"],
     },

@@ -47,6 +47,13 @@ LATCHED = _reliable(1, DurabilityPolicy.TRANSIENT_LOCAL)
 EPISODE = _reliable(1000, DurabilityPolicy.TRANSIENT_LOCAL)
 # From now on: for whoever must not act on the past.
 FRESH = _reliable(1000, DurabilityPolicy.VOLATILE)
+# Whatever a robot's driver offers, reliable or not; what is old is of no use.
+SENSED = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST,
+    depth=100,
+    reliability=ReliabilityPolicy.BEST_EFFORT,
+    durability=DurabilityPolicy.VOLATILE,
+)
 
 
 @dataclass(frozen=True)
@@ -75,6 +82,7 @@ SKILL_EVENTS = Topic("slap/skill_events", SkillEvent, EPISODE)
 DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, FRESH)
 MARKERS = Topic("slap/markers", MarkerArray, EPISODE)
 TF = Topic("/tf", TFMessage, _reliable(100, DurabilityPolicy.VOLATILE))
+TF_STATIC = Topic("/tf_static", TFMessage, _reliable(100, DurabilityPolicy.TRANSIENT_LOCAL))
 JOINT_STATES = Topic("joint_states", JointState, EPISODE)
 RECORDED = (
     DOMAIN,

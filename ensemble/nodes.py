@@ -5,19 +5,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from slap_ros.robot.worlds import MOCK, SIM
 from slap_ros.shortcuts.shortcut import DEFAULT
 
-# A node's name is that of its package as well.
+# A node is started by the name of its package.
 CLASSES = {
     "sim_node": "SimNode",
+    "robot_bridge": "RobotBridge",
+    "robot_bridge.mock": "MockRobot",
     "perception_node": "PerceptionNode",
     "skill_server": "SkillServer",
     "planner_node": "PlannerNode",
     "recorder_node": "RecorderNode",
 }
+
+
+# s without a state after which a skill is given up: a robot takes its time to move and to look.
+ROBOT_STATE_TIMEOUT = 8.0
 
 
 @dataclass(frozen=True)
@@ -33,6 +40,11 @@ class RunSettings:
     pace: float = 0.0  # environment steps a second; 0: as fast as commands come
     shortcuts: str = ""  # a library's folder, or none; empty: the shipped one
     samples: int = DEFAULT.samples  # attempts of a shortcut in the model
+    world: str = SIM  # the simulator, a robot, or the bridge with a mock robot behind it
+    scene: str = ""  # a robot's scene file; empty: the objects of the sampled task
+    # Parameters of the mock robot, and of the bridge, that are not the default.
+    mock: Mapping[str, str | int | float] = field(default_factory=dict)
+    bridge: Mapping[str, str | int | float] = field(default_factory=dict)
 
 
 def node_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int | float]]:
@@ -40,18 +52,30 @@ def node_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int |
     learned: dict[str, str | int | float] = {"samples": settings.samples}
     if settings.shortcuts:
         learned["shortcuts"] = settings.shortcuts
+    waiting = {} if settings.world == SIM else {"state_timeout": ROBOT_STATE_TIMEOUT}
     nodes: dict[str, Mapping[str, str | int | float]] = {
-        "sim_node": {
-            "domain": settings.domain,
-            "preset": settings.preset,
-            "seed": settings.seed,
-            "index": settings.index,
-            "pace": settings.pace,
-        },
+        **_world_parameters(settings),
         "perception_node": {},
-        "skill_server": learned,
+        "skill_server": learned | waiting,
         "planner_node": {"planner": settings.planner, **learned},
     }
     if settings.record is not None:
         nodes["recorder_node"] = {"bag": str(settings.record)}
     return nodes
+
+
+def _world_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int | float]]:
+    """Whatever is in the world's place."""
+    task: dict[str, str | int | float] = {
+        "domain": settings.domain,
+        "preset": settings.preset,
+        "seed": settings.seed,
+        "index": settings.index,
+    }
+    if settings.world == SIM:
+        return {"sim_node": task | {"pace": settings.pace}}
+    scene = {"scene": settings.scene} if settings.scene else {}
+    bridge = {"robot_bridge": task | scene | dict(settings.bridge)}
+    if settings.world == MOCK:
+        return {"robot_bridge.mock": task | dict(settings.mock)} | bridge
+    return bridge

@@ -51,6 +51,14 @@ class ErrorCode(IntEnum):
     # 70-89: simulator and robot bridge
     INVALID_COMMAND = 70
     STALE_COMMAND = 71
+    UNSAFE_COMMAND = 72
+    CONTROLLER_REJECTED = 73
+    CONTROLLER_ABORTED = 74
+    CONTROLLER_TIMEOUT = 75
+    NO_JOINT_STATE = 76
+    NO_DETECTION = 77
+    INVALID_MEASUREMENT = 78
+    INVALID_SCENE = 79
 
     # 90-109: bags
     DAMAGED_BAG = 90
@@ -209,6 +217,54 @@ class StaleCommandError(SlapError):
     """A command that answers another state than the current one."""
 
     code = ErrorCode.STALE_COMMAND
+
+
+class UnsafeCommandError(SlapError):
+    """A command that would take a real arm beyond its limits or out of its workspace."""
+
+    code = ErrorCode.UNSAFE_COMMAND
+
+
+class ControllerRejectedError(SlapError):
+    """A controller of the robot did not accept a goal."""
+
+    code = ErrorCode.CONTROLLER_REJECTED
+
+
+class ControllerAbortedError(SlapError):
+    """A controller of the robot gave a goal up."""
+
+    code = ErrorCode.CONTROLLER_ABORTED
+
+
+class ControllerTimeoutError(SlapError):
+    """A controller of the robot is not there, or did not answer in time."""
+
+    code = ErrorCode.CONTROLLER_TIMEOUT
+
+
+class NoJointStateError(SlapError):
+    """The robot does not say where its joints are."""
+
+    code = ErrorCode.NO_JOINT_STATE
+
+
+class NoDetectionError(SlapError):
+    """An object is not detected."""
+
+    code = ErrorCode.NO_DETECTION
+
+
+class InvalidMeasurementError(SlapError):
+    """A measurement that is not finite, no pose at all, or older than one already known."""
+
+    code = ErrorCode.INVALID_MEASUREMENT
+
+
+class InvalidSceneError(SlapError):
+    """A description of a real scene that is missing, malformed or of another domain."""
+
+    code = ErrorCode.INVALID_SCENE
 
 
 class DamagedBagError(SlapError):

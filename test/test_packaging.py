@@ -38,7 +38,14 @@ def checkout(tmp_path):
     return tmp_path
 
 
-NODES = ("sim_node", "perception_node", "planner_node", "skill_server", "recorder_node")
+NODES = (
+    "sim_node",
+    "perception_node",
+    "planner_node",
+    "skill_server",
+    "recorder_node",
+    "robot_bridge",
+)
 PACKAGE_FOLDERS = ("slap_ros", "ensemble", *NODES, "msg_schemas", "resource", "launch", "config")
 
 

@@ -29,6 +29,7 @@ from slap_ros.cli.render import render as write_animation
 from slap_ros.cli.report import write_report
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts
 from slap_ros.domains import get_domain
+from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.metrics import RunMetrics
 from slap_ros.messages.decode import decode_state
 from slap_ros.messages.events import PlanEventKind, SkillEventKind
@@ -37,6 +38,7 @@ from slap_ros.planning.execution import MAX_REPLANS
 from slap_ros.planning.planner import make_planner
 from slap_ros.relational.pddl import parse_goal
 from slap_ros.report import check_output
+from slap_ros.robot.worlds import MOCK, ROBOT, SIM, WORLDS
 from slap_ros.shortcuts.shipped import chosen_library
 
 
@@ -69,10 +71,23 @@ def run(
     live: Annotated[
         bool, typer.Option("--live", help="Show plan and progress in place, on a terminal.")
     ] = False,
+    world: Annotated[
+        str,
+        typer.Option(
+            help="sim, robot (see docs/real-robot.md), or mock: a robot that is not there."
+        ),
+    ] = SIM,
+    scene: Annotated[
+        Path | None, typer.Option(help="What stands around the robot: a scene file.")
+    ] = None,
+    mock: Annotated[
+        str, typer.Option(help="The mock robot's parameters, as latency=0.05,pose_noise=0.003.")
+    ] = "",
     json: Json = False,
 ) -> int:
     """Run the whole ensemble on one task: simulator, perception, planner, skills, recorder."""
     # Everything that can be refused is refused before a node is started.
+    check_world(world, scene, mock)
     chosen = get_domain(domain, preset)
     task = chosen.task(seed, index)
     atoms = parse_goal(goal, chosen.atom_space(task.initial_state)) if goal else frozenset()
@@ -89,11 +104,23 @@ def run(
     from ensemble.nodes import RunSettings
     from ensemble.run import RunRequest
     from ensemble.run import run as run_ensemble
+    from robot_bridge.mock.options import mock_options
 
     states = []
     with _bag(record, report, f"{domain}-{seed}") as bag:
         settings = RunSettings(
-            domain, preset, seed, index, planner, bag, pace, shortcuts or "", samples
+            domain,
+            preset,
+            seed,
+            index,
+            planner,
+            bag,
+            pace,
+            shortcuts or "",
+            samples,
+            world,
+            str(scene or ""),
+            mock_options(mock),
         )
         request = RunRequest(settings, atoms, 0, max_replans, timeout, in_process)
         with _narrator(live) as narrate:
@@ -112,6 +139,20 @@ def run(
         decoded = [decode_state(message, chosen.types_by_name) for message in states]
         write_animation(chosen, decoded, render)
     return int(metrics.error_code) or code
+
+
+def check_world(world: str, scene: Path | None, mock: str) -> None:
+    """Refuse a world that there is not, or what is meant for another one.
+
+    Raises:
+        InvalidParameterError: Says which.
+    """
+    if world not in WORLDS:
+        raise InvalidParameterError(f"--world must be one of {', '.join(WORLDS)}, not {world!r}")
+    if scene is not None and world != ROBOT:
+        raise InvalidParameterError(f"--scene is what is around a robot, not for --world {world}")
+    if mock and world != MOCK:
+        raise InvalidParameterError(f"--mock is for --world mock, not for --world {world}")
 
 
 @contextmanager

@@ -133,6 +133,16 @@ class Sight:
         )
         self._kinds = self._of_kinds()
         self.actions = action_map(domain, signature)
+        layout = space.layout
+        self.robot_features = np.array(  # where a state has the robot's own
+            [
+                layout.column(obj, feature.name)
+                for kind in sorted(domain.unread_types, key=str)
+                for obj in layout.of_type(kind)
+                for feature in kind.features
+            ],
+            dtype=np.intp,
+        )
 
     def _group(self, wanted: bool, predicate: Predicate, atoms: Sequence[GroundAtom]) -> _Atoms:
         columns = tuple(Column(objs) for objs in zip(*(a.objects for a in atoms), strict=True))

@@ -334,7 +334,7 @@ class MotionSkill:
         Raises:
             SkillNotApplicableError: There is no way for the arm.
         """
-        return Follow(_script(self, state, objects))
+        return Follow(_script(self, state, objects), self.timing.step)
 
 
 @remembered

@@ -13,7 +13,7 @@ import numpy as np
 
 from slap_ros.domains.domain import Action, Policy
 from slap_ros.domains.tabletop.reading import joints_of
-from slap_ros.domains.tabletop.timing import Timing
+from slap_ros.domains.tabletop.timing import ROUNDING, Timing
 from slap_ros.domains.tabletop.ways import Way
 from slap_ros.errors import SkillNotApplicableError
 from slap_ros.motion import Joints, linear_motion, shifted
@@ -22,6 +22,8 @@ from slap_ros.relational import Object, State
 
 STEP_LIMIT = 100  # environment steps
 GRIP, RELEASE = 1.0, -1.0  # gripper commands
+LAG = 0.005  # rad, by which an arm may be late without being waited for
+TRIES = 3  # for a position
 
 # To where it may go from a state, in the order in which it is tried.
 Ways = Callable[[State, tuple[Object, ...]], Iterable[Way]]
@@ -30,19 +32,38 @@ Ways = Callable[[State, tuple[Object, ...]], Iterable[Way]]
 class Follow:
     """Go to positions one after the other, giving a gripper command with each.
 
-    Closed loop: each step is what is missing from where the arm is.
+    Closed loop: each step is what is missing from where the arm is. A real arm lags behind: what is
+    missing may then be more than a step may be, and is gone as far as one may, in a straight line.
+    Where that leaves a good deal, the same position is tried again, a few times at most, as an arm
+    that is held up never gets there.
     """
 
-    def __init__(self, script: Sequence[tuple[Joints, float]]) -> None:
-        """``script``: positions in rad with gripper commands."""
+    def __init__(self, script: Sequence[tuple[Joints, float]], step: Sequence[float]) -> None:
+        """``script``: positions in rad with gripper commands; ``step``: rad, the most in a step."""
         self._script = deque(script)
+        self._step = np.array(step)
+        self._tries = TRIES
 
     def __call__(self, state: State) -> Action | None:
         """The next action; None at the end of the script."""
         if not self._script:
             return None
-        position, gripper = self._script.popleft()
-        return np.array([*(position - joints_of(state)), gripper])
+        position, gripper = self._script[0]
+        missing = position - joints_of(state)
+        excess = float((np.abs(missing) / self._step).max())
+        if excess <= 1.0 + ROUNDING:
+            self._next()
+            return np.array([*missing, gripper])
+        self._tries -= 1
+        if self._tries == 0 or float(np.abs(missing).max()) * (1.0 - 1.0 / excess) <= LAG:
+            self._next()
+        else:
+            gripper = 0.0  # not yet
+        return np.array([*(missing / excess), gripper])
+
+    def _next(self) -> None:
+        self._script.popleft()
+        self._tries = TRIES
 
 
 @dataclass(frozen=True)
@@ -88,7 +109,7 @@ class WaySkill:
         """
         for way in self.ways(state, objects):
             try:
-                return Follow(self._script(way))
+                return Follow(self._script(way), self.timing.step)
             except SkillNotApplicableError:
                 continue
         raise _no_way(self.name, objects)
@@ -144,7 +165,7 @@ class ReachSkill:
                 positions = self.timing.positions(way.pieces_over(can_end), way.free)
             except SkillNotApplicableError:
                 continue
-            return Follow([(position, 0.0) for position in positions])
+            return Follow([(position, 0.0) for position in positions], self.timing.step)
         raise _no_way(self.name, objects)
 
 

@@ -11,12 +11,18 @@ from typing import Protocol
 import numpy as np
 
 from slap_ros.motion import Free, Joints, Path, path_steps, retime, retime_in_tens
+from slap_ros.physics.panda import JOINTS, MAX_STEP
 
 ROUNDING = 1e-6  # control steps
 
 
 class Timing(Protocol):
     """How paths become positions, one a control step."""
+
+    @property
+    def step(self) -> Sequence[float]:
+        """How far joints may go in a step, rad."""
+        ...
 
     def positions(self, pieces: Sequence[Path], free: Free) -> Joints:
         """Positions in rad, shape (n, 7), without the start; corners may be cut where free."""
@@ -30,6 +36,8 @@ class Timing(Protocol):
 class AtSpeedLimit:
     """As fast as the joints may move, without stopping in between."""
 
+    step: Sequence[float] = MAX_STEP
+
     def positions(self, pieces: Sequence[Path], free: Free) -> Joints:
         """See :class:`Timing`."""
         path = np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])])
@@ -42,6 +50,8 @@ class AtSpeedLimit:
 
 class InTens:
     """The paper's timing: ten steps up, ten down, ten for each straight piece across."""
+
+    step: Sequence[float] = (math.pi,) * JOINTS
 
     def positions(self, pieces: Sequence[Path], free: Free) -> Joints:
         """See :class:`Timing`."""

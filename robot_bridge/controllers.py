@@ -1,0 +1,137 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The robot's controllers: one short goal at a time, each ending with the robot at rest."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from action_msgs.msg import GoalStatus
+from builtin_interfaces.msg import Duration
+from control_msgs.action import FollowJointTrajectory, GripperCommand
+from control_msgs.msg import GripperCommand as GripperGoal
+from rclpy.action import ActionClient
+from rclpy.node import Node
+from rclpy.task import Future
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from ensemble.waiting import first_of, seconds
+from slap_ros.errors import (
+    ControllerAbortedError,
+    ControllerRejectedError,
+    ControllerTimeoutError,
+)
+from slap_ros.robot.limits import Motion
+
+# As MoveIt's configurations of Franka's arms have them; ``ros2 action list`` tells.
+TRAJECTORY_ACTION = "ARM_arm_controller/follow_joint_trajectory"
+GRIPPER_ACTION = "franka_gripper/gripper_action"
+
+
+def action_name(name: str, arm: str) -> str:
+    """An action's name for an arm."""
+    return name.replace("ARM", arm)
+
+
+class Controllers:
+    """Clients of the arm's and the gripper's controller."""
+
+    def __init__(self, node: Node, arm: str, gripper: str, joints: list[str], grace_s: float):
+        """Names of both actions and of the joints; goals may take ``grace_s`` longer than asked."""
+        self._node, self._joints, self._grace_s = node, joints, grace_s
+        self._arm = ActionClient(node, FollowJointTrajectory, arm)
+        self._gripper = ActionClient(node, GripperCommand, gripper)
+        self._names = {self._arm: arm, self._gripper: gripper}
+        self._active: Any = None  # handle of the goal under way
+
+    def destroy(self) -> None:
+        """Destroy the clients."""
+        self._arm.destroy()
+        self._gripper.destroy()
+
+    @property
+    def ready(self) -> bool:
+        """Whether both controllers are there."""
+        return bool(self._arm.server_is_ready() and self._gripper.server_is_ready())
+
+    async def move(self, motion: Motion) -> None:
+        """Move the arm; a safe motion is the only kind there is.
+
+        Raises:
+            ControllerRejectedError: The goal was not accepted.
+            ControllerAbortedError: It was given up, or canceled.
+            ControllerTimeoutError: No controller, or no answer in time; the goal is canceled.
+        """
+        goal = FollowJointTrajectory.Goal(trajectory=trajectory(motion, self._joints))
+        outcome = await self._run(self._arm, goal, motion.duration_s + self._grace_s)
+        if outcome.status != GoalStatus.STATUS_SUCCEEDED:
+            result = outcome.result
+            raise ControllerAbortedError(
+                f"{self._names[self._arm]} gave a motion up: code {result.error_code}, "
+                f"{result.error_string or 'no reason given'}"
+            )
+
+    async def grip(self, position: float, effort: float, limit_s: float) -> None:
+        """Move the fingers, or close them around something.
+
+        Args:
+            position: As the controller wants it.
+            effort: N.
+            limit_s: How long it may take.
+
+        Raises:
+            ControllerRejectedError: As above.
+            ControllerAbortedError: As above; not where the fingers stalled at something.
+            ControllerTimeoutError: As above.
+        """
+        command = GripperGoal(position=position, max_effort=effort)
+        outcome = await self._run(self._gripper, GripperCommand.Goal(command=command), limit_s)
+        if outcome.status != GoalStatus.STATUS_SUCCEEDED and not outcome.result.stalled:
+            raise ControllerAbortedError(f"{self._names[self._gripper]} gave a goal up")
+
+    def hold(self) -> None:
+        """Have the goal under way canceled, if there is one: controllers then hold."""
+        if self._active is not None:
+            self._active.cancel_goal_async()
+            self._active = None
+
+    async def _run(self, client: ActionClient, goal: object, limit_s: float) -> Any:
+        name = self._names[client]
+        if not client.server_is_ready():
+            raise ControllerTimeoutError(f"{name} is not there: is the controller running?")
+        end = seconds(self._node) + limit_s
+        sent = client.send_goal_async(goal)
+        if not await first_of(self._node, sent, lambda: seconds(self._node) > end):
+            sent.add_done_callback(_cancel)  # should it be accepted after all
+            raise ControllerTimeoutError(f"{name} did not answer within {limit_s:.2f} s")
+        handle = sent.result()
+        if not handle.accepted:
+            raise ControllerRejectedError(f"{name} rejected a goal")
+        self._active = handle
+        ended = handle.get_result_async()
+        if not await first_of(self._node, ended, lambda: seconds(self._node) > end):
+            self.hold()
+            raise ControllerTimeoutError(f"{name} was not done within {limit_s:.2f} s")
+        self._active = None
+        return ended.result()
+
+
+def _cancel(sent: Future) -> None:
+    if sent.result().accepted:
+        sent.result().cancel_goal_async()
+
+
+def trajectory(motion: Motion, joints: list[str]) -> JointTrajectory:
+    """From wherever the arm stands to the target, at rest there: a quintic to a controller."""
+    whole = int(motion.duration_s)
+    return JointTrajectory(
+        joint_names=joints,
+        points=[
+            JointTrajectoryPoint(
+                positions=list(motion.target),
+                velocities=[0.0] * len(joints),
+                accelerations=[0.0] * len(joints),
+                time_from_start=Duration(sec=whole, nanosec=int((motion.duration_s - whole) * 1e9)),
+            )
+        ],
+    )

@@ -1,0 +1,118 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the robot's side publishes, into measurements of the core."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from geometry_msgs.msg import TransformStamped
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+from tf2_msgs.msg import TFMessage
+
+from ensemble.interfaces import JOINT_STATES, SENSED, TF, TF_STATIC
+from ensemble.waiting import seconds
+from slap_ros.errors import InvalidMeasurementError
+from slap_ros.messages.decode import NANOSECONDS, stamp_ns
+from slap_ros.physics.pose import Pose
+from slap_ros.robot.cell import Cell, Reading
+from slap_ros.robot.frames import StaticFrames
+from slap_ros.robot.tracking import measured_pose
+
+FINGERS = 2
+AHEAD = 0.05  # s, by which clocks of machines may differ
+
+
+class Senses:
+    """Hands joint positions and detections to a cell; counts what it refuses."""
+
+    def __init__(self, node: Node, cell: Cell, prefix: str, base: str) -> None:
+        """Joints are named ``PREFIX_joint1`` and so on, the base's frame ``base``."""
+        self._node, self._cell = node, cell
+        self._arm = [f"{prefix}_joint{i + 1}" for i in range(7)]
+        self._fingers = [f"{prefix}_finger_joint{i + 1}" for i in range(FINGERS)]
+        self._frames = StaticFrames(base)
+        self.counts: Counter[str] = Counter(readings=0, detections=0, refused_measurements=0)
+        self.gap: float | None = None  # m, between the fingers
+        self.gap_s = 0.0  # stamp of the gap
+        node.create_subscription(JOINT_STATES.type, JOINT_STATES.name, self._on_joints, SENSED)
+        node.create_subscription(TF.type, TF.name, self._on_frames, SENSED)
+        node.create_subscription(TF_STATIC.type, TF_STATIC.name, self._on_static, TF_STATIC.qos)
+
+    @property
+    def joints(self) -> list[str]:
+        """Names of the arm's joints."""
+        return self._arm
+
+    def _on_joints(self, message: JointState) -> None:
+        """The arm's joints, the fingers', or both; others are none of ours."""
+        stamp_s = self._stamp_s(message.header)
+        if stamp_s is None:
+            return
+        at = dict(zip(message.name, message.position, strict=False))
+        speed = dict(zip(message.name, message.velocity, strict=False))
+        if all(name in at for name in self._fingers):
+            self.gap, self.gap_s = sum(at[name] for name in self._fingers), stamp_s
+        if not all(name in at for name in self._arm):
+            return
+        velocities = tuple(speed[name] for name in self._arm if name in speed)
+        try:
+            self._cell.feel(
+                Reading(stamp_s, tuple(at[name] for name in self._arm), velocities, self.gap)
+            )
+        except InvalidMeasurementError as error:
+            self._refuse(error)
+        else:
+            self.counts["readings"] += 1
+
+    def _on_static(self, message: TFMessage) -> None:
+        for item in message.transforms:
+            try:
+                pose = measured_pose(*_parts(item))
+            except InvalidMeasurementError as error:
+                self._refuse(error)
+            else:
+                self._frames.add(item.header.frame_id, item.child_frame_id, pose)
+
+    def _on_frames(self, message: TFMessage) -> None:
+        for item in message.transforms:
+            base = self._frames.in_base(item.header.frame_id)
+            if base is None:
+                continue  # not seen from the robot
+            stamp_s = self._stamp_s(item.header)
+            if stamp_s is None:
+                continue
+            position, quaternion = _parts(item)
+            try:
+                self._cell.see(item.child_frame_id, stamp_s, base, Pose(position, quaternion))
+            except InvalidMeasurementError as error:
+                self._refuse(error)
+            else:
+                self.counts["detections"] += 1
+
+    def _stamp_s(self, header: Header) -> float | None:
+        """When something was measured; None where that is still to come.
+
+        From a clock that is ahead, what is older than the last motion would look newer.
+        """
+        stamp_s = stamp_ns(header) / NANOSECONDS
+        ahead_s = stamp_s - seconds(self._node)
+        if ahead_s <= AHEAD:
+            return stamp_s
+        self._refuse(
+            InvalidMeasurementError(f"a measurement of {header.frame_id} is {ahead_s:.3f} s ahead")
+        )
+        return None
+
+    def _refuse(self, error: InvalidMeasurementError) -> None:
+        self.counts["refused_measurements"] += 1
+        self._node.get_logger().debug(f"refused: {error}")
+
+
+def _parts(
+    item: TransformStamped,
+) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
+    t, q = item.transform.translation, item.transform.rotation
+    return (t.x, t.y, t.z), (q.x, q.y, q.z, q.w)

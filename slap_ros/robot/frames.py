@@ -1,0 +1,33 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""From the frame in which something is seen to the robot's base: chains of static transforms."""
+
+from __future__ import annotations
+
+from slap_ros.physics.pose import IDENTITY, Pose
+
+
+class StaticFrames:
+    """What ``/tf_static`` said."""
+
+    def __init__(self, base: str) -> None:
+        """``base``: the frame of the robot's base."""
+        self._base = base
+        self._parents: dict[str, tuple[str, Pose]] = {}
+
+    def add(self, parent: str, child: str, pose: Pose) -> None:
+        """Take a static transform: the child's pose in its parent."""
+        self._parents[child] = (parent, pose)
+
+    def in_base(self, frame: str) -> Pose | None:
+        """The pose of a frame in the base's; None where no chain leads there."""
+        pose, visited = IDENTITY, {frame}
+        while frame != self._base:
+            if frame not in self._parents:
+                return None
+            frame, step = self._parents[frame]
+            if frame in visited:
+                return None  # a loop
+            visited.add(frame)
+            pose = step.compose(pose)
+        return pose

@@ -1,0 +1,185 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where an object is, from noisy detections.
+
+What lies still is averaged and then stays where it is known to be for as long as detections agree
+with that: a state that is measured again is the same state. What does not agree has been moved,
+and is averaged anew.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from slap_ros.errors import InvalidMeasurementError, InvalidParameterError
+from slap_ros.physics.pose import ORIGIN, Pose, Vector, conjugate, multiply
+
+UNIT_TOLERANCE = 1e-2  # 1, of a measured quaternion's length: further off it is none
+SURPRISE = 4.5  # standard deviations beyond which a detection is not explained by noise
+LONGEST = 64  # detections remembered
+
+
+class Detection(NamedTuple):
+    """A measured pose."""
+
+    stamp_s: float  # when it was seen
+    pose: Pose  # in the base's frame
+
+
+@dataclass(frozen=True)
+class Sensing:
+    """How well detections can be trusted."""
+
+    position_noise_m: float = 0.002  # standard deviation along each axis
+    turn_noise_rad: float = 0.01  # standard deviation about each axis
+    enough: int = 3  # detections that confirm a place that is known
+    many: int = 10  # detections that make a place known
+
+    def __post_init__(self) -> None:
+        if min(self.position_noise_m, self.turn_noise_rad) <= 0.0:
+            raise InvalidParameterError("the noise of detections is above 0")
+        if not 2 <= self.enough <= self.many <= LONGEST:
+            raise InvalidParameterError(
+                f"of detections, 2 <= enough <= many <= {LONGEST}, not {self.enough}, {self.many}"
+            )
+
+
+class Sighting(NamedTuple):
+    """What is known of an object's motion."""
+
+    pose: Pose
+    velocity: Vector  # m/s
+    spin: Vector  # rad/s
+    steady: bool  # lies still
+    weight: int  # detections behind the pose
+
+
+def measured_pose(position: Sequence[float], quaternion: Sequence[float]) -> Pose:
+    """A pose as measured, its quaternion normalised.
+
+    Raises:
+        InvalidMeasurementError: Not finite, or a quaternion that is far from length 1.
+    """
+    if not all(map(math.isfinite, (*position, *quaternion))):
+        raise InvalidMeasurementError(f"a pose at {position}, {quaternion} is not finite")
+    length = math.hypot(*quaternion)
+    if abs(length - 1.0) > UNIT_TOLERANCE:
+        raise InvalidMeasurementError(f"a quaternion has length {length:.3f}, not 1")
+    x, y, z = position
+    qx, qy, qz, qw = (part / length for part in quaternion)
+    return Pose((x, y, z), (qx, qy, qz, qw))
+
+
+class Track:
+    """The detections of one object."""
+
+    def __init__(self, sensing: Sensing) -> None:
+        self._sensing = sensing
+        self._detections: deque[Detection] = deque(maxlen=LONGEST)
+        self._known: Sighting | None = None  # where it lies still
+
+    def add(self, detection: Detection) -> None:
+        """Take a detection.
+
+        Raises:
+            InvalidMeasurementError: It is not newer than the last one: late, or sent twice.
+        """
+        if self._detections and detection.stamp_s <= self._detections[-1].stamp_s:
+            raise InvalidMeasurementError(
+                f"a detection is {self._detections[-1].stamp_s - detection.stamp_s:.3f} s older "
+                "than the one before"
+            )
+        self._detections.append(detection)
+
+    @property
+    def seen_s(self) -> float:
+        """Stamp of the newest detection; minus infinity without one."""
+        return self._detections[-1].stamp_s if self._detections else -math.inf
+
+    def sighting(self, since_s: float) -> Sighting | None:
+        """What the detections since then say; None if they are too few."""
+        fresh = [d for d in self._detections if d.stamp_s > since_s]
+        few = fresh[-self._sensing.enough :]
+        if len(few) < self._sensing.enough:
+            return None
+        if not self._agree(few):
+            return _moving(few)
+        if self._known is not None and self._explains(self._known, few):
+            return self._merged(self._known, few)
+        many = fresh[-self._sensing.many :]
+        if len(many) < self._sensing.many:
+            return None
+        return _standing(many) if self._agree(many) else _moving(many)
+
+    def settle(self, sighting: Sighting) -> None:
+        """Remember where the object lies still, if it does."""
+        self._known = sighting if sighting.steady else None
+
+    def forget(self) -> None:
+        """It was moved on purpose: where it lay says nothing any more."""
+        self._known = None
+
+    def _agree(self, detections: Sequence[Detection]) -> bool:
+        """Whether one place explains all of them."""
+        middle = mean_pose([d.pose for d in detections])
+        return all(self._near(d.pose, middle, 1.0) for d in detections)
+
+    def _explains(self, known: Sighting, few: Sequence[Detection]) -> bool:
+        spread = math.sqrt(1.0 / len(few) + 1.0 / known.weight)
+        return self._near(mean_pose([d.pose for d in few]), known.pose, spread)
+
+    def _near(self, pose: Pose, other: Pose, spread: float) -> bool:
+        far = SURPRISE * spread * self._sensing.position_noise_m
+        turned = SURPRISE * spread * self._sensing.turn_noise_rad * math.sqrt(3.0)
+        return (
+            all(abs(a - b) <= far for a, b in zip(pose.position, other.position, strict=True))
+            and pose.angle_to(other) <= turned
+        )
+
+    def _merged(self, known: Sighting, few: Sequence[Detection]) -> Sighting:
+        """A little better known; what is known well enough stays the same to the bit."""
+        if known.weight >= self._sensing.many:
+            return known
+        weight = known.weight + len(few)
+        poses = [known.pose] * known.weight + [d.pose for d in few]
+        return _still(mean_pose(poses), weight)
+
+
+def mean_pose(poses: Sequence[Pose]) -> Pose:
+    """The mean of poses that differ by little."""
+    n = len(poses)
+    x, y, z = (sum(p.position[i] for p in poses) / n for i in range(3))
+    first = poses[0].quaternion
+    total = [0.0] * 4
+    for pose in poses:
+        q = pose.quaternion
+        sign = math.copysign(1.0, sum(a * b for a, b in zip(first, q, strict=True)))
+        total = [t + sign * part for t, part in zip(total, q, strict=True)]
+    length = math.hypot(*total)
+    qx, qy, qz, qw = (part / length for part in total)
+    return Pose((x, y, z), (qx, qy, qz, qw))
+
+
+def _standing(detections: Sequence[Detection]) -> Sighting:
+    return _still(mean_pose([d.pose for d in detections]), len(detections))
+
+
+def _still(pose: Pose, weight: int) -> Sighting:
+    return Sighting(pose, ORIGIN, ORIGIN, steady=True, weight=weight)
+
+
+def _moving(detections: Sequence[Detection]) -> Sighting:
+    """Velocities from the first to the last of the detections."""
+    first, last = detections[0], detections[-1]
+    dt = last.stamp_s - first.stamp_s
+    vx, vy, vz = (
+        (b - a) / dt for a, b in zip(first.pose.position, last.pose.position, strict=True)
+    )
+    x, y, z, w = multiply(last.pose.quaternion, conjugate(first.pose.quaternion))
+    sine, sign = math.hypot(x, y, z), math.copysign(1.0, w)
+    rate = sign * 2.0 * math.atan2(sine, abs(w)) / (sine * dt) if sine > 0.0 else 0.0
+    return Sighting(last.pose, (vx, vy, vz), (x * rate, y * rate, z * rate), False, 1)

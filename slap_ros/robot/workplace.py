@@ -1,0 +1,125 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What there is around a real robot: which objects, seen as which TF frame or standing where.
+
+A scene file is YAML, in the order in which the domain wants its objects (in Obstacle Tower the
+first block is the target block)::
+
+    objects:
+      block1:
+        type: block
+        frame: tag36h11:1        # child frame of the detections
+        offset: [0, 0, -0.025]   # m, from that frame to the object's middle, in the frame's axes
+        features: {mass: 0.5, friction: 0.9, half_x: 0.025, ...}
+      table:
+        type: surface
+        pose: [0.5, 0, -0.175, 0, 0, 0, 1]   # m and quaternion x y z w, in the base's frame
+        features: {half_x: 0.25, ...}
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from slap_ros.domains import Domain
+from slap_ros.errors import InvalidMeasurementError, InvalidSceneError, InvalidStateError
+from slap_ros.physics.features import (
+    ROBOT,
+    body_features,
+    pose_features,
+    robot_features,
+)
+from slap_ros.physics.panda import HOME
+from slap_ros.physics.pose import IDENTITY, ORIGIN, Pose
+from slap_ros.relational import Object, State
+from slap_ros.robot.tracking import measured_pose
+
+DETECTED = "detected_"  # prefix of detection frames where no scene file names them
+PARKED = 10.0  # m from the base: where what was not yet detected is out of everything's way
+KEYS = frozenset({"type", "frame", "offset", "pose", "features"})
+
+
+@dataclass(frozen=True)
+class Seen:
+    """How an object is detected."""
+
+    frame: str  # child frame in TF
+    offset: Pose = IDENTITY  # of the object's middle, seen from the detected frame
+
+
+@dataclass(frozen=True)
+class Workplace:
+    """The objects, what is known of them beforehand, and how the others are detected.
+
+    Args:
+        template: A state of the objects; where detected ones are in it means nothing.
+        seen: The objects that are detected.
+    """
+
+    template: State
+    seen: Mapping[Object, Seen]
+
+
+def sampled_workplace(initial: State) -> Workplace:
+    """That of a sampled task: what can move is detected, the rest stands where the task says."""
+    movable = [o for o in initial.objects if "held" in {f.name for f in o.type.features}]
+    return Workplace(initial, {o: Seen(f"{DETECTED}{o.name}") for o in movable})
+
+
+def read_workplace(path: Path, domain: Domain) -> Workplace:
+    """The workplace that a scene file describes.
+
+    Raises:
+        InvalidSceneError: It is missing or malformed, or its objects are not the domain's.
+    """
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise InvalidSceneError(f"scene file {path} cannot be read: {error}") from error
+    if not isinstance(content, dict) or not isinstance(content.get("objects"), dict):
+        raise InvalidSceneError(f"scene file {path} has no mapping `objects`")
+    features: dict[Object, Mapping[str, float]] = {ROBOT("robot"): robot_features(HOME)}
+    seen: dict[Object, Seen] = {}
+    for name, entry in content["objects"].items():
+        parked = Pose((PARKED + len(features), 0.0, 0.0))
+        try:
+            obj, given, how = _object(str(name), entry, domain, parked)
+        except (KeyError, TypeError, ValueError, InvalidMeasurementError) as error:
+            raise InvalidSceneError(f"scene file {path}, object {name}: {error}") from error
+        features[obj] = given
+        if how is not None:
+            seen[obj] = how
+    try:
+        return Workplace(State.build(features), seen)
+    except InvalidStateError as error:
+        raise InvalidSceneError(f"scene file {path}: {error}") from error
+
+
+def _object(
+    name: str, entry: Mapping[str, Any], domain: Domain, parked: Pose
+) -> tuple[Object, Mapping[str, float], Seen | None]:
+    if unknown := set(entry) - KEYS:
+        raise ValueError(f"unknown keys {sorted(unknown)}; there are {sorted(KEYS)}")
+    kinds = domain.types_by_name
+    if entry.get("type") not in kinds:
+        raise ValueError(f"unknown type {entry.get('type')!r}; there are {', '.join(kinds)}")
+    if ("frame" in entry) == ("pose" in entry):
+        raise ValueError("an object has either a frame, in which it is detected, or a pose")
+    given = {str(k): float(v) for k, v in entry.get("features", {}).items()}
+    obj = kinds[entry["type"]](name)
+    moves = "held" in {feature.name for feature in obj.type.features}
+    if "frame" in entry:
+        x, y, z = map(float, entry.get("offset", ORIGIN))
+        start = body_features(parked.position) if moves else pose_features(parked)
+        return obj, {**start, **given}, Seen(str(entry["frame"]), Pose((x, y, z)))
+    if moves:
+        raise ValueError("what can move needs a frame, in which it is detected")
+    numbers = [float(v) for v in entry["pose"]]
+    if len(numbers) != 7:
+        raise ValueError("a pose is x y z and a quaternion x y z w")
+    return obj, {**pose_features(measured_pose(numbers[:3], numbers[3:])), **given}, None

@@ -1,0 +1,304 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The whole ensemble on a mock robot; and whatever goes wrong there leaves the robot holding."""
+
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import TransformStamped
+from rclpy.executors import SingleThreadedExecutor
+from sensor_msgs.msg import JointState
+from slap_msgs.msg import RobotCommand
+from slap_msgs.srv import ResetTask
+from std_msgs.msg import Header
+from tf2_msgs.msg import TFMessage
+
+from ensemble.client import RunClient
+from ensemble.hosts import InProcessHost
+from ensemble.interfaces import COMMAND, JOINT_STATES, RESET_TASK, SENSED, TF
+from ensemble.nodes import RunSettings, node_parameters
+from ensemble.run import RunRequest, Spinner, run
+from robot_bridge.mock.options import mock_options
+from slap_ros.bags import evaluate_bag
+from slap_ros.cli.run import check_world
+from slap_ros.errors import ErrorCode, InvalidParameterError
+from slap_ros.messages.interfaces import STATE
+
+LIMIT = 60.0  # s, far more than anything here takes: a loaded machine takes its time
+# All nodes share a process here, and its time: joint positions may be late.
+PATIENT = {"joint_timeout": 3.0}
+QUICK = {"pace": 20.0, "rate": 200.0, "latency": 0.01}
+STILL = [0.0] * 7
+
+
+def settings(mock=None, bridge=None, record=None, **options):
+    options = {"shortcuts": "none", "world": "mock", "mock": QUICK | (mock or {})} | options
+    return RunSettings(
+        "obstacle_tower", "fair", 1, 0, "lazy", record, bridge=bridge or {}, **options
+    )
+
+
+class Lab:
+    """A client, the bridge and a mock robot, on one executor."""
+
+    def __init__(self, client, spinner):
+        self.client, self.spinner = client, spinner
+        self.heard, self.joints, self.health = [], [], {}
+        self.commands = client.create_publisher(COMMAND.type, COMMAND.name, COMMAND.qos)
+        client.create_subscription(
+            JointState, JOINT_STATES.name, lambda m: self.joints.append(list(m.position)), SENSED
+        )
+        client.create_subscription(DiagnosticArray, "/diagnostics", self.on_health, 10)
+
+    def on_health(self, message):
+        for status in message.status:
+            if status.name == "/robot_bridge":
+                self.health = {item.key: item.value for item in status.values}
+
+    @property
+    def states(self):
+        return [m for kind, m in self.client.heard if kind == STATE]
+
+    def until(self, condition):
+        assert self.spinner.until(condition, LIMIT)
+
+    def wait(self, seconds):
+        self.spinner.until(lambda: False, seconds)
+
+    def command(self, deltas=STILL, gripper=0.0, **moment):
+        now = {"episode": self.states[-1].episode, "step": self.states[-1].step} | moment
+        self.commands.publish(RobotCommand(deltas=deltas, gripper=gripper, **now))
+
+    def step(self, **command):
+        seen = len(self.states)
+        self.command(**command)
+        self.until(lambda: len(self.states) > seen)
+
+    def fault(self, code):
+        """Wait until the bridge holds for this reason; it then stands."""
+        self.until(lambda: self.health.get("fault") == code.name)
+        assert self.health["holding"] == "True"
+        states, joints = len(self.states), self.joints[-1][:7]
+        self.command(deltas=[0.02, *STILL[1:]])
+        self.wait(0.5)
+        assert len(self.states) == states
+        assert self.joints[-1][:7] == joints
+
+    def reset(self, **request):
+        service = self.client.create_client(RESET_TASK.type, RESET_TASK.name)
+        self.until(service.service_is_ready)
+        answer = service.call_async(ResetTask.Request(**request))
+        self.until(answer.done)
+        return answer.result()
+
+
+@contextmanager
+def lab(mock=None, bridge=None, started=True):
+    rclpy.init()
+    executor, heard = SingleThreadedExecutor(), []
+    client = RunClient(lambda kind, message: heard.append((kind, message)))
+    client.heard = heard
+    executor.add_node(client)
+    nodes = node_parameters(settings(mock, bridge))
+    only = {name: nodes[name] for name in ("robot_bridge.mock", "robot_bridge")}
+    try:
+        with InProcessHost(only, executor):
+            bench = Lab(client, Spinner(executor))
+            if started:
+                bench.until(lambda: bench.states and bench.commands.get_subscription_count())
+            yield bench
+    finally:
+        client.destroy_node()
+        executor.shutdown()
+        rclpy.shutdown()
+
+
+def test_the_ensemble_solves_a_task_on_a_mock_robot(network, tmp_path):
+    bag = tmp_path / "bag"
+    chosen = settings(bridge=PATIENT, record=bag)
+    metrics = run(RunRequest(chosen, timeout_s=200, in_process=True), lambda *_: None)
+    assert metrics.success, metrics.error_msg
+    assert metrics.plan_length > 60
+    found = evaluate_bag(bag)
+    assert found.runs[0].plan_length == metrics.plan_length
+    assert found.states == metrics.plan_length + 1
+
+
+def test_commands_are_answered_one_by_one_and_bad_ones_move_nothing(network):
+    with lab() as bench:
+        bench.until(lambda: bench.joints)
+        before = bench.joints[-1][:7]
+        refused = [
+            {"step": 7},
+            {"episode": 9},
+            {"deltas": [float("nan"), *STILL[1:]]},
+            {"deltas": [0.5, *STILL[1:]]},
+            {"deltas": [0.0]},
+            {"gripper": float("inf")},
+        ]
+        for command in refused:
+            bench.command(**command)
+        bench.wait(0.5)
+        assert len(bench.states) == 1
+        assert bench.joints[-1][:7] == before
+        bench.command(deltas=[0.05, *STILL[1:]])
+        bench.command(deltas=[0.05, *STILL[1:]])  # the same one again
+        bench.until(lambda: len(bench.states) == 2)
+        bench.wait(0.5)
+        assert [state.step for state in bench.states] == [0, 1]
+        assert bench.joints[-1][0] == pytest.approx(before[0] + 0.05, abs=1e-6)
+        bench.until(lambda: bench.health.get("steps") == "1")
+        assert bench.health["stale_commands"] == "3"
+        assert bench.health["invalid_commands"] == "4"
+        bench.until(lambda: bench.health["holding"] == "True")  # nobody commands anything
+
+
+def test_what_leaves_the_workspace_is_refused(network):
+    with lab(bridge={"workspace": [0.2, -0.5, 0.499, 0.8, 0.5, 0.9]}) as bench:
+        bench.command(deltas=[0.0, 0.05, *STILL[2:]])
+        bench.until(lambda: bench.health.get("unsafe_commands") == "1")
+        assert len(bench.states) == 1
+        bench.step()  # it goes on
+
+
+@pytest.mark.parametrize(
+    ("fault", "code"),
+    [
+        ("reject", ErrorCode.CONTROLLER_REJECTED),
+        ("abort", ErrorCode.CONTROLLER_ABORTED),
+        ("ignore", ErrorCode.CONTROLLER_TIMEOUT),
+    ],
+)
+def test_a_controller_that_fails_leaves_the_robot_holding(network, fault, code):
+    with lab({"fault": fault, "fault_after": 1}) as bench:
+        bench.step(deltas=[0.05, *STILL[1:]])
+        bench.command(deltas=[0.05, *STILL[1:]])
+        bench.fault(code)
+
+
+def test_an_object_that_is_never_seen_is_named(network):
+    with lab({"hidden": "block2"}, started=False) as bench:
+        bench.wait(1.0)
+        assert not bench.states
+        answer = bench.reset()
+        assert answer.error_code == ErrorCode.NO_DETECTION
+        assert answer.error_msg.endswith("block2")
+
+
+def test_sensors_that_fall_silent_stop_the_state(network):
+    """The mock robot is taken away: joint positions, detections and controllers with it."""
+    with lab() as bench:
+        bench.step()
+        (mock,) = [n for n in bench.spinner._executor.get_nodes() if n.get_name() == "mock_robot"]
+        for timer in list(mock.timers):
+            mock.destroy_timer(timer)
+        bench.wait(1.0)
+        assert bench.health["fault"] == "NONE"  # it stands anyway
+        bench.command(deltas=[0.02, *STILL[1:]])
+        bench.until(lambda: bench.health.get("fault") == "NO_JOINT_STATE")
+        assert len(bench.states) == 2
+
+
+def test_detections_that_are_lost_late_or_out_of_order_do_no_harm(network):
+    with lab({"dropout": 0.3, "jitter": 0.05, "pose_noise": 0.003}) as bench:
+        for _ in range(5):
+            bench.step(deltas=[0.02, *STILL[1:]])
+        bench.until(lambda: int(bench.health.get("refused_measurements", 0)) > 0)
+        heights = [state.objects[1].features[2] for state in bench.states]
+        assert max(heights) == min(heights)
+
+
+def test_poses_that_are_none_are_refused_and_counted(network):
+    with lab() as bench:
+        publisher = bench.client.create_publisher(TF.type, TF.name, TF.qos)
+        bench.until(lambda: publisher.get_subscription_count() >= 1)
+        item = TransformStamped(
+            header=Header(stamp=bench.client.get_clock().now().to_msg(), frame_id="panda_link0"),
+            child_frame_id="detected_block1",
+        )
+        item.transform.translation.x = float("nan")
+        publisher.publish(TFMessage(transforms=[item]))
+        bench.until(lambda: int(bench.health.get("refused_measurements", 0)) > 0)
+        bench.step()
+        assert bench.states[-1].objects[1].features == bench.states[0].objects[1].features
+
+
+def test_a_clock_that_is_ahead_is_not_believed(network):
+    with lab() as bench:
+        publisher = bench.client.create_publisher(JOINT_STATES.type, JOINT_STATES.name, 10)
+        bench.until(lambda: publisher.get_subscription_count() >= 1)
+        ahead = bench.client.get_clock().now().to_msg()
+        ahead.sec += 60
+        names = [f"panda_joint{i + 1}" for i in range(7)]
+        publisher.publish(JointState(header=Header(stamp=ahead), name=names, position=STILL))
+        bench.until(lambda: int(bench.health.get("refused_measurements", 0)) > 0)
+        bench.step()
+        assert bench.states[-1].objects[0].features == bench.states[0].objects[0].features
+
+
+def test_a_reset_opens_an_episode_as_measured_and_ends_a_fault(network):
+    with lab({"fault": "abort", "fault_after": 1}) as bench:
+        bench.step()
+        bench.command()
+        bench.fault(ErrorCode.CONTROLLER_ABORTED)
+        explicit = bench.reset(initial_state=bench.states[0])
+        assert explicit.error_code == ErrorCode.INVALID_STATE
+        assert "cannot be put into a state" in explicit.error_msg
+        bench.until(lambda: bench.reset().error_code == 0)
+        assert bench.states[-1].episode == 2
+        assert bench.states[-1].step == 0
+
+
+def test_a_skill_server_that_dies_leaves_the_robot_holding(network):
+    rclpy.init()
+    executor, heard = SingleThreadedExecutor(), []
+    client = RunClient(lambda kind, message: heard.append((kind, message)))
+    client.heard = heard
+    executor.add_node(client)
+    nodes = node_parameters(settings(bridge=PATIENT))
+    mind = {name: nodes.pop(name) for name in ("skill_server", "planner_node")}
+    try:
+        with InProcessHost(nodes, executor):
+            bench = Lab(client, Spinner(executor))
+            with InProcessHost(mind, executor):
+                bench.until(lambda: client.ready(False))
+                client.send((), 0, 5)
+                bench.until(lambda: len(bench.states) > 5)
+            bench.wait(1.0)  # for the motion under way
+            states, joints = len(bench.states), bench.joints[-1]
+            bench.wait(1.5)
+            assert (len(bench.states), bench.joints[-1]) == (states, joints)
+            bench.until(lambda: bench.health.get("phase") == "READY")
+            bench.until(lambda: bench.health["holding"] == "True")
+    finally:
+        client.destroy_node()
+        executor.shutdown()
+        rclpy.shutdown()
+
+
+def test_options_of_the_mock_robot_have_types_and_names():
+    assert mock_options("latency=1,noise_seed=3,fault=abort") == {
+        "latency": 1.0,
+        "noise_seed": 3,
+        "fault": "abort",
+    }
+    assert isinstance(mock_options("latency=1")["latency"], float)
+    for wrong in ("speed=1", "latency=soon", "domain=obstacle2d"):
+        with pytest.raises(InvalidParameterError, match="mock robot"):
+            mock_options(wrong)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("moon", None, ""), "--world must be one of sim, robot, mock"),
+        (("sim", Path("x.yaml"), ""), "not for --world sim"),
+        (("robot", None, "latency=0.1"), "for --world mock"),
+    ],
+)
+def test_the_command_line_refuses_what_does_not_fit(arguments, words):
+    with pytest.raises(InvalidParameterError, match=words):
+        check_world(*arguments)

@@ -1,0 +1,67 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A rehearsed shortcut in a world that is not quite the model."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from slap_ros.domains import get_domain
+from slap_ros.evaluation.approaches import approaches
+from slap_ros.planning.model import Model
+from slap_ros.planning.options import OptionKind
+from slap_ros.shortcuts.library import load_library
+from slap_ros.shortcuts.shortcut import Sampling
+
+DATA = Path(__file__).parent / "data" / "obstacle2d"
+DOMAIN = get_domain("obstacle2d")
+TASK = DOMAIN.task(1)
+
+
+@pytest.fixture(scope="module")
+def rehearsed():
+    """The shortcut of a plan, as an option, and where it starts."""
+    space = DOMAIN.atom_space(TASK.initial_state)
+    approach = approaches(load_library(DATA, DOMAIN), Sampling(samples=4))[-1]
+    planner = approach.planner("lazy", DOMAIN, TASK.initial_state)
+    plan = planner.plan(TASK.initial_state, space.mask(TASK.goal)).plan
+    model, state = Model.of(DOMAIN, TASK.initial_state), TASK.initial_state
+    for edge in plan.edges:
+        if edge.option.kind is OptionKind.SHORTCUT:
+            return edge.option, state
+        state = model.roll_out(edge.option, state, edge.target).final
+    raise AssertionError("no shortcut in the plan")
+
+
+def moved(state, kind, by):
+    obj = next(o for o in state.objects if o.type.name == kind)
+    return state.replace({(obj, "x"): float(state.get(obj, "x")) + by})
+
+
+def attempt(option, start):
+    ground = option.skill
+    return ground.rehearsal.attempts(ground.shortcut, ground.sight, start)[option.attempt]
+
+
+def test_it_is_kept_to_where_things_are_a_little_elsewhere(rehearsed):
+    shortcut, start = rehearsed
+    follow = shortcut.skill.start(start, shortcut.objects)
+    foreseen = attempt(shortcut, start)
+    for state, choice in zip(foreseen.states, foreseen.choices, strict=True):
+        action = follow(moved(state, "block", 0.003))
+        assert (action == shortcut.skill.act(choice)).all()
+
+
+def test_it_is_left_where_the_robot_is_elsewhere(rehearsed):
+    shortcut, start = rehearsed
+    follow = shortcut.skill.start(start, shortcut.objects)
+    foreseen = attempt(shortcut, start)
+    follow(foreseen.states[0])
+    off = moved(foreseen.states[1], "robot", 0.05)
+    seen = shortcut.skill.sight.look(off.alone()).observations
+    bare = shortcut.skill.act(shortcut.skill.shortcut.policy.mean(seen)[0])
+    assert np.array_equal(follow(off), bare)
+    again = follow(foreseen.states[2])  # and not taken up again
+    seen = shortcut.skill.sight.look(foreseen.states[2].alone()).observations
+    assert np.array_equal(again, shortcut.skill.act(shortcut.skill.shortcut.policy.mean(seen)[0]))
