@@ -184,7 +184,7 @@ def test_the_shipped_library_is_found_and_used_unless_told_otherwise(
 
 def test_a_checkout_ships_what_is_in_its_models():
     root = Path(shipped.__file__).parents[2]
-    for name in ("obstacle2d", "obstacle_tower"):
+    for name in ("obstacle2d", "obstacle_tower", "cleanup_table"):
         folder = root / "models" / name
         assert shipped_library(name) == (folder if folder.is_dir() else None)
 
