@@ -85,7 +85,7 @@ def _decomposed(file: Path, size_m: float, fineness: Fineness) -> list[Piece]:
         mesh = trimesh.load(file, force="mesh")
     except (ValueError, TypeError, KeyError, IndexError, OSError) as error:  # as files are damaged
         raise InvalidMeshError(f"{file} cannot be read as a mesh: {error}") from error
-    if not len(getattr(mesh, "faces", ())):
+    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
         raise InvalidMeshError(f"{file} has no faces, and so is no solid")
     vertices = np.asarray(mesh.vertices, dtype=np.float64)
     scaled = _placed(vertices, size_m, file.suffix.lower() in Y_IS_UP)
