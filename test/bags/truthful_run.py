@@ -251,6 +251,7 @@ class Script:
                 "slap_msgs/msg/PlanEdge",
                 kind=edge.option.kind.value,
                 name=edge.option.skill.name,
+                attempt=edge.option.attempt,
                 objects=[obj.name for obj in edge.option.objects],
                 expected_atoms=self.atoms_of(self.space.decode(edge.target)),
                 predicted_steps=edge.predicted_steps,
