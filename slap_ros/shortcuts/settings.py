@@ -134,7 +134,7 @@ SETTINGS: Mapping[str, Mapping[str, TrainingSettings]] = {
             OURS,
             # Nodes: everything over which the hand can be, that it can grasp, and lift.
             exploration=Exploration(tasks=3, rollouts=32, length=40, nodes=13),
-            ppo=replace(LEARN, total_steps=160_000),
+            ppo=replace(LEARN, total_steps=60_000),
             polish=replace(POLISH, total_steps=100_000),
             horizon=40,
             starts=120,
