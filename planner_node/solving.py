@@ -80,6 +80,12 @@ class Solving:
         assert self.observer.latest is not None  # a run begins with an observation
         return self.observer.latest
 
+    @property
+    def _last_step(self) -> int:
+        """The newest step of the run's own episode; another one counts from 0 again."""
+        latest = self._latest
+        return latest.step if latest.episode is self._start.episode else self._start.step
+
     async def run(self) -> SolveTask.Result:
         """Solve, or say why not; every outcome is published as an event."""
         while True:
@@ -97,7 +103,7 @@ class Solving:
             self._event(PlanEvent.SOLVED)
         else:
             self._event(PlanEvent.FAILED, error_code=int(stopped.code), error_msg=stopped.reason)
-        return self._tally.result(self._latest.step, stopped)
+        return self._tally.result(self._last_step, stopped)
 
     async def _attempt(self) -> Stopped:
         """One plan, as far as it goes."""
