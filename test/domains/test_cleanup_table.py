@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from executed import executed, fluent_atoms
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.cleanup_table import make
@@ -30,8 +31,7 @@ from slap_ros.physics.features import ROBOT
 from slap_ros.physics.panda import JOINT_HIGH, JOINT_LOW, MAX_STEP, grasp_pose
 from slap_ros.physics.pose import Pose, rotate
 from slap_ros.physics.world import PandaWorld
-from slap_ros.planning.execution import Executor
-from slap_ros.planning.planner import GraphPlanner, Problem, make_planner
+from slap_ros.planning.planner import GraphPlanner, Problem
 from slap_ros.planning.search import search_exhaustively, search_lazily
 from slap_ros.relational import Column, State
 
@@ -42,20 +42,11 @@ AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 def solve(task, domain=FAIR):
-    space = domain.atom_space(task.initial_state)
-    return Executor(
-        domain,
-        make_planner("lazy", domain, task.initial_state),
-        domain.make_world(task.initial_state),
-        space,
-        space.mask(task.goal),
-        task.step_limit,
-    ).run()
+    return executed(task, domain)
 
 
 def atoms(state, domain=FAIR):
-    space = domain.atom_space(state)
-    return {str(atom) for atom in space.decode(space.abstract(state) & ~space.static)}
+    return fluent_atoms(state, domain)
 
 
 def changed(state, name, **features):

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from executed import executed, fluent_atoms
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.cluttered_drawer.model import BLOCK, SIDES, FingerRoom
@@ -21,10 +22,9 @@ from slap_ros.physics.panda import MAX_STEP, grasp_pose
 from slap_ros.physics.pose import multiply, rotate
 from slap_ros.physics.scene import TABLE_TOP
 from slap_ros.planning.abstract_graph import build_abstract_graph
-from slap_ros.planning.execution import Executor
 from slap_ros.planning.model import Model
 from slap_ros.planning.options import given_option
-from slap_ros.planning.planner import GraphPlanner, Problem, make_planner
+from slap_ros.planning.planner import GraphPlanner, Problem
 from slap_ros.planning.search import search_exhaustively, search_lazily
 from slap_ros.relational import Column, State
 
@@ -36,20 +36,11 @@ LEFT_BLOCKER = (MIDDLE, NEIGHBOUR, 0.0)
 
 
 def solve(task, domain=FAIR):
-    space = domain.atom_space(task.initial_state)
-    return Executor(
-        domain,
-        make_planner("lazy", domain, task.initial_state),
-        domain.make_world(task.initial_state),
-        space,
-        space.mask(task.goal),
-        task.step_limit,
-    ).run()
+    return executed(task, domain)
 
 
 def atoms(state, domain=FAIR):
-    space = domain.atom_space(state)
-    return {str(atom) for atom in space.decode(space.abstract(state) & ~space.static)}
+    return fluent_atoms(state, domain)
 
 
 def sides(state, domain=FAIR):

@@ -10,11 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from executed import executed
 
 from slap_ros.domains.gymnasium_world import GymnasiumWorld, state_of
 from slap_ros.errors import InvalidCommandError, InvalidDomainError, InvalidStateError
-from slap_ros.planning.execution import Executor
-from slap_ros.planning.planner import make_planner
 from slap_ros.relational import State
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "marbles"
@@ -122,15 +121,7 @@ def test_the_broom_sweeps_several_marbles_where_the_skills_take_one():
 @pytest.mark.parametrize("seed", range(5))
 def test_the_example_is_solved_by_planning(seed):
     task = DOMAIN.task(seed)
-    space = DOMAIN.atom_space(task.initial_state)
-    episode = Executor(
-        DOMAIN,
-        make_planner("lazy", DOMAIN, task.initial_state),
-        DOMAIN.make_world(task.initial_state),
-        space,
-        space.mask(task.goal),
-        task.step_limit,
-    ).run()
+    episode = executed(task, DOMAIN)
     assert episode.success
     assert episode.replans == 0
 

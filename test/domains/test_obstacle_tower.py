@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from executed import executed, fluent_atoms
 from scattered import scattered
 
 from slap_ros.domains import get_domain
@@ -15,7 +16,6 @@ from slap_ros.domains.obstacle_tower.tasks import PaperTasks, RandomTasks, Scene
 from slap_ros.errors import ErrorCode, InvalidStateError, UnsolvableError
 from slap_ros.physics.panda import MAX_STEP
 from slap_ros.physics.scene import Material
-from slap_ros.planning.execution import Executor
 from slap_ros.planning.model import Model
 from slap_ros.planning.planner import GraphPlanner, Problem, make_planner
 from slap_ros.planning.search import search_exhaustively, search_lazily
@@ -25,20 +25,11 @@ FAIR, PAPER = get_domain("obstacle_tower"), get_domain("obstacle_tower", "paper"
 
 
 def solve(task, domain=FAIR):
-    space = domain.atom_space(task.initial_state)
-    return Executor(
-        domain,
-        make_planner("lazy", domain, task.initial_state),
-        domain.make_world(task.initial_state),
-        space,
-        space.mask(task.goal),
-        task.step_limit,
-    ).run()
+    return executed(task, domain)
 
 
 def atoms(state, domain=FAIR):
-    space = domain.atom_space(state)
-    return {str(atom) for atom in space.decode(space.abstract(state) & ~space.static)}
+    return fluent_atoms(state, domain)
 
 
 def test_a_tower_is_perceived_as_it_stands():
