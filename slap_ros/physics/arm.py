@@ -18,10 +18,11 @@ from slap_ros.physics.panda import HAND, link_poses
 from slap_ros.physics.pose import IDENTITY, Pose, Quaternion, Vector, conjugate, rotate
 from slap_ros.physics.scene import Body
 
-CLEARANCE = 0.01  # m, between a link and a body, at which they surely do not touch
+CLEARANCE = 0.003  # m, between the boxes around a link and a body, at which they do not touch
 LINK_DEPTH = 0.01  # m, how far a link may reach into a fixed body
 HELD_DEPTH = 0.02  # m, how far a held body may
 SAMPLING = 0.02  # m, of a link's way between two looks at what it hits, at the finest
+FINE = 0.01  # m, the same for what it comes near
 
 _RADII = tuple(shape.radius for shape in LINK_SHAPES)
 
@@ -112,23 +113,32 @@ class Sweep:
             )
         ]
 
-    def stays_clear(self, balls: Sequence[tuple[Vector, float]]) -> bool:
-        """Whether no link comes near any ball, given by centre and radius in m."""
-        return not any(self._comes_near(link, balls) for link in range(len(self.ways)))
+    def stays_clear(self, boxes: Sequence[OrientedBox]) -> bool:
+        """Whether no link comes near any of the boxes, which stand still."""
+        around = [(box, box.radius) for box in boxes]
+        return not any(self._comes_near(link, around) for link in range(len(self.ways)))
 
-    def _comes_near(self, link: int, balls: Sequence[tuple[Vector, float]]) -> bool:
+    def _comes_near(self, link: int, around: Sequence[tuple[OrientedBox, float]]) -> bool:
+        """Whether a link comes near a box; of most, the ball around the box tells that not."""
         start, end = self.start, self.end
         a, b = start.centres[link], end.centres[link]
         # A point is never further than half of its way from where it starts or where it ends.
         margin = CLEARANCE + 0.5 * self.ways[link]
         reach = margin + start.radii[link]
-        for centre, radius in balls:
-            within = reach + radius
-            if math.dist(centre, a) < within and start.box(link).near(centre, margin + radius):
-                return True
-            if math.dist(centre, b) < within and end.box(link).near(centre, margin + radius):
+        for box, radius in around:
+            centre, within = box.pose.position, reach + radius
+            if (
+                (math.dist(centre, a) < within and start.box(link).near(centre, margin + radius))
+                or (math.dist(centre, b) < within and end.box(link).near(centre, margin + radius))
+            ) and self._brushes(link, box):
                 return True
         return False
+
+    def _brushes(self, link: int, box: OrientedBox) -> bool:
+        """Whether the box around a link comes near another anywhere on its way."""
+        looks = math.ceil(self.ways[link] / FINE) or 1
+        around = box.grown(CLEARANCE + 0.5 * self.ways[link] / looks)
+        return any(around.overlaps(self._at(link, k / looks)) for k in range(looks + 1))
 
     def hits(self, obstacles: Sequence[Obstacle]) -> bool:
         """Whether the arm enters an obstacle deeper than it may, at the end of its way.

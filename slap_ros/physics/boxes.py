@@ -26,6 +26,11 @@ class OrientedBox(NamedTuple):
             self.pose, (max(x - depth, 0.0), max(y - depth, 0.0), max(z - depth, 0.0))
         )
 
+    def grown(self, margin: float) -> OrientedBox:
+        """The box with a layer of ``margin`` m around it."""
+        x, y, z = self.half
+        return OrientedBox(self.pose, (x + margin, y + margin, z + margin))
+
     @property
     def radius(self) -> float:
         """Half the diagonal, m."""

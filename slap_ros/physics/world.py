@@ -70,7 +70,6 @@ class PandaWorld:
         self._reader = Reader.of(scene, state.layout)
         self._standing: dict[object, bool] = {}
         self._solid = [i for i, body in enumerate(scene.fixed) if body.solid]
-        self._radii = [body.radius for body in scene.free]
         self._adopt(state)
         self._simulation = borrow(scene, stepping)
         self._closing = weakref.finalize(self, give_back, self._simulation)
@@ -225,8 +224,8 @@ class PandaWorld:
         bodies = now.bodies
         if not all(bodies[i].still for i in loose):
             return False
-        balls = [(bodies[i].pose.position, self._radii[i]) for i in loose]
-        return sweep.stays_clear(balls) and self._stand(now, loose)
+        boxes = [self._scene.free[i].at(bodies[i].pose) for i in loose]
+        return sweep.stays_clear(boxes) and self._stand(now, loose)
 
     def _stand(self, now: Snapshot, loose: list[int]) -> bool:
         """Whether bodies without velocity would stay where they are if there were no arm.

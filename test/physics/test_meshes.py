@@ -128,7 +128,7 @@ def test_an_arm_far_away_skips_what_rests_and_a_near_one_does_not():
         assert world.step(STILL) == settled
         with pytest.raises(AttributeError):
             for _ in range(20):
-                world.step(np.array([0, 0.05, 0, 0, 0, 0.05, 0, 0]))  # down to the toys
+                world.step(np.array([0.02, 0.05, 0, 0, 0, 0.05, 0, 0]))  # down to a toy
         world._simulation = simulation
 
 

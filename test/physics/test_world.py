@@ -430,13 +430,15 @@ def test_the_quiet_test_never_overlooks_a_touch():
         for action in push.actions:
             after = q + action[:7]
             arms = Arm.at(q, FINGER_OPEN), Arm.at(after, FINGER_OPEN)
-            centre = tuple((np.array([0.5, 0.0, 0.15]) + rng.normal(0, 0.05, 3)).tolist())
-            if Sweep(*arms).stays_clear([(centre, 0.0434)]):
+            centre = (np.array([0.5, 0.0, 0.15]) + rng.normal(0, 0.05, 3)).tolist()
+            turn = rng.normal(size=4)
+            turned = Pose(tuple(centre), tuple((turn / np.linalg.norm(turn)).tolist()))
+            box = Box("box", (0.04, 0.025, 0.01)).at(turned)
+            if Sweep(*arms).stays_clear([box]):
                 clear += 1
-                ball = Box("ball", (0.025,) * 3).at(Pose(centre))
-                for part in np.linspace(0, 1, 5):
+                for part in np.linspace(0, 1, 9):
                     arm = Arm.at(q + part * action[:7], FINGER_OPEN)
-                    assert not any(arm.box(i).overlaps(ball) for i in range(len(arm.links)))
+                    assert not any(arm.box(i).overlaps(box) for i in range(len(arm.links)))
             q = after
     assert clear > 100
 
