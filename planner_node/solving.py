@@ -36,7 +36,7 @@ from slap_ros.planning.planner import Planner
 
 ANSWER_TIMEOUT = 5.0  # s, for the skill server to accept a goal, or to end one that is canceled
 ASK_AGAIN = 2.0  # s without a result after which it is asked for once more
-OBSERVE_TIMEOUT = 10.0  # s, for a state that the skill server has seen to be seen here too
+OBSERVE_TIMEOUT = 5.0  # s, for a state that the skill server has seen to be seen here too
 
 # Outcomes of an edge after which a new plan from wherever the robot is now makes sense.
 DIVERGENCES = frozenset(
