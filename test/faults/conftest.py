@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))  # for the helpers of these tests
+sys.path.insert(0, str(Path(__file__).parent.parent / "bags"))  # and for theirs
 
 import faulty_links
 

@@ -14,7 +14,7 @@ from rclpy.parameter import Parameter
 from slap_msgs.srv import ResetTask
 
 from ensemble.client import RunClient
-from ensemble.interfaces import ATOMS, COMMAND, DOMAIN, RESET_TASK, STATE, TASK
+from ensemble.interfaces import ATOMS, COMMAND, DOMAIN, LATCHED, RESET_TASK, STATE, TASK
 from ensemble.nodes import CLASSES, RunSettings, node_parameters
 from ensemble.run import Spinner
 
@@ -27,10 +27,7 @@ HEARD = {
 }
 LINKS = [(receiver, topic) for receiver, topics in HEARD.items() for topic in topics]
 # What is waited for in vain, and then reported, is waited for less long than in a laboratory.
-IMPATIENT = {
-    "skill_server": {"state_timeout": 0.5},
-    "planner_node": {"observation_timeout": 2.0},
-}
+IMPATIENT = {"planner_node": {"observation_timeout": 2.0}}
 
 
 class Relay(Node):
@@ -49,6 +46,9 @@ class Relay(Node):
         self._rng = rng
         self._past, self._due = [], []
         self._broken = False
+        self._latched = topic.qos is LATCHED
+        # There are few messages on a latched topic.
+        self.rarely, self.often = (0.5, 0.5) if self._latched else (0.05, 0.3)
         self._out = self.create_publisher(topic.type, faulty_name(receiver, topic), topic.qos)
         self.create_subscription(topic.type, topic.name, self._on_message, topic.qos, raw=True)
 
@@ -56,6 +56,8 @@ class Relay(Node):
         """From now on everything is handed on as it comes."""
         self.fault = deliver
         self._due.clear()
+        if self._latched and self._past:  # as the middleware does for whoever is connected again
+            self.send(self._past[-1])
 
     def _on_message(self, raw):
         self.fault(self, bytes(raw))
@@ -107,19 +109,19 @@ def deliver(relay, raw):
 
 
 def drop(relay, raw):
-    if not relay.strikes(0.05):
+    if not relay.strikes(relay.rarely):
         relay.send(raw)
 
 
 def cut(relay, raw):
-    if relay.broken or relay.strikes(0.05):
+    if relay.broken or relay.strikes(relay.rarely):
         relay.break_down()
     else:
         relay.send(raw)
 
 
 def duplicate(relay, raw):
-    for _ in range(1 + 2 * relay.strikes(0.3)):
+    for _ in range(1 + 2 * relay.strikes(relay.often)):
         relay.send(raw)
 
 
@@ -132,7 +134,7 @@ def delay(relay, raw):
 def overtake(relay, raw):
     """Some of the past comes again, before or after what is new."""
     old = relay.any_of_the_past()
-    again = old is not None and relay.strikes(0.4)
+    again = old is not None and relay.strikes(relay.often)
     if again:
         relay.send(old)
     relay.send(raw)
