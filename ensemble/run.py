@@ -122,10 +122,9 @@ def _refuse_company(client: RunClient, spinner: Spinner) -> None:
 def _drive(request: RunRequest, client: RunClient, spinner: Spinner, host: Host) -> RunMetrics:
     spinner.check = host.check
     recording = request.settings.record is not None
-    if not spinner.until(lambda: client.ready(recording), READY_TIMEOUT):
-        raise NotReadyError(
-            f"the ensemble did not come up within {READY_TIMEOUT} s; try `slap doctor`"
-        )
+    patience = min(READY_TIMEOUT, request.timeout_s)
+    if not spinner.until(lambda: client.ready(recording), patience):
+        raise NotReadyError(f"the ensemble did not come up within {patience} s; try `slap doctor`")
     failure: SlapError | None = None
     try:
         _solve(request, client, spinner)
