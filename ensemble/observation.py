@@ -75,13 +75,18 @@ class EpisodeWatcher:
         subscribe(node, DOMAIN, self._on_domain)
         subscribe(node, TASK, self._on_task)
 
+    # What is latched comes again after two nodes had lost sight of each other for a moment. That
+    # is no new episode.
+
     def _on_domain(self, message: DomainInfo) -> None:
-        self._domain = message
-        self._open()
+        if message != self._domain:
+            self._domain = message
+            self._open()
 
     def _on_task(self, message: TaskMessage) -> None:
-        self._task = message
-        self._open()
+        if message != self._task:
+            self._task = message
+            self._open()
 
     def _open(self) -> None:
         if self._domain is None or self._task is None or self._domain.name != self._task.domain:
@@ -139,12 +144,14 @@ class Observer:
         self._pair()
 
     def _on_state(self, message: ObjectCentricState) -> None:
-        self._state = message
-        self._pair()
+        if not _is_late(message, self._state):
+            self._state = message
+            self._pair()
 
     def _on_atoms(self, message: AbstractState) -> None:
-        self._atoms = message
-        self._pair()
+        if not _is_late(message, self._atoms):
+            self._atoms = message
+            self._pair()
 
     def _pair(self) -> None:
         episode, state, atoms = self._watcher.current, self._state, self._atoms
@@ -164,3 +171,10 @@ class Observer:
             decode_atoms(atoms.atoms, episode.space),
         )
         self._on_observation(self.latest)
+
+
+def _is_late(
+    message: ObjectCentricState | AbstractState, newest: ObjectCentricState | AbstractState | None
+) -> bool:
+    """Whether the message is older than what is known: it was sent again, or overtaken."""
+    return newest is not None and stamp_ns(message.header) < stamp_ns(newest.header)

@@ -17,6 +17,7 @@ from rclpy.task import Future
 
 from ensemble.client import OnMessage, RunClient
 from ensemble.hosts import Host, InProcessHost, ProcessHost
+from ensemble.network import stay_on_this_host
 from ensemble.nodes import RunSettings, node_parameters
 from slap_ros.errors import (
     AlreadyRunningError,
@@ -66,6 +67,7 @@ def run(request: RunRequest, on_message: OnMessage) -> RunMetrics:
         SlapError: The planner refused the task; the code says why.
         KeyboardInterrupt: After the robot holds and the bag is closed.
     """
+    stay_on_this_host()
     with ExitStack() as stack:
         # No handlers: after Ctrl-C the goal is still to be canceled and the bag to be closed.
         rclpy.init(
@@ -122,10 +124,9 @@ def _refuse_company(client: RunClient, spinner: Spinner) -> None:
 def _drive(request: RunRequest, client: RunClient, spinner: Spinner, host: Host) -> RunMetrics:
     spinner.check = host.check
     recording = request.settings.record is not None
-    if not spinner.until(lambda: client.ready(recording), READY_TIMEOUT):
-        raise NotReadyError(
-            f"the ensemble did not come up within {READY_TIMEOUT} s; try `slap doctor`"
-        )
+    patience = min(READY_TIMEOUT, request.timeout_s)
+    if not spinner.until(lambda: client.ready(recording), patience):
+        raise NotReadyError(f"the ensemble did not come up within {patience} s; try `slap doctor`")
     failure: SlapError | None = None
     try:
         _solve(request, client, spinner)

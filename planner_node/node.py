@@ -37,9 +37,10 @@ from rclpy.node import Node
 from slap_msgs.action import SolveTask
 
 from ensemble.heartbeat import Heartbeat
-from ensemble.interfaces import EXECUTE_SKILL, SOLVE_TASK
+from ensemble.interfaces import EXECUTE_SKILL, SKILL_EVENTS, SOLVE_TASK
 from ensemble.observation import Observation, Observer
 from ensemble.parameters import parameter, read_parameters
+from ensemble.presence import Presence
 from ensemble.running import run_node
 from ensemble.shortcuts import Repertoires, ShortcutParameters
 from ensemble.waiting import run_in, seconds
@@ -171,12 +172,13 @@ class PlannerNode(Node):
         return latest
 
     def _skill_server_watch(self) -> Any:
-        """A function that tells whether the skill server has been away for too long."""
+        """A function that tells whether this skill server has been away for too long."""
+        skill_server = Presence(self, SKILL_EVENTS)
         last_seen = seconds(self)
 
         def lost() -> bool:
             nonlocal last_seen
-            if self._skills.server_is_ready():
+            if skill_server.there() and self._skills.server_is_ready():
                 last_seen = seconds(self)
             return seconds(self) - last_seen > self._settings.server_timeout
 

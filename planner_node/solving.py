@@ -7,8 +7,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from math import inf
 
+from action_msgs.msg import GoalStatus
 from rclpy.action import ActionClient
+from rclpy.action.client import ClientGoalHandle
 from rclpy.action.server import ServerGoalHandle
 from rclpy.node import Node
 from rclpy.task import Future
@@ -17,18 +20,23 @@ from slap_msgs.msg import PlanEvent
 
 from ensemble import encode
 from ensemble.observation import Observation, Observer
-from ensemble.waiting import first_of, submit, until
+from ensemble.waiting import first_of, seconds, submit
 from planner_node.reporting import Reporter, Tally
 from slap_ros.errors import (
     EpisodeChangedError,
     ErrorCode,
     NodeDiedError,
+    NoStateError,
     SlapError,
     TaskCanceledError,
 )
 from slap_ros.planning.options import Stopped
 from slap_ros.planning.plan import Plan, PlanEdge, PlanningResult
 from slap_ros.planning.planner import Planner
+
+ANSWER_TIMEOUT = 5.0  # s, for the skill server to accept a goal, or to end one that is canceled
+ASK_AGAIN = 2.0  # s without a result after which it is asked for once more
+OBSERVE_TIMEOUT = 5.0  # s, for a state that the skill server has seen to be seen here too
 
 # Outcomes of an edge after which a new plan from wherever the robot is now makes sense.
 DIVERGENCES = frozenset(
@@ -127,7 +135,7 @@ class Solving:
         self._feedback(SolveTask.Feedback.PLANNING)
         started = self._event(PlanEvent.PLANNING_STARTED)
         job = submit(self.workers, lambda: self.planner.plan(state, self.goal_mask))
-        await self._wait(job)
+        await self._done(job)
         result: PlanningResult = job.result().result()
         rolled_out = result.edges_rolled_out
         done = self._event(PlanEvent.PLANNED, edges_rolled_out=rolled_out)
@@ -156,40 +164,78 @@ class Solving:
             step_budget=budget,
         )
         sent = self.skills.send_goal_async(request)
-        await self._wait(sent)
-        ended = sent.result().get_result_async()
-        try:
-            await self._wait(ended)
-        except TaskCanceledError:
-            sent.result().cancel_goal_async()
-            await first_of(self.node, ended, self.skill_server_lost)  # until the robot holds
-            raise
-        result = ended.result().result
+        if not await self._done(sent, ANSWER_TIMEOUT):
+            raise NodeDiedError(f"skill_server did not accept {edge} within {ANSWER_TIMEOUT} s")
+        result = await self._result(sent.result())
         await self._observe(start.step + result.steps)
         return Stopped(ErrorCode(result.error_code), result.error_msg)
 
-    async def _observe(self, step: int) -> None:
-        """Wait until the state of a step is known here too, not only to the skill server."""
-        await until(
-            self.node,
-            lambda: self._latest.step >= step or self._latest.episode is not self._start.episode,
+    async def _result(self, goal: ClientGoalHandle) -> ExecuteSkill.Result:
+        """How a skill ended.
+
+        Asked for again and again: services are not latched, so that an answer is lost for good
+        where the two nodes had lost sight of each other for a moment.
+        """
+        ended = goal.get_result_async()
+        try:
+            while not await self._done(ended, ASK_AGAIN):
+                ended = goal.get_result_async()
+        except TaskCanceledError:
+            goal.cancel_goal_async()
+            await self._holds(ended)
+            raise
+        if ended.result().status == GoalStatus.STATUS_UNKNOWN:
+            raise NodeDiedError("skill_server has forgotten the skill: it was started anew")
+        return ended.result().result
+
+    async def _holds(self, ended: Future) -> None:
+        """Wait for a canceled skill to end, unless the skill server is gone."""
+        deadline = seconds(self.node) + ANSWER_TIMEOUT
+        await first_of(
+            self.node, ended, lambda: self.skill_server_lost() or seconds(self.node) > deadline
         )
 
-    async def _wait(self, future: Future) -> None:
-        """Wait for a future unless the run is over before.
+    async def _observe(self, step: int) -> None:
+        """Wait until the state of a step is known here too, not only to the skill server.
+
+        Raises:
+            NoStateError: It was lost on the way.
+        """
+        if self._latest.step >= step:
+            return
+        if not await self._done(Future(), OBSERVE_TIMEOUT, lambda: self._latest.step >= step):
+            raise NoStateError(f"step {step} was not perceived within {OBSERVE_TIMEOUT} s")
+
+    async def _done(
+        self,
+        future: Future,
+        timeout_s: float = inf,
+        condition: Callable[[], bool] = lambda: False,
+    ) -> bool:
+        """Wait for a future or a condition unless the run is over before.
+
+        Returns:
+            Whether it came, rather than the end of the time.
 
         Raises:
             TaskCanceledError: The goal was canceled.
             NodeDiedError: The skill server is gone.
             EpisodeChangedError: The simulator was reset.
         """
-        await first_of(self.node, future, self._over)
+        deadline = seconds(self.node) + timeout_s
+        await first_of(
+            self.node,
+            future,
+            lambda: condition() or self._over() or seconds(self.node) > deadline,
+        )
         if self.goal.is_cancel_requested:
             raise TaskCanceledError("canceled")
         if self._latest.episode is not self._start.episode:
             raise EpisodeChangedError("the simulator was reset during the run")
-        if not future.done():
+        done = future.done() or condition()
+        if not done and self.skill_server_lost():
             raise NodeDiedError("skill_server does not answer: it was stopped or died")
+        return done
 
     def _over(self) -> bool:
         return (

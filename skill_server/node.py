@@ -19,7 +19,8 @@ Services:
     slap/list_skills (slap_msgs/ListSkills): the current domain's options and learned shortcuts.
 
 Action servers:
-    slap/execute_skill (slap_msgs/ExecuteSkill): run a skill. Cancelling makes the robot hold.
+    slap/execute_skill (slap_msgs/ExecuteSkill): run a skill. Cancelling makes the robot hold, and
+        so does a planner that was there when the skill was asked for and is gone.
 """
 
 from __future__ import annotations
@@ -39,9 +40,10 @@ from slap_msgs.srv import ListSkills
 
 from ensemble import encode
 from ensemble.heartbeat import Heartbeat
-from ensemble.interfaces import COMMAND, EXECUTE_SKILL, LIST_SKILLS, SKILL_EVENTS
+from ensemble.interfaces import COMMAND, EXECUTE_SKILL, LIST_SKILLS, PLAN_EVENTS, SKILL_EVENTS
 from ensemble.observation import Observation, Observer
 from ensemble.parameters import parameter, read_parameters
+from ensemble.presence import Presence
 from ensemble.running import run_node
 from ensemble.shortcuts import Repertoires, ShortcutParameters
 from ensemble.waiting import run_in, seconds
@@ -137,11 +139,12 @@ class SkillServer(Node):
             self._busy = False
 
     async def _begin(self, goal: ServerGoalHandle) -> SkillRun:
+        planner = Presence(self, PLAN_EVENTS)
         start = await self._observe(goal.request.episode)
         # Starting a skill may take a while (motion planning, rehearsal), so not here.
         execution = await run_in(self._workers, lambda: self._start(goal.request, start))
         budget = goal.request.step_budget or execution.option.skill.step_limit
-        return SkillRun(goal, execution, start, budget, heard_s=seconds(self))
+        return SkillRun(goal, execution, start, budget, planner, heard_s=seconds(self))
 
     def _start(self, request: ExecuteSkill.Goal, start: Observation) -> OptionExecution:
         option, target = requested_option(request, start, self._repertoires)
@@ -217,6 +220,8 @@ class SkillServer(Node):
         silence = seconds(self) - run.heard_s
         if silence > self._settings.state_timeout:
             run.stop(ErrorCode.NO_STATE, f"no new state for {silence:.1f} s")
+        elif run.planner.gone():
+            run.stop(ErrorCode.NODE_DIED, "the planner is gone; the robot holds")
 
     # -- telling --------------------------------------------------------------------------------
 

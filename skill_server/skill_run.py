@@ -13,6 +13,7 @@ from slap_msgs.action import ExecuteSkill
 from slap_msgs.msg import PlanEdge
 
 from ensemble.observation import Observation
+from ensemble.presence import Presence
 from ensemble.shortcuts import Repertoires
 from slap_ros.errors import EpisodeChangedError, ErrorCode, UnknownSkillError
 from slap_ros.messages.decode import decode_atoms
@@ -28,6 +29,7 @@ class SkillRun:
     execution: OptionExecution
     start: Observation
     step_budget: int  # environment steps
+    planner: Presence  # nobody watches the plan when it is gone
     heard_s: float  # node time of the newest observation
     latest: Observation = field(init=False)
     ended: Future = field(default_factory=Future)  # of Stopped

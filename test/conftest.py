@@ -12,6 +12,15 @@ DOMAIN_IDS = range(150, 200)
 _next_ids = itertools.cycle(DOMAIN_IDS)
 
 
+def pytest_addoption(parser):
+    parser.addoption(
+        "--fault-cases",
+        type=int,
+        default=0,
+        help="how many cases of each kind of fault to inject; by default a few",
+    )
+
+
 @pytest.fixture
 def network(monkeypatch):
     """A DDS domain that no other worker, and no other run of these tests, uses meanwhile."""

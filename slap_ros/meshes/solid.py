@@ -66,7 +66,7 @@ class Solid:
         for number, piece in enumerate(pieces, start=1):
             if not np.isfinite(piece.vertices).all():
                 raise InvalidMeshError(f"piece {number} has vertices that are not finite")
-            if _moments(piece)[0] < LEAST_VOLUME:
+            if not piece.triangles or _moments(piece)[0] < LEAST_VOLUME:
                 raise InvalidMeshError(
                     f"piece {number} encloses no volume; are its triangles anticlockwise, seen "
                     "from outside, and its lengths in metres?"

@@ -4,9 +4,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,6 +40,10 @@ class Layout:
             twice = sorted({name for name in names if names.count(name) > 1})
             raise InvalidStateError(f"object names must be unique, but {twice} occur twice")
         return Layout(objects)
+
+    def __reduce__(self) -> tuple[Callable[..., Layout], tuple[tuple[Object, ...]]]:
+        """Sent to another process as its objects alone; there it is one and the same again."""
+        return Layout.of, (self.objects,)
 
     @cached_property
     def slices(self) -> dict[Object, slice]:
@@ -84,27 +89,33 @@ class Layout:
         """Indices of one feature of several objects."""
         return np.array([self.column(obj, feature) for obj in objects], dtype=np.intp)
 
+    # What is remembered of a column goes with it: layouts outlive episodes, columns need not.
+
     @cached_property
-    def _indices(self) -> dict[tuple[Column, str], NDArray[np.intp]]:
-        return {}
+    def _indices(self) -> WeakKeyDictionary[Column, dict[str, NDArray[np.intp]]]:
+        return WeakKeyDictionary()
 
     def indices(self, column: Column, feature: str) -> NDArray[np.intp]:
-        """Indices of one feature of a column of objects; remembered, the column lives on."""
-        key = (column, feature)
-        if key not in self._indices:
-            self._indices[key] = self.columns(column.objects, feature)
-        return self._indices[key]
+        """Indices of one feature of a column of objects; remembered as long as the column."""
+        try:
+            return self._indices[column][feature]
+        except KeyError:
+            found = self.columns(column.objects, feature)
+            self._indices.setdefault(column, {})[feature] = found
+            return found
 
     @cached_property
-    def _grids(self) -> dict[tuple[Column, tuple[str, ...]], NDArray[np.intp]]:
-        return {}
+    def _grids(self) -> WeakKeyDictionary[Column, dict[tuple[str, ...], NDArray[np.intp]]]:
+        return WeakKeyDictionary()
 
     def grid(self, column: Column, features: tuple[str, ...]) -> NDArray[np.intp]:
-        """Indices of features of a column of objects, shape (objects, features); remembered."""
-        key = (column, features)
-        if key not in self._grids:
-            self._grids[key] = np.stack([self.columns(column.objects, f) for f in features], -1)
-        return self._grids[key]
+        """Indices of features of a column of objects, shape (objects, features); as above."""
+        try:
+            return self._grids[column][features]
+        except KeyError:
+            found = np.stack([self.columns(column.objects, f) for f in features], -1)
+            self._grids.setdefault(column, {})[features] = found
+            return found
 
     @cached_property
     def _by_type(self) -> dict[Type, Column]:

@@ -42,6 +42,7 @@ from slap_ros.robot.tracking import measured_pose
 DETECTED = "detected_"  # prefix of detection frames where no scene file names them
 PARKED = 10.0  # m from the base: where what was not yet detected is out of everything's way
 KEYS = frozenset({"type", "frame", "offset", "pose", "features"})
+MALFORMED = (AttributeError, KeyError, TypeError, ValueError, InvalidMeasurementError)
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ def read_workplace(path: Path, domain: Domain) -> Workplace:
     """
     try:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+    except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
         raise InvalidSceneError(f"scene file {path} cannot be read: {error}") from error
     if not isinstance(content, dict) or not isinstance(content.get("objects"), dict):
         raise InvalidSceneError(f"scene file {path} has no mapping `objects`")
@@ -89,7 +90,7 @@ def read_workplace(path: Path, domain: Domain) -> Workplace:
         parked = Pose((PARKED + len(features), 0.0, 0.0))
         try:
             obj, given, how = _object(str(name), entry, domain, parked)
-        except (KeyError, TypeError, ValueError, InvalidMeasurementError) as error:
+        except MALFORMED as error:
             raise InvalidSceneError(f"scene file {path}, object {name}: {error}") from error
         features[obj] = given
         if how is not None:

@@ -65,8 +65,11 @@ class Find:
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Find:
         """The find of :meth:`as_json`."""
-        signature, origin = Signature.from_json(data["signature"]), tuple(data["origin"])
-        return cls(**{**data, "signature": signature, "origin": origin})
+        numbers = {name: data[name] for name in ("hits", "steps", "plan_steps", "promise")}
+        if not all(isinstance(value, int | float) for value in numbers.values()):
+            raise TypeError(f"{numbers} are not all numbers")
+        origin = tuple(str(name) for name in data["origin"])
+        return cls(Signature.from_json(data["signature"]), origin, **numbers)
 
 
 @dataclass(frozen=True)
@@ -88,7 +91,12 @@ class Explored:
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Explored:
         """What :meth:`as_json` wrote."""
-        return cls(**{**data, "finds": tuple(Find.from_json(find) for find in data["finds"])})
+        return cls(
+            tuple(Find.from_json(find) for find in data["finds"]),
+            int(data["candidates"]),
+            int(data["environment_steps"]),
+            {str(name): float(mean) for name, mean in data["operator_steps"].items()},
+        )
 
 
 class Explorer:

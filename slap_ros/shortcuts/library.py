@@ -170,7 +170,7 @@ def load_shortcut(folder: Path) -> Shortcut:
         signature = Signature.from_json(about["signature"])
         shortest, record = int(about["shortest"]), dict(about["record"])
         checksum = str(about["sha256"])
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise InvalidLibraryError(f"{folder / SHORTCUT}: damaged: {error!r}") from error
     if signature.name != folder.name:
         raise InvalidLibraryError(

@@ -18,6 +18,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.vec_env import VecEnv
 
+from slap_ros.errors import InvalidParameterError
 from slap_ros.shortcuts.policy import Normalisation, Policy
 from slap_ros.shortcuts.ppo_settings import PpoSettings
 from slap_ros.shortcuts.practice import Practice
@@ -210,8 +211,29 @@ class Learner:
 
     def resume(self, path: Path) -> None:
         """Go on from a checkpoint. Episodes begin anew."""
-        saved = torch.load(path, weights_only=True)
+        saved = read_checkpoint(path)
         self._ppo.policy.load_state_dict(saved["policy"])
         self._ppo.policy.optimizer.load_state_dict(saved["optimizer"])
-        self._ppo.num_timesteps = int(saved["steps"])
-        self._adapter.shortest = int(saved["shortest"])
+        self._ppo.num_timesteps = saved["steps"]
+        self._adapter.shortest = saved["shortest"]
+
+
+def read_checkpoint(path: Path) -> dict[str, Any]:
+    """What :meth:`Learner.save` wrote. Only tensors and plain data are read, never code.
+
+    Raises:
+        InvalidParameterError: It is damaged.
+    """
+    try:
+        saved = torch.load(path, weights_only=True)
+        steps, shortest = int(saved["steps"]), int(saved["shortest"])
+        return {
+            "steps": steps,
+            "shortest": shortest,
+            "policy": dict(saved["policy"]),
+            "optimizer": dict(saved["optimizer"]),
+        }
+    except Exception as error:  # torch says in a dozen ways that a file is damaged
+        raise InvalidParameterError(
+            f"{path}: damaged: {type(error).__name__}; remove it to learn this stage anew"
+        ) from error

@@ -12,14 +12,17 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from hashlib import sha256
 from typing import Any
+from weakref import WeakKeyDictionary
 
 from slap_ros.relational import AtomSpace, GroundAtom, Object, Predicate
 
 Kind = str
 Pattern = tuple[str, str, tuple[Kind, ...]]  # "+" or "-", predicate, kinds of its objects
+# Of spaces that are in use: one that is kept keeps every state that it has perceived.
+_KINDS: WeakKeyDictionary[AtomSpace, Mapping[Object, Kind]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True)
@@ -54,9 +57,15 @@ def context_of(
     return frozenset(predicate.name for predicate in holding if predicate in predicates)
 
 
-@lru_cache(maxsize=256)
 def kinds(space: AtomSpace) -> Mapping[Object, Kind]:
-    """The kind of each object of a task."""
+    """The kind of each object of a task; remembered as long as the space."""
+    known = _KINDS.get(space)
+    if known is None:
+        known = _KINDS[space] = _kinds(space)
+    return known
+
+
+def _kinds(space: AtomSpace) -> Mapping[Object, Kind]:
     labels: dict[Object, list[str]] = {obj: [] for obj in space.layout.objects}
     for atom in space.decode(space.static_truth):
         if len(atom.objects) == 1:

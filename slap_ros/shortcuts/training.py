@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import fmean
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 from slap_ros.errors import InvalidParameterError
 from slap_ros.shortcuts import jobs
@@ -65,6 +65,9 @@ class Candidate:
     promise: float
 
 
+Result = TypeVar("Result")
+# What decoding JSON raises that is not what was written.
+DAMAGED = (OSError, AttributeError, KeyError, TypeError, ValueError, OverflowError)
 Learning = tuple[frozenset[Pattern], frozenset[str]]  # what makes a problem another one
 
 
@@ -160,8 +163,11 @@ class Training:
     def _explore(self) -> list[Explored]:
         tasks = self.settings.exploration.tasks
         work = [(self.place, i, self.settings.exploration) for i in range(tasks)]
-        data = self._kept("explored", lambda: self._run("exploring tasks", jobs.explore, work))
-        return [Explored.from_json({k: v for k, v in one.items() if k != "cpu_s"}) for one in data]
+        return self._kept(
+            "explored",
+            lambda: self._run("exploring tasks", jobs.explore, work),
+            lambda data: [Explored.from_json(one) for one in data],
+        )
 
     def _starts(
         self, candidate: Candidate, operator_steps: dict[str, float]
@@ -171,10 +177,11 @@ class Training:
             (self.place, i, candidate.signature, candidate.origin, operator_steps)
             for i in range(self.settings.starts)
         ]
-        data = self._kept(
-            f"{name}/starts", lambda: self._run("collecting starts", jobs.start, work)
+        return self._kept(
+            f"{name}/starts",
+            lambda: self._run("collecting starts", jobs.start, work),
+            lambda data: tuple(StartRecord.from_json(one) for one in data if one is not None),
         )
-        return tuple(StartRecord.from_json(one) for one in data if one is not None)
 
     def _learn(self, signature: Signature, starts: tuple[StartRecord, ...]) -> Shortcut:
         folder = self.folder / signature.name
@@ -190,8 +197,11 @@ class Training:
             for i in range(self.settings.validation)
         ]
         name = "+".join(["plans", *(shortcut.name for shortcut in shortcuts)])
-        lengths = self._kept(name, lambda: self._run("planning", jobs.plan_length, work))
-        return float("inf") if None in lengths else fmean(lengths)
+        return self._kept(
+            name,
+            lambda: self._run("planning", jobs.plan_length, work),
+            lambda lengths: float("inf") if None in lengths else fmean(lengths),
+        )
 
     def _run(self, what: str, function: Any, work: Sequence[tuple[Any, ...]]) -> list[Any]:
         results = []
@@ -206,23 +216,34 @@ class Training:
     def _claim(self) -> None:
         """Refuse a folder with another training."""
         mine = json.loads(json.dumps({"place": vars(self.place), **self.settings.as_record()}))
-        if self._kept("settings", lambda: mine) != mine:
+        if self._kept("settings", lambda: mine, lambda kept: kept) != mine:
             raise InvalidParameterError(
                 f"{self.folder} has a training with other settings; give another folder, or remove "
                 "this one"
             )
 
-    def _kept(self, name: str, compute: Callable[[], Any]) -> Any:
-        """A result from the folder, or computed and put there."""
+    def _kept(
+        self, name: str, compute: Callable[[], Any], decode: Callable[[Any], Result]
+    ) -> Result:
+        """A result from the folder, or computed and put there.
+
+        Raises:
+            InvalidParameterError: What is in the folder is damaged.
+        """
         path = self.folder / f"{name}.json"
-        if path.exists():
-            return json.loads(path.read_text(encoding="utf-8"))
-        data = compute()
-        path.parent.mkdir(parents=True, exist_ok=True)
-        draft = path.with_suffix(".draft")
-        draft.write_text(json.dumps(data), encoding="utf-8")
-        draft.rename(path)
-        return data
+        if not path.exists():
+            data = compute()
+            path.parent.mkdir(parents=True, exist_ok=True)
+            draft = path.with_suffix(".draft")
+            draft.write_text(json.dumps(data), encoding="utf-8")
+            draft.rename(path)
+            return decode(data)
+        try:
+            return decode(json.loads(path.read_text(encoding="utf-8")))
+        except DAMAGED as error:
+            raise InvalidParameterError(
+                f"{path}: damaged: {error!r}; remove it to have it made anew"
+            ) from error
 
     def _record(
         self, explored: Sequence[Explored], baseline: float, length: float

@@ -112,8 +112,7 @@ def _explore(place: Place, index: int, settings: Exploration) -> Pruned | str:
         data = training_jobs.explore(place, index, settings)
     except (UnsolvableError, PlanningLimitError) as error:
         return str(error)
-    explored = Explored.from_json({k: v for k, v in data.items() if k != "cpu_s"})
-    return Pruned(place.seed, index, explored)
+    return Pruned(place.seed, index, Explored.from_json(data))
 
 
 def explored_in(

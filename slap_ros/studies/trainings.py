@@ -87,11 +87,8 @@ class TrainingFolder:
         path = self.path / "explored.json"
         tasks = _read(path)
         try:
-            return tuple(
-                Explored.from_json({k: v for k, v in task.items() if k != "cpu_s"})
-                for task in tasks
-            )
-        except (AttributeError, KeyError, TypeError, ValueError) as error:
+            return tuple(Explored.from_json(task) for task in tasks)
+        except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
             raise _damaged(path, error) from error
 
     def curves(self) -> tuple[Curve, ...]:
@@ -126,7 +123,10 @@ def read_curve(path: Path) -> Curve:
         InvalidParameterError: A line is damaged, or there is none; names file and line.
     """
     stages: dict[int, list[Point]] = {}
-    complete = path.read_text(encoding="utf-8").split("\n")[:-1]
+    try:
+        complete = path.read_text(encoding="utf-8").split("\n")[:-1]
+    except (OSError, ValueError) as error:
+        raise _damaged(path, error) from error
     for number, line in enumerate(complete, start=1):
         stage, point = _parse(line, f"{path}, line {number}")
         points = stages.setdefault(stage, [])
@@ -150,7 +150,7 @@ def _parse(line: str, where: str) -> tuple[int, Point]:
         data = json.loads(line)
         length = None if data["length"] is None else float(data["length"])
         stage, point = int(data["stage"]), Point(int(data["steps"]), float(data["success"]), length)
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise _damaged(where, error) from error
     numbers = [point.success, *([] if length is None else [length])]
     if not all(map(math.isfinite, numbers)) or not 0.0 <= point.success <= 1.0 or point.steps < 0:

@@ -2,11 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """States: immutable, equal to the bit, refusing what is not a state."""
 
+import gc
+import pickle
+import weakref
+
 import numpy as np
 import pytest
 
 from slap_ros.errors import InvalidStateError, UnknownObjectError
 from slap_ros.relational import Feature, Layout, State, Type
+from slap_ros.relational.objects import Column
 
 CUP = Type("cup", (Feature("x", "m"), Feature("full", "1")))
 
@@ -29,7 +34,25 @@ def test_equality_is_to_the_bit():
 
 
 def test_layouts_of_the_same_objects_are_one():
-    assert Layout.of((CUP("a"), CUP("b"))) is Layout.of((CUP("a"), CUP("b")))
+    layout = Layout.of((CUP("a"), CUP("b")))
+    assert layout is Layout.of((CUP("a"), CUP("b")))
+    assert layout is pickle.loads(pickle.dumps(layout))
+
+
+def test_a_layout_forgets_the_columns_that_nobody_has_any_more():
+    """Layouts outlive episodes, whose columns are asked for many thousand times."""
+    a, b = CUP("a"), CUP("b")
+    state = State.build({obj: {"x": 1.0, "full": 0.0} for obj in (a, b)})
+    kept = Column((a, b))
+    ask = (lambda c: state.stack(c, "x"), lambda c: state.gather(c, ("x", "full")))
+    for look in ask:
+        look(kept)
+        gone = weakref.ref(temporary := Column((b,)))
+        look(temporary)
+        del temporary
+        gc.collect()
+        assert gone() is None
+    assert state.layout.indices(kept, "x") is state.layout.indices(kept, "x")
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])

@@ -2,12 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lifting of changes, and substitution of objects."""
 
+import gc
+import weakref
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.obstacle_tower import make
 from slap_ros.domains.obstacle_tower.tasks import RandomTasks
+from slap_ros.evaluation.approaches import Approach
+from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.reach import Reach
 from slap_ros.shortcuts.signature import Change, Signature, concerned, context_of
 
@@ -168,3 +174,17 @@ def test_reach_finds_exactly_the_pairs_that_suit():
             quickly = {(i, j) for i, js in reach._by_source(graph.nodes) for j in js}
             begins = {i for i in range(len(graph.nodes)) if reach._may_begin(graph.nodes[i])}
             assert {(i, j) for i, j in slowly if i in begins} == quickly & set(pairs)
+
+
+def test_a_task_that_is_over_is_forgotten():
+    """What was worked out of its objects must not keep it, with every state that it perceived."""
+    domain = get_domain("obstacle2d")
+    library = load_library(Path(__file__).parent / "data" / "obstacle2d", domain)
+    task = domain.task(3)
+    planner = Approach("slap", library.shortcuts).planner("lazy", domain, task.initial_state)
+    space = planner.problem.model.space
+    assert planner.plan(task.initial_state, space.mask(task.goal)).plan.edges
+    forgotten = weakref.ref(space)
+    del planner, space
+    gc.collect()
+    assert forgotten() is None

@@ -86,7 +86,8 @@ class NodeGraph:
         self, dds_topic: str, *, writers: bool, with_qos: bool = False
     ) -> list[Endpoint]:
         find = self._graph.writers if writers else self._graph.readers
-        return [found for found in find(with_qos=with_qos) if found.topic_name == dds_topic]
+        endpoints = find(qos_on=dds_topic if with_qos else None)
+        return [endpoint for endpoint in endpoints if endpoint.topic_name == dds_topic]
 
     def _endpoints_of(self, name: str, namespace: str, *, writers: bool) -> list[Endpoint]:
         gids = self._graph.gids_of_node(name, namespace)

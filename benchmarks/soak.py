@@ -1,0 +1,269 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Many tasks in one ensemble: ``python -m benchmarks.soak [--tasks N] [--output FOLDER]``.
+
+Every node is a process of its own and stays the same for all tasks, the recorder too. Between tasks
+the resident memory, the threads and the open file descriptors of each are read. ``--output`` gets a
+page, a picture and the numbers (needs ``slap_ros[studies]``).
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import monotonic
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import psutil
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from slap_msgs.srv import ResetTask
+
+from benchmarks.printing import show
+from ensemble.client import RunClient
+from ensemble.hosts import ProcessHost
+from ensemble.interfaces import RESET_TASK
+from ensemble.nodes import RunSettings, node_parameters
+from ensemble.run import Spinner
+from slap_ros.cli.console import progress
+from slap_ros.evaluation.metrics import RunLog
+from slap_ros.studies.figures import LINES, picture, require_matplotlib
+from slap_ros.studies.results import Table, pretty
+from slap_ros.versions import versions
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DOMAIN = "obstacle2d"
+PATIENCE = 120.0  # s, for anything: the machine may be busy
+MIB = 2**20
+SIZE = (6.4, 6.0)  # inches
+PANELS = {"memory_mib": "resident memory [MiB]", "threads": "threads", "descriptors": "descriptors"}
+
+PAGE = """\
+# Soak: many tasks in one ensemble
+
+{tasks} tasks of {domain}, {solved} of them solved, one after the other in one ensemble: every node
+a process that lives from the first task to the last, with the shipped shortcuts, and a recorder
+that writes all of it into one bag. Between tasks resident memory, threads and open descriptors of
+each process are read. It took {minutes:.0f} minutes on a machine shared with other work.
+
+![Memory, threads and descriptors of each process over the tasks](soak.svg)
+
+{table}
+
+Growth is the slope of a line fitted to the second half of the tasks. In the first tasks memory does
+grow: publishers keep an episode's worth of messages for whoever comes late, up to 1000 a topic, and
+allocators keep what they once had. The recorder keeps an index entry for every message of its bag's
+current 64 KiB, and one for each 64 KiB before, because a closed bag ends in an index.
+
+## How to make it again
+
+    python -m benchmarks.soak --tasks {tasks} --output docs/results
+
+Every number: [soak.json](soak.json).
+"""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """What a process holds."""
+
+    memory_mib: float  # resident
+    threads: int
+    descriptors: int
+
+    @classmethod
+    def of(cls, process: psutil.Process) -> Sample:
+        """Read it."""
+        with process.oneshot():
+            return cls(process.memory_info().rss / MIB, process.num_threads(), process.num_fds())
+
+
+@dataclass(frozen=True)
+class Soaked:
+    """What it came to.
+
+    Args:
+        tasks: After how many tasks each sample was taken.
+        samples: By node, in order of ``tasks``.
+        solved: Of all tasks.
+        seconds: That all of it took.
+        failures: What was said of those not solved.
+    """
+
+    tasks: Sequence[int]
+    samples: Mapping[str, Sequence[Sample]]
+    solved: int
+    seconds: float
+    failures: Sequence[str]
+
+    def growth(self, node: str) -> float:
+        """Of resident memory over the second half, KiB a task."""
+        half = len(self.tasks) // 2
+        memory = [sample.memory_mib * 1024 for sample in self.samples[node][half:]]
+        return float(np.polyfit(self.tasks[half:], memory, 1)[0]) if len(memory) > 1 else 0.0
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "solved": self.solved,
+            "seconds": round(self.seconds, 1),
+            "failures": list(self.failures),
+            "tasks": list(self.tasks),
+            "nodes": {
+                node: {
+                    "growth_kib_per_task": round(self.growth(node), 3),
+                    **{key: [round(asdict(s)[key], 2) for s in samples] for key in PANELS},
+                }
+                for node, samples in self.samples.items()
+            },
+        }
+
+
+class Bench:
+    """The user of the ensemble."""
+
+    def __init__(self, client: RunClient, spinner: Spinner) -> None:
+        self._client, self._spinner = client, spinner
+        self._resets = client.create_client(RESET_TASK.type, RESET_TASK.name)
+
+    def ready(self) -> None:
+        """Wait until the ensemble is."""
+        self._wait(lambda: self._client.ready(True) and self._resets.service_is_ready())
+
+    def solve(self, seed: int) -> str:
+        """Have a task solved; empty, or why it was not."""
+        self._client.log = RunLog()  # only one run is of interest at a time
+        reset = self._resets.call_async(ResetTask.Request(seed=seed))
+        self._wait(reset.done)
+        sent = self._client.send((), 0, 5, reset.result().episode)
+        self._wait(sent.done)
+        ended = sent.result().get_result_async()
+        self._wait(ended.done)
+        result = ended.result().result
+        return "" if result.success else f"seed {seed}: {result.error_code}: {result.error_msg}"
+
+    def _wait(self, condition: Any) -> None:
+        if not self._spinner.until(condition, PATIENCE):
+            raise SystemExit(f"no answer within {PATIENCE} s")
+
+
+def soak(tasks: int, every: int) -> Soaked:
+    """Solve tasks with seeds from 0 on, reading the processes after every so many."""
+    with ExitStack() as stack:
+        bag = Path(stack.enter_context(TemporaryDirectory(prefix="slap-soak-"))) / "bag"
+        rclpy.init(args=["--ros-args", "--log-level", "warn"])
+        stack.callback(rclpy.try_shutdown)
+        executor = SingleThreadedExecutor()
+        stack.callback(executor.shutdown)
+        client = RunClient(lambda _type, _message: None)
+        stack.callback(client.destroy_node)
+        executor.add_node(client)
+        spinner = Spinner(executor)
+        settings = RunSettings(DOMAIN, "fair", 0, 0, "lazy", bag)
+        host = stack.enter_context(ProcessHost(node_parameters(settings)))
+        spinner.check = host.check
+        bench = Bench(client, spinner)
+        bench.ready()
+        processes = {name: psutil.Process(p.pid) for name, p in host.processes.items()}
+        processes["slap_run"] = psutil.Process()
+        read: dict[str, list[Sample]] = {name: [] for name in processes}
+        after, failures, start = [], [], monotonic()
+        with progress() as bar:
+            line = bar.add_task("soaking", total=tasks)
+            for number in range(1, tasks + 1):
+                if failure := bench.solve(number - 1):
+                    failures.append(failure)
+                    bar.console.print(failure, highlight=False)
+                if number == 1 or number % every == 0 or number == tasks:
+                    after.append(number)
+                    for name, process in processes.items():
+                        read[name].append(Sample.of(process))
+                bar.advance(line)
+        return Soaked(after, read, tasks - len(failures), monotonic() - start, failures)
+
+
+def draw(figure: Figure, soaked: Soaked) -> None:
+    """A panel each for memory, threads and descriptors; a line a process."""
+    panels = figure.subplots(len(PANELS), 1, sharex=True, height_ratios=(2, 1, 1))
+    for axes, (key, label) in zip(panels, PANELS.items(), strict=True):
+        for (node, samples), colour in zip(soaked.samples.items(), LINES, strict=True):
+            values = [getattr(sample, key) for sample in samples]
+            axes.plot(soaked.tasks, values, color=colour, linewidth=1.2, label=node)
+        axes.set_ylim(bottom=0)
+        axes.set_ylabel(label)
+    panels[-1].set_xlabel("tasks")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+
+
+def table(soaked: Soaked) -> Table:
+    """A row a process."""
+    rows = []
+    for node, samples in soaked.samples.items():
+        middle = samples[len(samples) // 2]
+        spans = [
+            f"{min(v)} to {max(v)}" if min(v) < max(v) else f"{max(v)}"
+            for v in ([s.threads for s in samples[1:]], [s.descriptors for s in samples[1:]])
+        ]
+        memory = [f"{s.memory_mib:.1f}" for s in (samples[0], middle, samples[-1])]
+        rows.append([f"`{node}`", *memory, f"{soaked.growth(node):.2f}", *spans])
+    return Table(
+        [
+            "process",
+            "memory after 1 task [MiB]",
+            "half-way",
+            "at the end",
+            "growth [KiB a task]",
+            "threads",
+            "descriptors",
+        ],
+        rows,
+    )
+
+
+def write(folder: Path, soaked: Soaked) -> None:
+    """Write the page, the picture and the numbers."""
+    folder.mkdir(parents=True, exist_ok=True)
+    page = PAGE.format(
+        tasks=soaked.tasks[-1],
+        domain=DOMAIN,
+        solved=soaked.solved,
+        minutes=soaked.seconds / 60,
+        table=table(soaked).as_markdown(),
+    )
+    data = {"domain": DOMAIN, "versions": dict(versions()), "found": soaked.as_json()}
+    drawing = picture(lambda figure: draw(figure, soaked), SIZE)
+    for ending, content in {"md": page, "json": pretty(data) + "\n", "svg": drawing}.items():
+        (folder / f"soak.{ending}").write_text(content, encoding="utf-8")
+
+
+def main() -> int:
+    """Print the figures."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--tasks", type=int, default=1000)
+    parser.add_argument("--every", type=int, default=10, help="tasks between two samples")
+    parser.add_argument("--output", type=Path, help="folder for page, picture and numbers")
+    parser.add_argument("--json", action="store_true")
+    arguments = parser.parse_args()
+    if arguments.output is not None:
+        require_matplotlib()
+    soaked = soak(arguments.tasks, arguments.every)
+    if arguments.output is not None:
+        write(arguments.output, soaked)
+    if arguments.json:
+        show(soaked.as_json(), as_json=True)
+    else:
+        print(f"{soaked.solved} of {arguments.tasks} solved in {soaked.seconds:.0f} s")
+        print(table(soaked).as_markdown())
+    return 1 if soaked.failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,37 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Whether another node is still there, and still the same one."""
+
+from __future__ import annotations
+
+from rclpy.node import Node
+
+from ensemble.interfaces import Topic
+
+
+class Presence:
+    """The nodes that were found to publish a topic.
+
+    A node that died and was started again has the same name, and servers that are ready, but it
+    knows nothing of what its predecessor was asked for. Its endpoints are others.
+    """
+
+    def __init__(self, node: Node, topic: Topic) -> None:
+        """Follow whoever publishes ``topic`` now or, if nobody does yet, first."""
+        self._node = node
+        self._topic = node.resolve_topic_name(topic.name)
+        self._known = self._publishers()
+
+    def there(self) -> bool:
+        """Whether one of them is there."""
+        now = self._publishers()
+        self._known = self._known or now
+        return not self._known.isdisjoint(now)
+
+    def gone(self) -> bool:
+        """Whether they were there and are no more; False as long as none was found."""
+        return not self.there() and bool(self._known)
+
+    def _publishers(self) -> frozenset[tuple[int, ...]]:
+        found = self._node.get_publishers_info_by_topic(self._topic)
+        return frozenset(tuple(info.endpoint_gid) for info in found)

@@ -1,0 +1,51 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Who can join in: nobody from another host, unless that was asked for."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from ensemble.network import REACH, stay_on_this_host
+
+HERE = Path(__file__).parent
+
+
+def two_hosts_possible():
+    """Whether a user may have network namespaces of their own, which are like hosts."""
+    if not all(map(shutil.which, ("unshare", "nsenter", "ip"))):
+        return False
+    return subprocess.run(["unshare", "-rn", "true"], capture_output=True).returncode == 0
+
+
+@pytest.mark.skipif(not two_hosts_possible(), reason="no network namespaces for this user")
+@pytest.mark.parametrize(("reach", "open_to_all"), [(None, False), ("SUBNET", True)])
+def test_another_host_is_heard_only_where_that_was_asked_for(network, reach, open_to_all):
+    """The other host knows the address and asks for it; nobody has to be discovered."""
+    environment = {key: value for key, value in os.environ.items() if key != REACH}
+    environment |= {REACH: reach} if reach else {}
+    told = subprocess.run(
+        ["unshare", "-rn", "bash", str(HERE / "two_hosts.sh"), sys.executable],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=200,
+    )
+    assert told.returncode == 0, told.stderr
+    assert set(told.stdout.split()) == {
+        "inside:True" if open_to_all else "inside:False",
+        "outside:True" if open_to_all else "outside:False",
+    }
+
+
+def test_jazzys_own_default_is_not_taken(monkeypatch):
+    monkeypatch.delenv(REACH, raising=False)
+    stay_on_this_host()
+    assert os.environ[REACH] == "LOCALHOST"
+    monkeypatch.setenv(REACH, "SUBNET")
+    stay_on_this_host()
+    assert os.environ[REACH] == "SUBNET"

@@ -1,0 +1,30 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))  # for the helpers of these tests
+sys.path.insert(0, str(Path(__file__).parent.parent / "bags"))  # and for theirs
+
+import faulty_links
+import process_faults
+
+SAMPLED = {
+    "message_case": faulty_links.Case.sampled,
+    "process_case": process_faults.Case.sampled,
+    "restart_case": process_faults.Case.sampled_restart,
+}
+# Few, as each takes seconds, and unlike one another. ``--fault-cases N`` injects the first N.
+USUAL = {
+    "message_case": range(0, 80, 5),
+    "process_case": (0, 1, 2, 15),
+    "restart_case": (2, 3),
+}
+
+
+def pytest_generate_tests(metafunc):
+    asked = metafunc.config.getoption("--fault-cases")
+    for name, sampled in SAMPLED.items():
+        if name in metafunc.fixturenames:
+            numbers = range(asked) if asked else USUAL[name]
+            metafunc.parametrize(name, [sampled(number) for number in numbers], ids=str)

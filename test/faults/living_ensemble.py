@@ -1,0 +1,99 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""An ensemble each of whose nodes may be killed and started again, and a client that goes on."""
+
+from contextlib import ExitStack, contextmanager
+
+import rclpy
+from process_faults import LIMIT
+from rclpy.executors import SingleThreadedExecutor
+from slap_msgs.srv import ResetTask
+
+from ensemble.client import RunClient
+from ensemble.hosts import ProcessHost
+from ensemble.interfaces import ATOMS, PLAN_EVENTS, RESET_TASK, SKILL_EVENTS, STATE
+from ensemble.nodes import RunSettings, node_parameters
+from ensemble.presence import Presence
+from ensemble.run import Spinner
+
+# By which a node is told from its successor.
+PUBLISHED = {
+    "sim_node": STATE,
+    "perception_node": ATOMS,
+    "skill_server": SKILL_EVENTS,
+    "planner_node": PLAN_EVENTS,
+}
+
+
+class Laboratory:
+    """An ensemble whose nodes come and go, and a client."""
+
+    def __init__(self, nodes, client, spinner, heard):
+        self.nodes, self.client, self.spinner, self.heard = nodes, client, spinner, heard
+        self._hosts = {}
+
+    def start(self, name, **changed):
+        self._hosts[name] = ProcessHost({name: {**self.nodes[name], **changed}})
+        self._hosts[name].__enter__()
+
+    def kill(self, name):
+        process = self._hosts[name].processes[name]
+        process.kill()
+        process.wait()
+
+    def restart(self, name, **changed):
+        """Kill it, start it again, and wait until nobody takes it for its predecessor."""
+        old = Presence(self.client, PUBLISHED[name]) if name in PUBLISHED else None
+        self.kill(name)
+        if old is None:
+            self.until(lambda: name not in self.client.others())
+        self.start(name, **changed)
+        self.until(lambda: (old is None or old.gone()) and self.client.ready(True))
+
+    def told(self, type_name):
+        """The messages of a type so far."""
+        return [message for name, message in self.heard if name == type_name]
+
+    def stop(self):
+        for host in self._hosts.values():
+            host.__exit__(None, None, None)
+
+    def until(self, condition):
+        """Wait for something that must come."""
+        assert self.spinner.until(condition, LIMIT), "hung"
+
+    def ask(self, episode=0):
+        """Ask for the task to be solved; the future result."""
+        sent = self.client.send((), 0, 2, episode)
+        self.until(sent.done)
+        return sent.result().get_result_async()
+
+    def reset(self, seed):
+        """Open a new episode; its number."""
+        service = self.client.create_client(RESET_TASK.type, RESET_TASK.name)
+        self.until(service.service_is_ready)
+        answer = service.call_async(ResetTask.Request(seed=seed))
+        self.until(answer.done)
+        self.client.destroy_client(service)
+        return answer.result().episode
+
+
+@contextmanager
+def laboratory(seed, bag, pace):
+    """An ensemble on a task, at so many steps a second; ``bag`` may be None."""
+    settings = RunSettings("obstacle2d", "fair", seed, 0, "lazy", bag, pace, shortcuts="none")
+    with ExitStack() as stack:
+        rclpy.init()
+        stack.callback(rclpy.shutdown)
+        executor = SingleThreadedExecutor()
+        stack.callback(executor.shutdown)
+        heard = []
+        client = RunClient(lambda type_name, message: heard.append((type_name, message)))
+        stack.callback(client.destroy_node)
+        executor.add_node(client)
+        bench = Laboratory(node_parameters(settings), client, Spinner(executor), heard)
+        stack.callback(bench.stop)
+        for name in bench.nodes:
+            bench.start(name)
+        bench.until(lambda: client.ready(bag is not None))
+        yield bench

@@ -1,0 +1,54 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Whoever dies in the middle of a skill leaves the robot holding, and the others say so."""
+
+import pytest
+from living_ensemble import laboratory
+from process_faults import LIMIT
+
+from slap_ros.errors import ErrorCode
+from slap_ros.messages.events import SkillEventKind
+from slap_ros.messages.interfaces import SKILL_EVENT, STATE
+
+SLOWLY = 1.0  # environment steps a second: a skill takes longer than a dead node is missed
+
+
+def holds(bench):
+    """Whether the robot stands still."""
+    before = len(bench.told(STATE))
+    bench.spinner.until(lambda: False, 3.0 / SLOWLY)
+    return len(bench.told(STATE)) == before
+
+
+@pytest.mark.timeout(3 * LIMIT)
+def test_a_planner_that_dies_leaves_the_robot_holding(network):
+    with laboratory(3, None, SLOWLY) as bench:
+        bench.ask()
+        bench.until(lambda: len(bench.told(STATE)) > 2)
+        bench.kill("planner_node")
+        bench.until(lambda: len(bench.told(SKILL_EVENT)) == 2)
+        _, end = bench.told(SKILL_EVENT)
+        assert (end.kind, end.error_code) == (SkillEventKind.FAILED, ErrorCode.NODE_DIED)
+        assert "the planner is gone" in end.error_msg
+        # One command may be under way; after that there are no more.
+        bench.spinner.until(lambda: False, 2.0 / SLOWLY)
+        assert holds(bench)
+
+
+@pytest.mark.timeout(3 * LIMIT)
+@pytest.mark.parametrize(
+    ("victim", "code"),
+    [
+        ("perception_node", ErrorCode.NO_STATE),
+        ("sim_node", ErrorCode.NO_STATE),
+        ("skill_server", ErrorCode.NODE_DIED),
+    ],
+)
+def test_whoever_else_dies_ends_the_run_and_the_robot_holds(network, victim, code):
+    with laboratory(3, None, SLOWLY) as bench:
+        result = bench.ask()
+        bench.until(lambda: len(bench.told(STATE)) > 2)
+        bench.kill(victim)
+        bench.until(result.done)
+        assert result.result().result.error_code == code
+        assert holds(bench)
