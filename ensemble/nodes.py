@@ -45,6 +45,7 @@ class RunSettings:
     # Parameters of the mock robot, and of the bridge, that are not the default.
     mock: Mapping[str, str | int | float] = field(default_factory=dict)
     bridge: Mapping[str, str | int | float] = field(default_factory=dict)
+    perception: Mapping[str, str | int | float] = field(default_factory=dict)  # the same
 
 
 def node_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int | float]]:
@@ -52,10 +53,14 @@ def node_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int |
     learned: dict[str, str | int | float] = {"samples": settings.samples}
     if settings.shortcuts:
         learned["shortcuts"] = settings.shortcuts
-    waiting = {} if settings.world == SIM else {"state_timeout": ROBOT_STATE_TIMEOUT}
+    waiting: dict[str, str | int | float] = {}
+    if settings.world != SIM:
+        waiting["state_timeout"] = ROBOT_STATE_TIMEOUT
+    if "debounce" in settings.perception:  # what is debounced is late
+        waiting["patience"] = int(settings.perception["debounce"]) - 1
     nodes: dict[str, Mapping[str, str | int | float]] = {
         **_world_parameters(settings),
-        "perception_node": {},
+        "perception_node": settings.perception,
         "skill_server": learned | waiting,
         "planner_node": {"planner": settings.planner, **learned},
     }

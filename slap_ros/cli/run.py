@@ -83,6 +83,9 @@ def run(
     mock: Annotated[
         str, typer.Option(help="The mock robot's parameters, as latency=0.05,pose_noise=0.003.")
     ] = "",
+    perception: Annotated[
+        str, typer.Option(help="How well is seen, as position_noise=0.002,debounce=3.")
+    ] = "",
     json: Json = False,
 ) -> int:
     """Run the whole ensemble on one task: simulator, perception, planner, skills, recorder."""
@@ -102,10 +105,14 @@ def run(
 
     # ROS is needed only here: every other command works without it.
     from ensemble.nodes import RunSettings
+    from ensemble.parameters import parse_parameters
     from ensemble.run import RunRequest
     from ensemble.run import run as run_ensemble
+    from perception_node.node import Parameters as PerceptionParameters
     from robot_bridge.mock.options import mock_options
 
+    seeing = parse_parameters(perception, PerceptionParameters, "perception")
+    _ = PerceptionParameters(**seeing).quality
     states = []
     with _bag(record, report, f"{domain}-{seed}") as bag:
         settings = RunSettings(
@@ -121,6 +128,7 @@ def run(
             world,
             str(scene or ""),
             mock_options(mock),
+            perception=seeing,
         )
         request = RunRequest(settings, atoms, 0, max_replans, timeout, in_process)
         with _narrator(live) as narrate:

@@ -19,6 +19,7 @@ from slap_ros.domains.cleanup_table.scenery import scene_of
 from slap_ros.domains.cleanup_table.shapes import shipped
 from slap_ros.domains.cleanup_table.view import VIEW
 from slap_ros.domains.domain import ActionSpace, Domain
+from slap_ros.domains.tabletop.settling import settling
 from slap_ros.domains.tabletop.showing import animation, visible_bodies
 from slap_ros.domains.tabletop.timing import AtSpeedLimit, InTens, Timing
 from slap_ros.domains.variation import varied
@@ -72,6 +73,7 @@ def make(
         make_world=lambda state: PandaWorld(scene(state), state, actions=actions),
         default_goal=tasks.everything_in_the_bin,
         step_limit=tasks.STEP_LIMIT,
+        settle=settling(scene),
         bodies=lambda state: visible_bodies(scene(state), state),
         animate=animation(scene, FROM_THE_LEFT),
         view=VIEW,

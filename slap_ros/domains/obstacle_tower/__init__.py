@@ -18,6 +18,7 @@ from slap_ros.domains.domain import ActionSpace, Domain
 from slap_ros.domains.obstacle_tower import model, skills, tasks
 from slap_ros.domains.obstacle_tower.scenery import scene_of
 from slap_ros.domains.obstacle_tower.view import VIEW
+from slap_ros.domains.tabletop.settling import settling
 from slap_ros.domains.tabletop.showing import animation, visible_bodies
 from slap_ros.domains.tabletop.timing import AtSpeedLimit, InTens, Timing
 from slap_ros.domains.variation import varied
@@ -52,6 +53,7 @@ def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Doma
         default_goal=tasks.target_block_on_target,
         step_limit=tasks.STEP_LIMIT,
         unread_types=frozenset({ROBOT}),
+        settle=settling(scene_of),
         bodies=lambda state: visible_bodies(scene_of(state), state),
         animate=animation(scene_of),
         view=VIEW,
