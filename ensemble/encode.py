@@ -86,7 +86,7 @@ def atoms(ground_atoms: Iterable[GroundAtom]) -> list[msgs.GroundAtom]:
 
 
 def percept(
-    value: Percept, of: msgs.ObjectCentricState, space: AtomSpace, exact: bool, known: State
+    value: Percept, of: msgs.ObjectCentricState, space: AtomSpace, known: State
 ) -> msgs.AbstractState:
     """What is perceived of a state; ``known``: that state, decoded."""
     return msgs.AbstractState(
@@ -94,7 +94,7 @@ def percept(
         episode=of.episode,
         step=of.step,
         atoms=atoms(space.decode(value.abstract)),
-        exact=exact,
+        exact=value.exact,
         seen=[
             msgs.ObjectState(name=obj.name, type=obj.type.name, features=value.state[obj].tolist())
             for obj in value.state.objects

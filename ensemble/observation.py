@@ -59,6 +59,7 @@ class Observation:
     state: State
     abstract: int
     missing: frozenset[str] = frozenset()  # objects of which nobody knows where they are
+    exact: bool = True  # whether another look would find the same
 
 
 def subscribe(node: Node, topic: Topic, callback: Callable[..., None]) -> None:
@@ -170,5 +171,6 @@ class Observer:
             decode_seen(atoms.seen, decode_state(state, episode.domain.types_by_name)),
             decode_atoms(atoms.atoms, episode.space),
             frozenset(atoms.missing),
+            bool(atoms.exact),
         )
         self._on_observation(self.latest)

@@ -128,9 +128,7 @@ class PerceptionNode(Node):
             self.get_logger().error(f"state of step {message.step} not perceived: {error}")
             return
         percept = self._perceiver.perceive(state)
-        self._atoms.publish(
-            encode.percept(percept, message, episode.space, self._quality.exact, state)
-        )
+        self._atoms.publish(encode.percept(percept, message, episode.space, state))
         self._perceived += 1
 
 

@@ -58,7 +58,8 @@ class NoisyPerceiver:
     def perceive(self, state: State) -> Percept:
         """See :class:`~slap_ros.perception.percept.Perceiver`."""
         seen = self.domain.settle(self.sight.look(state))
-        return Percept(seen, self.debouncer.add(self._abstract(seen)), self.sight.missing)
+        abstract = self.debouncer.add(self._abstract(seen))
+        return Percept(seen, abstract, self.sight.missing, self.quality.exact)
 
     def _abstract(self, seen: State) -> int:
         if self.quality.threshold_noise == 0.0:

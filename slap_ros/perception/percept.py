@@ -17,6 +17,7 @@ class Percept:
     state: State  # with poses as they are taken to be
     abstract: int  # atoms as they are taken to hold
     missing: frozenset[str] = frozenset()  # objects of which nobody knows any more where they are
+    exact: bool = True  # whether another look would find the same
 
 
 class Perceiver(Protocol):

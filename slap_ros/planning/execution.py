@@ -10,6 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from time import perf_counter
 
+import numpy as np
+
 from slap_ros.domains import Domain, World
 from slap_ros.domains.domain import Action
 from slap_ros.errors import (
@@ -82,16 +84,11 @@ class Executor:
         """Solve from the world's current state, or say why not."""
         episode = Episode(states=[self.world.state])
         while True:
-            try:
-                plan = self._plan(episode)
-            except (UnsolvableError, PlanningLimitError, InvalidStateError) as error:
-                episode.error = Stopped(error.code, str(error))
-                return episode
-            stopped = self._execute(plan, episode)
+            stopped, blind = self._attempt(episode)
             if stopped.reached:
                 episode.success = True
                 return episode
-            if stopped.code in FINAL:
+            if stopped.code in FINAL or (blind and self._known.exact):
                 episode.error = stopped
                 return episode
             if episode.replans == self.max_replans:
@@ -101,6 +98,16 @@ class Executor:
                 )
                 return episode
             episode.replans += 1
+            if blind and episode.plan_length < self.step_limit:
+                self._act(np.zeros(len(self.domain.action_space.axes)), episode)  # and look again
+
+    def _attempt(self, episode: Episode) -> tuple[Stopped, bool]:
+        """One plan, as far as it goes; second, whether there was none from what was seen."""
+        try:
+            plan = self._plan(episode)
+        except (UnsolvableError, PlanningLimitError, InvalidStateError) as error:
+            return Stopped(error.code, str(error)), True
+        return self._execute(plan, episode), False
 
     def _plan(self, episode: Episode) -> Plan:
         started = perf_counter()
@@ -138,7 +145,10 @@ class Executor:
                 return Stopped(
                     ErrorCode.STEP_LIMIT, f"the goal was not reached in {self.step_limit} steps"
                 )
-            episode.actions.append(action)
             episode.shortcut_steps += edge.option.kind is OptionKind.SHORTCUT
-            episode.states.append(self.world.step(action))
-            self._known = self._perceiver.perceive(episode.states[-1])
+            self._act(action, episode)
+
+    def _act(self, action: Action, episode: Episode) -> None:
+        episode.actions.append(action)
+        episode.states.append(self.world.step(action))
+        self._known = self._perceiver.perceive(episode.states[-1])

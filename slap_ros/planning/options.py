@@ -85,6 +85,34 @@ def given_option(domain: Domain, name: str, objects: Sequence[Object]) -> Option
 
 
 @dataclass(frozen=True)
+class HoldSkill:
+    """Stand still for a step: to look again where what was seen makes no sense."""
+
+    axes: int  # of an action
+    name: str = "Hold"
+    step_limit: int = 1
+    least_steps: int = 1
+
+    def lower_bound(self, state: State, objects: tuple[Object, ...]) -> int:
+        """A step."""
+        del state, objects
+        return self.least_steps
+
+    def start(self, state: State, objects: tuple[Object, ...]) -> Policy:
+        """Move nothing, whatever the state."""
+        del state, objects
+        return lambda _: np.zeros(self.axes)
+
+
+HOLD = HoldSkill.name
+
+
+def hold_option(actions: ActionSpace) -> Option:
+    """The option to stand still for a step; it leads nowhere, so it ends at its step limit."""
+    return Option(OptionKind.OPERATOR, HoldSkill(len(actions.axes)), ())
+
+
+@dataclass(frozen=True)
 class Stopped:
     """Why an execution is over: NONE where the target was reached."""
 
