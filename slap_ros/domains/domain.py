@@ -172,6 +172,7 @@ class Domain:
     # Measured poses put where physics would have them: what lies still lies on something.
     settle: Callable[[State], State] = lambda state: state
     bodies: Callable[[State], Sequence[VisibleBody]] = lambda _: ()  # to be shown
+    arm: Callable[[State], Sequence[VisibleBody]] = lambda _: ()  # the robot, unless a body is it
     animate: Animate | None = None
     view: View | None = None  # what a learner sees; without it there are no shortcuts
     learned_actions: ActionSpace | None = None  # of shortcuts, where not all actions are theirs
