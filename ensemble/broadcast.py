@@ -18,6 +18,7 @@ from rclpy.serialization import serialize_message
 
 from ensemble.interfaces import (
     ATOMS,
+    COMMAND,
     DOMAIN,
     JOINT_STATES,
     MARKERS,
@@ -40,6 +41,7 @@ SHOWN = (
     TASK,
     STATE,
     ATOMS,
+    COMMAND,
     PLAN,
     PLAN_EVENTS,
     SKILL_EVENTS,
@@ -77,7 +79,7 @@ class Broadcast:
         self._context = Context()
         self._channels = {
             topic.type_name: Channel(
-                _absolute(topic),
+                channel_name(topic),
                 schema=Schema(
                     name=topic.type_name,
                     encoding="ros2msg",
@@ -161,6 +163,6 @@ class Broadcast:
         self._server.stop()
 
 
-def _absolute(topic: Topic) -> str:
+def channel_name(topic: Topic) -> str:
     """The topic's name from the root, as bags have it."""
     return topic.name if topic.name.startswith("/") else f"/{topic.name}"
