@@ -36,8 +36,10 @@ def read_parameters(node: Node, kind: type[P]) -> P:
 
 def parse_parameters(
     text: str, kind: type[P], what: str, given: Collection[str] = ()
-) -> dict[str, str | int | float]:
+) -> dict[str, Any]:
     """Parameters as a command line has them, ``latency=0.05,dropout=0.1``, of their own types.
+
+    Several numbers are separated by blanks.
 
     Args:
         text: The parameters.
@@ -50,7 +52,7 @@ def parse_parameters(
     """
     kinds = {item.name: type(item.default) for item in fields(kind)}  # type: ignore[arg-type]
     known = [name for name in kinds if name not in given]
-    found: dict[str, str | int | float] = {}
+    found: dict[str, Any] = {}
     for part in filter(None, text.split(",")):
         name, _, value = part.partition("=")
         if name not in known:
@@ -58,7 +60,9 @@ def parse_parameters(
                 f"the {what} has no parameter {name!r}; it has {', '.join(known)}"
             )
         try:
-            found[name] = kinds[name](value)
+            found[name] = (
+                tuple(map(float, value.split())) if kinds[name] is tuple else kinds[name](value)
+            )
         except ValueError:
             raise InvalidParameterError(f"the {what}'s {name} is a number, not {value!r}") from None
     return found
