@@ -42,10 +42,10 @@ class RunSettings:
     samples: int = DEFAULT.samples  # attempts of a shortcut in the model
     world: str = SIM  # the simulator, a robot, or the bridge with a mock robot behind it
     scene: str = ""  # a robot's scene file; empty: the objects of the sampled task
-    # Parameters of the mock robot, and of the bridge, that are not the default.
+    # Parameters of the mock robot, of the bridge and of perception that are not the default.
     mock: Mapping[str, str | int | float] = field(default_factory=dict)
     bridge: Mapping[str, str | int | float] = field(default_factory=dict)
-    perception: Mapping[str, str | int | float] = field(default_factory=dict)  # the same
+    perception: Mapping[str, str | int | float] = field(default_factory=dict)
 
 
 def node_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int | float]]:

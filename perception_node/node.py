@@ -43,7 +43,7 @@ from ensemble.interfaces import ATOMS, STATE
 from ensemble.observation import Episode, EpisodeWatcher, subscribe
 from ensemble.parameters import parameter, read_parameters
 from ensemble.running import run_node
-from slap_ros.errors import InvalidStateError
+from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.messages.decode import decode_state
 from slap_ros.perception import ExactPerceiver, NoisyPerceiver, Perceiver, Quality
 from slap_ros.perception.quality import MEMORY
@@ -61,6 +61,15 @@ class Parameters:
     memory: int = parameter(MEMORY, "steps for which what is not seen is where it was")
     debounce: int = parameter(1, "times in a row that an atom is to be perceived as changed")
     noise_seed: int = parameter(0, "noise is a function of it")
+
+    def __post_init__(self) -> None:
+        """Refuse a seed that is none.
+
+        Raises:
+            InvalidParameterError: It is negative.
+        """
+        if self.noise_seed < 0:
+            raise InvalidParameterError(f"noise_seed is 0 or more, not {self.noise_seed}")
 
     @property
     def quality(self) -> Quality:

@@ -136,7 +136,8 @@ def run(
     from robot_bridge.mock.options import mock_options
 
     seeing = parse_parameters(perception, PerceptionParameters, "perception")
-    _ = PerceptionParameters(**seeing).quality
+    quality = PerceptionParameters(**seeing).quality
+    quality.require_known(task.initial_state.layout.by_name.keys())
     states = []
     with _bag(record, report, f"{domain}-{seed}") as bag:
         settings = RunSettings(

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from slap_ros.domains import Domain
-from slap_ros.errors import InvalidStateError
 from slap_ros.perception.debounce import Debouncer
 from slap_ros.perception.percept import Percept
 from slap_ros.perception.quality import Quality
@@ -45,13 +44,9 @@ class NoisyPerceiver:
         """The perceiver of an episode that begins in ``initial``, as its task says.
 
         Raises:
-            InvalidStateError: An object that is to be hidden is none of the task's.
+            InvalidParameterError: An object that is to be hidden is none of the task's.
         """
-        if unknown := sorted(quality.hidden - initial.layout.by_name.keys()):
-            raise InvalidStateError(
-                f"{', '.join(unknown)} cannot be hidden; the task has "
-                f"{', '.join(sorted(initial.layout.by_name))}"
-            )
+        quality.require_known(initial.layout.by_name.keys())
         sight = Sight.of(quality, rng, initial)
         return cls(domain, space, quality, rng, sight, Debouncer(quality.debounce))
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from slap_ros.errors import InvalidParameterError
@@ -52,6 +53,17 @@ class Quality:
             raise InvalidParameterError(f"memory is a number of steps, not {self.memory_steps}")
         if self.debounce < 1:
             raise InvalidParameterError(f"debounce is at least 1, not {self.debounce}")
+
+    def require_known(self, names: Collection[str]) -> None:
+        """Refuse to hide what is not there.
+
+        Raises:
+            InvalidParameterError: An object to be hidden is none of these.
+        """
+        if unknown := sorted(self.hidden - set(names)):
+            raise InvalidParameterError(
+                f"{', '.join(unknown)} cannot be hidden; the task has {', '.join(sorted(names))}"
+            )
 
     @property
     def exact(self) -> bool:

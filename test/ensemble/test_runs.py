@@ -11,10 +11,12 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
+from typer.testing import CliRunner
 
 from ensemble.nodes import RunSettings
 from ensemble.run import RunRequest, run
 from slap_ros.bags import bag_digest, bag_info, evaluate_bag, read_bag, replay_bag
+from slap_ros.cli import app
 from slap_ros.cli.run import Narrator
 from slap_ros.domains import get_domain
 from slap_ros.evaluation.experiment import Experiment
@@ -120,14 +122,27 @@ def test_with_noise_the_ensemble_errs_as_an_experiment_does(network, tmp_path, s
     assert (live.replans > 0) == replans
 
 
-def test_an_object_that_nobody_sees_ends_a_run_with_its_own_code(network, tmp_path):
+def test_an_object_that_nobody_sees_ends_a_run_with_its_own_code(network):
     arguments = ["--seed", "3", "--shortcuts", "none", "--in-process"]
     live = slap("run", "obstacle2d", *arguments, "--perception", "hidden=block1,memory=5")
     assert live.returncode == 77, live.stderr
     assert "not seen for too long: block1" in live.stderr
-    wrong = slap("run", "obstacle2d", *arguments, "--perception", "debounce=0")
-    assert wrong.returncode == 15
-    assert "debounce is at least 1" in wrong.stderr
+
+
+@pytest.mark.parametrize(
+    ("perception", "words"),
+    [
+        ("debounce=0", "debounce is at least 1"),
+        ("hidden=block9", "block9 cannot be hidden"),
+        ("noise_seed=-1", "noise_seed is 0 or more"),
+        ("acuity=6", "perception has no parameter"),
+        ("dropout=often", "dropout is a number"),
+    ],
+)
+def test_perception_that_cannot_be_is_refused_before_anything_starts(perception, words):
+    result = CliRunner().invoke(app, ["run", "obstacle2d", "--perception", perception])
+    assert result.exit_code == 15
+    assert words in " ".join(result.stderr.split())
 
 
 def test_a_goal_of_ones_own_is_reached_and_recognised(network, tmp_path):

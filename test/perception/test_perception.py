@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from slap_ros.domains import get_domain
-from slap_ros.errors import ErrorCode, InvalidParameterError, InvalidStateError
+from slap_ros.errors import ErrorCode, InvalidParameterError
 from slap_ros.perception import ExactPerceiver, NoisyPerceiver, Quality
 from slap_ros.perception.debounce import Debouncer
 from slap_ros.planning.execution import Executor
@@ -217,5 +217,5 @@ def test_what_is_no_quality_is_refused(wrong, what):
 
 
 def test_only_what_there_is_can_be_hidden():
-    with pytest.raises(InvalidStateError, match="block9 cannot be hidden"):
+    with pytest.raises(InvalidParameterError, match="block9 cannot be hidden"):
         perceiver(Quality(hidden=frozenset({"block9"})))
