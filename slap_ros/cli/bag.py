@@ -16,7 +16,6 @@ from slap_ros.bags.recording import Recording
 from slap_ros.cli.console import Json, console, exits, print_json
 from slap_ros.cli.render import check_renderable
 from slap_ros.cli.render import render as write_animation
-from slap_ros.cli.replay import replay_on_robot
 from slap_ros.errors import DamagedBagError, ErrorCode, InvalidParameterError
 from slap_ros.evaluation.metrics import RunMetrics
 from slap_ros.messages.decode import decode_state
@@ -148,6 +147,9 @@ def replay(
         return _replay_in_a_world(bag, json)
     if mock and to != MOCK:
         raise InvalidParameterError("--mock is for --to mock")
+    # Bullet is needed only here: the rest of `slap bag` works without it.
+    from slap_ros.cli.replay import replay_on_robot
+
     return replay_on_robot(bag, to, dry_run, robot, mock, yes or to == MOCK, json)
 
 
