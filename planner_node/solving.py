@@ -127,6 +127,14 @@ class Solving:
             self._event(PlanEvent.EDGE_REACHED, edge=number)
         return Stopped(ErrorCode.NONE)
 
+    async def _look_again(self) -> Stopped:
+        """Hold for a step, to see the same anew."""
+        hold = hold_option(self._latest.episode.domain.action_space)
+        try:
+            return await self._execute(PlanEdge(hold, 0, hold.skill.step_limit))
+        except SlapError as error:
+            return Stopped(error.code, str(error))
+
     # -- planning -------------------------------------------------------------------------------
 
     async def _plan(self) -> Plan:
@@ -175,14 +183,6 @@ class Solving:
         result = ended.result().result
         await self._observe(start.step + result.steps)
         return Stopped(ErrorCode(result.error_code), result.error_msg)
-
-    async def _look_again(self) -> Stopped:
-        """Hold for a step, to see the same anew."""
-        hold = hold_option(self._latest.episode.domain.action_space)
-        try:
-            return await self._execute(PlanEdge(hold, 0, hold.skill.step_limit))
-        except SlapError as error:
-            return Stopped(error.code, str(error))
 
     async def _observe(self, step: int) -> None:
         """Wait until the state of a step is known here too, not only to the skill server."""
