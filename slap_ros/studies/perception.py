@@ -60,7 +60,7 @@ KINDS = (
     Kind("position noise [mm]", tuple((f"{mm:g}", _position(mm)) for mm in (1.0, 2.0, 5.0))),
     Kind(
         "threshold noise [mm]",
-        tuple((f"{mm:g}", Quality(threshold_noise=mm / 1e3)) for mm in (2.0, 5.0, 10.0, 20.0)),
+        tuple((f"{mm:g}", Quality(threshold_noise=mm / 1e3)) for mm in (1.0, 2.0, 5.0)),
     ),
     Kind(
         "debounced at 2 mm\nposition noise [times]",
