@@ -45,6 +45,7 @@ PHYSICS = [
 TRAIN = ["torch>=2.4", "stable-baselines3>=2.3", "tensorboard>=2.15"]
 RAY = ["ray>=2.40"]
 STUDIES = ["matplotlib>=3.8"]
+LIVE = ["foxglove-sdk>=0.30,<1"]  # serves `slap run --live` to Foxglove; MIT
 DOCS = ["mkdocs>=1.6,<2"]
 DECOMPOSITION = ["coacd>=1.0.4", "trimesh>=4.4"]  # of other objects than those that come with it
 MESHES = [*DECOMPOSITION, "objaverse>=0.1.7"]  # Objaverse's own client
@@ -61,6 +62,8 @@ TEST = [
     *STUDIES,
     *DECOMPOSITION,
     *DOCS,
+    *LIVE,
+    "websocket-client>=1.8",  # watches a live run as Foxglove does
     "unified-planning>=1.1",
     "up-aries>=0.4",
     "colcon-common-extensions>=0.3",
@@ -131,6 +134,7 @@ setup(
         "ray": RAY,
         "studies": STUDIES,
         "docs": DOCS,
+        "live": LIVE,
         "meshes": MESHES,
         "test": TEST,
     },

@@ -36,12 +36,18 @@ OnMessage = Callable[[str, Any], None]  # message type, message
 class RunClient(Node):
     """Follows a run; ``log`` has its metrics."""
 
-    def __init__(self, on_message: OnMessage, **kwargs: Any) -> None:
-        """``on_message`` is called for every message followed, after the log has it."""
+    def __init__(self, on_message: OnMessage, shown: Collection[Topic] = (), **kwargs: Any) -> None:
+        """Follow a run.
+
+        Args:
+            on_message: Called for every message followed, after the log has it.
+            shown: Topics to follow besides those that the log needs.
+            kwargs: The node's.
+        """
         super().__init__("slap_run", **kwargs)
         self.log = RunLog()
         self._on_message = on_message
-        for topic in FOLLOWED:
+        for topic in (*FOLLOWED, *(topic for topic in shown if topic not in FOLLOWED)):
             self._follow(topic)
         self._solve = ActionClient(self, SOLVE_TASK.type, SOLVE_TASK.name)
         self._skills = ActionClient(self, EXECUTE_SKILL.type, EXECUTE_SKILL.name)

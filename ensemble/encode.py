@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
+import numpy as np
 import slap_msgs.msg as msgs
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import KeyValue
@@ -13,6 +14,7 @@ from std_msgs.msg import Header
 
 from slap_ros.domains import Domain, Skill, Task
 from slap_ros.domains.domain import Action
+from slap_ros.perception import Percept
 from slap_ros.planning.options import OptionKind
 from slap_ros.planning.plan import Plan, PlanEdge
 from slap_ros.relational import AtomSpace, GroundAtom, LiftedOperator, State
@@ -81,6 +83,25 @@ def atoms(ground_atoms: Iterable[GroundAtom]) -> list[msgs.GroundAtom]:
         msgs.GroundAtom(predicate=atom.predicate.name, objects=[obj.name for obj in atom.objects])
         for atom in ground_atoms
     ]
+
+
+def percept(
+    value: Percept, of: msgs.ObjectCentricState, space: AtomSpace, known: State
+) -> msgs.AbstractState:
+    """What is perceived of a state; ``known``: that state, decoded."""
+    return msgs.AbstractState(
+        header=of.header,
+        episode=of.episode,
+        step=of.step,
+        atoms=atoms(space.decode(value.abstract)),
+        exact=value.exact,
+        seen=[
+            msgs.ObjectState(name=obj.name, type=obj.type.name, features=value.state[obj].tolist())
+            for obj in value.state.objects
+            if not np.array_equal(value.state[obj], known[obj])
+        ],
+        missing=sorted(value.missing),
+    )
 
 
 def goal(ground_atoms: Iterable[GroundAtom]) -> list[msgs.GroundAtom]:

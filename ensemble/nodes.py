@@ -42,9 +42,10 @@ class RunSettings:
     samples: int = DEFAULT.samples  # attempts of a shortcut in the model
     world: str = SIM  # the simulator, a robot, or the bridge with a mock robot behind it
     scene: str = ""  # a robot's scene file; empty: the objects of the sampled task
-    # Parameters of the mock robot, and of the bridge, that are not the default.
+    # Parameters of the mock robot, of the bridge and of perception that are not the default.
     mock: Mapping[str, str | int | float] = field(default_factory=dict)
     bridge: Mapping[str, str | int | float] = field(default_factory=dict)
+    perception: Mapping[str, str | int | float] = field(default_factory=dict)
 
 
 def node_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int | float]]:
@@ -52,10 +53,14 @@ def node_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int |
     learned: dict[str, str | int | float] = {"samples": settings.samples}
     if settings.shortcuts:
         learned["shortcuts"] = settings.shortcuts
-    waiting = {} if settings.world == SIM else {"state_timeout": ROBOT_STATE_TIMEOUT}
+    waiting: dict[str, str | int | float] = {}
+    if settings.world != SIM:
+        waiting["state_timeout"] = ROBOT_STATE_TIMEOUT
+    if "debounce" in settings.perception:  # what is debounced is late
+        waiting["patience"] = int(settings.perception["debounce"]) - 1
     nodes: dict[str, Mapping[str, str | int | float]] = {
         **_world_parameters(settings),
-        "perception_node": {},
+        "perception_node": settings.perception,
         "skill_server": learned | waiting,
         "planner_node": {"planner": settings.planner, **learned},
     }

@@ -14,7 +14,13 @@ from slap_msgs.msg import Task as TaskMessage
 from ensemble.interfaces import ATOMS, DOMAIN, STATE, TASK, Topic
 from ensemble.waiting import seconds, until
 from slap_ros.domains import Domain, Task, get_domain
-from slap_ros.messages.decode import decode_atoms, decode_goal, decode_state, stamp_ns
+from slap_ros.messages.decode import (
+    decode_atoms,
+    decode_goal,
+    decode_seen,
+    decode_state,
+    stamp_ns,
+)
 from slap_ros.relational import AtomSpace, State
 
 
@@ -52,6 +58,8 @@ class Observation:
     step: int
     state: State
     abstract: int
+    missing: frozenset[str] = frozenset()  # objects of which nobody knows where they are
+    exact: bool = True  # whether another look would find the same
 
 
 def subscribe(node: Node, topic: Topic, callback: Callable[..., None]) -> None:
@@ -167,8 +175,10 @@ class Observer:
         self.latest = Observation(
             episode,
             state.step,
-            decode_state(state, episode.domain.types_by_name),
+            decode_seen(atoms.seen, decode_state(state, episode.domain.types_by_name)),
             decode_atoms(atoms.atoms, episode.space),
+            frozenset(atoms.missing),
+            bool(atoms.exact),
         )
         self._on_observation(self.latest)
 

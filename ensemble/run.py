@@ -17,6 +17,7 @@ from rclpy.task import Future
 
 from ensemble.client import OnMessage, RunClient
 from ensemble.hosts import Host, InProcessHost, ProcessHost
+from ensemble.interfaces import Topic
 from ensemble.network import stay_on_this_host
 from ensemble.nodes import RunSettings, node_parameters
 from slap_ros.errors import (
@@ -48,6 +49,7 @@ class RunRequest:
     max_replans: int = 5
     timeout_s: float = 600.0
     in_process: bool = False
+    shown: Collection[Topic] = ()  # to be followed as well, for the eye
 
 
 def run(request: RunRequest, on_message: OnMessage) -> RunMetrics:
@@ -77,7 +79,7 @@ def run(request: RunRequest, on_message: OnMessage) -> RunMetrics:
         stack.callback(rclpy.try_shutdown)
         executor = SingleThreadedExecutor()
         stack.callback(executor.shutdown)
-        client = RunClient(on_message)
+        client = RunClient(on_message, request.shown)
         stack.callback(client.destroy_node)
         executor.add_node(client)
         spinner = Spinner(executor)

@@ -21,6 +21,7 @@ from slap_ros.messages.interfaces import BODIES
 from slap_ros.relational import State
 
 UNSCALED = (1.0, 1.0, 1.0)
+ROBOT = "robot"  # the namespace of markers that show the arm
 JOINT_PREFIX = "panda_"  # of joint names in the robot description
 
 
@@ -37,20 +38,22 @@ class Visualizer:
     def show(self, state: State, stamp: Time) -> None:
         """Publish a state."""
         bodies = self._domain.bodies(state)
-        self._markers.publish(markers(bodies, stamp))
+        shown = markers(bodies, stamp)
+        shown.markers.extend(markers(self._domain.arm(state), stamp, ROBOT).markers)
+        self._markers.publish(shown)
         self._frames.publish(frames(bodies, stamp))
         joints = joint_state(state, stamp)
         if joints.name:
             self._joints.publish(joints)
 
 
-def markers(bodies: Sequence[VisibleBody], stamp: Time) -> MarkerArray:
+def markers(bodies: Sequence[VisibleBody], stamp: Time, namespace: str = BODIES) -> MarkerArray:
     """A box or triangles for each body."""
     return MarkerArray(
         markers=[
             Marker(
                 header=encode.header(stamp),
-                ns=BODIES,
+                ns=namespace,
                 id=number,
                 type=Marker.TRIANGLE_LIST if body.triangles else Marker.CUBE,
                 action=Marker.ADD,

@@ -34,13 +34,15 @@ ARGUMENTS = {
     "dropout": ("0.0", "share of detections that the mock robot loses"),
     "pace": ("0.0", "environment steps a second, for watching; 0: at full speed"),
     "record": ("", "folder of the bag to record; empty: none"),
+    "rviz": ("false", "open RViz as well"),
     "namespace": ("", "of every node: /robot1 gives /robot1/slap/state"),
 }
 
 
 def generate_launch_description() -> LaunchDescription:
     """Describe the ensemble."""
-    config = Path(get_package_share_directory("slap_ros")) / "config" / "ensemble.yaml"
+    folder = Path(get_package_share_directory("slap_ros")) / "config"
+    config = folder / "ensemble.yaml"
 
     def value(name: str, kind: type) -> ParameterValue:
         return ParameterValue(LaunchConfiguration(name), value_type=kind)
@@ -94,6 +96,16 @@ def generate_launch_description() -> LaunchDescription:
                 "recorder_node",
                 {"bag": value("record", str)},
                 condition=LaunchConfigurationNotEquals("record", ""),
+            ),
+            Node(
+                package="rviz2",
+                executable="rviz2",
+                name="rviz",
+                arguments=["-d", str(folder / "slap.rviz")],
+                remappings=[
+                    ("/slap/markers", [LaunchConfiguration("namespace"), "/slap/markers"]),
+                ],
+                condition=LaunchConfigurationEquals("rviz", "true"),
             ),
         ]
     )

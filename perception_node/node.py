@@ -2,8 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """Turns states into ground atoms. The place for a lab's own detectors.
 
+By default nothing is perceived otherwise than it is. With noise, whatever can be moved is seen
+where it is not quite, and planner and skill server know of no other place.
+
+ROS Parameters:
+    position_noise (double, 0.0): m, standard deviation of positions along each axis.
+    turn_noise (double, 0.0): rad, standard deviation of orientations about each axis.
+    threshold_noise (double, 0.0): standard deviation of predicates' thresholds, in the unit of each
+        one's metric: m or rad.
+    dropout (double, 0.0): share of the sightings of an object that are lost.
+    hidden (string, ""): objects that are never seen, separated by blanks.
+    memory (int, 40): environment steps for which what is not seen is taken to be where it was; then
+        it is missing, and a skill that is about it ends with NO_DETECTION.
+    debounce (int, 1): an atom changes once it was perceived as changed so many times in a row.
+    noise_seed (int, 0): noise is a function of it, of the episode and of its states.
+
 Publishers:
-    slap/atoms (slap_msgs/AbstractState): the ground atoms of each state.
+    slap/atoms (slap_msgs/AbstractState): the ground atoms of each state, and what else is perceived
+        otherwise than it is.
     /diagnostics (diagnostic_msgs/DiagnosticArray): states perceived; 1 Hz.
 
 Subscribers:
@@ -14,31 +30,90 @@ Subscribers:
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from rclpy.node import Node
-from slap_msgs.msg import AbstractState, ObjectCentricState
+from slap_msgs.msg import ObjectCentricState
 
 from ensemble import encode
 from ensemble.heartbeat import Heartbeat
 from ensemble.interfaces import ATOMS, STATE
 from ensemble.observation import Episode, EpisodeWatcher, subscribe
+from ensemble.parameters import parameter, read_parameters
 from ensemble.running import run_node
-from slap_ros.errors import InvalidStateError
+from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.messages.decode import decode_state
+from slap_ros.perception import ExactPerceiver, NoisyPerceiver, Perceiver, Quality
+from slap_ros.perception.quality import MEMORY
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """See the module's docstring."""
+
+    position_noise: float = parameter(0.0, "m, of positions, along each axis")
+    turn_noise: float = parameter(0.0, "rad, of orientations, about each axis")
+    threshold_noise: float = parameter(0.0, "m or rad, of predicates' thresholds")
+    dropout: float = parameter(0.0, "share of sightings that are lost")
+    hidden: str = parameter("", "objects that are never seen, separated by blanks")
+    memory: int = parameter(MEMORY, "steps for which what is not seen is where it was")
+    debounce: int = parameter(1, "times in a row that an atom is to be perceived as changed")
+    noise_seed: int = parameter(0, "noise is a function of it")
+
+    def __post_init__(self) -> None:
+        """Refuse a seed that is none.
+
+        Raises:
+            InvalidParameterError: It is negative.
+        """
+        if self.noise_seed < 0:
+            raise InvalidParameterError(f"noise_seed is 0 or more, not {self.noise_seed}")
+
+    @property
+    def quality(self) -> Quality:
+        """The same for the core.
+
+        Raises:
+            InvalidParameterError: A value that it cannot have.
+        """
+        return Quality(
+            self.position_noise,
+            self.turn_noise,
+            self.threshold_noise,
+            self.dropout,
+            frozenset(self.hidden.split()),
+            self.memory,
+            self.debounce,
+        )
 
 
 class PerceptionNode(Node):
-    """Perception by the domain's own predicates."""
+    """Perception by the domain's own predicates, as well as it is told to perceive."""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("perception_node", **kwargs)
+        parameters = read_parameters(self, Parameters)
+        self._quality, self._seed = parameters.quality, parameters.noise_seed
+        self._perceiver: Perceiver
         self._perceived = 0
         self._waiting: deque[ObjectCentricState] = deque()
         self._atoms = self.create_publisher(ATOMS.type, ATOMS.name, ATOMS.qos)
-        self._watcher = EpisodeWatcher(self, lambda _: self._perceive_waiting())
+        self._watcher = EpisodeWatcher(self, self._open)
         subscribe(self, STATE, self._on_state)
         Heartbeat(self, lambda: {"states": self._perceived})
+
+    def _open(self, episode: Episode) -> None:
+        self._perceiver = self._perceiver_of(episode)
+        self._perceive_waiting()
+
+    def _perceiver_of(self, episode: Episode) -> Perceiver:
+        if self._quality.exact:
+            return ExactPerceiver(episode.space)
+        rng = np.random.default_rng([self._seed, episode.number])
+        initial = episode.task.initial_state
+        return NoisyPerceiver.of(episode.domain, episode.space, initial, self._quality, rng)
 
     def _on_state(self, message: ObjectCentricState) -> None:
         self._waiting.append(message)
@@ -61,15 +136,8 @@ class PerceptionNode(Node):
         except InvalidStateError as error:
             self.get_logger().error(f"state of step {message.step} not perceived: {error}")
             return
-        abstract = episode.space.abstract(state)
-        self._atoms.publish(
-            AbstractState(
-                header=message.header,
-                episode=message.episode,
-                step=message.step,
-                atoms=encode.atoms(episode.space.decode(abstract)),
-            )
-        )
+        percept = self._perceiver.perceive(state)
+        self._atoms.publish(encode.percept(percept, message, episode.space, state))
         self._perceived += 1
 
 

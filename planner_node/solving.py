@@ -30,7 +30,7 @@ from slap_ros.errors import (
     SlapError,
     TaskCanceledError,
 )
-from slap_ros.planning.options import Stopped
+from slap_ros.planning.options import Stopped, hold_option
 from slap_ros.planning.plan import Plan, PlanEdge, PlanningResult
 from slap_ros.planning.planner import Planner
 
@@ -47,6 +47,8 @@ DIVERGENCES = frozenset(
         ErrorCode.INVALID_COMMAND,
     }
 )
+# Where these come of what was seen wrongly, another look may help.
+UNPLANNED = frozenset({ErrorCode.UNSOLVABLE, ErrorCode.PLANNING_LIMIT, ErrorCode.INVALID_STATE})
 
 
 @dataclass
@@ -101,12 +103,18 @@ class Solving:
                 stopped = await self._attempt()
             except SlapError as error:
                 stopped = Stopped(error.code, str(error))
-            if stopped.code not in DIVERGENCES:
+            blind = stopped.code in UNPLANNED and not self._latest.exact
+            if not blind and stopped.code not in DIVERGENCES:
                 break
             if self._tally.plans > self.goal.request.max_replans:
                 limit = f"diverged again after {self.goal.request.max_replans} replans"
                 stopped = Stopped(ErrorCode.REPLANS_EXHAUSTED, f"{limit}: {stopped.reason}")
                 break
+            if blind:
+                looked = await self._look_again()
+                if looked.code is not ErrorCode.SKILL_STEP_LIMIT:  # as it ends
+                    stopped = looked
+                    break
         if stopped.reached:
             self._event(PlanEvent.SOLVED)
         else:
@@ -126,6 +134,14 @@ class Solving:
                 return stopped
             self._event(PlanEvent.EDGE_REACHED, edge=number)
         return Stopped(ErrorCode.NONE)
+
+    async def _look_again(self) -> Stopped:
+        """Hold for a step, to see the same anew."""
+        hold = hold_option(self._latest.episode.domain.action_space)
+        try:
+            return await self._execute(PlanEdge(hold, 0, hold.skill.step_limit))
+        except SlapError as error:
+            return Stopped(error.code, str(error))
 
     # -- planning -------------------------------------------------------------------------------
 

@@ -61,7 +61,6 @@ from pathlib import Path
 from typing import Any
 
 from rclpy.node import Node
-from rclpy.task import Future
 from slap_msgs.msg import RobotCommand
 from slap_msgs.srv import ResetTask
 
@@ -71,13 +70,14 @@ from ensemble.interfaces import COMMAND, DOMAIN, FRESH, MARKERS, RESET_TASK, STA
 from ensemble.parameters import parameter, read_parameters
 from ensemble.running import run_node
 from ensemble.visualization import markers
-from ensemble.waiting import first_of, seconds
+from ensemble.waiting import seconds
 from robot_bridge.controllers import (
     GRIPPER_ACTION,
     TRAJECTORY_ACTION,
     Controllers,
     action_name,
 )
+from robot_bridge.fingers import move_fingers
 from robot_bridge.senses import Senses
 from slap_ros.domains import Task, get_domain
 from slap_ros.errors import (
@@ -101,7 +101,6 @@ from slap_ros.robot.tracking import Sensing
 from slap_ros.robot.workplace import Workplace, read_workplace, sampled_workplace
 
 MEASURED = -1  # seed of a task that was not sampled
-GAP_AGE = 0.1  # s, by which told finger positions may be older than their stamp: drivers merge them
 LOOK_PERIOD = 0.02  # s, between two looks at what is measured
 WORKSPACE = (*Workspace().low, *Workspace().high)
 
@@ -150,7 +149,7 @@ class RobotBridge(Node):
         super().__init__("robot_bridge", **kwargs)
         self._settings = settings = read_parameters(self, Parameters)
         self._domain = get_domain(settings.domain, settings.preset)
-        self._cell = Cell(self._domain, self._workplace(), _limits(settings), _sensing(settings))
+        self._cell = Cell(self._domain, self._workplace(), limits(settings), sensing(settings))
         self._senses = Senses(self, self._cell, settings.arm, f"{settings.arm}_link0")
         self._controllers = Controllers(
             self,
@@ -267,23 +266,7 @@ class RobotBridge(Node):
 
     async def _fingers(self, gap: float) -> float:
         """Move the fingers; the gap in m at which they then stand."""
-        settings = self._settings
-        await self._controllers.grip(
-            gap * settings.gripper_scale, settings.gripper_effort, settings.gripper_timeout
-        )
-        done_s = seconds(self) + GAP_AGE
-        late_s = done_s + settings.joint_timeout
-        await first_of(
-            self,
-            Future(),
-            lambda: self._senses.gap_s > done_s or seconds(self) > late_s,
-        )
-        if self._senses.gap is None or self._senses.gap_s <= done_s:
-            raise NoJointStateError(
-                f"no positions of the fingers within {settings.joint_timeout} s: are they among "
-                "joint_states?"
-            )
-        return self._senses.gap
+        return await move_fingers(self, self._controllers, self._senses, gap, self._settings)
 
     # -- measuring ------------------------------------------------------------------------------
 
@@ -408,14 +391,20 @@ class RobotBridge(Node):
         self._open_episode(state)
 
 
-def _limits(settings: Parameters) -> Limits:
+def limits(settings: Parameters) -> Limits:
+    """What the arm may do.
+
+    Raises:
+        InvalidParameterError: An unknown arm, or a speed or workspace that there is not.
+    """
     if len(settings.workspace) != len(WORKSPACE):
         raise InvalidParameterError("parameter workspace is x y z at its lowest and at its highest")
     x, y, z, to_x, to_y, to_z = settings.workspace
     return arm_limits(settings.arm).scaled(settings.speed, Workspace((x, y, z), (to_x, to_y, to_z)))
 
 
-def _sensing(settings: Parameters) -> Sensing:
+def sensing(settings: Parameters) -> Sensing:
+    """How well detections can be trusted."""
     return Sensing(settings.position_noise, settings.turn_noise)
 
 

@@ -6,6 +6,8 @@ ROS Parameters:
     shortcuts (string, ""): folder of a shortcut library, or none; empty: the shipped one.
     samples (int, 16): attempts of a shortcut in the model; the shortest is used.
     state_timeout (double, 2.0): seconds without a new state after which a skill is given up.
+    patience (int, 0): environment steps for which a skill holds at its end until its target is
+        perceived; perception that debounces takes its time.
 
 Publishers:
     slap/command (slap_msgs/RobotCommand): the robot's next step.
@@ -60,6 +62,7 @@ class Parameters(ShortcutParameters):
     """See the module's docstring."""
 
     state_timeout: float = parameter(2.0, "s without a new state after which a skill is given up")
+    patience: int = parameter(0, "steps to hold at a skill's end until its target is perceived")
 
 
 class SkillServer(Node):
@@ -148,7 +151,8 @@ class SkillServer(Node):
 
     def _start(self, request: ExecuteSkill.Goal, start: Observation) -> OptionExecution:
         option, target = requested_option(request, start, self._repertoires)
-        return OptionExecution(option, target, start.episode.domain.action_space, start.state)
+        actions, patience = start.episode.domain.action_space, self._settings.patience
+        return OptionExecution(option, target, actions, start.state, patience)
 
     async def _observe(self, episode: int) -> Observation:
         """The newest observation; whoever asks for a skill may have seen the episode before us."""
@@ -196,7 +200,7 @@ class SkillServer(Node):
             self._hold(run)
             return
         self._publish_feedback(run)
-        action = run.execution.advance(observation.state, observation.abstract)
+        action = run.execution.advance(observation.state, observation.abstract, observation.missing)
         if isinstance(action, Stopped):
             run.ended.set_result(action)
         elif run.steps >= run.step_budget:

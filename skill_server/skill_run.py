@@ -17,7 +17,15 @@ from ensemble.presence import Presence
 from ensemble.shortcuts import Repertoires
 from slap_ros.errors import EpisodeChangedError, ErrorCode, UnknownSkillError
 from slap_ros.messages.decode import decode_atoms
-from slap_ros.planning.options import Option, OptionExecution, OptionKind, Stopped, given_option
+from slap_ros.planning.options import (
+    HOLD,
+    Option,
+    OptionExecution,
+    OptionKind,
+    Stopped,
+    given_option,
+    hold_option,
+)
 from slap_ros.relational import Object
 
 
@@ -62,6 +70,8 @@ def requested_option(
         raise EpisodeChangedError(
             f"goal for episode {request.episode}, but episode {episode.number} is under way"
         )
+    if edge.name == HOLD:
+        return hold_option(episode.domain.action_space), 0
     objects = [episode.space.layout.object(name) for name in edge.objects]
     target = decode_atoms(edge.expected_atoms, episode.space)
     if edge.kind == OptionKind.SHORTCUT.value:

@@ -66,6 +66,7 @@ class ErrorCode(IntEnum):
     STORAGE_FULL = 92
     BAG_EXISTS = 93
     REPLAY_MISMATCH = 94
+    START_MISMATCH = 95
 
     # 110-129: the ensemble
     NODE_DIED = 110
@@ -289,6 +290,12 @@ class BagExistsError(SlapError):
     """A bag would overwrite something."""
 
     code = ErrorCode.BAG_EXISTS
+
+
+class StartMismatchError(SlapError):
+    """A robot, or what is around it, that is not where a recording begins."""
+
+    code = ErrorCode.START_MISMATCH
 
 
 class NodeDiedError(SlapError):

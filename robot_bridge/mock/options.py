@@ -4,10 +4,8 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-
+from ensemble.parameters import parse_parameters
 from robot_bridge.mock.node import Parameters
-from slap_ros.errors import InvalidParameterError
 
 GIVEN = frozenset({"domain", "preset", "seed", "index"})  # with the run
 
@@ -18,19 +16,4 @@ def mock_options(text: str) -> dict[str, str | int | float]:
     Raises:
         InvalidParameterError: One that there is not, or a value that it cannot have.
     """
-    kinds = {item.name: type(item.default) for item in fields(Parameters)}
-    known = [name for name in kinds if name not in GIVEN]
-    found: dict[str, str | int | float] = {}
-    for part in filter(None, text.split(",")):
-        name, _, value = part.partition("=")
-        if name not in known:
-            raise InvalidParameterError(
-                f"the mock robot has no parameter {name!r}; it has {', '.join(known)}"
-            )
-        try:
-            found[name] = kinds[name](value)
-        except ValueError:
-            raise InvalidParameterError(
-                f"the mock robot's {name} is a number, not {value!r}"
-            ) from None
-    return found
+    return parse_parameters(text, Parameters, "mock robot", GIVEN)

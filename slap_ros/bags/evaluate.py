@@ -32,7 +32,9 @@ class BagEvaluation:
     runs: list[RunMetrics]
     mismatches: list[AtomMismatch]
     states: int  # distinct states recorded
-    compared: int  # of them, those whose recorded atoms were compared with recomputed ones
+    # Of them, those whose recorded atoms were compared with recomputed ones: what was perceived
+    # with noise cannot be found again.
+    compared: int
     damage: str | None  # where reading had to stop and why
 
 
@@ -80,7 +82,7 @@ def evaluate(reading: Reading, domain: Domain | None) -> BagEvaluation:
     """
     episodes = reading.recording.episodes
     perceived = [(e, s) for e, episode in episodes.items() for s in episode.states]
-    comparable = [(e, s) for e, s in perceived if s in episodes[e].atoms]
+    comparable = [(e, s) for e, s in perceived if s in episodes[e].exact]
     return BagEvaluation(
         runs=reading.log.runs(),
         mismatches=[
@@ -100,7 +102,7 @@ def _mismatches(number: int, episode: Episode, domain: Domain) -> Iterator[AtomM
     if start is None:
         return
     space, types = domain.atom_space(start[1]), domain.types_by_name
-    for step in sorted(episode.states.keys() & episode.atoms.keys()):
+    for step in sorted(episode.states.keys() & episode.exact):
         mask = space.abstract(decode_state(episode.states[step], types))
         holding = frozenset(
             (atom.predicate.name, tuple(obj.name for obj in atom.objects))

@@ -41,6 +41,7 @@ class Episode:
     task: TaskMessage | None = None
     states: dict[int, StateMessage] = field(default_factory=dict)
     atoms: dict[int, AtomNames] = field(default_factory=dict)
+    exact: set[int] = field(default_factory=set)  # steps of atoms that can be found again
     commands: dict[int, list[Action]] = field(default_factory=dict)  # in order of arrival
 
 
@@ -86,7 +87,10 @@ class Recording:
         self._episode(msg.episode).states.setdefault(msg.step, msg)
 
     def _add_atoms(self, msg: AtomsMessage) -> None:
-        self._episode(msg.episode).atoms.setdefault(msg.step, atom_names(msg.atoms))
+        episode = self._episode(msg.episode)
+        episode.atoms.setdefault(msg.step, atom_names(msg.atoms))
+        if msg.exact:
+            episode.exact.add(msg.step)
 
     def _add_command(self, msg: CommandMessage) -> None:
         commands = self._episode(msg.episode).commands

@@ -16,9 +16,12 @@ from slap_ros.bags.recording import Recording
 from slap_ros.cli.console import Json, console, exits, print_json
 from slap_ros.cli.render import check_renderable
 from slap_ros.cli.render import render as write_animation
-from slap_ros.errors import DamagedBagError, ErrorCode
+from slap_ros.errors import DamagedBagError, ErrorCode, InvalidParameterError
 from slap_ros.evaluation.metrics import RunMetrics
 from slap_ros.messages.decode import decode_state
+from slap_ros.robot.worlds import MOCK, ROBOT
+
+SIM_WORLD = "world"
 
 app = typer.Typer(
     help="Look into recorded runs: info, evaluate, replay, render.", no_args_is_help=True
@@ -115,8 +118,42 @@ def render(
 
 @app.command("replay")
 @exits
-def replay(bag: BagPath, json: Json = False) -> int:
-    """Feed the recorded commands to a fresh world and compare every state, bit for bit."""
+def replay(
+    bag: BagPath,
+    to: Annotated[
+        str, typer.Option(help="world: a fresh one; robot (see docs/real-robot.md), or mock.")
+    ] = SIM_WORLD,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Check the motion against the robot's limits only.")
+    ] = False,
+    robot: Annotated[
+        str, typer.Option(help="The robot's parameters, as arm=fr3,speed=0.1: robot_bridge's.")
+    ] = "",
+    mock: Annotated[
+        str, typer.Option(help="The mock robot's parameters, as latency=0.05,pace=5.")
+    ] = "",
+    yes: Annotated[bool, typer.Option("--yes", help="Move the robot without asking.")] = False,
+    json: Json = False,
+) -> int:
+    """Feed the recorded commands to a fresh world and compare every state, bit for bit.
+
+    Or, with --to robot, execute the recorded motion on a robot, open loop: begin with --dry-run.
+    """
+    if to not in (SIM_WORLD, ROBOT, MOCK):
+        raise InvalidParameterError(f"--to must be world, robot or mock, not {to!r}")
+    if to == SIM_WORLD:
+        if dry_run or robot or mock:
+            raise InvalidParameterError("--dry-run, --robot and --mock are for --to robot or mock")
+        return _replay_in_a_world(bag, json)
+    if mock and to != MOCK:
+        raise InvalidParameterError("--mock is for --to mock")
+    # Bullet is needed only here: the rest of `slap bag` works without it.
+    from slap_ros.cli.replay import replay_on_robot
+
+    return replay_on_robot(bag, to, dry_run, robot, mock, yes or to == MOCK, json)
+
+
+def _replay_in_a_world(bag: Path, json: bool) -> int:
     result = replay_bag(bag)
     if json:
         print_json(asdict(result) | {"identical": result.identical})

@@ -6,9 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated, Any
+from time import sleep
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -41,6 +43,11 @@ from slap_ros.report import check_output
 from slap_ros.robot.worlds import MOCK, ROBOT, SIM, WORLDS
 from slap_ros.shortcuts.shipped import chosen_library
 
+if TYPE_CHECKING:
+    from ensemble.broadcast import Broadcast
+
+LOOK_S = 0.05  # s, between two looks at whether somebody watches
+
 
 def run(
     domain: Annotated[str, typer.Argument(help="One of `slap domains`.")],
@@ -69,7 +76,21 @@ def run(
         Path | None, typer.Option(help="Tell the run on a page, as `slap report` does: a .html.")
     ] = None,
     live: Annotated[
-        bool, typer.Option("--live", help="Show plan and progress in place, on a terminal.")
+        bool,
+        typer.Option(
+            "--live",
+            help="Show plan and progress in place on a terminal, and everything to Foxglove.",
+        ),
+    ] = False,
+    live_port: Annotated[
+        int | None,
+        typer.Option(
+            min=0, max=65535, help="Of the WebSocket for Foxglove. Default: 8765, or a free one."
+        ),
+    ] = None,
+    watched: Annotated[
+        bool,
+        typer.Option("--watched", help="With --live: begin once somebody watches; end with them."),
     ] = False,
     world: Annotated[
         str,
@@ -83,11 +104,16 @@ def run(
     mock: Annotated[
         str, typer.Option(help="The mock robot's parameters, as latency=0.05,pose_noise=0.003.")
     ] = "",
+    perception: Annotated[
+        str, typer.Option(help="How well is seen, as position_noise=0.002,debounce=3.")
+    ] = "",
     json: Json = False,
 ) -> int:
     """Run the whole ensemble on one task: simulator, perception, planner, skills, recorder."""
     # Everything that can be refused is refused before a node is started.
     check_world(world, scene, mock)
+    if not live and (watched or live_port is not None):
+        raise InvalidParameterError("--watched and --live-port are for --live")
     chosen = get_domain(domain, preset)
     task = chosen.task(seed, index)
     atoms = parse_goal(goal, chosen.atom_space(task.initial_state)) if goal else frozenset()
@@ -101,11 +127,17 @@ def run(
         check_output(report)
 
     # ROS is needed only here: every other command works without it.
+    from ensemble.broadcast import SHOWN
     from ensemble.nodes import RunSettings
+    from ensemble.parameters import parse_parameters
     from ensemble.run import RunRequest
     from ensemble.run import run as run_ensemble
+    from perception_node.node import Parameters as PerceptionParameters
     from robot_bridge.mock.options import mock_options
 
+    seeing = parse_parameters(perception, PerceptionParameters, "perception")
+    quality = PerceptionParameters(**seeing).quality
+    quality.require_known(task.initial_state.layout.by_name.keys())
     states = []
     with _bag(record, report, f"{domain}-{seed}") as bag:
         settings = RunSettings(
@@ -121,12 +153,17 @@ def run(
             world,
             str(scene or ""),
             mock_options(mock),
+            perception=seeing,
         )
         request = RunRequest(settings, atoms, 0, max_replans, timeout, in_process)
-        with _narrator(live) as narrate:
+        with _broadcast(live, live_port, watched) as show, _narrator(live) as narrate:
+            if show is not None:
+                request = replace(request, shown=SHOWN)
 
             def follow(type_name: str, message: Any) -> None:
                 narrate(type_name, message)
+                if show is not None:
+                    show(type_name, message)
                 if type_name == STATE and render is not None:
                     states.append(message)
 
@@ -163,6 +200,31 @@ def _bag(record: Path | None, report: Path | None, name: str) -> Iterator[Path |
         return
     with TemporaryDirectory(prefix="slap-") as folder:
         yield Path(folder) / name
+
+
+@contextmanager
+def _broadcast(live: bool, port: int | None, watched: bool) -> Iterator[Broadcast | None]:
+    """What shows the run to Foxglove, if it is to be shown and can be.
+
+    Raises:
+        InvalidParameterError: It was asked for explicitly, and cannot be.
+    """
+    from ensemble.broadcast import Broadcast, available
+
+    if not live:
+        yield None
+        return
+    if not (available() or watched or port is not None):
+        console.print("not shown to Foxglove: pip install 'slap_ros[live]'", markup=False)
+        yield None
+        return
+    with Broadcast(port) as show:
+        console.print(f"open in Foxglove: {show.url}", highlight=False)
+        while watched and not show.watched:
+            sleep(LOOK_S)
+        yield show
+        while watched and show.watched:
+            sleep(LOOK_S)
 
 
 def _narrator(live: bool) -> AbstractContextManager[Callable[[str, Any], None]]:

@@ -20,7 +20,7 @@ from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.approaches import Approach, approaches
 from slap_ros.shortcuts.settings import training_settings
 from slap_ros.shortcuts.shipped import shipped_library
-from slap_ros.studies import dynamics, generalisation, planning_time, pruning
+from slap_ros.studies import dynamics, generalisation, perception, planning_time, pruning
 from slap_ros.studies import goals as sampled
 from slap_ros.studies.comparison import Comparison
 from slap_ros.studies.figures import require_matplotlib
@@ -138,6 +138,30 @@ def pruning_(
         options = {"preset": preset, "tasks": tasks, "seeds": seeds, "settings": settings}
         origin = Origin(domain, _command("pruning", domain, **options), options)
     _write(output, pruning.study(domain, explored, how), origin)
+
+
+@app.command("perception")
+@exits
+def perception_(
+    domain: Domain,
+    max_replans: Annotated[int, typer.Option(min=0, help="Plans after the first.")] = 10,
+    tasks: Tasks = 4,
+    seeds: Seeds = 5,
+    preset: Preset = "fair",
+    shortcuts: Shortcuts = None,
+    samples: Samples = SAMPLES,
+    jobs: Jobs = 1,
+    output: Output = RESULTS,
+) -> None:
+    """SLAP D.3, D.4: success, length and replans while perception errs in several ways."""
+    comparison, settings = _compare(domain, preset, shortcuts, samples, tasks, seeds, jobs)
+    ends = replace(comparison, approaches=_first_and_last(comparison.approaches))
+    with _Show() as show:
+        report = perception.study(ends, max_replans, show)
+    settings = {"max_replans": max_replans, **settings}
+    options = {name.replace("_", "-"): value for name, value in settings.items()}
+    command = _command("perception", domain, shortcuts=shortcuts, **options)
+    _write(output, report, Origin(domain, command, settings))
 
 
 @app.command("planning_time")

@@ -169,7 +169,10 @@ class Domain:
     step_limit: int  # environment steps of a task
     unread_types: frozenset[Type] = frozenset()  # whose features no predicate reads: the robot's
     reading: frozenset[Predicate] = frozenset()  # predicates that read them nevertheless
+    # Measured poses put where physics would have them: what lies still lies on something.
+    settle: Callable[[State], State] = lambda state: state
     bodies: Callable[[State], Sequence[VisibleBody]] = lambda _: ()  # to be shown
+    arm: Callable[[State], Sequence[VisibleBody]] = lambda _: ()  # the robot, unless a body is it
     animate: Animate | None = None
     view: View | None = None  # what a learner sees; without it there are no shortcuts
     learned_actions: ActionSpace | None = None  # of shortcuts, where not all actions are theirs

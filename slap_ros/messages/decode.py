@@ -59,6 +59,28 @@ def _decode_object(msg: ObjectStateMessage, types: Mapping[str, Type]) -> Object
     return obj
 
 
+def decode_seen(msgs: Iterable[ObjectStateMessage], state: State) -> State:
+    """A state in which some objects are as they were seen.
+
+    Raises:
+        InvalidStateError: An object that the state does not have, or not with such features.
+    """
+    seen_otherwise = list(msgs)
+    if not seen_otherwise:
+        return state
+    data = state.data.copy()
+    for msg in seen_otherwise:
+        obj = state.layout.by_name.get(msg.name)
+        if obj is None or len(msg.features) != len(obj.type.features):
+            raise InvalidStateError(
+                f"{msg.name} was seen with {len(msg.features)} features, which the state has not"
+            )
+        data[state.layout.slices[obj]] = msg.features
+    seen = State(state.layout, data)
+    seen.require_finite()
+    return seen
+
+
 def decode_atoms(msgs: Iterable[GroundAtomMessage], space: AtomSpace) -> int:
     """The abstract state, a mask, in which these atoms hold and no others.
 

@@ -56,6 +56,9 @@ class AtomsMessage(Protocol):
     episode: int
     step: int
     atoms: Sequence[GroundAtomMessage]
+    exact: bool
+    seen: Sequence[ObjectStateMessage]
+    missing: Sequence[str]
 
 
 class CommandMessage(Protocol):

@@ -31,6 +31,15 @@ def conjugate(q: Quaternion) -> Quaternion:
     return (-q[0], -q[1], -q[2], q[3])
 
 
+def turn_about(v: Vector) -> Quaternion:
+    """The rotation about the axis ``v`` by its length in rad."""
+    angle = math.hypot(*v)
+    if angle == 0.0:
+        return NO_TURN
+    part = math.sin(0.5 * angle) / angle
+    return (part * v[0], part * v[1], part * v[2], math.cos(0.5 * angle))
+
+
 def rotate(q: Quaternion, v: Vector) -> Vector:
     """The vector turned by the quaternion."""
     x, y, z, w = q

@@ -10,15 +10,25 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from time import perf_counter
 
+import numpy as np
+
 from slap_ros.domains import Domain, World
 from slap_ros.domains.domain import Action
-from slap_ros.errors import ErrorCode, PlanningLimitError, SkillNotApplicableError, UnsolvableError
+from slap_ros.errors import (
+    ErrorCode,
+    InvalidStateError,
+    PlanningLimitError,
+    SkillNotApplicableError,
+    UnsolvableError,
+)
+from slap_ros.perception import ExactPerceiver, Perceiver, Percept
 from slap_ros.planning.options import OptionExecution, OptionKind, Stopped
 from slap_ros.planning.plan import Plan, PlanEdge
 from slap_ros.planning.planner import Planner
 from slap_ros.relational import AtomSpace, State
 
 MAX_REPLANS = 5  # default; a deterministic world needs none
+FINAL = frozenset({ErrorCode.STEP_LIMIT, ErrorCode.NO_DETECTION})  # another plan is no help
 
 
 @dataclass
@@ -51,6 +61,8 @@ class Executor:
         goal: Mask of the atoms to reach.
         step_limit: Environment steps.
         max_replans: How often a diverged plan may be replaced.
+        perceiver: What is known of the world comes from it; without one, everything is.
+        patience: See :class:`OptionExecution`.
     """
 
     domain: Domain
@@ -60,21 +72,23 @@ class Executor:
     goal: int
     step_limit: int
     max_replans: int = MAX_REPLANS
+    perceiver: Perceiver | None = None
+    patience: int = 0
+    _known: Percept = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        self._perceiver = self.perceiver or ExactPerceiver(self.space)
+        self._known = self._perceiver.perceive(self.world.state)
 
     def run(self) -> Episode:
         """Solve from the world's current state, or say why not."""
         episode = Episode(states=[self.world.state])
         while True:
-            try:
-                plan = self._plan(episode)
-            except (UnsolvableError, PlanningLimitError) as error:
-                episode.error = Stopped(error.code, str(error))
-                return episode
-            stopped = self._execute(plan, episode)
+            stopped, blind = self._attempt(episode)
             if stopped.reached:
                 episode.success = True
                 return episode
-            if stopped.code is ErrorCode.STEP_LIMIT:
+            if stopped.code in FINAL or (blind and self._known.exact):
                 episode.error = stopped
                 return episode
             if episode.replans == self.max_replans:
@@ -84,11 +98,21 @@ class Executor:
                 )
                 return episode
             episode.replans += 1
+            if blind and episode.plan_length < self.step_limit:
+                self._act(np.zeros(len(self.domain.action_space.axes)), episode)  # and look again
+
+    def _attempt(self, episode: Episode) -> tuple[Stopped, bool]:
+        """One plan, as far as it goes; second, whether there was none from what was seen."""
+        try:
+            plan = self._plan(episode)
+        except (UnsolvableError, PlanningLimitError, InvalidStateError) as error:
+            return Stopped(error.code, str(error)), True
+        return self._execute(plan, episode), False
 
     def _plan(self, episode: Episode) -> Plan:
         started = perf_counter()
         try:
-            result = self.planner.plan(self.world.state, self.goal)
+            result = self.planner.plan(self._known.state, self.goal)
         finally:
             episode.planning_seconds += perf_counter() - started
         episode.edges_rolled_out += result.edges_rolled_out
@@ -104,19 +128,27 @@ class Executor:
     def _execute_edge(self, edge: PlanEdge, episode: Episode) -> Stopped:
         try:
             execution = OptionExecution(
-                edge.option, edge.target, self.domain.action_space, self.world.state
+                edge.option,
+                edge.target,
+                self.domain.action_space,
+                self._known.state,
+                self.patience,
             )
         except SkillNotApplicableError as error:
             return Stopped(error.code, str(error))
         while True:
-            state = self.world.state
-            action = execution.advance(state, self.space.abstract(state))
+            known = self._known
+            action = execution.advance(known.state, known.abstract, known.missing)
             if isinstance(action, Stopped):
                 return action
             if episode.plan_length == self.step_limit:
                 return Stopped(
                     ErrorCode.STEP_LIMIT, f"the goal was not reached in {self.step_limit} steps"
                 )
-            episode.actions.append(action)
             episode.shortcut_steps += edge.option.kind is OptionKind.SHORTCUT
-            episode.states.append(self.world.step(action))
+            self._act(action, episode)
+
+    def _act(self, action: Action, episode: Episode) -> None:
+        episode.actions.append(action)
+        episode.states.append(self.world.step(action))
+        self._known = self._perceiver.perceive(episode.states[-1])

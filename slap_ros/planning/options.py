@@ -4,9 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+
+import numpy as np
 
 from slap_ros.domains import ActionSpace, Domain, Policy, Skill
 from slap_ros.domains.domain import Action
@@ -83,6 +85,34 @@ def given_option(domain: Domain, name: str, objects: Sequence[Object]) -> Option
 
 
 @dataclass(frozen=True)
+class HoldSkill:
+    """Stand still for a step: to look again where what was seen makes no sense."""
+
+    axes: int  # of an action
+    name: str = "Hold"
+    step_limit: int = 1
+    least_steps: int = 1
+
+    def lower_bound(self, state: State, objects: tuple[Object, ...]) -> int:
+        """A step."""
+        del state, objects
+        return self.least_steps
+
+    def start(self, state: State, objects: tuple[Object, ...]) -> Policy:
+        """Move nothing, whatever the state."""
+        del state, objects
+        return lambda _: np.zeros(self.axes)
+
+
+HOLD = HoldSkill.name
+
+
+def hold_option(actions: ActionSpace) -> Option:
+    """The option to stand still for a step; it leads nowhere, so it ends at its step limit."""
+    return Option(OptionKind.OPERATOR, HoldSkill(len(actions.axes)), ())
+
+
+@dataclass(frozen=True)
 class Stopped:
     """Why an execution is over: NONE where the target was reached."""
 
@@ -104,6 +134,8 @@ class OptionExecution:
         target: The abstract state in which it ends.
         actions: What the robot can do; anything else that the policy wants stops the option.
         state: Where it starts.
+        patience: Environment steps for which to hold at its end where the target is not perceived
+            yet, as debounced atoms are late.
 
     Raises:
         SkillNotApplicableError: The skill cannot start in this state.
@@ -113,14 +145,29 @@ class OptionExecution:
     target: int
     actions: ActionSpace
     state: State
+    patience: int = 0
     steps: int = 0  # environment steps commanded so far
     _policy: Policy = field(init=False, repr=False)
+    _waited: int = field(default=0, init=False)  # environment steps held at its end
 
     def __post_init__(self) -> None:
         self._policy = self.option.skill.start(self.state, self.option.objects)
 
-    def advance(self, state: State, abstract: int) -> Action | Stopped:
-        """The next action from the newest state, or why there is none."""
+    def advance(
+        self, state: State, abstract: int, missing: Collection[str] = ()
+    ) -> Action | Stopped:
+        """The next action from the newest state, or why there is none.
+
+        Args:
+            state: As perceived.
+            abstract: As perceived.
+            missing: Objects of which nobody knows where they are; those that it is about stop it.
+        """
+        if lost := [obj.name for obj in self.option.objects if obj.name in missing]:
+            return Stopped(
+                ErrorCode.NO_DETECTION,
+                f"{self.option}: not seen for too long: {', '.join(lost)}",
+            )
         if abstract == self.target and self.steps > 0 and self.option.accepts(state):
             return Stopped(ErrorCode.NONE)
         if self.steps >= self.option.skill.step_limit:
@@ -128,7 +175,7 @@ class OptionExecution:
                 ErrorCode.SKILL_STEP_LIMIT,
                 f"{self.option} did not end within {self.option.skill.step_limit} steps",
             )
-        action = self._policy(state)
+        action = self._next(state)
         if action is None:
             return Stopped(
                 ErrorCode.SKILL_STOPPED_SHORT,
@@ -139,4 +186,12 @@ class OptionExecution:
         except InvalidCommandError as error:
             return Stopped(error.code, f"{self.option}: {error}")
         self.steps += 1
+        return action
+
+    def _next(self, state: State) -> Action | None:
+        """The policy's next action; at its end, hold for as long as patience lasts."""
+        action = self._policy(state) if self._waited == 0 else None
+        if action is None and self._waited < self.patience:
+            self._waited += 1
+            return np.zeros(len(self.actions.axes))
         return action

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from slap_ros.errors import MismatchedAtomError, UnknownPredicateError
 from slap_ros.relational.objects import Column, Object, Type
-from slap_ros.relational.predicates import Classifier, GroundAtom, Predicate
+from slap_ros.relational.predicates import Classifier, GroundAtom, Margin, Predicate
 from slap_ros.relational.state import Layout, State
 
 MOST_REMEMBERED = 1024  # states perceived
@@ -109,6 +109,21 @@ class AtomSpace:
             mask |= _mask(self._evaluate(self._rereading, state, np.zeros_like(self._truth)))
         return mask
 
+    def abstract_within(self, state: State, shifts: NDArray[np.float64]) -> int:
+        """The abstract state of a single state under other thresholds.
+
+        Args:
+            state: The state.
+            shifts: By how much each atom's threshold is higher, in the unit of its predicate's
+                margin, shape (atoms,). Of predicates without a margin, it means nothing.
+        """
+        truth = self.truth(state)
+        for block in self._fluents:
+            if block.margin is not None:
+                margins = block.margin(state, *block.columns)
+                truth[block.where] = margins >= shifts[block.where]
+        return _mask(truth)
+
     def abstract_each(self, states: State) -> list[int]:
         """The abstract states of a batch of states, shape (n, layout.size)."""
         return [_mask(truth) for truth in self.truth(states)]
@@ -180,6 +195,7 @@ class _Block:
     """The atoms of one predicate."""
 
     classifier: Classifier
+    margin: Margin | None
     columns: tuple[Column, ...]
     where: slice  # of the space's atoms
 
@@ -190,6 +206,7 @@ class _Block:
         columns = zip(*(atoms[i].objects for i in numbers), strict=True)
         return cls(
             predicate.classifier,
+            predicate.margin,
             tuple(Column(objects) for objects in columns),
             slice(start, start + len(numbers)),
         )

@@ -31,10 +31,10 @@ from slap_ros.physics.features import (
 )
 from slap_ros.physics.panda import FINGER_OPEN, JOINTS, hand_pose
 from slap_ros.physics.pose import IDENTITY, ORIGIN, Pose, Vector
+from slap_ros.physics.settling import settled
 from slap_ros.physics.world import PandaWorld
 from slap_ros.relational import Feature, Object, State
 from slap_ros.robot.limits import STEP_TOLERANCE, Limits, Motion
-from slap_ros.robot.settling import settled
 from slap_ros.robot.tracking import Detection, Sensing, Sighting, Track, measured_pose
 from slap_ros.robot.workplace import Workplace
 

@@ -136,6 +136,9 @@ class Script:
             episode=self.episode,
             step=step,
             atoms=self.atoms_of(self.space.decode(self.space.abstract(state))),
+            exact=True,
+            seen=[],
+            missing=[],
         )
         self.messages[-1].message.header = header
 

@@ -8,19 +8,25 @@ import sys
 import threading
 from pathlib import Path
 
+import numpy as np
 import psutil
 import pytest
+from typer.testing import CliRunner
 
 from ensemble.nodes import RunSettings
 from ensemble.run import RunRequest, run
 from slap_ros.bags import bag_digest, bag_info, evaluate_bag, read_bag, replay_bag
+from slap_ros.cli import app
 from slap_ros.cli.run import Narrator
 from slap_ros.domains import get_domain
 from slap_ros.evaluation.experiment import Experiment
 from slap_ros.messages.interfaces import ATOMS
+from slap_ros.perception import NoisyPerceiver, Quality
+from slap_ros.planning.execution import Executor
+from slap_ros.planning.planner import make_planner
 
 # Of `slap run obstacle2d --seed 3`, whatever the machine, the Python and the numpy.
-DIGEST_OF_SEED_3 = "27bb342c6b09a5cba320046c5c3ed206bba06fc0a6a999902ebe7cdbfca9ad1d"
+DIGEST_OF_SEED_3 = "6ba176d79c8889b9b98a12fc8084d2315e8f77256d8fd15f372b77ce527912ad"
 
 
 def ignore(type_name, message):
@@ -77,6 +83,66 @@ def test_a_bag_replays_bit_for_bit_and_says_what_made_it(network, tmp_path):
     assert metadata["domain"] == "obstacle2d"
     assert metadata["seed"] == "5"
     assert {"python", "numpy", "slap_ros", "revision", "configuration.bystanders"} <= set(metadata)
+
+
+@pytest.mark.parametrize(("seed", "replans"), [(2, True), (3, False)])
+def test_with_noise_the_ensemble_errs_as_an_experiment_does(network, tmp_path, seed, replans):
+    """The same looks, plans and replans, whoever runs them; bags tell what cannot be checked."""
+    noise = {"position_noise": 0.005, "threshold_noise": 0.002, "noise_seed": 2}
+    settings = RunSettings(
+        "obstacle2d", "fair", seed, 0, "lazy", tmp_path / "bag", shortcuts="none", perception=noise
+    )
+    live = run(RunRequest(settings, max_replans=10, timeout_s=60, in_process=True), ignore)
+    (recorded,) = evaluate_bag(tmp_path / "bag").runs
+    assert recorded == live
+    assert evaluate_bag(tmp_path / "bag").compared == 0
+    assert replay_bag(tmp_path / "bag").identical  # what happened is exact, whatever was seen
+
+    domain = get_domain("obstacle2d")
+    task = domain.task(seed)
+    space = domain.atom_space(task.initial_state)
+    quality = Quality(position_noise_m=0.005, threshold_noise=0.002)
+    rng = np.random.default_rng([2, 1])  # of the first episode
+    offline = Executor(
+        domain,
+        make_planner("lazy", domain, task.initial_state),
+        domain.make_world(task.initial_state),
+        space,
+        space.mask(task.goal),
+        task.step_limit,
+        10,
+        NoisyPerceiver.of(domain, space, task.initial_state, quality, rng),
+    ).run()
+    assert (live.success, live.plan_length, live.replans, live.error_code) == (
+        offline.success,
+        offline.plan_length,
+        offline.replans,
+        offline.error.code,
+    )
+    assert (live.replans > 0) == replans
+
+
+def test_an_object_that_nobody_sees_ends_a_run_with_its_own_code(network):
+    arguments = ["--seed", "3", "--shortcuts", "none", "--in-process"]
+    live = slap("run", "obstacle2d", *arguments, "--perception", "hidden=block1,memory=5")
+    assert live.returncode == 77, live.stderr
+    assert "not seen for too long: block1" in live.stderr
+
+
+@pytest.mark.parametrize(
+    ("perception", "words"),
+    [
+        ("debounce=0", "debounce is at least 1"),
+        ("hidden=block9", "block9 cannot be hidden"),
+        ("noise_seed=-1", "noise_seed is 0 or more"),
+        ("acuity=6", "perception has no parameter"),
+        ("dropout=often", "dropout is a number"),
+    ],
+)
+def test_perception_that_cannot_be_is_refused_before_anything_starts(perception, words):
+    result = CliRunner().invoke(app, ["run", "obstacle2d", "--perception", perception])
+    assert result.exit_code == 15
+    assert words in " ".join(result.stderr.split())
 
 
 def test_a_goal_of_ones_own_is_reached_and_recognised(network, tmp_path):

@@ -9,6 +9,7 @@ from visualization_msgs.msg import Marker
 
 from ensemble.visualization import frames, joint_state, markers
 from slap_ros.domains import get_domain
+from slap_ros.physics.panda import grasp_pose
 
 STAMP = Time(sec=1, nanosec=2)
 
@@ -48,6 +49,20 @@ def test_meshes_are_shown_by_their_triangles():
     lowest = duck.pose.position.z + min(point.z for point in duck.points)
     assert lowest == pytest.approx(0.0)  # it stands on the table
     assert table.points == []
+
+
+def test_the_arm_is_shown_where_it_is():
+    domain = get_domain("obstacle_tower")
+    state = domain.task(0).initial_state
+    shown = {body.name: body for body in domain.arm(state)}
+    assert len(shown) == 11
+    x, y, z = grasp_pose(state.data[:7]).position
+    hand = shown["panda_hand"]
+    assert hand.position[:2] == pytest.approx((x, y), abs=0.02)
+    assert 0.0 < hand.position[2] - z < 0.1  # over what it would grasp
+    assert all(body.position[2] > 0.0 for body in shown.values())
+    array = markers(tuple(shown.values()), STAMP, "robot")
+    assert {marker.ns for marker in array.markers} == {"robot"}
 
 
 def test_joint_states_are_those_of_the_arm_and_only_of_an_arm():

@@ -10,8 +10,8 @@ import pytest
 from slap_ros.errors import InvalidMeasurementError
 from slap_ros.physics.pose import NO_TURN, Pose
 from slap_ros.physics.scene import TABLE, TABLE_TOP, cube
+from slap_ros.physics.settling import settled
 from slap_ros.robot.frames import StaticFrames
-from slap_ros.robot.settling import settled
 from slap_ros.robot.tracking import Detection, Sensing, Track, measured_pose
 
 SENSING = Sensing(position_noise_m=0.002)

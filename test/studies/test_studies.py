@@ -25,7 +25,7 @@ from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.settings import training_settings
 from slap_ros.shortcuts.shortcut import Sampling
 from slap_ros.shortcuts.workers import NoWorkers
-from slap_ros.studies import comparison, pruning
+from slap_ros.studies import comparison, perception, pruning
 from slap_ros.studies.goals import sample_goals
 from slap_ros.studies.trainings import TrainingFolder, read_curve
 from slap_ros.studies.variations import Variation, offered, parse_variation
@@ -388,3 +388,30 @@ def test_without_matplotlib_nothing_is_begun(monkeypatch):
     code, message = refusal("pruning", "obstacle2d")
     assert code == InvalidParameterError.code
     assert "pip install 'slap_ros[studies]'" in message
+
+
+def test_noise_in_perception_is_measured_in_the_world(tmp_path, monkeypatch):
+    monkeypatch.setattr(perception, "KINDS", perception.KINDS[1:2])
+    arguments = ("perception", "obstacle2d", "--tasks", 2, "--seeds", 1, *PLANNING)
+    data = study(tmp_path / "once", *arguments)
+    levels = data["found"]["levels"]
+    assert [(one["value"], one["approach"]) for one in levels] == [
+        (value, approach)
+        for value in ("exact", "1", "2", "5")
+        for approach in ("pure_planning", "slap")
+    ]
+    exact = levels[0]
+    experiment = Experiment(DOMAIN, 2, 1)
+    lengths = [experiment.run(0, index).plan_length for index in range(2)]
+    assert [one["plan_length"] for one in exact["attempts"]] == lengths
+    assert exact["replans"]["mean"] == 0.0
+    assert any(one["replans"]["mean"] > 0.0 for one in levels)
+    for one in levels:
+        assert one["success_rate"] == np.mean([t["success"] for t in one["attempts"]])
+        assert all(t["believed"] for t in one["attempts"] if t["success"])
+    study(tmp_path / "again", *arguments)
+    for ending in ("json", "svg", "md"):
+        name = f"perception_obstacle2d.{ending}"
+        once, again = ((tmp_path / run / name).read_text() for run in ("once", "again"))
+        assert once == again
+    ET.fromstring((tmp_path / "once" / "perception_obstacle2d.svg").read_text())

@@ -19,7 +19,8 @@ from slap_ros.domains.cleanup_table.scenery import scene_of
 from slap_ros.domains.cleanup_table.shapes import shipped
 from slap_ros.domains.cleanup_table.view import VIEW
 from slap_ros.domains.domain import ActionSpace, Domain
-from slap_ros.domains.tabletop.showing import animation, visible_bodies
+from slap_ros.domains.tabletop.settling import settling
+from slap_ros.domains.tabletop.showing import animation, visible_arm, visible_bodies
 from slap_ros.domains.tabletop.timing import AtSpeedLimit, InTens, Timing
 from slap_ros.domains.variation import varied
 from slap_ros.meshes.solid import Solid
@@ -72,7 +73,9 @@ def make(
         make_world=lambda state: PandaWorld(scene(state), state, actions=actions),
         default_goal=tasks.everything_in_the_bin,
         step_limit=tasks.STEP_LIMIT,
+        settle=settling(scene),
         bodies=lambda state: visible_bodies(scene(state), state),
+        arm=visible_arm,
         animate=animation(scene, FROM_THE_LEFT),
         view=VIEW,
         learned_actions=ACTION_SPACE,

@@ -18,7 +18,8 @@ from slap_ros.domains.cluttered_drawer import model, skills, tasks
 from slap_ros.domains.cluttered_drawer.scenery import scene_of
 from slap_ros.domains.cluttered_drawer.view import VIEW
 from slap_ros.domains.domain import ActionSpace, Domain
-from slap_ros.domains.tabletop.showing import animation, visible_bodies
+from slap_ros.domains.tabletop.settling import settling
+from slap_ros.domains.tabletop.showing import animation, visible_arm, visible_bodies
 from slap_ros.domains.tabletop.timing import AtSpeedLimit, InTens, Timing
 from slap_ros.domains.variation import varied
 from slap_ros.physics.features import ROBOT
@@ -57,7 +58,9 @@ def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Doma
         step_limit=tasks.STEP_LIMIT,
         unread_types=frozenset({ROBOT}),
         reading=model.HAND_PREDICATES,
+        settle=settling(scene_of),
         bodies=lambda state: visible_bodies(scene_of(state), state),
+        arm=visible_arm,
         animate=animation(scene_of, LOOK),
         view=VIEW,
         learned_actions=ACTION_SPACE,

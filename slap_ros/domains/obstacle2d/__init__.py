@@ -20,6 +20,7 @@ from slap_ros.domains.obstacle2d.dynamics import (
     CONTROL_PERIOD,
     Obstacle2DWorld,
     Obstacle2DWorlds,
+    settle,
 )
 from slap_ros.domains.obstacle2d.view import VIEW
 from slap_ros.domains.variation import varied
@@ -42,6 +43,7 @@ def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Doma
         default_goal=tasks.target_block_in_target_area,
         step_limit=tasks.STEP_LIMIT,
         unread_types=frozenset({model.ROBOT}),
+        settle=settle,
         bodies=visible_bodies,
         view=VIEW,
         make_many=Obstacle2DWorlds,

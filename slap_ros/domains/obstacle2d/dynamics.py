@@ -177,6 +177,27 @@ def require_possible(state: State) -> None:
                 raise InvalidStateError(f"{name} and {names[j]} are inside one another")
 
 
+def settle(state: State) -> State:
+    """A measured state as it can be: blocks on the table, side by side, between the walls."""
+    columns = _columns(state.layout)
+    data = state.data.copy()
+    x, held = data[columns.x], data[columns.held] > 0.5
+    data[columns.y] = np.where(held, data[columns.y], 0.0)
+    order = [i for i in np.argsort(x, kind="stable") if not held[i]]
+    data[columns.x[order]] = _apart(x[order])
+    return State(state.layout, data)
+
+
+def _apart(places: Array) -> Array:
+    """Shift what overlaps apart, to either side by as much, and off the walls; places ascend."""
+    room = BLOCK_SIZE * np.arange(len(places))
+    gaps = places - room
+    to_right = np.maximum.accumulate(gaps)
+    to_left = np.minimum.accumulate(gaps[::-1])[::-1]
+    apart: Array = np.clip(0.5 * (to_right + to_left), 0.0, 1.0 - room[-1:]) + room
+    return apart
+
+
 class Obstacle2DWorlds:
     """Many worlds of the same objects."""
 

@@ -8,12 +8,16 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from slap_ros.domains.domain import Animate, VisibleBody
-from slap_ros.domains.tabletop.reading import pose_of
+from slap_ros.domains.tabletop.reading import finger_of, joints_of, pose_of
 from slap_ros.meshes.solid import Solid
+from slap_ros.motion.arm_shapes import ARM_SHAPES, BASE
+from slap_ros.physics.panda import LINKS, link_poses
 from slap_ros.physics.pose import IDENTITY
 from slap_ros.physics.scene import Body, Scene
 from slap_ros.physics.viewpoint import View
 from slap_ros.relational import State
+
+METAL = (0.88, 0.9, 0.92, 1.0)  # of the arm
 
 SceneOf = Callable[[State], Scene]
 
@@ -21,6 +25,26 @@ SceneOf = Callable[[State], Scene]
 def visible_bodies(scene: Scene, state: State) -> list[VisibleBody]:
     """Everything that stands around the robot."""
     return [_visible(body, state) for body in scene.bodies]
+
+
+def visible_arm(state: State) -> list[VisibleBody]:
+    """The arm: a box around each of its links."""
+    links = dict(zip(LINKS, link_poses(joints_of(state), finger_of(state)), strict=True))
+    shapes = [
+        ("base", IDENTITY.compose(BASE.pose), BASE.half),
+        *(
+            (
+                shape.link,
+                links[shape.link].compose(shape.box.pose),
+                tuple(half + shape.radius for half in shape.box.half),
+            )
+            for shape in ARM_SHAPES
+        ),
+    ]
+    return [
+        VisibleBody(f"panda_{name}", *pose, (2.0 * x, 2.0 * y, 2.0 * z), METAL)
+        for name, pose, (x, y, z) in shapes
+    ]
 
 
 def _visible(body: Body, state: State) -> VisibleBody:

@@ -1,0 +1,168 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A run for Foxglove, on a WebSocket of this machine: ROS messages as they are, without ROS 2.
+
+Channels have the names, types and bytes that bags and ``foxglove_bridge`` have, so that one layout
+fits all three. Needs ``foxglove-sdk``.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from importlib.util import find_spec
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+from rclpy.serialization import serialize_message
+
+from ensemble.interfaces import (
+    ATOMS,
+    COMMAND,
+    DOMAIN,
+    JOINT_STATES,
+    MARKERS,
+    PLAN,
+    PLAN_EVENTS,
+    SKILL_EVENTS,
+    STATE,
+    TASK,
+    TF,
+    Topic,
+)
+from slap_ros.errors import InvalidParameterError
+from slap_ros.messages.interfaces import definition
+
+if TYPE_CHECKING:
+    from foxglove.websocket import ChannelView, Client
+
+SHOWN = (
+    DOMAIN,
+    TASK,
+    STATE,
+    ATOMS,
+    COMMAND,
+    PLAN,
+    PLAN_EVENTS,
+    SKILL_EVENTS,
+    MARKERS,
+    TF,
+    JOINT_STATES,
+)
+EVENTS = (PLAN_EVENTS.type_name, SKILL_EVENTS.type_name)
+HOST = "127.0.0.1"  # nobody else's business
+PORT = 8765  # where Foxglove looks
+BACKLOG = 4096  # messages kept for a viewer that is slow
+
+
+def available() -> bool:
+    """Whether what it takes is installed."""
+    return find_spec("foxglove") is not None
+
+
+class Broadcast:
+    """Sends what it is given to whoever watches; latecomers get the newest of each topic at once.
+
+    Raises:
+        InvalidParameterError: foxglove-sdk is not installed, or somebody else has the port.
+    """
+
+    def __init__(self, port: int | None = None) -> None:
+        """``port``: None for the usual one, or any other that is free."""
+        if not available():
+            raise InvalidParameterError(
+                "Foxglove is served with foxglove-sdk, which is not installed: "
+                "pip install 'slap_ros[live]'"
+            )
+        from foxglove import Channel, Context, Schema
+
+        self._context = Context()
+        self._channels = {
+            topic.type_name: Channel(
+                channel_name(topic),
+                schema=Schema(
+                    name=topic.type_name,
+                    encoding="ros2msg",
+                    data=definition(topic.type_name).encode(),
+                ),
+                message_encoding="cdr",
+                context=self._context,
+            )
+            for topic in SHOWN
+        }
+        self._by_id = {channel.id(): channel for channel in self._channels.values()}
+        self._newest: dict[int, bytes] = {}  # by channel
+        self._lock = threading.Lock()  # viewers come in threads of the server's
+        self._subscriptions = 0
+        self._server = self._start((PORT, 0) if port is None else (port,))
+
+    def _start(self, ports: Sequence[int]) -> Any:
+        from foxglove import start_server
+
+        for port in ports:
+            try:
+                return start_server(
+                    name="slap_ros",
+                    host=HOST,
+                    port=port,
+                    server_listener=self,
+                    context=self._context,
+                    message_backlog_size=BACKLOG,
+                )
+            except (OSError, RuntimeError) as error:
+                reason = error
+        raise InvalidParameterError(f"Foxglove cannot be served on port {ports[-1]}: {reason}")
+
+    @property
+    def url(self) -> str:
+        """What to open in Foxglove."""
+        return f"ws://{HOST}:{self._server.port}"
+
+    @property
+    def watched(self) -> bool:
+        """Whether somebody watches anything."""
+        return self._subscriptions > 0
+
+    def __call__(self, type_name: str, message: Any) -> None:
+        """Take a message of the run."""
+        channel = self._channels.get(type_name)
+        if channel is None:
+            return
+        data = bytes(serialize_message(message))
+        with self._lock:
+            if type_name not in EVENTS:  # which are not to be heard twice
+                self._newest[channel.id()] = data
+            channel.log(data)
+
+    def on_subscribe(self, client: Client, channel: ChannelView) -> None:
+        """Somebody begins to watch a topic: what it said last is news to them.
+
+        The server does not tell how to say it to them alone, so others hear it twice.
+        """
+        del client
+        with self._lock:
+            self._subscriptions += 1
+            if channel.id in self._newest:
+                self._by_id[channel.id].log(self._newest[channel.id])
+
+    def on_unsubscribe(self, client: Client, channel: ChannelView) -> None:
+        """Somebody watches a topic no more."""
+        del client, channel
+        with self._lock:
+            self._subscriptions -= 1
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._server.stop()
+
+
+def channel_name(topic: Topic) -> str:
+    """The topic's name from the root, as bags have it."""
+    return topic.name if topic.name.startswith("/") else f"/{topic.name}"

@@ -1,0 +1,221 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Executes a recorded plan on a robot, open loop: ``slap bag replay BAG --to robot``.
+
+It looks once before it begins, and once when it is done. In between it trusts the recording for
+everything but the arm's own joints, fingers and controllers: the first of these that fails ends the
+replay, and nothing more is sent, so that the controllers hold.
+
+Subscribers:
+    joint_states (sensor_msgs/JointState), /tf, /tf_static (tf2_msgs/TFMessage): as robot_bridge.
+
+Action clients:
+    trajectory_action (control_msgs/FollowJointTrajectory), gripper_action
+        (control_msgs/GripperCommand): as robot_bridge.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.task import Future
+
+from ensemble.parameters import parameter
+from ensemble.waiting import first_of, seconds
+from robot_bridge.controllers import Controllers, action_name
+from robot_bridge.fingers import move_fingers
+from robot_bridge.node import Parameters as BridgeParameters
+from robot_bridge.node import limits, sensing
+from robot_bridge.senses import Senses
+from slap_ros.errors import (
+    ControllerAbortedError,
+    ControllerTimeoutError,
+    InvalidStateError,
+    NoDetectionError,
+    NoJointStateError,
+    SlapError,
+    StartMismatchError,
+)
+from slap_ros.physics.features import POSE_FEATURES
+from slap_ros.relational import State
+from slap_ros.robot.cell import GAP_OPEN, GAP_SHUT, GRASPED, Cell, Grip
+from slap_ros.robot.limits import Motion
+from slap_ros.robot.rehearsal import Recorded, Rehearsal, Waypoint
+from slap_ros.robot.workplace import Workplace, read_workplace, sampled_workplace
+
+POSITION = tuple(feature.name for feature in POSE_FEATURES[:3])
+ON_STEP = Callable[[int], None]
+
+
+@dataclass(frozen=True)
+class Parameters(BridgeParameters):
+    """Those of robot_bridge, and how far from where the recording begins things may be."""
+
+    start_timeout: float = parameter(15.0, "s to wait for the robot and every object")
+    start_tolerance: float = parameter(0.05, "rad that a joint may be off the recording's start")
+    place_tolerance: float = parameter(0.01, "m that an object may be off the recording's start")
+
+
+class Player(Node):
+    """Plays one recording."""
+
+    def __init__(
+        self, recorded: Recorded, rehearsal: Rehearsal, settings: Parameters, **kwargs: Any
+    ) -> None:
+        """Play what was rehearsed.
+
+        Raises:
+            UnsafeCommandError: The rehearsal says that it must not be executed.
+        """
+        rehearsal.require_safe()
+        super().__init__("robot_player", **kwargs)
+        self._recorded, self._motions, self._settings = recorded, rehearsal.motions, settings
+        self._cell = Cell(recorded.domain, self._workplace(), limits(settings), sensing(settings))
+        self._senses = Senses(self, self._cell, settings.arm, f"{settings.arm}_link0")
+        self._controllers = Controllers(
+            self,
+            action_name(settings.trajectory_action, settings.arm),
+            action_name(settings.gripper_action, settings.arm),
+            self._senses.joints,
+            settings.controller_timeout,
+        )
+        self.failure: SlapError | None = None
+        self.done = 0  # steps
+        self.final: State | None = None  # as measured at the end; None where something is held
+
+    def destroy_node(self) -> None:
+        """Hold, and give back what is held."""
+        self._controllers.hold()
+        self._controllers.destroy()
+        self._cell.close()
+        super().destroy_node()
+
+    def hold(self) -> None:
+        """Have the motion under way canceled."""
+        self._controllers.hold()
+
+    async def play(self) -> None:
+        """Play it; what goes wrong is in ``failure``."""
+        try:
+            await self._begin()
+            for waypoint, motion in zip(self._recorded.waypoints, self._motions, strict=True):
+                await self._step(waypoint, motion)
+                self.done += 1
+            if not any(_held(self._recorded.states[-1], name) for name in self._names):
+                self.final = await self._look("at the end")
+        except SlapError as error:
+            self.hold()
+            self.failure = error
+
+    # -- before the first motion ----------------------------------------------------------------
+
+    def _workplace(self) -> Workplace:
+        if self._settings.scene:
+            return read_workplace(Path(self._settings.scene), self._recorded.domain)
+        return sampled_workplace(self._recorded.states[0])
+
+    @property
+    def _names(self) -> list[str]:
+        """Objects that can be moved."""
+        return [o.name for o in self._recorded.states[0].objects if "held" in o.type.column]
+
+    async def _begin(self) -> None:
+        """Wait for the robot; refuse to begin elsewhere than the recording does."""
+        end = seconds(self) + self._settings.start_timeout
+        await first_of(self, Future(), lambda: self._controllers.ready or seconds(self) > end)
+        if not self._controllers.ready:
+            raise ControllerTimeoutError("the controllers are not there: are they running?")
+        state = await self._look("at the start")
+        off = self._cell.distance(self._recorded.start)
+        if off > self._settings.start_tolerance:
+            raise StartMismatchError(
+                f"a joint is {off:.3f} rad off where the recording begins, which may be "
+                f"{self._settings.start_tolerance} rad: move the arm there first"
+            )
+        for name in self._names:
+            self._require_place(name, state)
+
+    def _require_place(self, name: str, state: State) -> None:
+        first = self._recorded.states[0]
+        if name not in state.layout.by_name:
+            raise StartMismatchError(f"the recording is about {name}, which the scene has not")
+        there, recorded = (
+            [float(s.get(s.layout.object(name), axis)) for axis in POSITION] for s in (state, first)
+        )
+        off = math.dist(there, recorded)
+        if off > self._settings.place_tolerance:
+            place = ", ".join(f"{value:.3f}" for value in recorded)
+            raise StartMismatchError(
+                f"{name} is {off:.3f} m off where the recording begins, which may be "
+                f"{self._settings.place_tolerance} m: put it to ({place})"
+            )
+
+    async def _look(self, when: str) -> State:
+        """The state, measured anew."""
+        since_s = seconds(self)
+        end_s = since_s + self._settings.start_timeout
+        found: list[State] = []
+        reasons: list[InvalidStateError] = []
+
+        def look() -> bool:
+            try:
+                state = self._cell.look(since_s)
+            except InvalidStateError as error:
+                reasons.append(error)
+            else:
+                found.extend([state] if state is not None else [])
+            return bool(found) or seconds(self) > end_s
+
+        await first_of(self, Future(), look)
+        if found:
+            return found[-1]
+        if self._cell.heard_s <= since_s:
+            raise NoJointStateError(f"no joint positions {when}")
+        if reasons:
+            raise reasons[-1]
+        missing = ", ".join(self._cell.unseen(since_s)) or "none at all, but too few times"
+        raise NoDetectionError(f"not detected {when}: {missing}")
+
+    # -- motions --------------------------------------------------------------------------------
+
+    async def _step(self, waypoint: Waypoint, motion: Motion) -> None:
+        await self._require_at(motion.start, f"before step {waypoint.step}")
+        if waypoint.grip is not Grip.KEEP:
+            await self._grip(waypoint)
+        await self._controllers.move(motion)
+
+    async def _grip(self, waypoint: Waypoint) -> None:
+        closing = waypoint.grip is Grip.CLOSE
+        wanted = GAP_SHUT if closing else GAP_OPEN
+        gap = await move_fingers(self, self._controllers, self._senses, wanted, self._settings)
+        if closing and gap < GRASPED * waypoint.gap:
+            raise ControllerAbortedError(
+                f"the fingers closed around nothing in step {waypoint.step}: {gap:.3f} m apart, "
+                f"{waypoint.gap:.3f} m in the recording"
+            )
+
+    async def _require_at(self, joints: tuple[float, ...], when: str) -> None:
+        """Hear anew where the arm is, which must be where the recording had it."""
+        since_s = seconds(self)
+        end_s = since_s + self._settings.joint_timeout
+        await first_of(
+            self, Future(), lambda: self._cell.heard_s > since_s or seconds(self) > end_s
+        )
+        if self._cell.heard_s <= since_s:
+            raise NoJointStateError(
+                f"no joint positions for {self._settings.joint_timeout} s {when}"
+            )
+        off = self._cell.distance(joints)
+        if off > self._settings.arrival_tolerance:
+            raise ControllerAbortedError(
+                f"the arm is {off:.3f} rad off the recording {when}: it was held up, or moved"
+            )
+
+
+def _held(state: State, name: str) -> bool:
+    return bool(state.get(state.layout.object(name), "held") > 0.5)

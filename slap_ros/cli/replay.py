@@ -1,0 +1,123 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``slap bag replay --to robot``: a recorded motion rehearsed, then executed open loop."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import typer
+from rich.table import Table
+
+from slap_ros.cli.console import console, print_json, progress
+from slap_ros.errors import ErrorCode, TaskCanceledError
+from slap_ros.robot.cell import Grip
+from slap_ros.robot.rehearsal import Recorded, Rehearsal, recorded_motion, rehearse
+from slap_ros.robot.worlds import MOCK
+
+REACHED = {
+    None: "nobody looked at the end",
+    True: "the goal holds",
+    False: "the goal does not hold",
+}
+
+
+def replay_on_robot(
+    bag: Path, to: str, dry_run: bool, robot: str, mock: str, sure: bool, json: bool
+) -> int:
+    """Rehearse, and unless that is all, execute; the exit code.
+
+    Raises:
+        SlapError: It must not be executed, or failed; a robot then holds.
+    """
+    # ROS is needed only here: the rest of `slap bag` works without it.
+    from ensemble.parameters import parse_parameters
+    from robot_bridge.mock.options import GIVEN, mock_options
+    from robot_bridge.node import limits
+    from robot_bridge.player import Parameters
+    from robot_bridge.playing import play
+
+    settings = Parameters(**parse_parameters(robot, Parameters, "robot", GIVEN))
+    parameters = mock_options(mock) if to == MOCK else None
+    recorded = recorded_motion(bag)
+    rehearsal = rehearse(recorded, limits(settings))
+    if json and dry_run:
+        print_json(_as_json(recorded, rehearsal))
+    else:
+        console.print(_table(recorded, rehearsal, settings.arm))
+    for step, reason in rehearsal.violations:
+        console.print(f"step {step}: {reason}", highlight=False, markup=False)
+    if dry_run:
+        return int(ErrorCode.UNSAFE_COMMAND) if rehearsal.violations else 0
+    rehearsal.require_safe()
+    if not sure and not _agreed():
+        raise TaskCanceledError("nothing moved: nobody said that it may (--yes)")
+    with progress() as bar:
+        watched = bar.add_task("replaying", total=len(recorded.waypoints))
+        played = play(
+            recorded,
+            rehearsal,
+            settings,
+            parameters,
+            lambda done: bar.update(watched, completed=done),
+        )
+    reached = played.reached(recorded)
+    if json:
+        print_json(_as_json(recorded, rehearsal) | {"played": played.steps, "reached": reached})
+    console.print(f"{played.steps} steps executed; {REACHED[reached]}")
+    return int(ErrorCode.REPLAY_MISMATCH) if reached is False else 0
+
+
+def _agreed() -> bool:
+    """Whether the person at the terminal lets the arm move; nobody there does not."""
+    if not sys.stdin.isatty():
+        return False
+    return typer.confirm("The arm is going to move. Is everybody out of its reach?", err=True)
+
+
+def _table(recorded: Recorded, rehearsal: Rehearsal, arm: str) -> Table:
+    steps = len(recorded.waypoints)
+    grips = sum(waypoint.grip is not Grip.KEEP for waypoint in recorded.waypoints)
+    verdict = (
+        f"{len(rehearsal.violations)} steps beyond its limits"
+        if rehearsal.violations
+        else f"{rehearsal.duration_s:.1f} s of motion"
+    )
+    table = Table(
+        "closest to a limit",
+        "value",
+        "allowed",
+        "share",
+        "step",
+        title=(
+            f"{recorded.domain.name}, seed {recorded.seed}, on {arm}: {steps} steps "
+            f"({steps * recorded.domain.control_period_s:.1f} s as recorded), {grips} grips, "
+            f"{verdict}"
+        ),
+    )
+    for extreme in rehearsal.extremes:
+        style = "bold red" if extreme.share > 1.0 else None
+        table.add_row(
+            extreme.quantity,
+            f"{extreme.value:.3f} {extreme.unit}",
+            f"{extreme.low:.3f} to {extreme.high:.3f}",
+            f"{extreme.share:.0%}",
+            str(extreme.step),
+            style=style,
+        )
+    return table
+
+
+def _as_json(recorded: Recorded, rehearsal: Rehearsal) -> dict[str, Any]:
+    return {
+        "domain": recorded.domain.name,
+        "seed": recorded.seed,
+        "index": recorded.index,
+        "steps": len(recorded.waypoints),
+        "duration_s": rehearsal.duration_s,
+        "extremes": [{**asdict(extreme), "share": extreme.share} for extreme in rehearsal.extremes],
+        "violations": [{"step": step, "reason": reason} for step, reason in rehearsal.violations],
+    }

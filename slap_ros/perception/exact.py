@@ -1,0 +1,21 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Perception that errs in nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from slap_ros.perception.percept import Percept
+from slap_ros.relational import AtomSpace, State
+
+
+@dataclass(frozen=True)
+class ExactPerceiver:
+    """The state as it is, and the domain's own predicates."""
+
+    space: AtomSpace
+
+    def perceive(self, state: State) -> Percept:
+        """See :class:`~slap_ros.perception.percept.Perceiver`."""
+        return Percept(state, self.space.abstract(state))

@@ -1,0 +1,63 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Perception that errs, by so much as one says: noise, lost sightings, and what is done about it.
+
+A state is seen, put where physics would have it, and abstracted with thresholds that are not quite
+right; then atoms are debounced. The planner plans from the poses, not from the debounced atoms:
+its model has predicates of its own, and the two must agree where a plan begins.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from slap_ros.domains import Domain
+from slap_ros.perception.debounce import Debouncer
+from slap_ros.perception.percept import Percept
+from slap_ros.perception.quality import Quality
+from slap_ros.perception.sight import Sight
+from slap_ros.relational import AtomSpace, State
+
+
+@dataclass
+class NoisyPerceiver:
+    """Perceives an episode. The same generator and states give the same percepts."""
+
+    domain: Domain
+    space: AtomSpace
+    quality: Quality
+    rng: np.random.Generator
+    sight: Sight
+    debouncer: Debouncer
+
+    @classmethod
+    def of(
+        cls,
+        domain: Domain,
+        space: AtomSpace,
+        initial: State,
+        quality: Quality,
+        rng: np.random.Generator,
+    ) -> NoisyPerceiver:
+        """The perceiver of an episode that begins in ``initial``, as its task says.
+
+        Raises:
+            InvalidParameterError: An object that is to be hidden is none of the task's.
+        """
+        quality.require_known(initial.layout.by_name.keys())
+        sight = Sight.of(quality, rng, initial)
+        return cls(domain, space, quality, rng, sight, Debouncer(quality.debounce))
+
+    def perceive(self, state: State) -> Percept:
+        """See :class:`~slap_ros.perception.percept.Perceiver`."""
+        seen = self.domain.settle(self.sight.look(state))
+        abstract = self.debouncer.add(self._abstract(seen))
+        return Percept(seen, abstract, self.sight.missing, self.quality.exact)
+
+    def _abstract(self, seen: State) -> int:
+        if self.quality.threshold_noise == 0.0:
+            return self.space.abstract(seen)
+        shifts = self.quality.threshold_noise * self.rng.standard_normal(len(self.space.atoms))
+        return self.space.abstract_within(seen, shifts)

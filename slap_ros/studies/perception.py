@@ -1,0 +1,259 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What noise in perception does to success, length and replanning (SLAP D.3, D.4).
+
+Poses, thresholds and sightings are disturbed anew in each step. Plans begin from what is seen and
+are watched by it; whether a task is solved is asked of the world.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from statistics import fmean
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from slap_ros.domains import get_domain
+from slap_ros.evaluation.approaches import Approach
+from slap_ros.evaluation.summary import Spread
+from slap_ros.perception import NoisyPerceiver, Quality
+from slap_ros.planning.execution import Executor
+from slap_ros.studies.comparison import Audience, Comparison, complaint, said, spread_of
+from slap_ros.studies.figures import dodged, label, legend_above, plot_spreads, plot_values
+from slap_ros.studies.results import Report, Table
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+EXACT = "exact"
+TURN_FOR_POSITION = 5.0  # rad/m: a detector that is 2 mm off is 10 mrad off
+MEASURED = """\
+Pure planning and SLAP solve the same tasks while perception errs: noise is normal, with the
+standard deviation given, and new in each step. Position noise comes with 5 mrad of turn for each
+mm, where things can turn; threshold noise moves the threshold of each predicate of each atom;
+a sighting that is lost leaves an object where it was last seen; debounced atoms change once they
+were perceived as changed so many times in a row, and a skill then holds at its end for as long.
+What lies still is put where physics would have it before a plan is made of it. At each divergence,
+and where no plan can be made of what is seen, there is a new plan, up to the limit given below.
+
+A task is solved if the planner says so and its goal holds in the world. Length is the number of
+environment steps executed, mean ± sample standard deviation over solved tasks; replans are over
+all tasks."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One way in which perception errs, at several levels."""
+
+    name: str  # for an axis, with the unit
+    levels: tuple[tuple[str, Quality], ...]
+
+
+def _position(mm: float) -> Quality:
+    return Quality(position_noise_m=mm / 1e3, turn_noise_rad=TURN_FOR_POSITION * mm / 1e3)
+
+
+KINDS = (
+    Kind("position noise [mm]", tuple((f"{mm:g}", _position(mm)) for mm in (1.0, 2.0, 5.0))),
+    Kind(
+        "threshold noise [mm]",
+        tuple((f"{mm:g}", Quality(threshold_noise=mm / 1e3)) for mm in (1.0, 2.0, 5.0)),
+    ),
+    Kind(
+        "debounced at 2 mm\nposition noise [times]",
+        tuple((str(n), replace(_position(2.0), debounce=n)) for n in (2, 3)),
+    ),
+    Kind("sightings lost", tuple((f"{share:.0%}", Quality(dropout=share)) for share in (0.3, 0.8))),
+)
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """What came of one task."""
+
+    seed: int
+    index: int
+    success: bool  # as the planner said, and in the world
+    believed: bool  # as the planner said
+    plan_length: int  # environment steps executed
+    replans: int
+    error: str  # name of the code
+    reason: str
+
+
+@dataclass(frozen=True)
+class Level:
+    """What came of an approach at one level of one kind of noise."""
+
+    kind: str
+    value: str
+    quality: Quality
+    approach: str
+    attempts: tuple[Attempt, ...]  # by seed and index
+
+    @property
+    def success_rate(self) -> float:
+        """Part of the tasks solved in the world."""
+        return fmean(one.success for one in self.attempts)
+
+    @property
+    def length(self) -> Spread | None:
+        """Environment steps of solved tasks."""
+        return spread_of([float(one.plan_length) for one in self.attempts if one.success])
+
+    @property
+    def replans(self) -> Spread:
+        """Of all tasks."""
+        return Spread.of([float(one.replans) for one in self.attempts])
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "kind": self.kind,
+            "value": self.value,
+            "quality": {**asdict(self.quality), "hidden": sorted(self.quality.hidden)},
+            "approach": self.approach,
+            "success_rate": self.success_rate,
+            "plan_length": asdict(self.length) if self.length else None,
+            "replans": asdict(self.replans),
+            "attempts": [asdict(one) for one in self.attempts],
+        }
+
+    def as_row(self) -> list[str]:
+        """Row of a table."""
+        where = self.kind if self.kind == EXACT else f"{self.kind}: {self.value}"
+        return [
+            " ".join(where.split()),
+            label(self.approach),
+            f"{self.success_rate:.0%}",
+            said(self.length, 1),
+            said(self.replans, 1),
+        ]
+
+
+def study(comparison: Comparison, max_replans: int, audience: Audience) -> Report:
+    """Measure at every level of every kind of noise."""
+    planned = [(EXACT, EXACT, Quality())]
+    planned += [(kind.name, value, quality) for kind in KINDS for value, quality in kind.levels]
+    levels = [
+        level for one in planned for level in _measure(comparison, *one, max_replans, audience)
+    ]
+    return Report(
+        study="perception",
+        source="SLAP D.3 and D.4",
+        title=f"Noise in perception: {comparison.domain.name}",
+        measured=MEASURED,
+        table=Table(
+            ["perception", "approach", "success", "length [steps]", "replans"],
+            [level.as_row() for level in levels],
+        ),
+        found={"levels": [level.as_json() for level in levels]},
+        draw=lambda figure: draw(figure, levels),
+        size=(1.2 + 2.3 * len(KINDS), 5.2),
+    )
+
+
+def _measure(
+    comparison: Comparison,
+    kind: str,
+    value: str,
+    quality: Quality,
+    max_replans: int,
+    audience: Audience,
+) -> Iterator[Level]:
+    """One approach after the other."""
+    tasks = list(comparison.experiment)
+    audience.begin(" ".join(f"{kind} {value}".split()), len(tasks) * len(comparison.approaches))
+    for approach in comparison.approaches:
+        attempts = []
+        jobs = [(quality, max_replans, seed, index) for seed, index in tasks]
+        for _, one in comparison.each(attempt, approach, jobs):
+            attempts.append(one)
+            audience.done()
+            if not one.success:
+                audience.failed(complaint(approach, one.seed, one.index, one.reason))
+        attempts.sort(key=lambda one: (one.seed, one.index))
+        yield Level(kind, value, quality, approach.name, tuple(attempts))
+
+
+def attempt(
+    domain: str,
+    preset: str,
+    planner: str,
+    approach: Approach,
+    quality: Quality,
+    max_replans: int,
+    seed: int,
+    index: int,
+) -> Attempt:
+    """Solve one task as it is perceived; the domain is made anew where this runs."""
+    chosen = get_domain(domain, preset)
+    task = chosen.task(seed, index)
+    initial = task.initial_state
+    space, world = chosen.atom_space(initial), chosen.make_world(initial)
+    goal = space.mask(task.goal)
+    rng = np.random.default_rng([seed, index])
+    episode = Executor(
+        chosen,
+        approach.planner(planner, chosen, initial),
+        world,
+        space,
+        goal,
+        task.step_limit,
+        max_replans,
+        NoisyPerceiver.of(chosen, space, initial, quality, rng),
+        quality.patience,
+    ).run()
+    holds = space.abstract(world.state) & goal == goal
+    reason = episode.error.reason or ("" if holds else "solved, as far as was seen, and is not")
+    return Attempt(
+        seed,
+        index,
+        episode.success and holds,
+        episode.success,
+        episode.plan_length,
+        episode.replans,
+        episode.error.code.name,
+        reason,
+    )
+
+
+def draw(figure: Figure, levels: Sequence[Level]) -> None:
+    """A column a kind of noise: success, length, replans; first, apart, exact perception."""
+    exact = [one for one in levels if one.kind == EXACT]
+    grid = figure.subplots(
+        3, len(KINDS), squeeze=False, sharex="col", sharey="row", height_ratios=(1, 1.6, 1.2)
+    )
+    for column, kind in zip(grid.T, KINDS, strict=True):
+        own = [one for one in levels if one.kind == kind.name]
+        _plot(column, exact, [EXACT])
+        _plot(column, own, [value for value, _ in kind.levels])
+        for axes in column:
+            axes.axvspan(-0.5, 0.5, color="#f1f3f5", zorder=0)
+        ticks = [EXACT, *(value for value, _ in kind.levels)]
+        column[-1].set_xticks(range(len(ticks)), ticks)
+        column[-1].set_xlim(-0.5, len(kind.levels) + 0.5)
+        column[-1].set_xlabel(kind.name)
+    for axes, quantity in zip(
+        grid[:, 0], ("success [%]", "length of solved\ntasks [steps]", "replans"), strict=True
+    ):
+        axes.set_ylabel(quantity)
+    grid[0, 0].set_ylim(-8, 108)
+    grid[1, 0].set_ylim(bottom=0)
+    grid[2, 0].set_ylim(bottom=0)
+    legend_above(figure, grid[1, 0])
+
+
+def _plot(column: Sequence[Axes], levels: Sequence[Level], values: Sequence[str]) -> None:
+    """Approaches beside each other; exact perception at 0, the others from 1 on."""
+    names = list(dict.fromkeys(one.approach for one in levels))
+    places = range(len(values)) if values == [EXACT] else range(1, len(values) + 1)
+    for number, name in enumerate(names):
+        own = [one for one in levels if one.approach == name]
+        beside = dodged(places, number, len(names))
+        plot_values(column[0], beside, [100.0 * one.success_rate for one in own], name)
+        plot_spreads(column[1], beside, [one.length for one in own], name)
+        plot_spreads(column[2], beside, [one.replans for one in own], name)
