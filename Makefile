@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 TORCH := torch==2.13.0  # pinned: another version trains other policies from the same seed
 METADATA := pyproject.toml setup.py setup.cfg embedded_ros/pyproject.toml
 
-.PHONY: help install demo test lint format clean
+.PHONY: help install demo test faults lint format clean
 
 help:  ## Show what can be made
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -51,6 +51,9 @@ demo: install  ## Run the whole ensemble, record bags, replay them, measure, rep
 test: $(VENV)/.tested lint  ## Run every test
 	$(BIN)/pytest -q -n 2 --dist worksteal
 	cd embedded_ros && $(abspath $(BIN))/pytest -q -n 2 --dist worksteal
+
+faults: $(VENV)/.tested  ## Inject many more faults than the tests do, for about an hour
+	$(BIN)/pytest -q test/faults --fault-cases $(or $(CASES),100)
 
 lint: $(VENV)/.tested  ## Check style and types
 	$(BIN)/ruff check . embedded_ros

@@ -1,17 +1,29 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Who may join in: whoever is on this host, unless the environment says otherwise."""
+"""Joining the network: whoever is on this host, unless the environment says otherwise."""
 
 from __future__ import annotations
 
 import os
+from typing import Any
+
+import rclpy
+
+from slap_ros.errors import InvalidParameterError
 
 REACH = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 
 
-def stay_on_this_host() -> None:
-    """Before ``rclpy.init``: a robot takes no commands from elsewhere by accident.
+def join(**options: Any) -> None:
+    """``rclpy.init``, so that a robot takes no commands from elsewhere by accident.
 
     Left to itself Jazzy looks for others on the whole subnet. Who wants that sets ``REACH``.
+
+    Raises:
+        InvalidParameterError: An environment variable, such as ROS_DOMAIN_ID, is wrong.
     """
     os.environ.setdefault(REACH, "LOCALHOST")
+    try:
+        rclpy.init(**options)
+    except ValueError as error:
+        raise InvalidParameterError(str(error)) from error

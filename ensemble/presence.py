@@ -7,6 +7,9 @@ from __future__ import annotations
 from rclpy.node import Node
 
 from ensemble.interfaces import Topic
+from ensemble.waiting import seconds
+
+PERIOD = 0.5  # s between two looks at the graph, which cost time; DDS takes longer to miss a node
 
 
 class Presence:
@@ -20,13 +23,16 @@ class Presence:
         """Follow whoever publishes ``topic`` now or, if nobody does yet, first."""
         self._node = node
         self._topic = node.resolve_topic_name(topic.name)
-        self._known = self._publishers()
+        self._known = self._now = self._publishers()
+        self._looked_s = seconds(node)
 
     def there(self) -> bool:
         """Whether one of them is there."""
-        now = self._publishers()
-        self._known = self._known or now
-        return not self._known.isdisjoint(now)
+        if seconds(self._node) - self._looked_s > PERIOD:
+            self._now = self._publishers()
+            self._known = self._known or self._now
+            self._looked_s = seconds(self._node)
+        return not self._known.isdisjoint(self._now)
 
     def gone(self) -> bool:
         """Whether they were there and are no more; False as long as none was found."""

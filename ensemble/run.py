@@ -18,7 +18,7 @@ from rclpy.task import Future
 from ensemble.client import OnMessage, RunClient
 from ensemble.hosts import Host, InProcessHost, ProcessHost
 from ensemble.interfaces import Topic
-from ensemble.network import stay_on_this_host
+from ensemble.network import join
 from ensemble.nodes import RunSettings, node_parameters
 from slap_ros.errors import (
     AlreadyRunningError,
@@ -63,16 +63,16 @@ def run(request: RunRequest, on_message: OnMessage) -> RunMetrics:
         The metrics, from the messages of the run; failures are in their error code.
 
     Raises:
+        InvalidParameterError: An environment variable, such as ROS_DOMAIN_ID, is wrong.
         AlreadyRunningError: Another ensemble would be disturbed.
         NotReadyError: The nodes did not come up.
         NodeDiedError: A node ended before the run began.
         SlapError: The planner refused the task; the code says why.
         KeyboardInterrupt: After the robot holds and the bag is closed.
     """
-    stay_on_this_host()
     with ExitStack() as stack:
         # No handlers: after Ctrl-C the goal is still to be canceled and the bag to be closed.
-        rclpy.init(
+        join(
             args=["--ros-args", "--log-level", "warn"],
             signal_handler_options=SignalHandlerOptions.NO,
         )

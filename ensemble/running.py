@@ -12,7 +12,7 @@ from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
-from ensemble.network import stay_on_this_host
+from ensemble.network import join
 from slap_ros.errors import ErrorCode, SlapError
 
 
@@ -22,11 +22,10 @@ def run_node(name: str, make: Callable[[], Node]) -> int:
     Returns:
         Exit code: 0 after a signal, else the error's code, whose message went to stderr.
     """
-    stay_on_this_host()
     try:
-        rclpy.init()
-    except ValueError as error:  # of an environment variable, such as ROS_DOMAIN_ID
-        return _refuse(name, error, ErrorCode.INVALID_PARAMETER)
+        join()
+    except SlapError as error:
+        return _refuse(name, error, error.code)
     try:
         return _run(name, make)
     finally:

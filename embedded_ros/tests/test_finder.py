@@ -93,3 +93,8 @@ def test_a_malformed_file_is_named_with_its_line(run: Run, tmp_path: Path) -> No
 def test_a_wrong_environment_variable_says_so(run: Run, value: str) -> None:
     last = outcome(run(code="from env_msgs.msg import A", EMBEDDED_ROS_INTERFACES=value))
     assert "EMBEDDED_ROS_INTERFACES" in last
+
+
+def test_what_cannot_be_encrypted_is_not_sent(run: Run) -> None:
+    code = "import rclpy; rclpy.init()"
+    assert "embedded_ros has no SROS 2" in outcome(run(code=code, ROS_SECURITY_ENABLE="true"))

@@ -165,10 +165,8 @@ def test_the_domain_comes_from_the_environment(
         rclpy.init(args=[])
     monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "WORLD")
-    rclpy.init(args=[])
     with pytest.raises(ValueError, match="ROS_AUTOMATIC_DISCOVERY_RANGE is 'WORLD'"):
-        Node("n")
-    rclpy.shutdown()
+        rclpy.init(args=[])
 
 
 def test_an_idle_node_sleeps(run: Run) -> None:

@@ -9,8 +9,10 @@ import sys
 from pathlib import Path
 
 import pytest
+import rclpy
 
-from ensemble.network import REACH, stay_on_this_host
+from ensemble.network import REACH, join
+from slap_ros.errors import InvalidParameterError
 
 HERE = Path(__file__).parent
 
@@ -42,10 +44,20 @@ def test_another_host_is_heard_only_where_that_was_asked_for(network, reach, ope
     }
 
 
-def test_jazzys_own_default_is_not_taken(monkeypatch):
-    monkeypatch.delenv(REACH, raising=False)
-    stay_on_this_host()
-    assert os.environ[REACH] == "LOCALHOST"
-    monkeypatch.setenv(REACH, "SUBNET")
-    stay_on_this_host()
-    assert os.environ[REACH] == "SUBNET"
+@pytest.mark.parametrize(("given", "taken"), [(None, "LOCALHOST"), ("SUBNET", "SUBNET")])
+def test_jazzys_own_default_is_not_taken(network, monkeypatch, given, taken):
+    if given is not None:
+        monkeypatch.setenv(REACH, given)
+    join()
+    rclpy.shutdown()
+    assert os.environ[REACH] == taken
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("ROS_DOMAIN_ID", "abc"), ("ROS_DOMAIN_ID", "1000"), (REACH, "EVERYWHERE")],
+)
+def test_a_wrong_environment_is_refused(network, monkeypatch, name, value):
+    monkeypatch.setenv(name, value)
+    with pytest.raises(InvalidParameterError, match=value):
+        join()

@@ -11,7 +11,11 @@ from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from embedded_ros.transport.config import checked_domain_id, domain_id_from_environment
+from embedded_ros.transport.config import (
+    checked_domain_id,
+    configuration,
+    domain_id_from_environment,
+)
 from embedded_ros.transport.participant import Participant
 
 from ._arguments import RosArguments, parse_arguments
@@ -63,6 +67,7 @@ class Context:
             self._domain_id = (
                 domain_id_from_environment() if domain_id is None else checked_domain_id(domain_id)
             )
+            configuration()  # what is wrong in the environment is refused now, not by a node
             self._close()
             self._arguments = arguments
             self._initialized = self._valid = True

@@ -16,6 +16,7 @@ MAX_DOMAIN_ID = 232
 # 1 ms; only readers that died keep it waiting (CycloneDDS's own default: 1 s each).
 WRITER_LINGER_MS = 200
 DOMAIN_VARIABLE = "ROS_DOMAIN_ID"
+SECURITY_VARIABLE = "ROS_SECURITY_ENABLE"
 
 _RANGES = ("OFF", "LOCALHOST", "SUBNET", "SYSTEM_DEFAULT")
 
@@ -43,8 +44,13 @@ def configuration() -> str | None:
     """The configuration as XML, or None where CYCLONEDDS_URI or CycloneDDS itself decides.
 
     Raises:
-        ValueError: ROS_AUTOMATIC_DISCOVERY_RANGE is none of ROS 2's ranges.
+        ValueError: ROS_AUTOMATIC_DISCOVERY_RANGE is none of ROS 2's ranges, or SROS 2 is asked for.
     """
+    if os.environ.get(SECURITY_VARIABLE, "").strip().lower() == "true":
+        raise ValueError(
+            f"{SECURITY_VARIABLE} is true, but embedded_ros has no SROS 2: source a ROS 2, or "
+            "unset it to run without encryption"
+        )
     if os.environ.get("CYCLONEDDS_URI"):
         return None
     reach = _discovery_range()

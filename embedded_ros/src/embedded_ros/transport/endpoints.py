@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import ctypes as ct
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,6 +31,29 @@ class Sample:
     publication_handle: int  # of the writer, known to this process only
 
 
+class _Peers:
+    """The matched endpoints of a reader or writer.
+
+    The discovery data of each is asked for once: CycloneDDS's Python layer does not give back what
+    DDS allocates for it (11.0.1), and whether a server is ready is asked many times a second.
+    """
+
+    def __init__(self, handles: Callable[[], Iterable[int]], data: Callable[[int], Any]) -> None:
+        self._ask_handles, self._ask_data = handles, data
+        self._known: dict[int, Any] = {}
+
+    def handles(self) -> list[int]:
+        now, known = list(self._ask_handles()), self._known
+        self._known = {handle: known[handle] for handle in now if handle in known}
+        return now
+
+    def data(self, handle: int) -> Any:
+        known = self._known.get(handle)
+        if known is None and (known := self._ask_data(handle)) is not None:
+            self._known[handle] = known
+        return known
+
+
 class Writer:
     """A DDS writer."""
 
@@ -40,6 +63,7 @@ class Writer:
         self.topic_name = topic_name
         self.gid: bytes = entity.guid.bytes
         self.closed = False
+        self._peers = _Peers(entity.get_matched_subscriptions, entity.get_matched_subscription_data)
         entity.set_status_mask(DDSStatus.OfferedIncompatibleQos)
 
     @property
@@ -68,11 +92,11 @@ class Writer:
 
     def matched_handles(self) -> list[int]:
         """Handles of the readers that receive from this writer."""
-        return [] if self.closed else list(self._entity.get_matched_subscriptions())
+        return [] if self.closed else self._peers.handles()
 
     def matched(self, handle: int) -> Any:
         """The discovery data of a matched reader, or None where it has gone."""
-        return self._entity.get_matched_subscription_data(handle)
+        return self._peers.data(handle)
 
     def wait_for_acknowledgements(self, timeout_ns: int) -> bool:
         """Wait until every reliable reader has everything, or the time is up."""
@@ -102,6 +126,7 @@ class Reader:
         self.gid: bytes = entity.guid.bytes
         self.condition = library.dds_create_readcondition(self._ref, _ANY)
         self.closed = False
+        self._peers = _Peers(entity.get_matched_publications, entity.get_matched_publication_data)
         entity.set_status_mask(DDSStatus.RequestedIncompatibleQos)
 
     @property
@@ -126,11 +151,11 @@ class Reader:
 
     def matched_handles(self) -> list[int]:
         """Handles of the writers this reader receives from."""
-        return [] if self.closed else list(self._entity.get_matched_publications())
+        return [] if self.closed else self._peers.handles()
 
     def matched(self, handle: int) -> Any:
         """The discovery data of a matched writer, or None where it has gone."""
-        return self._entity.get_matched_publication_data(handle)
+        return self._peers.data(handle)
 
     def take_incompatible_policy(self) -> int:
         """Policy of the latest writer refused for its QoS since last asked, 0 for none."""
