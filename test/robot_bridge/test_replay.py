@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import rclpy
 from typer.testing import CliRunner
 
 from ensemble.nodes import RunSettings
@@ -174,6 +175,18 @@ def test_an_object_that_is_not_there_is_named_before_anything_moves(network, bag
     code, _, told = slap_alone(bag, "--to", "mock", "--mock", mock, "--robot", settings)
     assert code == 77
     assert "not detected at the start: block2" in told
+
+
+def test_a_robot_that_a_bridge_commands_is_left_alone(network, bag):
+    rclpy.init()
+    bridge = rclpy.create_node("robot_bridge")
+    try:
+        code, _, told = slap_alone(bag, "--to", "robot", "--yes")
+    finally:
+        bridge.destroy_node()
+        rclpy.shutdown()
+    assert code == 113
+    assert "stop it first" in told
 
 
 def test_half_a_recording_is_not_executed(bag, tmp_path):
