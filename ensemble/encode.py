@@ -97,7 +97,7 @@ def percept(
         exact=value.exact,
         seen=[
             msgs.ObjectState(name=obj.name, type=obj.type.name, features=value.state[obj].tolist())
-            for obj in value.state.objects
+            for obj in (value.state.objects if value.state is not known else ())
             if not np.array_equal(value.state[obj], known[obj])
         ],
         missing=sorted(value.missing),

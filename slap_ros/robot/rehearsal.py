@@ -57,7 +57,7 @@ def recorded_motion(path: Path) -> Recorded:
 
     Raises:
         DamagedBagError: It breaks off, or lacks a state: half a plan is none for a robot.
-        InvalidParameterError: Its domain has no Panda.
+        InvalidParameterError: Its domain has no Panda, or it begins with something in the hand.
         ForeignBagError, UnknownDomainError, InvalidStateError: As for any replay.
     """
     bag = read_bag(path)
@@ -73,6 +73,10 @@ def recorded_motion(path: Path) -> Recorded:
         raise DamagedBagError(f"{path} has no task with states, so there is nothing to execute")
     episode, task = moved[-1], moved[-1].task
     states = tuple(_states(episode, domain))
+    if _holds(states[0]):
+        raise InvalidParameterError(
+            f"{path} begins with something in the hand, and nobody could put it there just so"
+        )
     space = domain.atom_space(states[0])
     return Recorded(
         domain,

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import rclpy
 from typer.testing import CliRunner
 
 from ensemble.nodes import RunSettings
@@ -155,7 +156,7 @@ def test_the_mock_robot_does_what_was_recorded(network, bag):
 def test_another_start_is_refused(network, bag, tmp_path):
     """The same recording from a moment later: neither arm nor blocks are there."""
     late = tmp_path / "late"
-    cut(bag, late, first=12)
+    cut(bag, late, first=6)
     code, _, told = slap_alone(late, "--to", "mock", "--mock", QUICK, "--robot", PATIENT)
     assert code == 95
     assert "rad off where the recording begins" in told
@@ -176,11 +177,30 @@ def test_an_object_that_is_not_there_is_named_before_anything_moves(network, bag
     assert "not detected at the start: block2" in told
 
 
+def test_a_robot_that_a_bridge_commands_is_left_alone(network, bag):
+    rclpy.init()
+    bridge = rclpy.create_node("robot_bridge")
+    try:
+        code, _, told = slap_alone(bag, "--to", "robot", "--yes")
+    finally:
+        bridge.destroy_node()
+        rclpy.shutdown()
+    assert code == 113
+    assert "stop it first" in told
+
+
 def test_half_a_recording_is_not_executed(bag, tmp_path):
     holed = tmp_path / "holed"
     cut(bag, holed, without=5)
     with pytest.raises(DamagedBagError, match="state of step 5 is not in the bag"):
         recorded_motion(holed)
+
+
+def test_a_recording_that_begins_with_something_in_the_hand_is_refused(bag, tmp_path):
+    grasped = next(w.step for w in recorded_motion(bag).waypoints if w.grip is Grip.CLOSE)
+    cut(bag, tmp_path / "held", first=grasped)
+    with pytest.raises(InvalidParameterError, match="in the hand"):
+        recorded_motion(tmp_path / "held")
 
 
 def test_a_domain_without_an_arm_is_refused(network, tmp_path):
