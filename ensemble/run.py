@@ -167,9 +167,9 @@ def _cancel(sent: Future, spinner: Spinner) -> None:
     """Make the robot hold."""
     if sent.done():
         canceled: Any = sent.result().cancel_goal_async()
-        spinner.until(canceled.done, CANCEL_TIMEOUT)
-        ended = sent.result().get_result_async()
-        spinner.until(ended.done, CANCEL_TIMEOUT)
+        if spinner.until(canceled.done, CANCEL_TIMEOUT):  # else the planner is away
+            ended = sent.result().get_result_async()
+            spinner.until(ended.done, CANCEL_TIMEOUT)
 
 
 def _close_bag(client: RunClient, spinner: Spinner, host: Host) -> SlapError | None:
