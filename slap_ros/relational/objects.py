@@ -4,8 +4,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Places = tuple[object, dict[Any, NDArray[np.intp]]]  # of a layout: what it remembers, by feature
 
 
 @dataclass(frozen=True)
@@ -50,6 +56,18 @@ class Column:
     """Objects side by side, for asking the same of all of them at once."""
 
     objects: tuple[Object, ...]
+    _places: Places = field(default=(None, {}), init=False, repr=False)
+
+    def places(self, layout: object) -> dict[Any, NDArray[np.intp]]:
+        """What a layout remembers of it; it goes with the column, as layouts outlive episodes.
+
+        A column is as good as always asked about by the same layout, so the latest one's is kept.
+        """
+        known = self._places  # read once: threads may remember twice, but never mix up layouts
+        if known[0] is not layout:
+            known = (layout, {})
+            object.__setattr__(self, "_places", known)
+        return known[1]
 
 
 @dataclass(frozen=True)

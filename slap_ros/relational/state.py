@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -89,33 +88,19 @@ class Layout:
         """Indices of one feature of several objects."""
         return np.array([self.column(obj, feature) for obj in objects], dtype=np.intp)
 
-    # What is remembered of a column goes with it: layouts outlive episodes, columns need not.
-
-    @cached_property
-    def _indices(self) -> WeakKeyDictionary[Column, dict[str, NDArray[np.intp]]]:
-        return WeakKeyDictionary()
-
     def indices(self, column: Column, feature: str) -> NDArray[np.intp]:
         """Indices of one feature of a column of objects; remembered as long as the column."""
-        try:
-            return self._indices[column][feature]
-        except KeyError:
-            found = self.columns(column.objects, feature)
-            self._indices.setdefault(column, {})[feature] = found
-            return found
-
-    @cached_property
-    def _grids(self) -> WeakKeyDictionary[Column, dict[tuple[str, ...], NDArray[np.intp]]]:
-        return WeakKeyDictionary()
+        places = column.places(self)
+        if feature not in places:
+            places[feature] = self.columns(column.objects, feature)
+        return places[feature]
 
     def grid(self, column: Column, features: tuple[str, ...]) -> NDArray[np.intp]:
         """Indices of features of a column of objects, shape (objects, features); as above."""
-        try:
-            return self._grids[column][features]
-        except KeyError:
-            found = np.stack([self.columns(column.objects, f) for f in features], -1)
-            self._grids.setdefault(column, {})[features] = found
-            return found
+        places = column.places(self)
+        if features not in places:
+            places[features] = np.stack([self.columns(column.objects, f) for f in features], -1)
+        return places[features]
 
     @cached_property
     def _by_type(self) -> dict[Type, Column]:
