@@ -21,8 +21,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import psutil
-import rclpy
-from rclpy.executors import SingleThreadedExecutor
 from slap_msgs.srv import ResetTask
 
 from benchmarks.printing import show
@@ -30,7 +28,7 @@ from ensemble.client import RunClient
 from ensemble.hosts import ProcessHost
 from ensemble.interfaces import RESET_TASK
 from ensemble.nodes import RunSettings, node_parameters
-from ensemble.run import Spinner
+from ensemble.spinning import Spinner, spinning
 from slap_ros.cli.console import progress
 from slap_ros.evaluation.metrics import RunLog
 from slap_ros.studies.figures import LINES, picture, require_matplotlib
@@ -163,16 +161,12 @@ class Bench:
 
 def soak(tasks: int, every: int) -> Soaked:
     """Solve tasks with seeds from 0 on, reading the processes after every so many."""
-    with ExitStack() as stack:
-        bag = Path(stack.enter_context(TemporaryDirectory(prefix="slap-soak-"))) / "bag"
-        rclpy.init(args=["--ros-args", "--log-level", "warn"])
-        stack.callback(rclpy.try_shutdown)
-        executor = SingleThreadedExecutor()
-        stack.callback(executor.shutdown)
-        client = RunClient(lambda _type, _message: None)
-        stack.callback(client.destroy_node)
-        executor.add_node(client)
-        spinner = Spinner(executor)
+    with (
+        TemporaryDirectory(prefix="slap-soak-") as folder,
+        spinning(lambda: RunClient(lambda _type, _message: None)) as (client, spinner),
+        ExitStack() as stack,
+    ):
+        bag = Path(folder) / "bag"
         settings = RunSettings(DOMAIN, "fair", 0, 0, "lazy", bag)
         host = stack.enter_context(ProcessHost(node_parameters(settings)))
         spinner.check = host.check

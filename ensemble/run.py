@@ -4,22 +4,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
-from contextlib import ExitStack
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from time import monotonic
 from typing import Any
 
-import rclpy
-from rclpy.executors import Executor, SingleThreadedExecutor
-from rclpy.signals import SignalHandlerOptions
+from rclpy.executors import Executor
 from rclpy.task import Future
 
 from ensemble.client import OnMessage, RunClient
 from ensemble.hosts import Host, InProcessHost, ProcessHost
 from ensemble.interfaces import Topic
-from ensemble.network import join
 from ensemble.nodes import RunSettings, node_parameters
+from ensemble.spinning import Spinner, spinning
 from slap_ros.errors import (
     AlreadyRunningError,
     NodeDiedError,
@@ -31,7 +28,6 @@ from slap_ros.errors import (
 from slap_ros.evaluation.metrics import RunMetrics
 from slap_ros.relational import GroundAtom
 
-SPIN = 0.05  # s, the longest time between two looks at the nodes
 DISCOVERY = 0.3  # s, after which nodes that are there already are known
 READY_TIMEOUT = 30.0  # s, for all nodes to come up
 CANCEL_TIMEOUT = 5.0  # s, for the robot to hold after a cancel
@@ -70,44 +66,10 @@ def run(request: RunRequest, on_message: OnMessage) -> RunMetrics:
         SlapError: The planner refused the task; the code says why.
         KeyboardInterrupt: After the robot holds and the bag is closed.
     """
-    with ExitStack() as stack:
-        # No handlers: after Ctrl-C the goal is still to be canceled and the bag to be closed.
-        join(
-            args=["--ros-args", "--log-level", "warn"],
-            signal_handler_options=SignalHandlerOptions.NO,
-        )
-        stack.callback(rclpy.try_shutdown)
-        executor = SingleThreadedExecutor()
-        stack.callback(executor.shutdown)
-        client = RunClient(on_message, request.shown)
-        stack.callback(client.destroy_node)
-        executor.add_node(client)
-        spinner = Spinner(executor)
+    with spinning(lambda: RunClient(on_message, request.shown)) as (client, spinner):
         _refuse_company(client, spinner)
-        with _host(request, executor) as host:
+        with _host(request, spinner.executor) as host:
             return _drive(request, client, spinner, host)
-
-
-class Spinner:
-    """Spins an executor until something holds, looking after the nodes meanwhile."""
-
-    def __init__(self, executor: Executor) -> None:
-        self.check: Callable[[], None] = lambda: None
-        self._executor = executor
-
-    def until(self, condition: Callable[[], bool], timeout_s: float) -> bool:
-        """Whether the condition came to hold in time.
-
-        Raises:
-            NodeDiedError: A node ended meanwhile.
-        """
-        end = monotonic() + timeout_s
-        while not condition():
-            if monotonic() > end:
-                return False
-            self._executor.spin_once(timeout_sec=SPIN)
-            self.check()
-        return True
 
 
 def _host(request: RunRequest, executor: Executor) -> Host:

@@ -9,12 +9,9 @@ from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 
-import rclpy
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.signals import SignalHandlerOptions
-
 from ensemble.hosts import ProcessHost
-from ensemble.run import CANCEL_TIMEOUT, DISCOVERY, Spinner
+from ensemble.run import CANCEL_TIMEOUT, DISCOVERY
+from ensemble.spinning import Spinner, spinning
 from robot_bridge.player import Parameters, Player
 from slap_ros.errors import AlreadyRunningError, InvalidParameterError
 from slap_ros.relational import State
@@ -58,27 +55,20 @@ def play(
         UnsafeCommandError: It must not be executed.
         AlreadyRunningError: A robot_bridge commands the same robot.
         StartMismatchError: The robot, or an object, is not where the recording begins.
+        InvalidParameterError: An environment variable, such as ROS_DOMAIN_ID, is wrong.
         SlapError: A controller or a sensor failed; the robot holds.
         KeyboardInterrupt: After the motion under way was canceled.
     """
-    with ExitStack() as stack:
-        rclpy.init(
-            args=["--ros-args", "--log-level", "warn"],
-            signal_handler_options=SignalHandlerOptions.NO,
-        )
-        stack.callback(rclpy.try_shutdown)
-        executor = SingleThreadedExecutor()
-        stack.callback(executor.shutdown)
-        player = Player(recorded, rehearsal, settings)
-        stack.callback(player.destroy_node)
-        executor.add_node(player)
-        spinner = Spinner(executor)
+    with (
+        spinning(lambda: Player(recorded, rehearsal, settings)) as (player, spinner),
+        ExitStack() as stack,
+    ):
         if spinner.until(lambda: BRIDGE in player.get_node_names(), DISCOVERY):
             raise AlreadyRunningError("a robot_bridge commands this robot: stop it first")
         if mock is not None:
             host = stack.enter_context(ProcessHost({"robot_bridge.mock": _cell(recorded) | mock}))
             spinner.check = host.check
-        _drive(player, spinner, executor, on_step)
+        _drive(player, spinner, on_step)
     if player.failure is not None:
         raise player.failure
     return Played(player.done, player.final)
@@ -87,10 +77,9 @@ def play(
 def _drive(
     player: Player,
     spinner: Spinner,
-    executor: SingleThreadedExecutor,
     on_step: Callable[[int], None],
 ) -> None:
-    played = executor.create_task(player.play())
+    played = spinner.executor.create_task(player.play())
 
     def over() -> bool:
         on_step(player.done)

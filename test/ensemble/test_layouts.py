@@ -17,7 +17,7 @@ from ensemble.client import RunClient
 from ensemble.hosts import InProcessHost
 from ensemble.interfaces import MARKERS
 from ensemble.nodes import RunSettings, node_parameters
-from ensemble.run import Spinner
+from ensemble.spinning import Spinner
 from slap_ros.messages.interfaces import typestore
 
 CONFIG = Path(__file__).parents[2] / "config"

@@ -23,7 +23,7 @@ from ensemble.hosts import ProcessHost
 from ensemble.interfaces import COMMAND, LIST_SKILLS, RESET_TASK
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.observation import Observer
-from ensemble.run import Spinner
+from ensemble.spinning import Spinner
 from slap_ros.bags import evaluate_bag
 from slap_ros.messages.interfaces import STATE
 

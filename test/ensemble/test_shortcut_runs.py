@@ -20,8 +20,9 @@ from ensemble.hosts import InProcessHost
 from ensemble.interfaces import LIST_SKILLS
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.observation import Episode, Observation
-from ensemble.run import RunRequest, Spinner, run
+from ensemble.run import RunRequest, run
 from ensemble.shortcuts import Repertoires, ShortcutParameters
+from ensemble.spinning import Spinner
 from skill_server.skill_run import requested_option
 from slap_ros.bags import evaluate_bag, replay_bag
 from slap_ros.domains import get_domain

@@ -20,7 +20,8 @@ from ensemble.client import RunClient
 from ensemble.hosts import InProcessHost
 from ensemble.interfaces import COMMAND, JOINT_STATES, RESET_TASK, SENSED, TF
 from ensemble.nodes import RunSettings, node_parameters
-from ensemble.run import RunRequest, Spinner, run
+from ensemble.run import RunRequest, run
+from ensemble.spinning import Spinner
 from robot_bridge.mock.options import mock_options
 from slap_ros.bags import evaluate_bag
 from slap_ros.cli.run import check_world

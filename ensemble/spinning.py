@@ -1,0 +1,66 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A node of one's own on the network, spun while something is waited for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from time import monotonic
+from typing import TypeVar
+
+import rclpy
+from rclpy.executors import Executor, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from ensemble.network import join
+
+SPIN = 0.05  # s, the longest time between two looks at the nodes
+
+N = TypeVar("N", bound=Node)
+
+
+class Spinner:
+    """Spins an executor until something holds, looking after the nodes meanwhile."""
+
+    def __init__(self, executor: Executor) -> None:
+        self.check: Callable[[], None] = lambda: None
+        self.executor = executor
+
+    def until(self, condition: Callable[[], bool], timeout_s: float) -> bool:
+        """Whether the condition came to hold in time.
+
+        Raises:
+            NodeDiedError: A node ended meanwhile.
+        """
+        end = monotonic() + timeout_s
+        while not condition():
+            if monotonic() > end:
+                return False
+            self.executor.spin_once(timeout_sec=SPIN)
+            self.check()
+        return True
+
+
+@contextmanager
+def spinning(make: Callable[[], N]) -> Iterator[tuple[N, Spinner]]:
+    """Join the network with a node, and leave it in the end.
+
+    No signal handlers: after Ctrl-C there still is something to be canceled and closed.
+
+    Raises:
+        InvalidParameterError: An environment variable, such as ROS_DOMAIN_ID, is wrong.
+    """
+    with ExitStack() as stack:
+        join(
+            args=["--ros-args", "--log-level", "warn"],
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
+        stack.callback(rclpy.try_shutdown)
+        executor = SingleThreadedExecutor()
+        stack.callback(executor.shutdown)
+        node = make()
+        stack.callback(node.destroy_node)
+        executor.add_node(node)
+        yield node, Spinner(executor)
