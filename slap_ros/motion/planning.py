@@ -18,6 +18,7 @@ from slap_ros.motion.joints import (
     between,
     configuration,
     control_steps,
+    path_configurations,
     path_steps,
     within_limits,
 )
@@ -74,8 +75,10 @@ def plan_path(
     rng = np.random.default_rng(seed)
 
     def shortened(path: Path) -> Path:
-        path = shorten(path, free, rng, tries=shortcuts, resolution=resolution)
-        return straighten(path, free, resolution=resolution)
+        shorter = shorten(path, free, rng, tries=shortcuts, resolution=resolution)
+        shorter = straighten(shorter, free, resolution=resolution)
+        # What is left of a piece is looked at in other places than the whole of it was.
+        return shorter if free(path_configurations(shorter, resolution)).all() else path
 
     bent = detour(start, goal, free, rng, resolution=resolution)
     if bent is not None:

@@ -7,7 +7,7 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from motion_scenes import (
     HELD,
@@ -97,6 +97,7 @@ def test_where_one_bend_is_not_enough_a_path_is_found_at_random():
 
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 2**32 - 1))
+@example(115)  # a piece of a path, cut short, is seen to graze a box that the whole piece did not
 def test_free_among_random_boxes(seed):
     rng = np.random.default_rng(seed)
     free = CollisionChecker([random_box(rng) for _ in range(4)])
