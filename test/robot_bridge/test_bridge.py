@@ -195,7 +195,7 @@ def test_sensors_that_fall_silent_stop_the_state(network):
     """The mock robot is taken away: joint positions, detections and controllers with it."""
     with lab() as bench:
         bench.step()
-        (mock,) = [n for n in bench.spinner._executor.get_nodes() if n.get_name() == "mock_robot"]
+        (mock,) = [n for n in bench.spinner.executor.get_nodes() if n.get_name() == "mock_robot"]
         for timer in list(mock.timers):
             mock.destroy_timer(timer)
         bench.wait(1.0)
