@@ -67,6 +67,11 @@ class Arm:
         """The box around a link."""
         return self.box_at(link, self.links[link])
 
+    def near(self, link: int, point: Vector, distance: float) -> bool:
+        """Whether a point is within ``distance`` m of the box around a link."""
+        reach = distance + self.radii[link]
+        return math.dist(point, self.centres[link]) < reach and self.box(link).near(point, distance)
+
     def box_at(self, link: int, pose: Pose) -> OrientedBox:
         """The box around a link, were the link at that pose."""
         if link < len(LINK_SHAPES):
@@ -120,17 +125,12 @@ class Sweep:
 
     def _comes_near(self, link: int, around: Sequence[tuple[OrientedBox, float]]) -> bool:
         """Whether a link comes near a box; of most, the ball around the box tells that not."""
-        start, end = self.start, self.end
-        a, b = start.centres[link], end.centres[link]
         # A point is never further than half of its way from where it starts or where it ends.
         margin = CLEARANCE + 0.5 * self.ways[link]
-        reach = margin + start.radii[link]
         for box, radius in around:
-            centre, within = box.pose.position, reach + radius
-            if (
-                (math.dist(centre, a) < within and start.box(link).near(centre, margin + radius))
-                or (math.dist(centre, b) < within and end.box(link).near(centre, margin + radius))
-            ) and self._brushes(link, box):
+            ball = box.pose.position, margin + radius
+            near = self.start.near(link, *ball) or self.end.near(link, *ball)
+            if near and self._brushes(link, box):
                 return True
         return False
 
