@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -74,11 +73,6 @@ class Box:
         """Alike for boxes of one size."""
         return self.half_extents_m
 
-    @property
-    def radius(self) -> float:
-        """How far it reaches from its origin, m."""
-        return math.hypot(*self.half_extents_m)
-
     def extent(self, axis: Vector) -> float:
         """How far it reaches from its origin along an axis of length 1, m."""
         return sum(abs(a) * half for a, half in zip(axis, self.half_extents_m, strict=True))
@@ -119,11 +113,6 @@ class Mesh:
     def cores(self, pose: Pose) -> tuple[OrientedBox, ...]:
         """Boxes inside it at a pose."""
         return tuple(OrientedBox(pose.compose(core.pose), core.half) for core in self.shape.cores)
-
-    @property
-    def radius(self) -> float:
-        """How far it reaches from its origin, m."""
-        return self.shape.radius
 
     def extent(self, axis: Vector) -> float:
         """How far it reaches from its origin along an axis of length 1, m."""
