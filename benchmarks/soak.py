@@ -14,6 +14,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
+from itertools import combinations
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import monotonic
@@ -107,12 +108,14 @@ class Soaked:
     def growth(self, node: str) -> float:
         """Of resident memory over the second half, KiB a task.
 
-        The median over samples, as whole libraries' pages come and go in steps.
+        The median slope over pairs of samples (Theil and Sen's), as whole libraries' pages come and
+        go in steps.
         """
         half = len(self.tasks) // 2
         memory = [sample.memory_mib * 1024 for sample in self.samples[node][half:]]
-        growth = np.diff(memory) / np.diff(self.tasks[half:])
-        return float(np.median(growth)) if len(growth) else 0.0
+        pairs = combinations(zip(self.tasks[half:], memory, strict=True), 2)
+        slopes = [(later - before) / (end - begin) for (begin, before), (end, later) in pairs]
+        return float(np.median(slopes)) if slopes else 0.0
 
     def as_json(self) -> dict[str, Any]:
         """Plain data."""
