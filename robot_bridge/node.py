@@ -35,12 +35,12 @@ ROS Parameters:
 Publishers:
     slap/domain (slap_msgs/DomainInfo), slap/task (slap_msgs/Task), slap/state
         (slap_msgs/ObjectCentricState), slap/markers (visualization_msgs/MarkerArray): as sim_node.
-    /diagnostics (diagnostic_msgs/DiagnosticArray): phase, fault, counts; 1 Hz.
+    diagnostics (diagnostic_msgs/DiagnosticArray): phase, fault, counts; 1 Hz.
 
 Subscribers:
     slap/command (slap_msgs/RobotCommand): refused unless it answers the current state and is safe.
     joint_states (sensor_msgs/JointState): of arm and fingers.
-    /tf, /tf_static (tf2_msgs/TFMessage): detections, and where cameras are.
+    tf, tf_static (tf2_msgs/TFMessage): detections, and where cameras are.
 
 Services:
     slap/reset_task (slap_msgs/ResetTask): opens an episode in the state that is measured, whatever
@@ -60,6 +60,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Any
 
+from builtin_interfaces.msg import Time
 from rclpy.node import Node
 from slap_msgs.msg import RobotCommand
 from slap_msgs.srv import ResetTask
@@ -192,7 +193,7 @@ class RobotBridge(Node):
             return read_workplace(Path(settings.scene), self._domain)
         return sampled_workplace(self._domain.task(settings.seed, settings.index).initial_state)
 
-    def _now(self) -> Any:
+    def _now(self) -> Time:
         return self.get_clock().now().to_msg()
 
     def _diagnostics(self) -> dict[str, object]:
@@ -326,8 +327,9 @@ class RobotBridge(Node):
         self._step += 1
         self._counts["steps"] += 1
         self._enter(Phase.READY)
-        self._states.publish(encode.state(state, self._episode, self._step, self._now()))
-        self._show(state)
+        now = self._now()
+        self._states.publish(encode.state(state, self._episode, self._step, now))
+        self._show(state, now)
 
     def _enter(self, phase: Phase) -> None:
         self._phase = phase
@@ -354,15 +356,16 @@ class RobotBridge(Node):
         self._fault = ErrorCode.NONE
         self._last = None
         self._enter(Phase.READY)
-        message = encode.task(task, self._domain, self._episode, MEASURED, 0, self._now())
+        now = self._now()
+        message = encode.task(task, self._domain, self._episode, MEASURED, 0, now)
         self._tasks.publish(message)
         self._states.publish(message.initial_state)
-        self._show(state)
+        self._show(state, now)
         self.get_logger().info(f"episode {self._episode}: {self._domain.name}, as measured")
 
-    def _show(self, state: State) -> None:
+    def _show(self, state: State, stamp: Time) -> None:
         # Not as frames or joint states: those are the robot's own to publish.
-        self._markers.publish(markers(self._domain.bodies(state), self._now()))
+        self._markers.publish(markers(self._domain.bodies(state), stamp))
 
     def _on_reset(
         self, request: ResetTask.Request, response: ResetTask.Response
