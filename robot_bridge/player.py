@@ -7,7 +7,7 @@ everything but the arm's own joints, fingers and controllers: the first of these
 replay, and nothing more is sent, so that the controllers hold.
 
 Subscribers:
-    joint_states (sensor_msgs/JointState), /tf, /tf_static (tf2_msgs/TFMessage): as robot_bridge.
+    joint_states (sensor_msgs/JointState), tf, tf_static (tf2_msgs/TFMessage): as robot_bridge.
 
 Action clients:
     trajectory_action (control_msgs/FollowJointTrajectory), gripper_action
