@@ -95,6 +95,11 @@ def configuration() -> str | None:
     )
 
 
+def is_host_only() -> bool:
+    """Whether nobody from another host is to be heard; only where :func:`configuration` decides."""
+    return _discovery_range() in ("OFF", "LOCALHOST")
+
+
 def _discovery_range() -> str:
     if os.environ.get("ROS_LOCALHOST_ONLY") == "1":
         return "LOCALHOST"
