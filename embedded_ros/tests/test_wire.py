@@ -31,6 +31,7 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
 from conftest import Process, wait_until
+from embedded_ros.transport import loopback
 
 CONFIGURATION = (
     '<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo"/></Interfaces>'
@@ -237,6 +238,17 @@ def test_other_hosts_are_not_listened_to_unless_asked_for(
                 heard_on.add(name.rstrip(b"\0").decode())
     rclpy.shutdown()
     assert heard_on == {interface}
+
+
+@pytest.mark.skipif(not hasattr(socket, "SO_BINDTODEVICE"), reason="Linux alone can do that")
+def test_where_other_hosts_cannot_be_kept_out_that_is_said(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(loopback, "INTERFACE", b"none")
+    rclpy.init(args=[], domain_id=domain)
+    with pytest.warns(RuntimeWarning, match=r"all interfaces \(No such device"):
+        rclpy.create_node("listener")
+    rclpy.shutdown()
 
 
 def test_no_multicast_by_default(domain: int, run: Callable[..., Process]) -> None:

@@ -9,7 +9,9 @@ over only what comes in over one of them.
 
 from __future__ import annotations
 
+import ctypes as ct
 import os
+import re
 import socket
 import warnings
 from collections.abc import Iterator
@@ -18,6 +20,11 @@ from pathlib import Path
 
 INTERFACE = b"lo"
 DESCRIPTORS = Path("/proc/self/fd")  # Linux's
+UDP = Path("/proc/self/net/udp")
+# A row of that: its number, the local address in hexadecimal, and the tenth column, the inode.
+EVERYWHERE = re.compile(r"^ *\d+: 00000000:[0-9A-F]{4}(?: +\S+){7} +(\d+)", re.MULTILINE)
+
+_libc = ct.CDLL(None, use_errno=True)
 
 
 @contextmanager
@@ -29,42 +36,31 @@ def loopback_only() -> Iterator[None]:
     before = _listening()
     yield
     for descriptor in _listening() - before:
-        with _duplicate(descriptor) as listener:
-            try:
-                listener.setsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, INTERFACE)
-            except PermissionError:
-                warnings.warn(
-                    "DDS listens on all interfaces: Linux before 5.7 lets only root restrict it; "
-                    "close its ports in the firewall",
-                    RuntimeWarning,
-                    stacklevel=2,
-                )
+        _bind(descriptor)
+
+
+def _bind(descriptor: int) -> None:
+    # By way of C: Python's socket objects change the mode of what they are made from.
+    option = socket.SO_BINDTODEVICE
+    if _libc.setsockopt(descriptor, socket.SOL_SOCKET, option, INTERFACE, len(INTERFACE)) != 0:
+        warnings.warn(
+            f"DDS listens on all interfaces ({os.strerror(ct.get_errno())}; Linux before 5.7 lets "
+            "only root restrict that): close its ports in the firewall",
+            RuntimeWarning,
+            stacklevel=2,
+        )
 
 
 def _listening() -> set[int]:
-    """Descriptors of the UDP sockets of this process that are bound to no interface."""
-    if not DESCRIPTORS.is_dir():
+    """Descriptors of the UDP sockets of this process that are bound to no interface's address."""
+    if not UDP.exists():
         return set()
-    return {int(name) for name in os.listdir(DESCRIPTORS) if _hears_everything(int(name))}
+    names = {f"socket:[{inode}]" for inode in EVERYWHERE.findall(UDP.read_text())}
+    return {int(path.name) for path in DESCRIPTORS.iterdir() if _target(path) in names}
 
 
-def _hears_everything(descriptor: int) -> bool:
+def _target(path: Path) -> str:
     try:
-        candidate = _duplicate(descriptor)
-    except OSError:  # no socket, or closed by now
-        return False
-    with candidate:
-        if (candidate.family, candidate.type) != (socket.AF_INET, socket.SOCK_DGRAM):
-            return False
-        address, port = candidate.getsockname()
-        return bool(port) and address == "0.0.0.0"
-
-
-def _duplicate(descriptor: int) -> socket.socket:
-    """A socket of the same file: closing it leaves the descriptor open."""
-    copy = os.dup(descriptor)
-    try:
-        return socket.socket(fileno=copy)
-    except OSError:
-        os.close(copy)
-        raise
+        return os.readlink(path)
+    except FileNotFoundError:  # closed by now
+        return ""
