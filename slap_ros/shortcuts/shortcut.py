@@ -14,6 +14,7 @@ import numpy as np
 from slap_ros.domains import Domain
 from slap_ros.domains import Policy as Control
 from slap_ros.domains.domain import Action
+from slap_ros.domains.view import Worlds
 from slap_ros.errors import SkillNotApplicableError
 from slap_ros.relational import Object, State
 from slap_ros.shortcuts.policy import Policy, Weights
@@ -134,9 +135,10 @@ class Rehearsal:
         """Rehearse with the objects of ``initial``."""
         self.sampling = sampling
         together = domain.make_many is not None
-        self._count = 1 + (sampling.samples - 1) * (sampling.crowd if together else 1)
-        self._at_once = self._count if together else 1
-        self._worlds = domain.make_worlds([initial] * self._at_once)
+        self._count = (sampling.samples - 1) * (sampling.crowd if together else 1)  # with noise
+        self._at_once = self._count + 1 if together else 1
+        self._alone = domain.make_worlds([initial])
+        self._crowd = domain.make_worlds([initial] * self._at_once) if together else self._alone
         self._memory: dict[tuple[str, Change, bytes], tuple[Attempt, ...]] = {}
         self._failures: Counter[str] = Counter()  # more than expected, of each shortcut
 
@@ -165,13 +167,16 @@ class Rehearsal:
         def choose(_: int, seen: Weights) -> Weights:
             return policy.sample(seen, rng, daring[:, None])
 
-        calm = self._attempt(sight, state, lambda _, seen: policy.mean(seen), sampling.horizon, 1)
+        def calmly(_: int, seen: Weights) -> Weights:
+            return policy.mean(seen)
+
+        calm = self._attempt(self._alone, sight, state, calmly, sampling.horizon)
         found = _Found(sampling.ends, next(iter(calm), None))
-        for failures in range(1, self._count, self._at_once):
-            if not found.attempts and failures >= sampling.patience:
+        for failures in range(0, self._count, self._at_once):
+            if not found.attempts and failures + 1 >= sampling.patience:
                 break
             limit = found.limit(sampling.horizon)
-            found.add(self._attempt(sight, state, choose, limit, sampling.ends))
+            found.add(self._attempt(self._crowd, sight, state, choose, limit))
         for number in range(sampling.refinements if found.attempts else 0):
             self._refine(found, sight, state, sampling.spread * NARROWER**number, rng)
         return tuple(found.attempts)
@@ -182,21 +187,22 @@ class Rehearsal:
         """Try random variations of the shortest: a round of a cross-entropy search."""
         middle = np.clip(np.array(found.attempts[0].choices), -1.0, 1.0)[:, None]
         shape = (len(middle), self._at_once, middle.shape[-1])
-        for _ in range(0, self._count, self._at_once):
+        for _ in range(0, self._count + 1, self._at_once):
             script = _scripted(middle + spread * rng.standard_normal(shape, dtype=np.float32))
             limit = found.limit(len(middle))
-            found.add(self._attempt(sight, state, script, limit, self.sampling.ends))
+            found.add(self._attempt(self._crowd, sight, state, script, limit))
 
     def _attempt(
-        self, sight: Sight, state: State, choose: Choose, limit: int, enough: int
+        self, worlds: Worlds, sight: Sight, state: State, choose: Choose, limit: int
     ) -> list[Attempt]:
-        """Run in all worlds, for at most ``limit`` steps; of what succeeds, the shortest."""
+        """Run in all of the worlds, for at most ``limit`` steps; of what succeeds, the shortest."""
         target = sight.change.apply(sight.space.abstract(state))
-        for world in range(self._at_once):
-            self._worlds.reset(world, state)
-        states = State(state.layout, np.tile(state.data, (self._at_once, 1)))
+        count = len(worlds.states.data)
+        for world in range(count):
+            worlds.reset(world, state)
+        states = worlds.states
         seen = sight.look(states).observations
-        alive = np.ones(self._at_once, dtype=bool)
+        alive = np.ones(count, dtype=bool)
         past: list[tuple[State, Weights]] = []
         reached: list[Attempt] = []
         for step in range(limit):
@@ -205,15 +211,15 @@ class Rehearsal:
             alive &= ~np.isnan(choices).any(axis=-1)  # a policy may want what is no number
             if not alive.any():
                 break
-            states = self._worlds.step(sight.actions(np.nan_to_num(choices).astype(np.float64)))
+            states = worlds.step(sight.actions(np.nan_to_num(choices).astype(np.float64)))
             look = sight.look(states)
-            done = alive & sight.done(states, look, [target] * self._at_once)
+            done = alive & sight.done(states, look, [target] * count)
             reached += [_run(past, int(world)) for world in np.flatnonzero(done)]
-            if len(reached) >= enough:
+            if len(reached) >= self.sampling.ends:
                 break
             alive &= ~done & ~look.lost
             seen = look.observations
-        return reached[:enough]
+        return reached
 
 
 def _run(past: Sequence[tuple[State, Weights]], world: int) -> Attempt:
