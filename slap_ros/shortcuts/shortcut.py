@@ -195,7 +195,7 @@ class Rehearsal:
     def _attempt(
         self, worlds: Worlds, sight: Sight, state: State, choose: Choose, limit: int
     ) -> list[Attempt]:
-        """Run in all of the worlds, for at most ``limit`` steps; of what succeeds, the shortest."""
+        """Run in all of the worlds for at most ``limit`` steps, and stop when enough succeeded."""
         target = sight.change.apply(sight.space.abstract(state))
         count = len(worlds.states.data)
         for world in range(count):
@@ -209,15 +209,13 @@ class Rehearsal:
             choices = choose(step, seen)
             past.append((states, choices))
             alive &= ~np.isnan(choices).any(axis=-1)  # a policy may want what is no number
-            if not alive.any():
-                break
             states = worlds.step(sight.actions(np.nan_to_num(choices).astype(np.float64)))
             look = sight.look(states)
             done = alive & sight.done(states, look, [target] * count)
             reached += [_run(past, int(world)) for world in np.flatnonzero(done)]
-            if len(reached) >= self.sampling.ends:
-                break
             alive &= ~done & ~look.lost
+            if not alive.any() or len(reached) >= self.sampling.ends:
+                break
             seen = look.observations
         return reached
 
