@@ -78,8 +78,7 @@ def find_start(
     """Where a shortcut of this signature would begin in a task; None if nowhere.
 
     Of all sources that the operators of ``origin`` lead to, the one from which the shortcut gets
-    nearest to the goal; of several, that with the least to change: a signature also suits changes
-    that concern more than it has to.
+    nearest to the goal.
     """
     task = domain.task(seed, index)
     problem = Problem.of(domain, task.initial_state)
@@ -92,23 +91,19 @@ def find_start(
         return None
     to_go = ways_to_goal(graph, operator_steps)
     reach = Reach(signature, space, view_of(domain).grasping)
-    choices = []
-    for path in _paths(graph, origin):
-        i = path[-1].target if path else 0
-        for j in reach.targets(graph.nodes, i):
-            if np.isfinite(to_go[j]):
-                change = Change.between(graph.nodes[i], graph.nodes[j])
-                choices.append((to_go[j], _extent(change), path, change))
-    for _, _, path, change in sorted(choices, key=lambda choice: choice[:2]):
+    choices = [
+        (to_go[j], path, j)
+        for path in _paths(graph, origin)
+        for j in reach.targets(graph.nodes, path[-1].target if path else 0)
+        if np.isfinite(to_go[j])
+    ]
+    for _, path, j in sorted(choices, key=lambda choice: choice[0]):
         state = _execute(problem, graph, path, task.initial_state)
         if state is not None:
+            i = path[-1].target if path else 0
+            change = Change.between(graph.nodes[i], graph.nodes[j])
             return StartRecord(seed, index, tuple(state.data), change.add, change.delete)
     return None
-
-
-def _extent(change: Change) -> int:
-    """How many atoms it adds or deletes."""
-    return (change.add | change.delete).bit_count()
 
 
 def _paths(graph: AbstractGraph, origin: Origin) -> Iterator[tuple[Edge, ...]]:
