@@ -140,6 +140,12 @@ SETTINGS: Mapping[str, Mapping[str, TrainingSettings]] = {
             starts=120,
             shortcuts=2,
         ),
+        "obstacle_tower": replace(
+            OURS,
+            ppo=replace(LEARN, hidden=(128, 128), total_steps=350_000),
+            polish=replace(POLISH, hidden=(128, 128), total_steps=400_000),
+            starts=400,
+        ),
         "": OURS,
     },
     "paper": {
