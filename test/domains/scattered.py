@@ -8,7 +8,8 @@ import math
 
 import numpy as np
 
-from slap_ros.domains.obstacle_tower.model import BLOCK, CENTRED, SURFACE, TOUCHING
+from slap_ros.domains.obstacle_tower.lying import CENTRED, TOUCHING
+from slap_ros.domains.obstacle_tower.things import BLOCK, SURFACE
 from slap_ros.physics.pose import Pose, multiply, rotate
 from slap_ros.physics.scene import CUBE_EDGE, TABLE_TOP
 from slap_ros.relational import Object, State

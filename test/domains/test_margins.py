@@ -9,7 +9,7 @@ from scattered import one_by_one, scattered
 from slap_ros.domains import get_domain
 from slap_ros.domains.obstacle2d.model import RESTING_TOLERANCE
 from slap_ros.domains.obstacle2d.tasks import make_task
-from slap_ros.domains.obstacle_tower.model import TOUCHING
+from slap_ros.domains.obstacle_tower.lying import TOUCHING
 from slap_ros.domains.obstacle_tower.tasks import Scenery
 from slap_ros.physics.scene import CUBE_EDGE
 from slap_ros.relational import Column, State

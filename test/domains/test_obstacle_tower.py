@@ -11,8 +11,8 @@ from executed import executed, fluent_atoms
 from scattered import scattered
 
 from slap_ros.domains import get_domain
-from slap_ros.domains.obstacle_tower.model import BLOCK
 from slap_ros.domains.obstacle_tower.tasks import PaperTasks, RandomTasks, Scenery
+from slap_ros.domains.obstacle_tower.things import BLOCK
 from slap_ros.errors import ErrorCode, InvalidStateError, UnsolvableError
 from slap_ros.physics.panda import MAX_STEP
 from slap_ros.physics.scene import Material

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from slap_ros.domains.domain import Skill
-from slap_ros.domains.obstacle_tower.model import BLOCK, SURFACE
+from slap_ros.domains.obstacle_tower.things import BLOCK, SURFACE
 from slap_ros.domains.tabletop.grasps import grasps_along_faces, grasps_to_stand, quarter_turns
 from slap_ros.domains.tabletop.places import GAP, Place, free_places
 from slap_ros.domains.tabletop.reading import box_of, held_body, pose_of, top_of, yaw_of

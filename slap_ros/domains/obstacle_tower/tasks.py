@@ -11,7 +11,8 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from slap_ros.domains.domain import Task
-from slap_ros.domains.obstacle_tower.model import BLOCK, NOT_IS_TARGET, ON, SURFACE
+from slap_ros.domains.obstacle_tower.model import NOT_IS_TARGET, ON
+from slap_ros.domains.obstacle_tower.things import BLOCK, SURFACE
 from slap_ros.domains.tabletop.places import GAP
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.physics.features import (

@@ -6,13 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from slap_ros.domains.obstacle_tower.model import (
-    BLOCK,
-    GRIPPER_EMPTY,
-    HOLDING,
-    NOT_HOLDING,
-    SURFACE,
-)
+from slap_ros.domains.obstacle_tower.model import GRIPPER_EMPTY, HOLDING, NOT_HOLDING
+from slap_ros.domains.obstacle_tower.things import BLOCK, SURFACE
 from slap_ros.domains.tabletop import seeing
 from slap_ros.domains.view import View
 from slap_ros.physics.features import ROBOT

@@ -1,0 +1,121 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Obstacle Tower: what lies on what. Lengths in m, base frame.
+
+Of many states, or as margins, by numpy; of one state, as truths, in plain floats: few things are
+at a height to touch, and one call of numpy takes longer than to find out which.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from slap_ros.domains.obstacle_tower.things import Things
+from slap_ros.domains.tabletop.floats import FloatBox
+from slap_ros.domains.tabletop.lying import (
+    TO_EDGES,
+    along_axes,
+    complex_of,
+    strictly,
+    turned_back,
+    unpinched,
+    widths,
+)
+from slap_ros.relational import State
+from slap_ros.relational.predicates import Bools, shared
+from slap_ros.relational.state import Array
+
+TOUCHING = 0.004  # m, height over a thing at which a block still lies on it
+CENTRED = 0.015  # m, distance from the target's middle at which a block still is in it
+
+
+class Lie(NamedTuple):
+    """How everything lies in a state, as margins in m."""
+
+    things: Things
+    on: Array  # of blocks on things, shape (..., blocks * things)
+    room: Array  # for a block on things, shape (..., things)
+
+
+@shared
+def lie(state: State) -> Lie:
+    """How everything lies: all at once, as predicates share most of it.
+
+    Horizontal vectors are complex numbers: turned by a product, seen along both axes at once.
+    """
+    things, data = Things.of(state.layout), state.data
+    blocks = slice(things.blocks)
+    q = data.take(things.quaternions, axis=-1)
+    products = (q[..., None] * q[..., None, :]).reshape(*q.shape[:-1], 16)
+    edges = products @ TO_EDGES * data.take(things.halves, axis=-1)
+    is_movable = data.take(things.is_movable, axis=-1) > 0.5
+    is_target = data.take(things.is_target, axis=-1) > 0.5
+
+    # A block touches what its lowest point is at the height of.
+    z, height = data.take(things.z, axis=-1), np.add.reduce(np.abs(edges[..., 6:]), axis=-1)
+    gap = (z - height)[..., blocks, None] - (z + height)[..., None, :]
+    touches = unpinched(TOUCHING - np.abs(gap))
+
+    # It covers what it is over, seen along the axes of that thing.
+    places = complex_of(data.take(things.places, axis=-1))[..., 0]
+    way = places[..., blocks, None] - places[..., None, :]
+    back = turned_back(q, edges)[..., None, :]
+    width = widths(complex_of(edges[..., :6])[..., None, :], back)
+    own_width = np.diagonal(width, axis1=-3, axis2=-2).swapaxes(-1, -2)[..., None, :, :]
+    ahead_aside = width[..., blocks, :, :] + own_width - along_axes(way * back)
+    covers = np.minimum(ahead_aside[..., 0], ahead_aside[..., 1])
+
+    # It lies in the middle of a target; elsewhere on the table; or on a part of another block.
+    centred = CENTRED - np.abs(way)
+    to_target = np.where(is_target[..., None, :], centred, -1.0)[..., things.blocks :]
+    elsewhere = strictly(-np.maximum.reduce(to_target, axis=-1, initial=-1.0))[..., None]
+    on_table = np.minimum(covers, elsewhere)
+    off_targets = np.where(is_movable[..., None, :], covers, on_table)
+    sideways = np.where(is_target[..., None, :], centred, off_targets)
+    on = np.minimum(touches, sideways)
+
+    # On the table there is always room; on targets and blocks for one block only.
+    over = np.maximum.reduce(np.minimum(touches, covers), axis=-2, initial=-1.0)
+    room = np.where(is_movable | is_target, strictly(-over), 1.0)
+    return Lie(things, on.reshape(*on.shape[:-2], -1), room)
+
+
+class Rest(NamedTuple):
+    """The same of a single state, as truths."""
+
+    things: Things
+    on: Bools  # of blocks on things, shape (blocks * things,)
+    room: Bools  # for a block on things, shape (things,)
+
+
+@shared
+def rest(state: State) -> Rest:
+    """What lies on what in a single state: what is at the right height is looked at closely."""
+    things, values = Things.of(state.layout), state.data.tolist()
+    boxes = [FloatBox(*read(values)) for read in things.boxes]
+    is_movable = [values[i] > 0.5 for i in things.is_movable.tolist()]
+    is_target = [values[i] > 0.5 for i in things.is_target.tolist()]
+    targets = [boxes[i] for i in range(things.blocks, len(boxes)) if is_target[i]]
+    on = np.zeros((things.blocks, len(boxes)), dtype=bool)
+    room = np.ones(len(boxes), dtype=bool)
+    for number, block in enumerate(boxes[: things.blocks]):
+        for i, thing in enumerate(boxes):
+            if abs(block.bottom - thing.top) > TOUCHING:
+                continue
+            covers = block.covers(thing)
+            if is_target[i]:
+                on[number, i] = _is_centred(block, thing)
+            else:
+                on[number, i] = covers and (
+                    is_movable[i] or not any(_is_centred(block, target) for target in targets)
+                )
+            if covers and (is_movable[i] or is_target[i]):
+                room[i] = False
+    return Rest(things, on.reshape(-1), room)
+
+
+def _is_centred(block: FloatBox, target: FloatBox) -> bool:
+    return math.hypot(block.x - target.x, block.y - target.y) <= CENTRED
