@@ -142,8 +142,10 @@ SETTINGS: Mapping[str, Mapping[str, TrainingSettings]] = {
         ),
         "obstacle_tower": replace(
             OURS,
-            ppo=replace(LEARN, hidden=(128, 128), total_steps=350_000),
-            polish=replace(POLISH, hidden=(128, 128), total_steps=400_000),
+            ppo=replace(
+                LEARN, hidden=(128, 128), rollout_steps=128, batch_size=512, total_steps=300_000
+            ),
+            polish=replace(POLISH, hidden=(128, 128), total_steps=300_000),
             starts=400,
         ),
         "": OURS,
