@@ -16,39 +16,14 @@ from typing import TYPE_CHECKING, Any, Self
 
 from rclpy.serialization import serialize_message
 
-from ensemble.interfaces import (
-    ATOMS,
-    COMMAND,
-    DOMAIN,
-    JOINT_STATES,
-    MARKERS,
-    PLAN,
-    PLAN_EVENTS,
-    SKILL_EVENTS,
-    STATE,
-    TASK,
-    TF,
-    Topic,
-)
+from ensemble.interfaces import DIAGNOSTICS, PLAN_EVENTS, RECORDED, SKILL_EVENTS, Topic
 from slap_ros.errors import InvalidParameterError
 from slap_ros.messages.interfaces import definition
 
 if TYPE_CHECKING:
     from foxglove.websocket import ChannelView, Client
 
-SHOWN = (
-    DOMAIN,
-    TASK,
-    STATE,
-    ATOMS,
-    COMMAND,
-    PLAN,
-    PLAN_EVENTS,
-    SKILL_EVENTS,
-    MARKERS,
-    TF,
-    JOINT_STATES,
-)
+SHOWN = tuple(topic for topic in RECORDED if topic is not DIAGNOSTICS)
 EVENTS = (PLAN_EVENTS.type_name, SKILL_EVENTS.type_name)
 HOST = "127.0.0.1"  # nobody else's business
 PORT = 8765  # where Foxglove looks
@@ -165,4 +140,4 @@ class Broadcast:
 
 def channel_name(topic: Topic) -> str:
     """The topic's name from the root, as bags have it."""
-    return topic.name if topic.name.startswith("/") else f"/{topic.name}"
+    return f"/{topic.name}"

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Every node's 1 Hz sign of life on ``/diagnostics``."""
+"""Every node's 1 Hz sign of life on ``diagnostics``."""
 
 from __future__ import annotations
 

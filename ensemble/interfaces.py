@@ -3,7 +3,8 @@
 """Names and QoS of every topic, service and action.
 
 Names are relative: ``slap/state`` becomes ``/slap/state``, or ``/robot1/slap/state`` for nodes in
-the namespace ``/robot1``.
+the namespace ``/robot1``. ``tf`` and ``diagnostics`` as well, so that ensembles whose blocks have
+the same names can share a network.
 """
 
 from __future__ import annotations
@@ -79,10 +80,10 @@ COMMAND = Topic("slap/command", RobotCommand, EPISODE)
 PLAN = Topic("slap/plan", Plan, LATCHED)
 PLAN_EVENTS = Topic("slap/plan_events", PlanEvent, EPISODE)
 SKILL_EVENTS = Topic("slap/skill_events", SkillEvent, EPISODE)
-DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, FRESH)
+DIAGNOSTICS = Topic("diagnostics", DiagnosticArray, FRESH)
 MARKERS = Topic("slap/markers", MarkerArray, EPISODE)
-TF = Topic("/tf", TFMessage, _reliable(100, DurabilityPolicy.VOLATILE))
-TF_STATIC = Topic("/tf_static", TFMessage, _reliable(100, DurabilityPolicy.TRANSIENT_LOCAL))
+TF = Topic("tf", TFMessage, _reliable(100, DurabilityPolicy.VOLATILE))
+TF_STATIC = Topic("tf_static", TFMessage, _reliable(100, DurabilityPolicy.TRANSIENT_LOCAL))
 JOINT_STATES = Topic("joint_states", JointState, EPISODE)
 RECORDED = (
     DOMAIN,

@@ -103,7 +103,8 @@ def generate_launch_description() -> LaunchDescription:
                 name="rviz",
                 arguments=["-d", str(folder / "slap.rviz")],
                 remappings=[
-                    ("/slap/markers", [LaunchConfiguration("namespace"), "/slap/markers"]),
+                    (topic, [LaunchConfiguration("namespace"), topic])
+                    for topic in ("/slap/markers", "/tf", "/tf_static")
                 ],
                 condition=LaunchConfigurationEquals("rviz", "true"),
             ),

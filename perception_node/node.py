@@ -20,7 +20,7 @@ ROS Parameters:
 Publishers:
     slap/atoms (slap_msgs/AbstractState): the ground atoms of each state, and what else is perceived
         otherwise than it is.
-    /diagnostics (diagnostic_msgs/DiagnosticArray): states perceived; 1 Hz.
+    diagnostics (diagnostic_msgs/DiagnosticArray): states perceived; 1 Hz.
 
 Subscribers:
     slap/domain (slap_msgs/DomainInfo), slap/task (slap_msgs/Task): what to perceive.

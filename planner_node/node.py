@@ -12,7 +12,7 @@ ROS Parameters:
 Publishers:
     slap/plan (slap_msgs/Plan): the plan under execution; latched.
     slap/plan_events (slap_msgs/PlanEvent): what happens to it.
-    /diagnostics (diagnostic_msgs/DiagnosticArray): tasks tried and solved; 1 Hz.
+    diagnostics (diagnostic_msgs/DiagnosticArray): tasks tried and solved; 1 Hz.
 
 Subscribers:
     slap/domain, slap/task, slap/state, slap/atoms: see ``ensemble.observation``.

@@ -11,6 +11,9 @@ ROS Parameters:
 Subscribers:
     every topic of ``ensemble.interfaces.RECORDED``, as raw bytes.
 
+Publishers:
+    diagnostics (diagnostic_msgs/DiagnosticArray): messages written; 1 Hz.
+
 Services:
     slap/close_bag (std_srvs/Trigger): finish the bag once nothing more arrives.
 """
@@ -28,6 +31,7 @@ from rclpy.serialization import deserialize_message
 from slap_msgs.msg import DomainInfo, Task
 from std_srvs.srv import Trigger
 
+from ensemble.heartbeat import Heartbeat
 from ensemble.interfaces import CLOSE_BAG, DIAGNOSTICS, DOMAIN, RECORDED, TASK, Topic
 from ensemble.parameters import parameter, read_parameters
 from ensemble.running import run_node
@@ -67,6 +71,7 @@ class RecorderNode(Node):
         self._writer: BagWriter | None = None
         self._closed = False
         self._heard_ns = 0
+        self._written = 0  # messages
         for topic in RECORDED:
             self._subscribe(topic)
         # A group of its own: while it waits for quiet it would keep its group's other callbacks
@@ -77,6 +82,7 @@ class RecorderNode(Node):
             self._on_close,
             callback_group=MutuallyExclusiveCallbackGroup(),
         )
+        Heartbeat(self, lambda: {"messages": self._written, "closed": self._closed})
 
     def destroy_node(self) -> None:
         """Finish the bag, also on a signal."""
@@ -115,6 +121,7 @@ class RecorderNode(Node):
     def _write(self, record: Record) -> None:
         assert self._writer is not None
         self._writer.write(record.topic, record.type_name, record.stamp_ns, record.raw)
+        self._written += 1
 
     async def _on_close(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         await until(self, lambda: self.get_clock().now().nanoseconds - self._heard_ns > QUIET_NS)

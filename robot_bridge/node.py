@@ -35,12 +35,12 @@ ROS Parameters:
 Publishers:
     slap/domain (slap_msgs/DomainInfo), slap/task (slap_msgs/Task), slap/state
         (slap_msgs/ObjectCentricState), slap/markers (visualization_msgs/MarkerArray): as sim_node.
-    /diagnostics (diagnostic_msgs/DiagnosticArray): phase, fault, counts; 1 Hz.
+    diagnostics (diagnostic_msgs/DiagnosticArray): phase, fault, counts; 1 Hz.
 
 Subscribers:
     slap/command (slap_msgs/RobotCommand): refused unless it answers the current state and is safe.
     joint_states (sensor_msgs/JointState): of arm and fingers.
-    /tf, /tf_static (tf2_msgs/TFMessage): detections, and where cameras are.
+    tf, tf_static (tf2_msgs/TFMessage): detections, and where cameras are.
 
 Services:
     slap/reset_task (slap_msgs/ResetTask): opens an episode in the state that is measured, whatever
@@ -57,9 +57,9 @@ from collections import Counter
 from collections.abc import Collection
 from dataclasses import dataclass
 from enum import Enum
-from pathlib import Path
 from typing import Any
 
+from builtin_interfaces.msg import Time
 from rclpy.node import Node
 from slap_msgs.msg import RobotCommand
 from slap_msgs.srv import ResetTask
@@ -71,21 +71,13 @@ from ensemble.parameters import parameter, read_parameters
 from ensemble.running import run_node
 from ensemble.visualization import markers
 from ensemble.waiting import seconds
-from robot_bridge.controllers import (
-    GRIPPER_ACTION,
-    TRAJECTORY_ACTION,
-    Controllers,
-    action_name,
-)
-from robot_bridge.fingers import move_fingers
-from robot_bridge.senses import Senses
+from robot_bridge.robot import Robot, RobotParameters
 from slap_ros.domains import Task, get_domain
 from slap_ros.errors import (
     BusyError,
     ControllerAbortedError,
     ErrorCode,
     InvalidCommandError,
-    InvalidParameterError,
     InvalidStateError,
     NoDetectionError,
     NoJointStateError,
@@ -95,41 +87,23 @@ from slap_ros.errors import (
 )
 from slap_ros.messages.decode import decode_command, decode_goal
 from slap_ros.relational import GroundAtom, State
-from slap_ros.robot.cell import GAP_OPEN, GAP_SHUT, Cell, Grip, Step
-from slap_ros.robot.limits import Limits, Workspace, arm_limits
-from slap_ros.robot.tracking import Sensing
-from slap_ros.robot.workplace import Workplace, read_workplace, sampled_workplace
+from slap_ros.robot.cell import GAP_OPEN, GAP_SHUT, Grip, Step
 
 MEASURED = -1  # seed of a task that was not sampled
 LOOK_PERIOD = 0.02  # s, between two looks at what is measured
-WORKSPACE = (*Workspace().low, *Workspace().high)
 
 
 @dataclass(frozen=True)
-class Parameters:
+class Parameters(RobotParameters):
     """See the module's docstring."""
 
     domain: str = parameter("obstacle_tower", "which domain")
     preset: str = parameter("fair", "one that obeys the joints' speed limit")
     seed: int = parameter(0, "samples the task whose objects there are")
     index: int = parameter(0, "which of the seed's tasks")
-    scene: str = parameter("", "a scene file; empty: the sampled task's objects")
-    arm: str = parameter("panda", "panda or fr3")
-    speed: float = parameter(0.5, "fraction of the velocity and acceleration limits")
-    workspace: tuple[float, ...] = parameter(WORKSPACE, "m, fingertips, lowest x y z, highest")
-    trajectory_action: str = parameter(TRAJECTORY_ACTION, "the arm's controller")
-    gripper_action: str = parameter(GRIPPER_ACTION, "the gripper's controller")
-    gripper_scale: float = parameter(0.5, "position to be sent for each m between the fingers")
-    gripper_effort: float = parameter(20.0, "N")
-    position_noise: float = parameter(0.002, "m, of detections, along each axis")
-    turn_noise: float = parameter(0.01, "rad, of detections, about each axis")
     settle_time: float = parameter(1.5, "s to wait for what moves to come to rest")
-    joint_timeout: float = parameter(0.5, "s without joint positions until the robot holds")
     detection_timeout: float = parameter(2.0, "s without a measured state until the robot holds")
-    controller_timeout: float = parameter(0.5, "s that a controller may take longer than it should")
-    gripper_timeout: float = parameter(5.0, "s that the gripper may take")
     hold_after: float = parameter(0.5, "s without a command after which it says that it holds")
-    arrival_tolerance: float = parameter(0.1, "rad that a joint may be off after a motion")
 
 
 class Phase(Enum):
@@ -149,15 +123,7 @@ class RobotBridge(Node):
         super().__init__("robot_bridge", **kwargs)
         self._settings = settings = read_parameters(self, Parameters)
         self._domain = get_domain(settings.domain, settings.preset)
-        self._cell = Cell(self._domain, self._workplace(), limits(settings), sensing(settings))
-        self._senses = Senses(self, self._cell, settings.arm, f"{settings.arm}_link0")
-        self._controllers = Controllers(
-            self,
-            action_name(settings.trajectory_action, settings.arm),
-            action_name(settings.gripper_action, settings.arm),
-            self._senses.joints,
-            settings.controller_timeout,
-        )
+        self._robot = Robot(self, self._domain, self._sampled, settings)
         self._phase = Phase.STARTING
         self._since_s = seconds(self)  # when the phase, or the measurement of a state, began
         self._fault = ErrorCode.NONE
@@ -181,18 +147,13 @@ class RobotBridge(Node):
 
     def destroy_node(self) -> None:
         """Hold, and give back what is held."""
-        self._controllers.hold()
-        self._controllers.destroy()
-        self._cell.close()
+        self._robot.destroy()
         super().destroy_node()
 
-    def _workplace(self) -> Workplace:
-        settings = self._settings
-        if settings.scene:
-            return read_workplace(Path(settings.scene), self._domain)
-        return sampled_workplace(self._domain.task(settings.seed, settings.index).initial_state)
+    def _sampled(self) -> State:
+        return self._domain.task(self._settings.seed, self._settings.index).initial_state
 
-    def _now(self) -> Any:
+    def _now(self) -> Time:
         return self.get_clock().now().to_msg()
 
     def _diagnostics(self) -> dict[str, object]:
@@ -200,7 +161,7 @@ class RobotBridge(Node):
         holding = self._phase is Phase.FAULT or (self._phase is Phase.READY and idle)
         return {
             **self._counts,
-            **self._senses.counts,
+            **self._robot.senses.counts,
             "episode": self._episode,
             "phase": self._phase.name,
             "fault": self._fault.name,
@@ -213,7 +174,7 @@ class RobotBridge(Node):
         try:
             self._check_moment(message)
             self._require_joints()
-            step = self._cell.plan(decode_command(message))
+            step = self._robot.cell.plan(decode_command(message))
         except NoJointStateError as error:
             self._fail(error)
         except StaleCommandError as error:
@@ -236,7 +197,7 @@ class RobotBridge(Node):
             )
 
     def _require_joints(self) -> None:
-        silence = seconds(self) - self._cell.heard_s
+        silence = seconds(self) - self._robot.cell.heard_s
         if silence > self._settings.joint_timeout:
             raise NoJointStateError(f"no joint positions for {silence:.1f} s")
 
@@ -248,7 +209,7 @@ class RobotBridge(Node):
         try:
             await self._grip(step.grip)
             if self._phase is Phase.MOVING:  # not failed meanwhile
-                await self._controllers.move(step.motion)
+                await self._robot.controllers.move(step.motion)
         except SlapError as error:
             if self._phase is Phase.MOVING:
                 self._fail(error)
@@ -258,15 +219,15 @@ class RobotBridge(Node):
                 self._enter(Phase.LOOKING)
 
     async def _grip(self, grip: Grip) -> None:
-        if grip is Grip.CLOSE and self._cell.closed(await self._fingers(GAP_SHUT)):
+        if grip is Grip.CLOSE and self._robot.cell.closed(await self._fingers(GAP_SHUT)):
             return
         if grip is not Grip.KEEP:  # to be opened, or closed around nothing
             await self._fingers(GAP_OPEN)
-            self._cell.opened()
+            self._robot.cell.opened()
 
     async def _fingers(self, gap: float) -> float:
         """Move the fingers; the gap in m at which they then stand."""
-        return await move_fingers(self, self._controllers, self._senses, gap, self._settings)
+        return await self._robot.move_fingers(gap)
 
     # -- measuring ------------------------------------------------------------------------------
 
@@ -274,18 +235,18 @@ class RobotBridge(Node):
         """Whatever time brings: a state, or a sensor that has become silent."""
         now_s = seconds(self)
         if self._phase in (Phase.STARTING, Phase.FAULT):
-            if self._phase is Phase.STARTING and self._controllers.ready:
+            if self._phase is Phase.STARTING and self._robot.controllers.ready:
                 self._start()
         elif self._phase is Phase.READY:
             pass  # it stands, whatever the sensors say
-        elif now_s - max(self._cell.heard_s, self._since_s) > self._settings.joint_timeout:
+        elif now_s - max(self._robot.cell.heard_s, self._since_s) > self._settings.joint_timeout:
             self._fail(NoJointStateError(f"no joint positions: {self._phase.value}"))
         elif self._phase is Phase.LOOKING:
             self._measure(now_s)
 
     def _start(self) -> None:
         try:
-            state = self._cell.look(self._since_s)
+            state = self._robot.cell.look(self._since_s)
         except InvalidStateError as error:
             self.get_logger().warning(f"not yet: {error}", throttle_duration_sec=1.0)
             return
@@ -295,7 +256,7 @@ class RobotBridge(Node):
     def _measure(self, now_s: float) -> None:
         waited = now_s - self._since_s
         try:
-            state = self._cell.look(self._since_s, moving=waited > self._settings.settle_time)
+            state = self._robot.cell.look(self._since_s, moving=waited > self._settings.settle_time)
             if state is not None:
                 self._require_arrival()
         except InvalidStateError as error:
@@ -310,13 +271,15 @@ class RobotBridge(Node):
                 self._fail(self._blind())
 
     def _blind(self) -> NoDetectionError:
-        missing = ", ".join(self._cell.unseen(self._since_s)) or "none at all, but too few times"
+        missing = (
+            ", ".join(self._robot.cell.unseen(self._since_s)) or "none at all, but too few times"
+        )
         return NoDetectionError(
             f"not detected within {self._settings.detection_timeout} s: {missing}"
         )
 
     def _require_arrival(self) -> None:
-        off = 0.0 if self._last is None else self._cell.distance(self._last.motion.target)
+        off = 0.0 if self._last is None else self._robot.cell.distance(self._last.motion.target)
         if off > self._settings.arrival_tolerance:
             raise ControllerAbortedError(
                 f"the arm is {off:.3f} rad off where its controller says that it went"
@@ -326,8 +289,9 @@ class RobotBridge(Node):
         self._step += 1
         self._counts["steps"] += 1
         self._enter(Phase.READY)
-        self._states.publish(encode.state(state, self._episode, self._step, self._now()))
-        self._show(state)
+        now = self._now()
+        self._states.publish(encode.state(state, self._episode, self._step, now))
+        self._show(state, now)
 
     def _enter(self, phase: Phase) -> None:
         self._phase = phase
@@ -335,7 +299,7 @@ class RobotBridge(Node):
 
     def _fail(self, error: SlapError) -> None:
         """Hold until reset."""
-        self._controllers.hold()
+        self._robot.controllers.hold()
         self._enter(Phase.FAULT)
         self._fault = error.code
         self._counts["faults"] += 1
@@ -354,15 +318,16 @@ class RobotBridge(Node):
         self._fault = ErrorCode.NONE
         self._last = None
         self._enter(Phase.READY)
-        message = encode.task(task, self._domain, self._episode, MEASURED, 0, self._now())
+        now = self._now()
+        message = encode.task(task, self._domain, self._episode, MEASURED, 0, now)
         self._tasks.publish(message)
         self._states.publish(message.initial_state)
-        self._show(state)
+        self._show(state, now)
         self.get_logger().info(f"episode {self._episode}: {self._domain.name}, as measured")
 
-    def _show(self, state: State) -> None:
+    def _show(self, state: State, stamp: Time) -> None:
         # Not as frames or joint states: those are the robot's own to publish.
-        self._markers.publish(markers(self._domain.bodies(state), self._now()))
+        self._markers.publish(markers(self._domain.bodies(state), stamp))
 
     def _on_reset(
         self, request: ResetTask.Request, response: ResetTask.Response
@@ -383,29 +348,12 @@ class RobotBridge(Node):
             )
         if self._phase is Phase.MOVING:
             raise BusyError("the arm moves: cancel the task first")
-        state = self._cell.look(self._since_s)
+        state = self._robot.cell.look(self._since_s)
         if state is None:
             self._require_joints()
             raise self._blind()
         self._goal = decode_goal(request.goal, self._domain.atom_space(state))
         self._open_episode(state)
-
-
-def limits(settings: Parameters) -> Limits:
-    """What the arm may do.
-
-    Raises:
-        InvalidParameterError: An unknown arm, or a speed or workspace that there is not.
-    """
-    if len(settings.workspace) != len(WORKSPACE):
-        raise InvalidParameterError("parameter workspace is x y z at its lowest and at its highest")
-    x, y, z, to_x, to_y, to_z = settings.workspace
-    return arm_limits(settings.arm).scaled(settings.speed, Workspace((x, y, z), (to_x, to_y, to_z)))
-
-
-def sensing(settings: Parameters) -> Sensing:
-    """How well detections can be trusted."""
-    return Sensing(settings.position_noise, settings.turn_noise)
 
 
 def main() -> int:

@@ -7,7 +7,7 @@ everything but the arm's own joints, fingers and controllers: the first of these
 replay, and nothing more is sent, so that the controllers hold.
 
 Subscribers:
-    joint_states (sensor_msgs/JointState), /tf, /tf_static (tf2_msgs/TFMessage): as robot_bridge.
+    joint_states (sensor_msgs/JointState), tf, tf_static (tf2_msgs/TFMessage): as robot_bridge.
 
 Action clients:
     trajectory_action (control_msgs/FollowJointTrajectory), gripper_action
@@ -19,7 +19,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from rclpy.node import Node
@@ -27,11 +26,7 @@ from rclpy.task import Future
 
 from ensemble.parameters import parameter
 from ensemble.waiting import first_of, seconds
-from robot_bridge.controllers import Controllers, action_name
-from robot_bridge.fingers import move_fingers
-from robot_bridge.node import Parameters as BridgeParameters
-from robot_bridge.node import limits, sensing
-from robot_bridge.senses import Senses
+from robot_bridge.robot import Robot, RobotParameters
 from slap_ros.errors import (
     ControllerAbortedError,
     ControllerTimeoutError,
@@ -43,18 +38,17 @@ from slap_ros.errors import (
 )
 from slap_ros.physics.features import POSE_FEATURES
 from slap_ros.relational import State
-from slap_ros.robot.cell import GAP_OPEN, GAP_SHUT, GRASPED, Cell, Grip
+from slap_ros.robot.cell import GAP_OPEN, GAP_SHUT, GRASPED, Grip
 from slap_ros.robot.limits import Motion
 from slap_ros.robot.rehearsal import Recorded, Rehearsal, Waypoint
-from slap_ros.robot.workplace import Workplace, read_workplace, sampled_workplace
 
 POSITION = tuple(feature.name for feature in POSE_FEATURES[:3])
 ON_STEP = Callable[[int], None]
 
 
 @dataclass(frozen=True)
-class Parameters(BridgeParameters):
-    """Those of robot_bridge, and how far from where the recording begins things may be."""
+class Parameters(RobotParameters):
+    """Those of a robot, and how far from where the recording begins things may be."""
 
     start_timeout: float = parameter(15.0, "s to wait for the robot and every object")
     start_tolerance: float = parameter(0.05, "rad that a joint may be off the recording's start")
@@ -75,29 +69,19 @@ class Player(Node):
         rehearsal.require_safe()
         super().__init__("robot_player", **kwargs)
         self._recorded, self._motions, self._settings = recorded, rehearsal.motions, settings
-        self._cell = Cell(recorded.domain, self._workplace(), limits(settings), sensing(settings))
-        self._senses = Senses(self, self._cell, settings.arm, f"{settings.arm}_link0")
-        self._controllers = Controllers(
-            self,
-            action_name(settings.trajectory_action, settings.arm),
-            action_name(settings.gripper_action, settings.arm),
-            self._senses.joints,
-            settings.controller_timeout,
-        )
+        self._robot = Robot(self, recorded.domain, lambda: recorded.states[0], settings)
         self.failure: SlapError | None = None
         self.done = 0  # steps
         self.final: State | None = None  # as measured at the end; None where something is held
 
     def destroy_node(self) -> None:
         """Hold, and give back what is held."""
-        self._controllers.hold()
-        self._controllers.destroy()
-        self._cell.close()
+        self._robot.destroy()
         super().destroy_node()
 
     def hold(self) -> None:
         """Have the motion under way canceled."""
-        self._controllers.hold()
+        self._robot.controllers.hold()
 
     async def play(self) -> None:
         """Play it; what goes wrong is in ``failure``."""
@@ -114,11 +98,6 @@ class Player(Node):
 
     # -- before the first motion ----------------------------------------------------------------
 
-    def _workplace(self) -> Workplace:
-        if self._settings.scene:
-            return read_workplace(Path(self._settings.scene), self._recorded.domain)
-        return sampled_workplace(self._recorded.states[0])
-
     @property
     def _names(self) -> list[str]:
         """Objects that can be moved."""
@@ -127,11 +106,11 @@ class Player(Node):
     async def _begin(self) -> None:
         """Wait for the robot; refuse to begin elsewhere than the recording does."""
         end = seconds(self) + self._settings.start_timeout
-        await first_of(self, Future(), lambda: self._controllers.ready or seconds(self) > end)
-        if not self._controllers.ready:
+        await first_of(self, Future(), lambda: self._robot.controllers.ready or seconds(self) > end)
+        if not self._robot.controllers.ready:
             raise ControllerTimeoutError("the controllers are not there: are they running?")
         state = await self._look("at the start")
-        off = self._cell.distance(self._recorded.start)
+        off = self._robot.cell.distance(self._recorded.start)
         if off > self._settings.start_tolerance:
             raise StartMismatchError(
                 f"a joint is {off:.3f} rad off where the recording begins, which may be "
@@ -164,7 +143,7 @@ class Player(Node):
 
         def look() -> bool:
             try:
-                state = self._cell.look(since_s)
+                state = self._robot.cell.look(since_s)
             except InvalidStateError as error:
                 reasons.append(error)
             else:
@@ -174,11 +153,11 @@ class Player(Node):
         await first_of(self, Future(), look)
         if found:
             return found[-1]
-        if self._cell.heard_s <= since_s:
+        if self._robot.cell.heard_s <= since_s:
             raise NoJointStateError(f"no joint positions {when}")
         if reasons:
             raise reasons[-1]
-        missing = ", ".join(self._cell.unseen(since_s)) or "none at all, but too few times"
+        missing = ", ".join(self._robot.cell.unseen(since_s)) or "none at all, but too few times"
         raise NoDetectionError(f"not detected {when}: {missing}")
 
     # -- motions --------------------------------------------------------------------------------
@@ -187,12 +166,12 @@ class Player(Node):
         await self._require_at(motion.start, f"before step {waypoint.step}")
         if waypoint.grip is not Grip.KEEP:
             await self._grip(waypoint)
-        await self._controllers.move(motion)
+        await self._robot.controllers.move(motion)
 
     async def _grip(self, waypoint: Waypoint) -> None:
         closing = waypoint.grip is Grip.CLOSE
         wanted = GAP_SHUT if closing else GAP_OPEN
-        gap = await move_fingers(self, self._controllers, self._senses, wanted, self._settings)
+        gap = await self._robot.move_fingers(wanted)
         if closing and gap < GRASPED * waypoint.gap:
             raise ControllerAbortedError(
                 f"the fingers closed around nothing in step {waypoint.step}: {gap:.3f} m apart, "
@@ -204,13 +183,13 @@ class Player(Node):
         since_s = seconds(self)
         end_s = since_s + self._settings.joint_timeout
         await first_of(
-            self, Future(), lambda: self._cell.heard_s > since_s or seconds(self) > end_s
+            self, Future(), lambda: self._robot.cell.heard_s > since_s or seconds(self) > end_s
         )
-        if self._cell.heard_s <= since_s:
+        if self._robot.cell.heard_s <= since_s:
             raise NoJointStateError(
                 f"no joint positions for {self._settings.joint_timeout} s {when}"
             )
-        off = self._cell.distance(joints)
+        off = self._robot.cell.distance(joints)
         if off > self._settings.arrival_tolerance:
             raise ControllerAbortedError(
                 f"the arm is {off:.3f} rad off the recording {when}: it was held up, or moved"

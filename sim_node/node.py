@@ -14,9 +14,9 @@ Publishers:
     slap/domain (slap_msgs/DomainInfo): what world runs; latched.
     slap/task (slap_msgs/Task): the episode's task; latched.
     slap/state (slap_msgs/ObjectCentricState): the state after each step.
-    slap/markers (visualization_msgs/MarkerArray), /tf (tf2_msgs/TFMessage), joint_states
+    slap/markers (visualization_msgs/MarkerArray), tf (tf2_msgs/TFMessage), joint_states
         (sensor_msgs/JointState): the same for RViz and Foxglove.
-    /diagnostics (diagnostic_msgs/DiagnosticArray): steps taken and commands refused; 1 Hz.
+    diagnostics (diagnostic_msgs/DiagnosticArray): steps taken and commands refused; 1 Hz.
 
 Subscribers:
     slap/command (slap_msgs/RobotCommand): refused unless it answers the current state and is in
@@ -32,6 +32,7 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import Any
 
+from builtin_interfaces.msg import Time
 from rclpy.node import Node
 from rclpy.timer import Timer
 from slap_msgs.msg import RobotCommand
@@ -95,7 +96,7 @@ class SimNode(Node):
         task = self._domain.task(parameters.seed, parameters.index)
         self._open_episode(task, parameters.seed, parameters.index)
 
-    def _now(self) -> Any:
+    def _now(self) -> Time:
         return self.get_clock().now().to_msg()
 
     def _open_episode(self, task: Task, seed: int, index: int) -> None:
@@ -107,7 +108,7 @@ class SimNode(Node):
         message = encode.task(task, self._domain, self._episode, seed, index, now)
         self._tasks.publish(message)
         self._states.publish(message.initial_state)
-        self._show(task.initial_state)
+        self._show(task.initial_state, now)
         self.get_logger().info(f"episode {self._episode}: {self._domain.name}, seed {seed}")
 
     def _on_command(self, message: RobotCommand) -> None:
@@ -128,13 +129,14 @@ class SimNode(Node):
     def _advance(self, state: State) -> None:
         self._stop_waiting()
         self._step += 1
-        self._states.publish(encode.state(state, self._episode, self._step, self._now()))
-        self._show(state)
+        now = self._now()
+        self._states.publish(encode.state(state, self._episode, self._step, now))
+        self._show(state, now)
 
-    def _show(self, state: State) -> None:
+    def _show(self, state: State, stamp: Time) -> None:
         # After the state: the others are at work meanwhile.
         if self._visualizer is not None:
-            self._visualizer.show(state, self._now())
+            self._visualizer.show(state, stamp)
 
     def _stop_waiting(self) -> None:
         if self._timer is not None:

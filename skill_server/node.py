@@ -12,7 +12,7 @@ ROS Parameters:
 Publishers:
     slap/command (slap_msgs/RobotCommand): the robot's next step.
     slap/skill_events (slap_msgs/SkillEvent): what happens to each skill.
-    /diagnostics (diagnostic_msgs/DiagnosticArray): skills run; 1 Hz.
+    diagnostics (diagnostic_msgs/DiagnosticArray): skills run; 1 Hz.
 
 Subscribers:
     slap/domain, slap/task, slap/state, slap/atoms: see ``ensemble.observation``.

@@ -12,7 +12,16 @@ from pathlib import Path
 
 import slap_ros
 
-LIBRARIES = ("numpy", "rosbags", "pybullet", "pybullet-arm64", "torch", "stable-baselines3")
+LIBRARIES = (
+    "numpy",
+    "rosbags",
+    "cyclonedds",
+    "pybullet",
+    "pybullet-arm64",
+    "torch",
+    "stable-baselines3",
+    "matplotlib",
+)
 
 
 @lru_cache(maxsize=1)

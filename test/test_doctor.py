@@ -80,6 +80,8 @@ def test_healthy(tmp_path: Path) -> None:
         "rosbags",
         "PyBullet",
         "Training",
+        "Figures",
+        "Live view",
         "Disk space for runs",
         "Write permission for runs",
         "Open-file limit",
@@ -249,8 +251,11 @@ def test_missing_libraries(monkeypatch: pytest.MonkeyPatch) -> None:
     expect_problem(libraries.rosbags(), "not installed")
     assert libraries.pybullet().status == "warning"
     assert libraries.pybullet().advice == 'pip install "slap_ros[physics]"'
-    assert libraries.training().status == "ok"
-    assert libraries.training().advice == 'pip install "slap_ros[train]"'
+    extras = {"train": libraries.training, "studies": libraries.figures, "live": libraries.live}
+    for extra, check in extras.items():
+        assert check().status == "ok"
+        assert "not installed; needed" in check().found
+        assert check().advice == f'pip install "slap_ros[{extra}]"'
 
 
 # -- the machine --------------------------------------------------------------------------------

@@ -6,6 +6,8 @@ Nothing of embedded_ros is used on this side but the environment's configuration
 """
 
 # No postponed annotations here: IdlStruct reads them.
+import os
+import socket
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -13,6 +15,7 @@ from typing import Any
 
 import psutil
 import pytest
+import rclpy
 from cyclonedds.builtin import (
     BuiltinDataReader,
     BuiltinTopicDcpsParticipant,
@@ -28,6 +31,7 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
 from conftest import Process, wait_until
+from embedded_ros.transport import loopback
 
 CONFIGURATION = (
     '<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo"/></Interfaces>'
@@ -215,6 +219,36 @@ def test_a_lease_of_four_seconds_is_announced(
 
     assert wait_until(discovered)
     assert others[0].qos[Policy.Liveliness] == Policy.Liveliness.Automatic(4 * 10**9)
+
+
+@pytest.mark.skipif(not hasattr(socket, "SO_BINDTODEVICE"), reason="Linux alone can do that")
+@pytest.mark.parametrize(("reach", "interface"), [("", "lo"), ("OFF", "lo"), ("SUBNET", "")])
+def test_other_hosts_are_not_listened_to_unless_asked_for(
+    domain: int, monkeypatch: pytest.MonkeyPatch, reach: str, interface: str
+) -> None:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", reach)
+    before = {connection.fd for connection in psutil.Process().net_connections("udp")}
+    rclpy.init(args=[], domain_id=domain)
+    rclpy.create_node("listener")
+    heard_on = set()
+    for connection in psutil.Process().net_connections("udp"):
+        if connection.fd not in before and connection.laddr.ip == "0.0.0.0":
+            with socket.socket(fileno=os.dup(connection.fd)) as listener:
+                name = listener.getsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, 16)
+                heard_on.add(name.rstrip(b"\0").decode())
+    rclpy.shutdown()
+    assert heard_on == {interface}
+
+
+@pytest.mark.skipif(not hasattr(socket, "SO_BINDTODEVICE"), reason="Linux alone can do that")
+def test_where_other_hosts_cannot_be_kept_out_that_is_said(
+    domain: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(loopback, "INTERFACE", b"none")
+    rclpy.init(args=[], domain_id=domain)
+    with pytest.warns(RuntimeWarning, match=r"all interfaces \(No such device"):
+        rclpy.create_node("listener")
+    rclpy.shutdown()
 
 
 def test_no_multicast_by_default(domain: int, run: Callable[..., Process]) -> None:

@@ -25,8 +25,8 @@ ROS Parameters:
 
 Publishers:
     joint_states (sensor_msgs/JointState): of arm and fingers.
-    /tf (tf2_msgs/TFMessage): objects, as frames detected_NAME.
-    /diagnostics (diagnostic_msgs/DiagnosticArray): goals by outcome; 1 Hz.
+    tf (tf2_msgs/TFMessage): objects, as frames detected_NAME.
+    diagnostics (diagnostic_msgs/DiagnosticArray): goals by outcome; 1 Hz.
 
 Action servers:
     trajectory_action (control_msgs/FollowJointTrajectory), gripper_action

@@ -35,15 +35,14 @@ def replay_on_robot(
     """
     # ROS is needed only here: the rest of `slap bag` works without it.
     from ensemble.parameters import parse_parameters
-    from robot_bridge.mock.options import GIVEN, mock_options
-    from robot_bridge.node import limits
+    from robot_bridge.mock.options import mock_options
     from robot_bridge.player import Parameters
     from robot_bridge.playing import play
 
-    settings = Parameters(**parse_parameters(robot, Parameters, "robot", GIVEN))
+    settings = Parameters(**parse_parameters(robot, Parameters, "robot"))
     parameters = mock_options(mock) if to == MOCK else None
     recorded = recorded_motion(bag)
-    rehearsal = rehearse(recorded, limits(settings))
+    rehearsal = rehearse(recorded, settings.limits)
     if json and dry_run:
         print_json(_as_json(recorded, rehearsal))
     else:

@@ -33,6 +33,8 @@ def diagnose(runs: Path = RUNS) -> list[Check]:
         libraries.rosbags(),
         libraries.pybullet(),
         libraries.training(),
+        libraries.figures(),
+        libraries.live(),
         machine.disk_space(runs),
         machine.write_permission(runs),
         machine.open_files(),

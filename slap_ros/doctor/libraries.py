@@ -31,12 +31,27 @@ def pybullet() -> Check:
 
 def training() -> Check:
     """Needed to train shortcuts, not to use them."""
-    name, modules = "Training", ["torch", "stable_baselines3"]
+    modules, distributions = ["torch", "stable_baselines3"], ["torch", "stable-baselines3"]
+    return _extra("Training", modules, distributions, "train", "to train, not to run or evaluate")
+
+
+def figures() -> Check:
+    """Needed to draw what studies found."""
+    return _extra("Figures", ["matplotlib"], ["matplotlib"], "studies", "for `slap study`")
+
+
+def live() -> Check:
+    """Needed to serve a run to Foxglove."""
+    return _extra("Live view", ["foxglove"], ["foxglove-sdk"], "live", "for `slap run --live`")
+
+
+def _extra(name: str, modules: list[str], distributions: list[str], extra: str, use: str) -> Check:
+    """What may well be missing: ``use`` says for what it is needed."""
     missing = [module for module in modules if find_spec(module) is None]
     if missing:
-        found = f"{' and '.join(missing)} not installed; needed to train, not to run or evaluate"
-        return Check(name, "ok", found, _pip("train"))
-    return _imported(name, modules, ["torch", "stable-baselines3"], _pip("train"))
+        found = f"{' and '.join(missing)} not installed; needed {use}"
+        return Check(name, "ok", found, _pip(extra))
+    return _imported(name, modules, distributions, _pip(extra))
 
 
 def _imported(name: str, modules: list[str], distributions: list[str], advice: str) -> Check:

@@ -62,9 +62,9 @@ class Policy:
         return actions
 
     def sample(
-        self, observations: Weights, rng: np.random.Generator, temperature: float = 1.0
+        self, observations: Weights, rng: np.random.Generator, temperature: float | Weights = 1.0
     ) -> Weights:
-        """Actions with noise; temperature 0 is none."""
+        """Actions with noise; temperature, one or of shape (n, 1), 0 is none."""
         mean = self.mean(observations)
         noise = rng.standard_normal(mean.shape, dtype=np.float32)
         actions = mean + temperature * np.exp(self.log_std) * noise

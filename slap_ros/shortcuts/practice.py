@@ -167,10 +167,9 @@ class _Group:
         state = self._worlds.step(commands)
         look = self.sight.look(state)
         done = self.sight.done(state, look, self._targets)
-        lost = self.sight.view.lost(state)
         self.observations, self._potential = look.observations.copy(), look.potential.copy()
-        self._begin_anew(np.flatnonzero(done | lost | late))
-        return done, lost, before, look.potential, look.observations, self.observations
+        self._begin_anew(np.flatnonzero(done | look.lost | late))
+        return done, look.lost, before, look.potential, look.observations, self.observations
 
     def _begin_anew(self, ended: NDArray[np.intp]) -> None:
         if not ended.size:

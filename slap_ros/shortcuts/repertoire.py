@@ -29,7 +29,7 @@ class Repertoire:
         self.shortcuts = tuple(shortcuts)
         self._domain = domain
         self._space = domain.atom_space(initial)
-        self._rehearsal = Rehearsal(domain.make_world(initial), sampling)
+        self._rehearsal = Rehearsal(domain, initial, sampling)
         self._reach = [
             Reach(s.signature, self._space, view_of(domain).grasping) for s in self.shortcuts
         ]

@@ -117,11 +117,14 @@ SETTINGS: Mapping[str, Mapping[str, TrainingSettings]] = {
     "ours": {
         "obstacle2d": replace(
             OURS,
-            exploration=Exploration(tasks=6, rollouts=200, length=40, hold=4),
-            ppo=PpoSettings(total_steps=120_000),
+            # Its worlds are stepped together, so that many cost little.
+            exploration=Exploration(tasks=6, rollouts=6000, length=16, hold=4),
+            ppo=PpoSettings(
+                environments=128, rollout_steps=32, batch_size=512, total_steps=400_000
+            ),
             polish=None,
             horizon=30,
-            starts=200,
+            starts=300,
         ),
         "cluttered_drawer": replace(
             OURS,

@@ -11,16 +11,18 @@ from hashlib import sha256
 
 import numpy as np
 
+from slap_ros.domains import Domain
 from slap_ros.domains import Policy as Control
-from slap_ros.domains import World
 from slap_ros.domains.domain import Action
-from slap_ros.errors import InvalidCommandError, SkillNotApplicableError
+from slap_ros.domains.view import Worlds
+from slap_ros.errors import SkillNotApplicableError
 from slap_ros.relational import Object, State
 from slap_ros.shortcuts.policy import Policy, Weights
 from slap_ros.shortcuts.sight import Sight
 from slap_ros.shortcuts.signature import Change, Signature
 
 HOPE = 3  # failures, on top of as many for each success, before a shortcut is given up
+DARING = 2.0  # temperature of the last of a crowd against that of the first
 NARROWER = 0.7  # of the spread of variations from one round to the next
 SAME = 1e-6  # in any feature's unit: up to here a state is the one that was foreseen
 ALIKE = 0.02  # in any feature's unit: up to here a robot is where it was foreseen to be
@@ -54,6 +56,8 @@ class Sampling:
 
     Args:
         samples: Attempts, the first without noise.
+        crowd: Attempts in place of each further one, all at once, where a domain's worlds can be
+            stepped together.
         ends: Attempts kept besides that without noise: each ends in a state of its own, and what
             comes next may take less from where a longer one ends.
         refinements: Rounds of random variations of the best, a cross-entropy search's last ones.
@@ -64,6 +68,7 @@ class Sampling:
     """
 
     samples: int = 16
+    crowd: int = 32
     ends: int = 3
     refinements: int = 1
     temperature: float = 2.0
@@ -78,11 +83,10 @@ PAPER = Sampling(samples=1, refinements=0, temperature=1.0, horizon=100)
 
 @dataclass(frozen=True)
 class Attempt:
-    """One run of a shortcut in the model."""
+    """A run of a shortcut in the model that succeeded."""
 
     choices: tuple[Weights, ...]  # the policy's actions, from -1 to 1
     states: tuple[State, ...]  # in which they were chosen
-    reached: bool
 
     @property
     def steps(self) -> int:
@@ -108,30 +112,33 @@ class _Found:
         """Environment steps, of at most so many, that one more may take to be kept."""
         return most if len(self.others) < self.ends else min(most, self.others[-1].steps - 1)
 
-    def add(self, attempt: Attempt) -> None:
-        """Keep it, if it is worth keeping."""
-        if attempt.reached:
-            self.others = sorted((*self.others, attempt), key=_steps)[: self.ends]
+    def add(self, attempts: Sequence[Attempt]) -> None:
+        """Keep those that are worth keeping."""
+        self.others = sorted((*self.others, *attempts), key=_steps)[: self.ends]
 
 
 def _steps(attempt: Attempt) -> int:
     return attempt.steps
 
 
-Choose = Callable[[int, Weights], Weights]  # step and observation, (1, size), to (actions,)
+Choose = Callable[[int, Weights], Weights]  # step and observations, (n, size), to (n, actions)
 
 
 class Rehearsal:
-    """Tries shortcuts out in a world of its own, and remembers what came of it.
+    """Tries shortcuts out in worlds of its own, and remembers what came of it.
 
     The outcome is a function of the shortcut, the change and the state: noise comes from a
     generator that is seeded with them. So planner, skill server and replay agree.
     """
 
-    def __init__(self, world: World, sampling: Sampling) -> None:
-        """Rehearse in ``world``, which nobody else may use."""
+    def __init__(self, domain: Domain, initial: State, sampling: Sampling) -> None:
+        """Rehearse with the objects of ``initial``."""
         self.sampling = sampling
-        self._world = world
+        together = domain.make_many is not None
+        self._count = (sampling.samples - 1) * (sampling.crowd if together else 1)  # with noise
+        self._at_once = self._count + 1 if together else 1
+        self._alone = domain.make_worlds([initial])
+        self._crowd = domain.make_worlds([initial] * self._at_once) if together else self._alone
         self._memory: dict[tuple[str, Change, bytes], tuple[Attempt, ...]] = {}
         self._failures: Counter[str] = Counter()  # more than expected, of each shortcut
 
@@ -154,17 +161,22 @@ class Rehearsal:
     def _try(
         self, policy: Policy, sight: Sight, state: State, rng: np.random.Generator
     ) -> tuple[Attempt, ...]:
-        def choose(_: int, seen: Weights) -> Weights:
-            noisy: Weights = policy.sample(seen, rng, self.sampling.temperature)[0]
-            return noisy
-
         sampling = self.sampling
-        calm = self._attempt(sight, state, lambda _, seen: policy.mean(seen)[0], sampling.horizon)
-        found = _Found(sampling.ends, calm if calm.reached else None)
-        for failures in range(1, sampling.samples):
-            if not found.attempts and failures >= sampling.patience:
+        daring = sampling.temperature * np.linspace(1.0, DARING, self._at_once, dtype=np.float32)
+
+        def choose(_: int, seen: Weights) -> Weights:
+            return policy.sample(seen, rng, daring[:, None])
+
+        def calmly(_: int, seen: Weights) -> Weights:
+            return policy.mean(seen)
+
+        calm = self._attempt(self._alone, sight, state, calmly, sampling.horizon)
+        found = _Found(sampling.ends, next(iter(calm), None))
+        for failures in range(0, self._count, self._at_once):
+            if not found.attempts and failures + 1 >= sampling.patience:
                 break
-            found.add(self._attempt(sight, state, choose, found.limit(sampling.horizon)))
+            limit = found.limit(sampling.horizon)
+            found.add(self._attempt(self._crowd, sight, state, choose, limit))
         for number in range(sampling.refinements if found.attempts else 0):
             self._refine(found, sight, state, sampling.spread * NARROWER**number, rng)
         return tuple(found.attempts)
@@ -173,35 +185,47 @@ class Rehearsal:
         self, found: _Found, sight: Sight, state: State, spread: float, rng: np.random.Generator
     ) -> None:
         """Try random variations of the shortest: a round of a cross-entropy search."""
-        middle = np.clip(np.array(found.attempts[0].choices), -1.0, 1.0)
-        for _ in range(self.sampling.samples):
-            varied = middle + spread * rng.standard_normal(middle.shape, dtype=np.float32)
-            script = _scripted(varied)
-            found.add(self._attempt(sight, state, script, found.limit(len(varied))))
+        middle = np.clip(np.array(found.attempts[0].choices), -1.0, 1.0)[:, None]
+        shape = (len(middle), self._at_once, middle.shape[-1])
+        for _ in range(0, self._count + 1, self._at_once):
+            script = _scripted(middle + spread * rng.standard_normal(shape, dtype=np.float32))
+            limit = found.limit(len(middle))
+            found.add(self._attempt(self._crowd, sight, state, script, limit))
 
-    def _attempt(self, sight: Sight, state: State, choose: Choose, limit: int) -> Attempt:
-        """Run for at most ``limit`` steps."""
+    def _attempt(
+        self, worlds: Worlds, sight: Sight, state: State, choose: Choose, limit: int
+    ) -> list[Attempt]:
+        """Run in all of the worlds for at most ``limit`` steps, and stop when enough succeeded."""
         target = sight.change.apply(sight.space.abstract(state))
-        self._world.reset(state)
-        seen = sight.look(state.alone()).observations
-        choices: list[Weights] = []
-        states: list[State] = []
+        count = len(worlds.states.data)
+        for world in range(count):
+            worlds.reset(world, state)
+        states = worlds.states
+        seen = sight.look(states).observations
+        alive = np.ones(count, dtype=bool)
+        past: list[tuple[State, Weights]] = []
+        reached: list[Attempt] = []
         for step in range(limit):
-            choice = choose(step, seen)
-            states.append(state)
-            choices.append(choice)
-            try:
-                state = self._world.step(sight.actions(choice.astype(np.float64)))
-            except InvalidCommandError:  # a policy that wants what is no number
-                break
-            batch = state.alone()
-            look = sight.look(batch)
-            if sight.done(batch, look, [target])[0]:
-                return Attempt(tuple(choices), tuple(states), True)
-            if sight.view.lost(batch)[0]:
+            choices = choose(step, seen)
+            past.append((states, choices))
+            alive &= ~np.isnan(choices).any(axis=-1)  # a policy may want what is no number
+            states = worlds.step(sight.actions(np.nan_to_num(choices).astype(np.float64)))
+            look = sight.look(states)
+            done = alive & sight.done(states, look, [target] * count)
+            reached += [_run(past, int(world)) for world in np.flatnonzero(done)]
+            alive &= ~done & ~look.lost
+            if not alive.any() or len(reached) >= self.sampling.ends:
                 break
             seen = look.observations
-        return Attempt(tuple(choices), tuple(states), False)
+        return reached
+
+
+def _run(past: Sequence[tuple[State, Weights]], world: int) -> Attempt:
+    """What happened in one of the worlds."""
+    return Attempt(
+        tuple(choices[world] for _, choices in past),
+        tuple(State(states.layout, states.data[world]) for states, _ in past),
+    )
 
 
 def _scripted(script: Weights) -> Choose:

@@ -104,11 +104,14 @@ class Look:
             the lowest object of which something is missing: it carries the rest; and the robot's
             strain.
         near: Whether nothing is missing, slack included, and nothing moves, shape (n,).
+        lost: Whether something happened that cannot be undone, shape (n,): the domain says what,
+            and what was let go of somewhere else than it should be is out of hand.
     """
 
     observations: NDArray[np.float32]
     potential: Array
     near: Bools
+    lost: Bools
 
 
 class Sight:
@@ -132,6 +135,14 @@ class Sight:
         )
         self._about_places = np.array(
             [atom.predicate not in self.view.grasping for _, atom in change.atoms(space)]
+        )
+        self._empties = np.array(  # which atoms say that the hand is empty
+            [
+                sign == "+"
+                and atom.predicate in self.view.grasping
+                and all(obj.type in domain.unread_types for obj in atom.objects)
+                for sign, atom in change.atoms(space)
+            ]
         )
         self._kinds = self._of_kinds()
         self.actions = action_map(domain, signature)
@@ -170,10 +181,14 @@ class Sight:
         hand = self.view.hand(state)
         ways = self._ways(state, hand)
         missing = self._missing(state, deficits, ways)
+        done, settled = deficits < DONE, self.view.settled(state)
+        near = done.all(axis=-1) & settled
+        dropped = done[:, self._empties].any(axis=-1) & settled & ~near
         return Look(
             self._observe(state, hand, missing),
             self._potential(deficits, missing, ways) - STRAIN * self.view.strain(state),
-            (deficits < DONE).all(axis=-1) & self.view.settled(state),
+            near,
+            self.view.lost(state) | dropped,
         )
 
     def done(self, state: State, look: Look, targets: Sequence[int]) -> Bools:
@@ -216,6 +231,9 @@ class Sight:
 
     def _potential(self, deficits: Array, missing: Array, ways: Array) -> Array:
         """Objects one after the other, in their order; each that is done is a step forward."""
+        # The grasp comes last: to let go counts for nothing before all is in its place.
+        due = np.where(self._about_places, deficits, 0.0).max(axis=-1, keepdims=True)
+        deficits = np.where(self._about_places, deficits, np.maximum(deficits, due))
         left = (missing > DONE) & np.isfinite(ways)
         every, first = np.arange(len(left)), left.argmax(axis=-1)
         way = np.where(left.any(axis=-1), ways[every, first] / self.view.length_m, 0.0)

@@ -7,9 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
-import rclpy
 import yaml
-from rclpy.executors import SingleThreadedExecutor
 from rosbags.interfaces import Nodetype
 
 from ensemble.broadcast import SHOWN, channel_name
@@ -17,7 +15,7 @@ from ensemble.client import RunClient
 from ensemble.hosts import InProcessHost
 from ensemble.interfaces import MARKERS
 from ensemble.nodes import RunSettings, node_parameters
-from ensemble.spinning import Spinner
+from ensemble.spinning import spinning
 from slap_ros.messages.interfaces import typestore
 
 CONFIG = Path(__file__).parents[2] / "config"
@@ -54,24 +52,17 @@ def foxglove_paths():
 def published(network):
     """Types by topic, of the nodes of a run in Obstacle Tower."""
     pytest.importorskip("pybullet")
-    rclpy.init()
-    executor = SingleThreadedExecutor()
-    client = RunClient(lambda *_: None)
-    executor.add_node(client)
     settings = RunSettings("obstacle_tower", "fair", 1, 0, "lazy", None, shortcuts="none")
-    try:
-        with InProcessHost(node_parameters(settings), executor):
-            assert Spinner(executor).until(lambda: client.ready(recording=False), 60.0)
-            topics = {
-                name: types
-                for name, types in client.get_topic_names_and_types()
-                if client.count_publishers(name)
-            }
-    finally:
-        client.destroy_node()
-        executor.shutdown()
-        rclpy.shutdown()
-    return topics
+    with (
+        spinning(lambda: RunClient(lambda *_: None)) as (client, spinner),
+        InProcessHost(node_parameters(settings), spinner.executor),
+    ):
+        assert spinner.until(lambda: client.ready(recording=False), 60.0)
+        return {
+            name: types
+            for name, types in client.get_topic_names_and_types()
+            if client.count_publishers(name)
+        }
 
 
 def test_what_is_shown_is_published_and_has_such_fields(published):

@@ -41,6 +41,7 @@ def test_another_host_is_heard_only_where_that_was_asked_for(network, reach, ope
     assert set(told.stdout.split()) == {
         "inside:True" if open_to_all else "inside:False",
         "outside:True" if open_to_all else "outside:False",
+        "door:True" if open_to_all else "door:False",
     }
 
 

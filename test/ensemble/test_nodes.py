@@ -7,13 +7,10 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-import rclpy
 from rcl_interfaces.srv import GetParameters
-from rclpy.executors import SingleThreadedExecutor
 from slap_msgs.msg import RobotCommand
 from slap_msgs.srv import ListSkills, ResetTask
 
@@ -23,7 +20,7 @@ from ensemble.hosts import ProcessHost
 from ensemble.interfaces import COMMAND, LIST_SKILLS, RESET_TASK
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.observation import Observer
-from ensemble.spinning import Spinner
+from ensemble.spinning import spinning
 from slap_ros.bags import evaluate_bag
 from slap_ros.messages.interfaces import STATE
 
@@ -32,21 +29,12 @@ ALL = ("sim_node", "perception_node", "skill_server", "planner_node", "recorder_
 LIMIT = 60.0  # s, far more than anything here takes: a loaded machine takes its time
 
 
-@contextmanager
-def spinning():
-    """A client node and a way to spin it."""
-    rclpy.init()
-    executor = SingleThreadedExecutor()
-    heard = []
-    client = RunClient(lambda type_name, message: heard.append((type_name, message)))
-    client.heard = heard
-    executor.add_node(client)
-    try:
-        yield client, Spinner(executor)
-    finally:
-        client.destroy_node()
-        executor.shutdown()
-        rclpy.shutdown()
+class Listener(RunClient):
+    """A client that notes what it hears."""
+
+    def __init__(self):
+        super().__init__(lambda type_name, message: self.heard.append((type_name, message)))
+        self.heard = []
 
 
 def parameters(record=None, seed=3, pace=0.0):
@@ -80,7 +68,7 @@ def states(client):
 @pytest.mark.parametrize("order", [ALL, ALL[::-1]], ids=["sim first", "recorder first"])
 def test_any_order_of_start_gives_the_same_complete_bag(network, tmp_path, order):
     nodes = parameters(tmp_path / "bag")
-    with spinning() as (client, spinner):
+    with spinning(Listener) as (client, spinner):
         running = []
         for name in order:
             host = ProcessHost({name: nodes[name]})
@@ -102,7 +90,7 @@ def test_any_order_of_start_gives_the_same_complete_bag(network, tmp_path, order
 def test_a_node_stops_cleanly(network, tmp_path, name, stop):
     bag = ["-p", f"bag:={tmp_path / 'bag'}"] if name == "recorder_node" else []
     process = start(name, *bag)
-    with spinning() as (client, spinner):
+    with spinning(Listener) as (client, spinner):
         assert spinner.until(lambda: name in client.others(), LIMIT)
         time.sleep(0.2)
     process.send_signal(stop)
@@ -115,7 +103,7 @@ def test_a_node_stops_cleanly(network, tmp_path, name, stop):
 def test_a_node_that_comes_back_is_taken_up_again(network, victim):
     nodes = parameters()
     others = {name: p for name, p in nodes.items() if name != victim}
-    with spinning() as (client, spinner), ProcessHost(others):
+    with spinning(Listener) as (client, spinner), ProcessHost(others):
         with ProcessHost({victim: nodes[victim]}) as first:
             assert spinner.until(lambda: client.ready(False), LIMIT)
             assert solve(client, spinner).success
@@ -131,7 +119,7 @@ def test_a_node_that_comes_back_is_taken_up_again(network, victim):
 def test_a_simulator_that_comes_back_opens_a_new_episode(network):
     nodes = parameters()
     others = {name: p for name, p in nodes.items() if name != "sim_node"}
-    with spinning() as (client, spinner), ProcessHost(others):
+    with spinning(Listener) as (client, spinner), ProcessHost(others):
         for _ in range(2):
             with ProcessHost({"sim_node": nodes["sim_node"]}):
                 client.heard.clear()
@@ -151,7 +139,7 @@ def reset(client, spinner, **request):
 
 
 def test_a_task_is_solved_in_the_episode_that_was_asked_for(network):
-    with spinning() as (client, spinner), ProcessHost(parameters()):
+    with spinning(Listener) as (client, spinner), ProcessHost(parameters()):
         assert spinner.until(lambda: client.ready(False), LIMIT)
         for episode in (2, 3):  # at once: before the planner can have heard of it
             assert reset(client, spinner, seed=episode).episode == episode
@@ -163,7 +151,7 @@ def test_a_task_is_solved_in_the_episode_that_was_asked_for(network):
 
 def test_commands_that_are_stale_or_impossible_move_nothing(network):
     only = {"sim_node": parameters()["sim_node"]}
-    with spinning() as (client, spinner), ProcessHost(only):
+    with spinning(Listener) as (client, spinner), ProcessHost(only):
         assert spinner.until(lambda: states(client), LIMIT)
         publisher = client.create_publisher(COMMAND.type, COMMAND.name, COMMAND.qos)
         assert spinner.until(lambda: publisher.get_subscription_count() == 1, LIMIT)
@@ -187,7 +175,7 @@ def test_commands_that_are_stale_or_impossible_move_nothing(network):
 
 def test_resets_are_checked_at_the_door(network):
     only = {"sim_node": parameters()["sim_node"]}
-    with spinning() as (client, spinner), ProcessHost(only):
+    with spinning(Listener) as (client, spinner), ProcessHost(only):
         assert spinner.until(lambda: states(client), LIMIT)
         explicit = states(client)[0]
         answer = reset(client, spinner, seed=9)
@@ -202,7 +190,7 @@ def test_resets_are_checked_at_the_door(network):
 
 
 def test_cancelling_makes_the_robot_hold(network):
-    with spinning() as (client, spinner), ProcessHost(parameters(pace=5.0)):
+    with spinning(Listener) as (client, spinner), ProcessHost(parameters(pace=5.0)):
         assert spinner.until(lambda: client.ready(False), LIMIT)
         sent = client.send((), 0, 5)
         assert spinner.until(sent.done, LIMIT)
@@ -221,7 +209,7 @@ def test_cancelling_makes_the_robot_hold(network):
 
 
 def test_skills_are_listed_with_their_signatures(network):
-    with spinning() as (client, spinner), ProcessHost(parameters()):
+    with spinning(Listener) as (client, spinner), ProcessHost(parameters()):
         service = client.create_client(LIST_SKILLS.type, LIST_SKILLS.name)
         assert spinner.until(service.service_is_ready, LIMIT)
 
@@ -321,7 +309,7 @@ def test_a_wrong_parameter_is_refused_in_one_line(network, arguments, code, word
 
 
 def test_parameters_can_be_read_from_outside(network):
-    with spinning() as (client, spinner), ProcessHost(parameters()):
+    with spinning(Listener) as (client, spinner), ProcessHost(parameters()):
         service = client.create_client(GetParameters, "planner_node/get_parameters")
         assert spinner.until(service.service_is_ready, LIMIT)
         answer = service.call_async(GetParameters.Request(names=["planner", "server_timeout"]))
@@ -339,7 +327,7 @@ def test_a_thousand_steps_are_answered_one_by_one(network):
 def test_observer_ignores_states_of_an_episode_that_is_over(network):
     """A message of the old episode that comes late must not look like news."""
     with (
-        spinning() as (client, spinner),
+        spinning(Listener) as (client, spinner),
         ProcessHost(
             {name: p for name, p in parameters().items() if name in ("sim_node", "perception_node")}
         ),

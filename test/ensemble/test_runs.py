@@ -20,11 +20,13 @@ from slap_ros.cli import app
 from slap_ros.cli.run import Narrator
 from slap_ros.domains import get_domain
 from slap_ros.evaluation.experiment import Experiment
-from slap_ros.messages.interfaces import ATOMS
+from slap_ros.messages.decode import stamp_ns
+from slap_ros.messages.interfaces import ATOMS, MARKERS, STATE
 from slap_ros.perception import NoisyPerceiver, Quality
 from slap_ros.planning.execution import Executor
 from slap_ros.planning.planner import make_planner
 
+FRAMES = "tf2_msgs/msg/TFMessage"
 # Of `slap run obstacle2d --seed 3`, whatever the machine, the Python and the numpy.
 DIGEST_OF_SEED_3 = "6ba176d79c8889b9b98a12fc8084d2315e8f77256d8fd15f372b77ce527912ad"
 
@@ -83,6 +85,25 @@ def test_a_bag_replays_bit_for_bit_and_says_what_made_it(network, tmp_path):
     assert metadata["domain"] == "obstacle2d"
     assert metadata["seed"] == "5"
     assert {"python", "numpy", "slap_ros", "revision", "configuration.bystanders"} <= set(metadata)
+
+
+def test_what_is_shown_of_a_state_has_its_stamp(network, tmp_path):
+    run(request(tmp_path / "bag"), ignore)
+    stamps = {kind: [] for kind in (STATE, MARKERS, FRAMES)}
+    for _, kind, _, message in read_bag(tmp_path / "bag"):
+        if kind == STATE:
+            stamps[kind].append(stamp_ns(message.header))
+        elif kind in stamps:
+            (shown,) = {stamp_ns(part.header) for part in parts(message)}
+            stamps[kind].append(shown)
+    assert stamps[STATE] == stamps[MARKERS]
+    assert len(stamps[FRAMES]) > 20
+    assert set(stamps[FRAMES]) <= set(stamps[STATE])  # they do not wait for a recorder
+
+
+def parts(message):
+    """The markers or frames of a message."""
+    return message.markers if hasattr(message, "markers") else message.transforms
 
 
 @pytest.mark.parametrize(("seed", "replans"), [(2, True), (3, False)])

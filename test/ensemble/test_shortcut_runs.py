@@ -10,8 +10,6 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-import rclpy
-from rclpy.executors import SingleThreadedExecutor
 from slap_msgs.srv import ListSkills
 
 from ensemble import encode
@@ -22,7 +20,7 @@ from ensemble.nodes import RunSettings, node_parameters
 from ensemble.observation import Episode, Observation
 from ensemble.run import RunRequest, run
 from ensemble.shortcuts import Repertoires, ShortcutParameters
-from ensemble.spinning import Spinner
+from ensemble.spinning import spinning
 from skill_server.skill_run import requested_option
 from slap_ros.bags import evaluate_bag, replay_bag
 from slap_ros.domains import get_domain
@@ -108,13 +106,12 @@ def test_a_foreign_library_ends_the_run_before_it_begins(network, tmp_path):
 
 
 def test_learned_shortcuts_are_listed(network):
-    rclpy.init()
-    executor = SingleThreadedExecutor()
-    client = RunClient(ignore)
-    executor.add_node(client)
-    spinner = Spinner(executor)
     nodes = node_parameters(request().settings)
-    with InProcessHost({name: nodes[name] for name in ("sim_node", "skill_server")}, executor):
+    two = {name: nodes[name] for name in ("sim_node", "skill_server")}
+    with (
+        spinning(lambda: RunClient(ignore)) as (client, spinner),
+        InProcessHost(two, spinner.executor),
+    ):
         service = client.create_client(LIST_SKILLS.type, LIST_SKILLS.name)
         assert spinner.until(service.service_is_ready, LIMIT)
 
@@ -125,9 +122,6 @@ def test_learned_shortcuts_are_listed(network):
 
         assert spinner.until(skills, LIMIT)  # once the skill server knows the domain
         (learned,) = [skill for skill in skills() if skill.kind == OptionKind.SHORTCUT.value]
-    client.destroy_node()
-    executor.shutdown()
-    rclpy.shutdown()
     assert learned.name == SHORTCUT
     assert list(learned.parameters) == ["block", "surface", "surface"]
     assert learned.step_limit == DEFAULT.horizon

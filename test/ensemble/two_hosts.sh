@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 # Two network namespaces joined by a cable, a node in each: `unshare -rn bash two_hosts.sh PYTHON`.
 set -euo pipefail
-node="$(dirname "$0")/lonely_node.py"
+here="$(dirname "$0")"
+node="$here/lonely_node.py"
+port=$((7410 + 250 * ROS_DOMAIN_ID)) # where a domain's first participant listens
 
 unshare -n sleep 150 & other=$!
 trap 'kill $other' EXIT
@@ -19,6 +21,8 @@ there ip addr add 10.9.0.2/24 dev outside
 there ip link set outside up
 
 "$1" "$node" inside & one=$!
+"$1" "$here/knock.py" 127.0.0.1 $port open
+if there "$1" "$here/knock.py" 10.9.0.1 $port refused; then echo door:False; else echo door:True; fi
 export CYCLONEDDS_URI='<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="outside"/>
   </Interfaces></General><Discovery><ParticipantIndex>auto</ParticipantIndex>
   <Peers><Peer address="10.9.0.1"/></Peers></Discovery></Domain></CycloneDDS>'

@@ -2,11 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """An ensemble each of whose nodes may be killed and started again, and a client that goes on."""
 
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 
-import rclpy
 from process_faults import LIMIT
-from rclpy.executors import SingleThreadedExecutor
 from slap_msgs.srv import ResetTask
 
 from ensemble.client import RunClient
@@ -14,7 +12,7 @@ from ensemble.hosts import ProcessHost
 from ensemble.interfaces import ATOMS, PLAN_EVENTS, RESET_TASK, SKILL_EVENTS, STATE
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.presence import Presence
-from ensemble.run import Spinner
+from ensemble.spinning import spinning
 
 # By which a node is told from its successor.
 PUBLISHED = {
@@ -82,18 +80,17 @@ class Laboratory:
 def laboratory(seed, bag, pace):
     """An ensemble on a task, at so many steps a second; ``bag`` may be None."""
     settings = RunSettings("obstacle2d", "fair", seed, 0, "lazy", bag, pace, shortcuts="none")
-    with ExitStack() as stack:
-        rclpy.init()
-        stack.callback(rclpy.shutdown)
-        executor = SingleThreadedExecutor()
-        stack.callback(executor.shutdown)
-        heard = []
-        client = RunClient(lambda type_name, message: heard.append((type_name, message)))
-        stack.callback(client.destroy_node)
-        executor.add_node(client)
-        bench = Laboratory(node_parameters(settings), client, Spinner(executor), heard)
-        stack.callback(bench.stop)
-        for name in bench.nodes:
-            bench.start(name)
-        bench.until(lambda: client.ready(bag is not None))
-        yield bench
+    heard = []
+
+    def client_node():
+        return RunClient(lambda type_name, message: heard.append((type_name, message)))
+
+    with spinning(client_node) as (client, spinner):
+        bench = Laboratory(node_parameters(settings), client, spinner, heard)
+        try:
+            for name in bench.nodes:
+                bench.start(name)
+            bench.until(lambda: client.ready(bag is not None))
+            yield bench
+        finally:
+            bench.stop()

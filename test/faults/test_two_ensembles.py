@@ -5,20 +5,23 @@
 import os
 import subprocess
 import sys
+from collections import Counter
 from contextlib import ExitStack
 from importlib import import_module
 
-import rclpy
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
 from ensemble.client import RunClient
+from ensemble.interfaces import DIAGNOSTICS
 from ensemble.nodes import CLASSES, RunSettings, node_parameters
-from ensemble.run import Spinner
-from slap_ros.bags import evaluate_bag
+from ensemble.spinning import spinning
+from slap_ros.bags import evaluate_bag, read_bag
 from slap_ros.domains import get_domain
 from slap_ros.evaluation.experiment import Experiment
 
+NODES = ("sim_node", "perception_node", "skill_server", "planner_node", "recorder_node")
+# Of every node of ROS 2, wherever it is; nothing of an ensemble is on these.
+GLOBAL = {"/rosout", "/parameter_events"}
 LIMIT = 60.0  # s, far more than anything here takes
 SEEDS = {"left": 3, "right": 4}
 
@@ -29,31 +32,60 @@ def alone(seed):
 
 
 def test_namespaces_keep_two_ensembles_apart(network, tmp_path):
+    alive = {side: {f"/{side}/{name}" for name in NODES} for side in SEEDS}
+    heard = {side: set() for side in SEEDS}
     with ExitStack() as stack:
-        rclpy.init()
-        stack.callback(rclpy.shutdown)
-        executor = SingleThreadedExecutor()
-        stack.callback(executor.shutdown)
-        clients = {}
+        left, spinner = stack.enter_context(spinning(lambda: client_of("left", heard)))
+        clients = {"left": left, "right": client_of("right", heard)}
+        stack.callback(clients["right"].destroy_node)
+        spinner.executor.add_node(clients["right"])
         for side, seed in SEEDS.items():
-            clients[side] = RunClient(lambda *_: None, namespace=f"/{side}")
             bag = tmp_path / side
             settings = RunSettings("obstacle2d", "fair", seed, 0, "lazy", bag, shortcuts="none")
-            for node in (clients[side], *ensemble(side, settings)):
+            for node in ensemble(side, settings):
                 stack.callback(node.destroy_node)
-                executor.add_node(node)
-        spinner = Spinner(executor)
+                spinner.executor.add_node(node)
         both = clients.values()
         assert spinner.until(lambda: all(client.ready(True) for client in both), LIMIT)
         handles = answers(spinner, [client.send((), 0, 5) for client in both])
         results = answers(spinner, [handle.get_result_async() for handle in handles])
+        assert spinner.until(lambda: all(heard[side] >= alive[side] for side in SEEDS), LIMIT)
+        names = [name for name, _ in left.get_topic_names_and_types()]
+        names += [name for name, _ in left.get_service_names_and_types()]
         answers(spinner, [client.close_bag() for client in both])
+    assert len(names) > 100  # actions are topics and services too
+    assert {name.split("/")[1] for name in set(names) - GLOBAL} == {"left", "right"}
+    assert heard == alive
     lengths = {side: r.result.plan_length for side, r in zip(SEEDS, results, strict=True)}
     for side, seed in SEEDS.items():
         found = evaluate_bag(tmp_path / side)
         assert [(run.seed, run.success) for run in found.runs] == [(seed, True)]
         assert lengths[side] == found.runs[0].plan_length == alone(seed)
         assert found.states == lengths[side] + 1
+        topics = Counter(message.topic for message in read_bag(tmp_path / side))
+        assert {topic.split("/")[1] for topic in topics} == {side}
+        assert 0 < topics[f"/{side}/tf"] <= found.states  # frames do not wait for a recorder
+        assert speakers(tmp_path / side) == alive[side]
+
+
+def client_of(side, heard):
+    """A client that notes whose heart beats."""
+
+    def on_message(type_name, message):
+        if type_name == DIAGNOSTICS.type_name:
+            heard[side].update(status.name for status in message.status)
+
+    return RunClient(on_message, [DIAGNOSTICS], namespace=f"/{side}")
+
+
+def speakers(bag):
+    """Whose heartbeats were recorded."""
+    return {
+        status.name
+        for _, type_name, _, message in read_bag(bag)
+        if type_name == DIAGNOSTICS.type_name
+        for status in message.status
+    }
 
 
 def answers(spinner, futures):

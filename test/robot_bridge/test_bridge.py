@@ -6,10 +6,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TransformStamped
-from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import JointState
 from slap_msgs.msg import RobotCommand
 from slap_msgs.srv import ResetTask
@@ -21,7 +19,7 @@ from ensemble.hosts import InProcessHost
 from ensemble.interfaces import COMMAND, JOINT_STATES, RESET_TASK, SENSED, TF
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.run import RunRequest, run
-from ensemble.spinning import Spinner
+from ensemble.spinning import spinning
 from robot_bridge.mock.options import mock_options
 from slap_ros.bags import evaluate_bag
 from slap_ros.cli.run import check_world
@@ -46,9 +44,9 @@ def settings(mock=None, bridge=None, record=None, **options):
 class Lab:
     """A client, the bridge and a mock robot, on one executor."""
 
-    def __init__(self, client, spinner):
-        self.client, self.spinner = client, spinner
-        self.heard, self.joints, self.health = [], [], {}
+    def __init__(self, client, spinner, heard):
+        self.client, self.spinner, self.heard = client, spinner, heard
+        self.joints, self.health = [], {}
         self.commands = client.create_publisher(COMMAND.type, COMMAND.name, COMMAND.qos)
         client.create_subscription(
             JointState, JOINT_STATES.name, lambda m: self.joints.append(list(m.position)), SENSED
@@ -62,7 +60,7 @@ class Lab:
 
     @property
     def states(self):
-        return [m for kind, m in self.client.heard if kind == STATE]
+        return [m for kind, m in self.heard if kind == STATE]
 
     def until(self, condition):
         assert self.spinner.until(condition, LIMIT)
@@ -99,23 +97,17 @@ class Lab:
 
 @contextmanager
 def lab(mock=None, bridge=None, started=True):
-    rclpy.init()
-    executor, heard = SingleThreadedExecutor(), []
-    client = RunClient(lambda kind, message: heard.append((kind, message)))
-    client.heard = heard
-    executor.add_node(client)
     nodes = node_parameters(settings(mock, bridge))
     only = {name: nodes[name] for name in ("robot_bridge.mock", "robot_bridge")}
-    try:
-        with InProcessHost(only, executor):
-            bench = Lab(client, Spinner(executor))
-            if started:
-                bench.until(lambda: bench.states and bench.commands.get_subscription_count())
-            yield bench
-    finally:
-        client.destroy_node()
-        executor.shutdown()
-        rclpy.shutdown()
+    heard = []
+    with (
+        spinning(lambda: RunClient(lambda *message: heard.append(message))) as (client, spinner),
+        InProcessHost(only, spinner.executor),
+    ):
+        bench = Lab(client, spinner, heard)
+        if started:
+            bench.until(lambda: bench.states and bench.commands.get_subscription_count())
+        yield bench
 
 
 @pytest.mark.timeout(700)
@@ -256,30 +248,24 @@ def test_a_reset_opens_an_episode_as_measured_and_ends_a_fault(network):
 
 
 def test_a_skill_server_that_dies_leaves_the_robot_holding(network):
-    rclpy.init()
-    executor, heard = SingleThreadedExecutor(), []
-    client = RunClient(lambda kind, message: heard.append((kind, message)))
-    client.heard = heard
-    executor.add_node(client)
     nodes = node_parameters(settings(bridge=PATIENT))
     mind = {name: nodes.pop(name) for name in ("skill_server", "planner_node")}
-    try:
-        with InProcessHost(nodes, executor):
-            bench = Lab(client, Spinner(executor))
-            with InProcessHost(mind, executor):
-                bench.until(lambda: client.ready(False))
-                client.send((), 0, 5)
-                bench.until(lambda: len(bench.states) > 5)
-            bench.wait(1.0)  # for the motion under way
-            states, joints = len(bench.states), bench.joints[-1]
-            bench.wait(1.5)
-            assert (len(bench.states), bench.joints[-1]) == (states, joints)
-            bench.until(lambda: bench.health.get("phase") == "READY")
-            bench.until(lambda: bench.health["holding"] == "True")
-    finally:
-        client.destroy_node()
-        executor.shutdown()
-        rclpy.shutdown()
+    heard = []
+    with (
+        spinning(lambda: RunClient(lambda *message: heard.append(message))) as (client, spinner),
+        InProcessHost(nodes, spinner.executor),
+    ):
+        bench = Lab(client, spinner, heard)
+        with InProcessHost(mind, spinner.executor):
+            bench.until(lambda: client.ready(False))
+            client.send((), 0, 5)
+            bench.until(lambda: len(bench.states) > 5)
+        bench.wait(1.0)  # for the motion under way
+        states, joints = len(bench.states), bench.joints[-1]
+        bench.wait(1.5)
+        assert (len(bench.states), bench.joints[-1]) == (states, joints)
+        bench.until(lambda: bench.health.get("phase") == "READY")
+        bench.until(lambda: bench.health["holding"] == "True")
 
 
 def test_options_of_the_mock_robot_have_types_and_names():

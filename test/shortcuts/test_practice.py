@@ -124,6 +124,47 @@ def test_the_gripper_acts_only_where_what_is_held_is_to_change():
     assert Sight(DOMAIN, start.space, signature, release).actions.size == 3
 
 
+def test_what_is_let_go_of_elsewhere_is_out_of_hand():
+    start = STARTS[0]
+    names = [("On", ["block1", "target"]), ("Overlap", ["block1", "target"])]
+    names += [("GripperEmpty", ["robot"]), ("On", ["block2", "table"])]
+    add = start.space.mask([start.space.atom(*name) for name in names])
+    held = start.space.atom("Holding", ["robot", "block1"])
+    change = Change(add, start.space.mask([held, overlap(start.space)]))
+    sight = Sight(DOMAIN, start.space, Signature.of(change, start.space), change)
+    world = DOMAIN.make_world(start.state)
+    looks = [sight.look(start.state.alone())]
+    looks += [sight.look(world.step(np.array([0.0, 0.0, -1.0])).alone())]
+    assert [bool(look.lost[0]) for look in looks] == [False, True]
+    assert not looks[1].near[0]
+    there = moved_there(start.state, world.state)
+    assert not sight.look(there.alone()).lost[0]
+    assert sight.look(there.alone()).near[0]
+
+
+def moved_there(initial, released):
+    """The target block released where it should be, and the obstacle beside it."""
+    layout, data = initial.layout, released.data.copy()
+    target = initial.get(layout.object("target"), "x")
+    side = 0.25 if target < 0.5 else -0.25
+    for name, x in (("block1", target), ("block2", target + side)):
+        data[layout.column(layout.object(name), "x")] = x
+    return State(layout, data)
+
+
+def test_the_way_to_the_target_counts_while_a_block_is_held():
+    start = STARTS[0]
+    on = start.space.mask([start.space.atom("On", ["block1", "target"])])
+    change = Change(on, 0)
+    sight = Sight(DOMAIN, start.space, Signature.of(change, start.space), change)
+    layout, block = start.state.layout, start.state.layout.object("block1")
+    target = start.state.get(layout.object("target"), "x")
+    data = np.repeat(start.state.data[None], 5, axis=0)
+    data[:, layout.column(block, "x")] = target + np.array([0.4, 0.3, 0.2, 0.1, 0.0])
+    data[:, layout.column(layout.object("robot"), "x")] = data[:, layout.column(block, "x")]
+    assert (np.diff(sight.look(State(layout, data)).potential) > 0.0).all()
+
+
 def test_same_seed_same_practice():
     first, second = (list(random_steps(practice(), 40)) for _ in range(2))
     for a, b in zip(first, second, strict=True):

@@ -66,7 +66,7 @@ def _rest_margin(state: State, block: Column) -> Array:
 
     It rises so steeply that the margin of a block at rest is that of the distances sideways.
     """
-    height = np.where(state.stack(block, "held") > 0.5, 1.0, state.stack(block, "y"))
+    height = np.where(state.stack(block, "held") > 0.5, BLOCK_SIZE, state.stack(block, "y"))
     margin = RESTING_TOLERANCE - height
     return np.maximum(margin, STEEPNESS * margin)
 
@@ -82,7 +82,13 @@ def _overlap_margin(state: State, block: Column, surface: Column) -> Array:
 def _inside_margin(state: State, block: Column, surface: Column) -> Array:
     distance = np.abs(state.stack(block, "x") - state.stack(surface, "x"))
     slack = (state.stack(surface, "width") - BLOCK_SIZE) / 2 + INSIDE_TOLERANCE
-    return np.minimum(_rest_margin(state, block), slack - distance)
+    return _both(_rest_margin(state, block), slack - distance)
+
+
+def _both(one: Array, other: Array) -> Array:
+    """The lesser where both are met, else what is missing of either: both are to be made good."""
+    missing = np.minimum(one, 0.0) + np.minimum(other, 0.0)
+    return np.where(missing < 0.0, missing, np.minimum(one, other))
 
 
 def _each(state: State, kind: Type) -> list[Column]:

@@ -53,8 +53,8 @@ class Graph:
         self._participant = participant
         self._lock = threading.Lock()
         self._participants = BuiltinDataReader(entity, BuiltinTopicDcpsParticipant)
-        self._publications = BuiltinDataReader(entity, BuiltinTopicDcpsPublication)
-        self._subscriptions = BuiltinDataReader(entity, BuiltinTopicDcpsSubscription)
+        self._publications = _Endpoints(entity, BuiltinTopicDcpsPublication)
+        self._subscriptions = _Endpoints(entity, BuiltinTopicDcpsSubscription)
         self._nodes: Reader = participant.create_reader(
             discovery.TOPIC, discovery.TYPE, discovery.READER_POLICIES
         )
@@ -63,11 +63,13 @@ class Graph:
 
     def writers(self, *, qos_on: str | None = None) -> list[Endpoint]:
         """Every writer in the domain, those on the DDS topic ``qos_on`` with their QoS."""
-        return self._endpoints(self._publications, qos_on)
+        with self._lock:
+            return self._publications.read(qos_on)
 
     def readers(self, *, qos_on: str | None = None) -> list[Endpoint]:
         """Every reader in the domain, those on the DDS topic ``qos_on`` with their QoS."""
-        return self._endpoints(self._subscriptions, qos_on)
+        with self._lock:
+            return self._subscriptions.read(qos_on)
 
     def nodes(self) -> list[tuple[str, str]]:
         """Name and namespace of every node in the domain."""
@@ -99,9 +101,9 @@ class Graph:
     def close(self) -> None:
         """Delete the readers."""
         with self._lock:
-            for reader in (self._participants, self._publications, self._subscriptions):
-                reader._next_condition.__del__()
-                reader.__del__()
+            _close(self._participants)
+            self._publications.close()
+            self._subscriptions.close()
             self._participant.close_endpoint(self._nodes)
 
     def _live_info(self) -> Iterator[Any]:
@@ -122,11 +124,52 @@ class Graph:
         samples = ddspy_read_participant(self._participants._ref, _ALL, _participant_key, _no_qos)
         return set() if isinstance(samples, int) else {key for key in samples if key is not None}
 
-    def _endpoints(self, reader: BuiltinDataReader, qos_on: str | None) -> list[Endpoint]:
-        make = partial(_endpoint, qos_on)
-        with self._lock:
-            samples = ddspy_read_endpoint(reader._ref, _ALL, make, _qos_pointer)
-        return [] if isinstance(samples, int) else [s for s in samples if s is not None]
+
+class _Endpoints:
+    """Every writer, or every reader, in the domain.
+
+    The QoS of each is converted once: CycloneDDS's Python layer does not give back the copy of the
+    user data that it is handed (11.0.1), and who watches another node asks many times.
+    """
+
+    def __init__(self, entity: DomainParticipant, topic: Any) -> None:
+        self._reader = BuiltinDataReader(entity, topic)
+        self._qos: dict[bytes, Qos] = {}  # by endpoint, of those that were asked for
+
+    def read(self, qos_on: str | None) -> list[Endpoint]:
+        make = partial(self._endpoint, qos_on)
+        samples = ddspy_read_endpoint(self._reader._ref, _ALL, make, _qos_pointer)
+        found = [] if isinstance(samples, int) else [s for s in samples if s is not None]
+        self._qos = {e.gid: self._qos[e.gid] for e in found if e.gid in self._qos}
+        return found
+
+    def close(self) -> None:
+        _close(self._reader)
+
+    def _endpoint(
+        self,
+        qos_on: str | None,
+        key: bytes,
+        participant: bytes,
+        participant_handle: int,
+        topic_name: str,
+        type_name: str,
+        qos_pointer: int,
+        info: Any,
+        type_id: bytes | None,
+    ) -> Endpoint | None:
+        if info.instance_state != InstanceState.Alive or not info.valid_data:
+            return None
+        qos = None
+        if topic_name == qos_on:
+            # The pointer is CycloneDDS's, and valid as long as this runs.
+            qos = self._qos.get(key) or self._qos.setdefault(key, cqos_to_qos(qos_pointer))
+        return Endpoint(key, participant, topic_name, type_name, qos)
+
+
+def _close(reader: BuiltinDataReader) -> None:
+    reader._next_condition.__del__()
+    reader.__del__()
 
 
 def _participant_key(key: bytes, qos: object, info: Any) -> bytes | None:
@@ -140,24 +183,6 @@ def _no_qos(pointer: int) -> None:
 def _qos_pointer(pointer: int) -> int:
     """Leave the QoS as it is: to convert it takes 0.1 ms, and few are asked for."""
     return pointer
-
-
-def _endpoint(
-    qos_on: str | None,
-    key: bytes,
-    participant: bytes,
-    participant_handle: int,
-    topic_name: str,
-    type_name: str,
-    qos_pointer: int,
-    info: Any,
-    type_id: bytes | None,
-) -> Endpoint | None:
-    if info.instance_state != InstanceState.Alive or not info.valid_data:
-        return None
-    # The pointer is CycloneDDS's, and valid as long as this runs.
-    qos = cqos_to_qos(qos_pointer) if topic_name == qos_on else None
-    return Endpoint(key, participant, topic_name, type_name, qos)
 
 
 def topics(endpoints: list[Endpoint]) -> dict[str, set[str]]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import struct
 import threading
 from collections.abc import Iterable, Sequence
+from contextlib import nullcontext
 from typing import Any
 
 from cyclonedds.core import Policy, Qos
@@ -21,6 +22,7 @@ from .discovery import DiscoveryInfo
 from .endpoints import Reader, WaitSet, Writer
 from .errors import TransportClosedError
 from .graph import Graph
+from .loopback import loopback_only
 
 
 class _Domains:
@@ -34,8 +36,7 @@ class _Domains:
         with self._lock:
             domain, users = self._open.get(domain_id, (None, 0))
             if users == 0:
-                xml = config.configuration()
-                domain = Domain(domain_id, xml) if xml is not None else None
+                domain = _configured(domain_id)
             self._open[domain_id] = (domain, users + 1)
 
     def release(self, domain_id: int) -> None:
@@ -45,6 +46,15 @@ class _Domains:
                 self._open[domain_id] = (domain, users - 1)
             elif domain is not None:
                 domain.__del__()
+
+
+def _configured(domain_id: int) -> Domain | None:
+    """The domain as the environment wants it; None where that is CycloneDDS's own business."""
+    xml = config.configuration()
+    if xml is None:
+        return None
+    with loopback_only() if config.is_host_only() else nullcontext():
+        return Domain(domain_id, xml)
 
 
 _domains = _Domains()
