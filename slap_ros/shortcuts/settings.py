@@ -128,19 +128,19 @@ SETTINGS: Mapping[str, Mapping[str, TrainingSettings]] = {
         ),
         "cluttered_drawer": replace(
             OURS,
-            ppo=replace(LEARN, total_steps=160_000),
-            polish=replace(POLISH, total_steps=100_000),
+            ppo=replace(LEARN, total_steps=200_000),
+            polish=replace(POLISH, total_steps=250_000),
             horizon=40,
-            starts=150,
+            starts=200,
         ),
         "cleanup_table": replace(
             OURS,
             # Nodes: everything over which the hand can be, that it can grasp, and lift.
             exploration=Exploration(tasks=3, rollouts=32, length=40, nodes=13),
-            ppo=replace(LEARN, total_steps=60_000),
-            polish=replace(POLISH, total_steps=100_000),
+            ppo=replace(LEARN, total_steps=120_000),
+            polish=replace(POLISH, total_steps=200_000),
             horizon=40,
-            starts=120,
+            starts=200,
             shortcuts=2,
         ),
         "obstacle_tower": replace(
