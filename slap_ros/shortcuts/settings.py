@@ -143,14 +143,6 @@ SETTINGS: Mapping[str, Mapping[str, TrainingSettings]] = {
             starts=200,
             shortcuts=2,
         ),
-        "obstacle_tower": replace(
-            OURS,
-            ppo=replace(
-                LEARN, hidden=(128, 128), rollout_steps=128, batch_size=512, total_steps=300_000
-            ),
-            polish=replace(POLISH, hidden=(128, 128), total_steps=300_000),
-            starts=400,
-        ),
         "": OURS,
     },
     "paper": {
