@@ -40,6 +40,10 @@ def _never(state: State) -> Bools:
     return np.zeros(state.data.shape[:-1], dtype=bool)
 
 
+def _none(state: State) -> Array:
+    return np.zeros(state.data.shape[:-1])
+
+
 def _always(state: State) -> Bools:
     return np.ones(state.data.shape[:-1], dtype=bool)
 
@@ -58,6 +62,8 @@ class View:
         apart: (state, object, objects) to how far each is from the first, m, shape (n, objects).
         settled: Whether nothing would move by itself any more, shape (n,).
         lost: Whether something happened that cannot be undone, shape (n,).
+        strain: How close the robot is to where it cannot move on, shape (n,): 1 for each of its
+            axes that is at its limit, 0 well before.
         slack: By how much the margin of a predicate must pass its threshold before a shortcut
             counts as done, in the margin's unit, by the predicate's name. Room for the gripper
             beside what a shortcut left lying about, for instance.
@@ -73,6 +79,7 @@ class View:
     apart: Callable[[State, Object, Column], Array]
     settled: Callable[[State], Bools] = _always
     lost: Callable[[State], Bools] = _never
+    strain: Callable[[State], Array] = _none
     slack: Mapping[str, float] = field(default_factory=dict)
     grasping: frozenset[Predicate] = frozenset()
     length_m: float = 0.1

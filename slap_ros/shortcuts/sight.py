@@ -28,6 +28,7 @@ from slap_ros.shortcuts.signature import Change, Kind, Signature, concerned, kin
 
 WEIGHT = 3.0  # of an atom that is not done at all against being ``length_m`` away
 QUEUE = 3.0  # of an object whose turn has not come, against the same
+STRAIN = 3.0  # of an axis at its limit, against the same: a policy that drives it there is stuck
 DONE = 1e-9  # deficit below which an atom counts as done
 
 
@@ -98,9 +99,10 @@ class Look:
     Args:
         observations: For the policy, shape (n, size); of the same size for all changes that the
             signature suits.
-        potential: About minus the steps to go, shape (n,), for shaping rewards. Two terms: what
-            is missing of the changed atoms, through the metric behind each predicate; and the way
-            to the lowest object of which something is missing: it carries the rest.
+        potential: About minus the steps to go, shape (n,), for shaping rewards. Three terms: what
+            is missing of the changed atoms, through the metric behind each predicate; the way to
+            the lowest object of which something is missing: it carries the rest; and the robot's
+            strain.
         near: Whether nothing is missing, slack included, and nothing moves, shape (n,).
         lost: Whether something happened that cannot be undone, shape (n,): the domain says what,
             and what was let go of somewhere else than it should be is out of hand.
@@ -184,7 +186,7 @@ class Sight:
         dropped = done[:, self._empties].any(axis=-1) & settled & ~near
         return Look(
             self._observe(state, hand, missing),
-            self._potential(deficits, missing, ways),
+            self._potential(deficits, missing, ways) - STRAIN * self.view.strain(state),
             near,
             self.view.lost(state) | dropped,
         )

@@ -75,5 +75,6 @@ VIEW = View(
     apart=seeing.apart,
     settled=seeing.settled,
     lost=_lost,
+    strain=seeing.strain,
     grasping=frozenset({HOLDING, NOT_HOLDING, GRIPPER_EMPTY}),
 )

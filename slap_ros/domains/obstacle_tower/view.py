@@ -76,6 +76,7 @@ VIEW = View(
     apart=seeing.apart,
     settled=seeing.settled,
     lost=seeing.lower_than(FALLEN),
+    strain=seeing.strain,
     slack={"NothingOn": FINGER_ROOM},
     grasping=frozenset({HOLDING, NOT_HOLDING, GRIPPER_EMPTY}),
 )

@@ -21,6 +21,7 @@ from slap_ros.relational.state import Array
 FAR = 0.2  # m, the scale of what is seen
 FAST = 0.5  # m/s
 STILL = 0.05  # m/s and rad/s, along each axis: a body so slow stays where it is
+AT_EASE = 0.8  # of a joint's range, from its middle to its limit
 OFF_CENTRE = 0.02  # m, the scale of where in the fingers a body is held
 
 POSITION = ("x", "y", "z")
@@ -50,10 +51,17 @@ def robot(state: State, hand: Array) -> Array:
     layout = state.layout
     held = state.stack(bodies(layout), "held").max(axis=-1, keepdims=True)
     offset = state.gather(layout.column_of(ROBOT), GRASP_NAMES[:3])[:, 0] - _GRASP_OFFSET
-    joints = (_joints(state) - _MIDDLE) / _HALF_RANGE
+    joints = _over_ranges(state)
     height = (hand[:, 2, 3:] - TABLE_TOP) / FAR
     axes = (hand[:, :3, 0], hand[:, :3, 2])
     return np.concatenate([joints, *axes, height, held, held * offset / OFF_CENTRE], axis=-1)
+
+
+def strain(state: State) -> Array:
+    """How far joints are beyond where they are at ease, 1 for each at its limit, shape (n,)."""
+    beyond = np.maximum(np.abs(_over_ranges(state)) - AT_EASE, 0.0) / (1.0 - AT_EASE)
+    summed: Array = np.square(beyond).sum(axis=-1)
+    return summed
 
 
 def place(state: State, hand: Array, column: Column) -> Array:
@@ -124,4 +132,10 @@ def alone(obj: Object) -> Column:
 
 def _joints(state: State) -> Array:
     joints: Array = state.gather(state.layout.column_of(ROBOT), JOINT_NAMES)[:, 0]
+    return joints
+
+
+def _over_ranges(state: State) -> Array:
+    """Joints over their ranges, from -1 to 1, shape (n, 7)."""
+    joints: Array = (_joints(state) - _MIDDLE) / _HALF_RANGE
     return joints

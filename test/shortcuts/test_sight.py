@@ -1,0 +1,54 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What learners are told of a Panda's joints."""
+
+import numpy as np
+import pytest
+
+from slap_ros.domains import get_domain
+from slap_ros.physics.features import ROBOT
+from slap_ros.physics.panda import JOINT_HIGH
+from slap_ros.relational import State
+from slap_ros.shortcuts.sight import STRAIN, Sight
+from slap_ros.shortcuts.signature import Change, Signature
+
+TOWER = get_domain("obstacle_tower", "paper")
+
+
+@pytest.fixture(scope="module")
+def sight():
+    """On the slap: the tower down from the target."""
+    space = TOWER.atom_space(TOWER.task(0).initial_state)
+    tower = [space.atom("On", ["block2", "target"])]
+    change = Change(space.mask([space.atom("NothingOn", ["target"])]), space.mask(tower))
+    return Sight(TOWER, space, Signature.of(change, space), change)
+
+
+def potential(sight, **joints):
+    """With some joints elsewhere: the seventh turns the hand about itself, and moves nothing."""
+    state = TOWER.task(0).initial_state
+    (robot,) = state.layout.of_type(ROBOT)
+    moved = state.replace({(robot, name): value for name, value in joints.items()})
+    return float(sight.look(moved.alone()).potential[0])
+
+
+@pytest.mark.parametrize(("share", "strain"), [(0.0, 0.0), (0.79, 0.0), (0.9, 0.25), (1.0, 1.0)])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_joint_close_to_its_limit_costs(sight, share, strain, side):
+    high = JOINT_HIGH[6]  # its range is symmetric
+    less = potential(sight, joint7=0.0) - potential(sight, joint7=side * share * high)
+    assert less == pytest.approx(STRAIN * strain, abs=1e-9)
+
+
+def test_a_batch_is_strained_like_its_states(sight):
+    state = TOWER.task(0).initial_state
+    rng = np.random.default_rng(0)
+    rows = np.tile(state.data, (20, 1))
+    (robot,) = state.layout.of_type(ROBOT)
+    for joint in range(7):
+        column = state.layout.column(robot, f"joint{joint + 1}")
+        rows[:, column] = rng.uniform(-2.8, 0.0 if joint == 3 else 2.8, 20)
+    together = TOWER.view.strain(State(state.layout, rows))
+    alone = [TOWER.view.strain(State(state.layout, row[None]))[0] for row in rows]
+    assert together == pytest.approx(np.array(alone))
+    assert len(set(together)) == 20
