@@ -3,8 +3,8 @@
 """Obstacle Tower: put a block on a target on which a tower of other blocks stands (SLAP §5).
 
 A Panda at the origin, a table before it; x to the front, z up, m and rad. Read on in this order:
-``model`` (types, predicates, operators), ``tasks``, ``skills``. The world is that of
-``slap_ros.physics``.
+``things`` (types), ``lying`` (what lies on what), ``model`` (predicates, operators), ``tasks``,
+``skills``. The world is that of ``slap_ros.physics``.
 """
 
 from __future__ import annotations
