@@ -8,10 +8,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from slap_ros.errors import PlanningLimitError, UnsolvableError
+from slap_ros.planning.distance import Distance
 from slap_ros.planning.options import Option
 from slap_ros.relational import GroundOperator
 
 MAX_NODES = 200_000  # abstract states after which the top level is given up
+MANY_NODES = 20_000  # after which it is looked at which of them are of use
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,9 @@ def build_abstract_graph(
 ) -> AbstractGraph:
     """Breadth-first over ground operators until the depth at which the goal first holds.
 
-    Every goal state of that depth is kept. Goal states are not expanded.
+    Every goal state of that depth is kept. Goal states are not expanded. Where abstract states
+    become many, as six blocks can be stacked in so many ways, those are left out from which the
+    goal is surely too far away to be reached by that depth.
 
     Args:
         start: The abstract state to start from.
@@ -78,22 +82,38 @@ def build_abstract_graph(
         UnsolvableError: The goal holds in no reachable abstract state.
         PlanningLimitError: More than ``max_nodes`` abstract states.
     """
-    graph = AbstractGraph(goal, [start], [0])
-    index = {start: 0}
-    layer, last = [0], None
-    while layer:
-        depth = graph.depth[layer[0]]
-        if last is None and any(graph.nodes[i] & goal == goal for i in layer):
-            last = depth + extra_depth
-        if depth == last:
-            return graph
-        layer = _expand(graph, index, layer, operators)
-        if len(graph.nodes) > max_nodes:
-            raise PlanningLimitError(
-                f"more than {max_nodes} abstract states without reaching the goal; "
-                "raise the limit or give a goal nearer by"
-            )
-    if last is None:
+    try:
+        growth = _Growth(goal, operators, min(max_nodes, MANY_NODES))
+        return _with_goal(growth.grow(start, extra_depth))
+    except PlanningLimitError:
+        if max_nodes <= MANY_NODES:
+            raise
+    return _goalward(start, goal, operators, extra_depth, max_nodes)
+
+
+def _goalward(
+    start: int,
+    goal: int,
+    operators: Sequence[tuple[GroundOperator, Option]],
+    extra_depth: int,
+    max_nodes: int,
+) -> AbstractGraph:
+    """Only what may be on a way to the goal of so many operators, and of one more each time."""
+    distance = Distance(goal, [operator for operator, _ in operators])
+    reach = distance(start) or 0
+    while True:
+        growth = _Growth(goal, operators, max_nodes, distance, reach)
+        graph = growth.grow(start, 0)
+        if graph.goal_nodes and extra_depth:
+            reach += extra_depth
+            return _Growth(goal, operators, max_nodes, distance, reach).grow(start, extra_depth)
+        if graph.goal_nodes or not growth.left_out:
+            return _with_goal(graph)
+        reach += 1
+
+
+def _with_goal(graph: AbstractGraph) -> AbstractGraph:
+    if not graph.goal_nodes:
         raise UnsolvableError(
             f"the goal holds in none of the {len(graph.nodes)} abstract states that the "
             "operators can reach"
@@ -101,28 +121,71 @@ def build_abstract_graph(
     return graph
 
 
-def _expand(
-    graph: AbstractGraph,
-    index: dict[int, int],
-    layer: list[int],
-    operators: Sequence[tuple[GroundOperator, Option]],
-) -> list[int]:
-    """Add the successors of a layer; the nodes that are new are the next one."""
-    following = []
-    for source in layer:
-        abstract = graph.nodes[source]
-        if abstract & graph.goal == graph.goal:
-            continue
-        for operator, option in operators:
-            if not operator.applicable(abstract):
+class _Growth:
+    """Layer by layer."""
+
+    def __init__(
+        self,
+        goal: int,
+        operators: Sequence[tuple[GroundOperator, Option]],
+        max_nodes: int,
+        distance: Distance | None = None,
+        reach: int = 0,
+    ) -> None:
+        """With a ``distance``, leave out what is not on a way of ``reach`` operators."""
+        self._goal, self._operators, self._max_nodes = goal, operators, max_nodes
+        self._distance, self._reach = distance, reach
+        self.left_out = False  # whether anything was
+
+    def grow(self, start: int, extra_depth: int) -> AbstractGraph:
+        """Until so many layers after the first with a goal state, or until there is no more."""
+        graph = AbstractGraph(self._goal, [start], [0])
+        index = {start: 0}
+        layer, last = [0], None
+        while layer:
+            depth = graph.depth[layer[0]]
+            if last is None and any(self._is_goal(graph.nodes[i]) for i in layer):
+                last = depth + extra_depth
+            if depth == last:
+                break
+            layer = self._expand(graph, index, layer)
+            if len(graph.nodes) > self._max_nodes:
+                raise PlanningLimitError(
+                    f"more than {self._max_nodes} abstract states without reaching the goal; "
+                    "raise the limit or give a goal nearer by"
+                )
+        return graph
+
+    def _expand(self, graph: AbstractGraph, index: dict[int, int], layer: list[int]) -> list[int]:
+        """Add the successors of a layer; the nodes that are new are the next one."""
+        following = []
+        for source in layer:
+            abstract, depth = graph.nodes[source], graph.depth[source] + 1
+            if self._is_goal(abstract):
                 continue
-            successor = operator.apply(abstract)
-            if successor == abstract:
-                continue
-            if successor not in index:
-                index[successor] = len(graph.nodes)
-                following.append(len(graph.nodes))
-                graph.nodes.append(successor)
-                graph.depth.append(graph.depth[source] + 1)
-            graph.edges.append(Edge(source, index[successor], option))
-    return following
+            for operator, option in self._operators:
+                if not operator.applicable(abstract):
+                    continue
+                successor = operator.apply(abstract)
+                if successor == abstract:
+                    continue
+                if successor not in index:
+                    if not self._may_reach(successor, depth):
+                        continue
+                    index[successor] = len(graph.nodes)
+                    following.append(len(graph.nodes))
+                    graph.nodes.append(successor)
+                    graph.depth.append(depth)
+                graph.edges.append(Edge(source, index[successor], option))
+        return following
+
+    def _is_goal(self, abstract: int) -> bool:
+        return abstract & self._goal == self._goal
+
+    def _may_reach(self, abstract: int, depth: int) -> bool:
+        if self._distance is None:
+            return True
+        to_go = self._distance(abstract)
+        near = to_go is not None and depth + to_go <= self._reach
+        self.left_out |= not near and to_go is not None
+        return near

@@ -1,0 +1,78 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The top level where abstract states are many: fewer of them, and the same ways to the goal."""
+
+import pytest
+
+from slap_ros.domains import get_domain
+from slap_ros.errors import PlanningLimitError, UnsolvableError
+from slap_ros.planning import abstract_graph
+from slap_ros.planning.abstract_graph import build_abstract_graph
+from slap_ros.planning.distance import Distance
+from slap_ros.planning.planner import Problem
+
+
+def top_level(blocks, seed=0):
+    """What builds the graph of a tower: start, goal, operators."""
+    domain = get_domain("obstacle_tower", f"fair:obstacles={blocks}")
+    task = domain.task(seed)
+    problem = Problem.of(domain, task.initial_state)
+    space = problem.model.space
+    start, goal = space.abstract(task.initial_state), space.mask(task.goal)
+    return start, goal, problem.operators
+
+
+def on_shortest_ways(graph):
+    """Nodes from which a goal node is reached by as few operators as there are layers left."""
+    on_way = set(graph.goal_nodes)
+    for edge in reversed(graph.edges):
+        deeper = graph.depth[edge.target] == graph.depth[edge.source] + 1
+        if deeper and edge.target in on_way:
+            on_way.add(edge.source)
+    return {graph.nodes[i] for i in on_way}
+
+
+def goals(graph):
+    """Abstract states in which the goal holds, and how deep they are."""
+    return {(graph.nodes[i], graph.depth[i]) for i in graph.goal_nodes}
+
+
+@pytest.mark.parametrize("extra_depth", [0, 1])
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_left_out_is_on_no_shortest_way(seed, extra_depth, monkeypatch):
+    start, goal, operators = top_level(3, seed)
+    whole = build_abstract_graph(start, goal, operators, extra_depth)
+    monkeypatch.setattr(abstract_graph, "MANY_NODES", 10)
+    part = build_abstract_graph(start, goal, operators, extra_depth)
+    assert set(part.nodes) < set(whole.nodes)
+    assert goals(part) == goals(whole)
+    assert on_shortest_ways(part) == on_shortest_ways(whole)
+
+
+def test_the_distance_is_never_more_than_the_operators_left():
+    start, goal, operators = top_level(3)
+    graph = build_abstract_graph(start, goal, operators)
+    distance = Distance(goal, [operator for operator, _ in operators])
+    depth = dict(zip(graph.nodes, graph.depth, strict=True))
+    for node in on_shortest_ways(graph):
+        assert distance(node) <= max(graph.depth) - depth[node]
+    assert distance(start) > 1
+
+
+def test_five_obstacles_take_no_more_abstract_states_than_needed():
+    start, goal, operators = top_level(5)
+    with pytest.raises(PlanningLimitError):
+        build_abstract_graph(start, goal, operators, max_nodes=abstract_graph.MANY_NODES)
+    graph = build_abstract_graph(start, goal, operators)
+    assert max(graph.depth) == 12  # five times off and down, then the target block
+    assert len(graph.nodes) < abstract_graph.MANY_NODES
+
+
+def test_the_unreachable_stays_unsolvable_and_the_limit_is_kept(monkeypatch):
+    start, goal, operators = top_level(2)
+    monkeypatch.setattr(abstract_graph, "MANY_NODES", 10)
+    with pytest.raises(PlanningLimitError, match="more than 20 abstract states"):
+        build_abstract_graph(start, goal, operators, max_nodes=20)
+    picks = [(o, option) for o, option in operators if "Place" not in str(o)]
+    with pytest.raises(UnsolvableError, match="none of the"):
+        build_abstract_graph(start, goal, picks)
