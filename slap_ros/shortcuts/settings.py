@@ -128,10 +128,10 @@ SETTINGS: Mapping[str, Mapping[str, TrainingSettings]] = {
         ),
         "cluttered_drawer": replace(
             OURS,
-            ppo=replace(LEARN, total_steps=200_000),
-            polish=replace(POLISH, total_steps=250_000),
+            ppo=replace(LEARN, total_steps=160_000),
+            polish=replace(POLISH, total_steps=100_000),
             horizon=40,
-            starts=200,
+            starts=150,
         ),
         "cleanup_table": replace(
             OURS,
