@@ -13,18 +13,18 @@ from typing import Any
 import numpy as np
 
 from slap_ros.domains.tabletop.lying import HALVES, PARTS, Indices
+from slap_ros.domains.tabletop.reading import HALF_NAMES
 from slap_ros.physics.features import BODY_FEATURES, MATERIAL_FEATURES, POSE_FEATURES
 from slap_ros.relational import Column, Feature, Layout, Object, Type
 
 MOST_REMEMBERED = 1024  # columns of objects, a layout
-EDGES = ("half_x", "half_y", "half_z")  # half a thing's edges
 
 Asked = Column | tuple[Column, Column]
 Read = Callable[[Sequence[float]], tuple[Any, ...]]
 
 # Of blocks and surfaces alike, so that predicates can ask both at once.
 THING_FEATURES = (
-    *(Feature(edge, "m") for edge in EDGES),
+    *(Feature(edge, "m") for edge in HALF_NAMES),
     Feature("is_movable", "1"),
     Feature("is_target", "1"),
 )
@@ -59,7 +59,7 @@ class Things:
             return np.array([layout.columns(objects, name) for name in features])
 
         def box(obj: Object) -> Read:
-            names = ("x", "y", "z", *PARTS, *EDGES)
+            names = ("x", "y", "z", *PARTS, *HALF_NAMES)
             return itemgetter(*(layout.column(obj, name) for name in names))
 
         return Things(
