@@ -30,6 +30,7 @@ from slap_ros.shortcuts.sight import view_of
 from slap_ros.shortcuts.signature import Change, Signature, context_of
 
 Origin = tuple[str, ...]  # operators by which a shortcut's source was reached
+MERGED = 0.5  # of a motion's steps that are left where it is part of a shortcut
 ONE_BY_ONE = 4  # worlds that cannot be stepped together
 GRIPPER_CHOICES = np.array([0.0, 0.0, 0.0, 1.0, -1.0])  # in every second rollout
 
@@ -42,7 +43,7 @@ class Find:
         signature: What it changes.
         origin: Where from.
         hits: In how many rollouts.
-        steps: Of the shortest of them.
+        steps: Of the shortest of them, and of what led there from where the shortcut begins.
         plan_steps: Of the plan without it.
         promise: Environment steps by which it would shorten the plan.
     """
@@ -109,6 +110,9 @@ class Explorer:
         self._domain, self._settings, self._rng = domain, settings, rng
         self._problem = Problem.of(domain, self.task.initial_state)
         self.space = self._problem.model.space
+        self._grasping = self.space.mask(
+            atom for atom in self.space.atoms if atom.predicate in view_of(domain).grasping
+        )
         goal = self.space.mask(self.task.goal)
         self._plan = GraphPlanner(self._problem).plan(self.task.initial_state, goal).plan
         self.graph = build_abstract_graph(
@@ -127,11 +131,14 @@ class Explorer:
         joined = {(edge.source, edge.target) for edge in self.graph.edges}
         finds = []
         for vertex in vertices:
-            reached = self._roll_out(vertex, index)
-            for j, lengths in reached.items():
-                if (vertex.node, j) in joined or len(lengths) < self._settings.hits:
+            for j, lengths in self._roll_out(vertex, index).items():
+                if len(lengths) < self._settings.hits:
                     continue
-                finds.append(self._value(vertex, j, lengths, to_go[j]))
+                finds += [
+                    self._value(beginning, vertex, j, lengths, to_go[j])
+                    for beginning in self._beginnings(vertex)
+                    if (beginning.node, j) not in joined
+                ]
         return Explored(
             tuple(find for find in finds if find.promise > 0.0),
             len(self.graph.candidates()),
@@ -139,18 +146,37 @@ class Explorer:
             operator_steps,
         )
 
-    def _value(self, vertex: Vertex, j: int, lengths: list[int], to_go: float) -> Find:
-        source = self.graph.nodes[vertex.node]
+    def _beginnings(self, vertex: Vertex) -> Iterator[Vertex]:
+        """Where a shortcut may begin that does what was found from a vertex.
+
+        There, or before the motions of the empty or full hand that led there: what they are good
+        for a shortcut may well do on its way.
+        """
+        yield vertex
+        while vertex.parent is not None:
+            nodes = self.graph.nodes[vertex.parent.node], self.graph.nodes[vertex.node]
+            if (nodes[0] ^ nodes[1]) & self._grasping:
+                return
+            vertex = vertex.parent
+            yield vertex
+
+    def _value(
+        self, beginning: Vertex, vertex: Vertex, j: int, lengths: list[int], to_go: float
+    ) -> Find:
+        """What was found from a vertex, as a shortcut that begins there or before."""
+        source = self.graph.nodes[beginning.node]
         change = Change.between(source, self.graph.nodes[j])
         context = context_of(source, view_of(self._domain).grasping, self.space)
-        with_it = vertex.cost + min(lengths) + to_go
+        motions = vertex.cost - beginning.cost
+        steps = min(lengths)
+        hoped = beginning.cost + MERGED * motions + steps
         return Find(
             Signature.of(change, self.space, context),
-            origin_of(vertex),
+            origin_of(beginning),
             len(lengths),
-            min(lengths),
+            motions + steps,
             self._plan.predicted_steps,
-            self._plan.predicted_steps - with_it,
+            self._plan.predicted_steps - (hoped + to_go),
         )
 
     def _collect(self) -> tuple[list[Vertex], dict[str, float]]:

@@ -84,11 +84,12 @@ def lie(state: State) -> Lie:
 
 
 class Rest(NamedTuple):
-    """The same of a single state, as truths."""
+    """The same of a single state, as truths, and what is held."""
 
     things: Things
     on: Bools  # of blocks on things, shape (blocks * things,)
     room: Bools  # for a block on things, shape (things,)
+    held: Bools  # shape (blocks,)
 
 
 @shared
@@ -96,8 +97,10 @@ def rest(state: State) -> Rest:
     """What lies on what in a single state: what is at the right height is looked at closely."""
     things, values = Things.of(state.layout), state.data.tolist()
     boxes = [FloatBox(*read(values)) for read in things.boxes]
-    is_movable = [values[i] > 0.5 for i in things.is_movable.tolist()]
-    is_target = [values[i] > 0.5 for i in things.is_target.tolist()]
+    is_movable, is_target, held = (
+        [values[i] > 0.5 for i in label.tolist()]
+        for label in (things.is_movable, things.is_target, things.held)
+    )
     targets = [boxes[i] for i in range(things.blocks, len(boxes)) if is_target[i]]
     on = np.zeros((things.blocks, len(boxes)), dtype=bool)
     room = np.ones(len(boxes), dtype=bool)
@@ -114,7 +117,7 @@ def rest(state: State) -> Rest:
                 )
             if covers and (is_movable[i] or is_target[i]):
                 room[i] = False
-    return Rest(things, on.reshape(-1), room)
+    return Rest(things, on.reshape(-1), room, np.array(held))
 
 
 def _is_centred(block: FloatBox, target: FloatBox) -> bool:

@@ -32,8 +32,8 @@ TYPES = (ROBOT, THING, BLOCK, SURFACE)
 def _on(state: State, block: Column, thing: Column) -> Bools:
     if state.data.ndim > 1:
         return _on_margin(state, block, thing) >= 0.0
-    things, on, _ = rest(state)
-    return on[things.pairs(block, thing)]
+    known = rest(state)
+    return known.on[known.things.pairs(block, thing)]
 
 
 def _on_margin(state: State, block: Column, thing: Column) -> Array:
@@ -44,8 +44,8 @@ def _on_margin(state: State, block: Column, thing: Column) -> Array:
 def _nothing_on(state: State, thing: Column) -> Bools:
     if state.data.ndim > 1:
         return _nothing_on_margin(state, thing) >= 0.0
-    things, _, room = rest(state)
-    return room[things.numbers(thing)]
+    known = rest(state)
+    return known.room[known.things.numbers(thing)]
 
 
 def _nothing_on_margin(state: State, thing: Column) -> Array:
@@ -68,14 +68,19 @@ def _always(state: State, column: Column) -> Bools:
 
 
 def _held(state: State, _: Column, block: Column) -> Bools:
-    return _is(state, block, "held")
+    if state.data.ndim > 1:
+        return _is(state, block, "held")
+    known = rest(state)
+    return known.held[known.things.numbers(block)]
 
 
-def _not_held(state: State, _: Column, block: Column) -> Bools:
-    return ~_is(state, block, "held")
+def _not_held(state: State, robot: Column, block: Column) -> Bools:
+    return ~_held(state, robot, block)
 
 
 def _gripper_empty(state: State, _: Column) -> Bools:
+    if state.data.ndim == 1:
+        return np.array([not rest(state).held.any()])
     held = _is(state, _all(state.layout, BLOCK), "held")
     empty: Bools = ~np.logical_or.reduce(held, axis=-1, keepdims=True)
     return empty

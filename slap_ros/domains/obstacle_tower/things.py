@@ -45,6 +45,7 @@ class Things:
     z: Indices  # (things,), as the labels
     is_movable: Indices
     is_target: Indices
+    held: Indices  # (blocks,)
     boxes: tuple[Read, ...]  # of each, what a FloatBox is made of
     _numbers: dict[Asked, Indices] = field(default_factory=dict)
 
@@ -71,6 +72,7 @@ class Things:
             z=where("z")[0],
             is_movable=where("is_movable")[0],
             is_target=where("is_target")[0],
+            held=layout.columns(blocks, "held"),
             boxes=tuple(box(obj) for obj in objects),
         )
 

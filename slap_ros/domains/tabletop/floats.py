@@ -41,8 +41,11 @@ class FloatBox:
 
     def covers(self, other: FloatBox) -> bool:
         """Whether it is over the other somewhere, both seen from above along the other's axes."""
-        (cos, sin), (ahead, aside) = other._frame or other._find_frame()
         x, y = self.x - other.x, self.y - other.y
+        least = min(other._half)  # a box reaches so far, whichever way one looks
+        if x * x + y * y <= least * least:
+            return True
+        (cos, sin), (ahead, aside) = other._frame or other._find_frame()
         ahead -= abs(cos * x + sin * y)
         aside -= abs(cos * y - sin * x)
         if ahead >= 0.0 and aside >= 0.0:
