@@ -128,10 +128,9 @@ SETTINGS: Mapping[str, Mapping[str, TrainingSettings]] = {
         ),
         "cluttered_drawer": replace(
             OURS,
-            ppo=replace(LEARN, total_steps=160_000),
-            polish=replace(POLISH, total_steps=100_000),
-            horizon=40,
-            starts=150,
+            polish=replace(POLISH, total_steps=200_000),
+            horizon=50,
+            starts=600,
         ),
         "cleanup_table": replace(
             OURS,

@@ -65,6 +65,7 @@ VIEW = View(
     apart=seeing.apart,
     settled=seeing.settled,
     lost=seeing.lower_than(BOTTOM),
+    strain=seeing.strain,
     slack={f"{side}Clear": FINGER_ROOM for side in SIDES},
     grasping=GRASPING,
     length_m=0.05,
