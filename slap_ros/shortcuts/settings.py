@@ -126,6 +126,14 @@ SETTINGS: Mapping[str, Mapping[str, TrainingSettings]] = {
             horizon=30,
             starts=300,
         ),
+        "obstacle_tower": replace(
+            OURS,
+            ppo=replace(LEARN, rollout_steps=128, batch_size=512, total_steps=300_000),
+            polish=replace(POLISH, total_steps=400_000),
+            horizon=50,
+            starts=1200,
+            shortcuts=1,
+        ),
         "cluttered_drawer": replace(
             OURS,
             polish=replace(POLISH, total_steps=200_000),

@@ -28,6 +28,7 @@ from slap_ros.shortcuts.signature import Change, Kind, Signature, concerned, kin
 
 WEIGHT = 3.0  # of an atom that is not done at all against being ``length_m`` away
 QUEUE = 3.0  # of an object whose turn has not come, against the same
+HANDS_OFF = 3.0  # of being where the last object was put while it still moves, against the same
 STRAIN = 3.0  # of an axis at its limit, against the same: a policy that drives it there is stuck
 DONE = 1e-9  # deficit below which an atom counts as done
 
@@ -99,10 +100,10 @@ class Look:
     Args:
         observations: For the policy, shape (n, size); of the same size for all changes that the
             signature suits.
-        potential: About minus the steps to go, shape (n,), for shaping rewards. Three terms: what
+        potential: About minus the steps to go, shape (n,), for shaping rewards. Four terms: what
             is missing of the changed atoms, through the metric behind each predicate; the way to
-            the lowest object of which something is missing: it carries the rest; and the robot's
-            strain.
+            the lowest object of which something is missing: it carries the rest; where nothing is
+            missing but rest, how close the hand still is; and the robot's strain.
         near: Whether nothing is missing, slack included, and nothing moves, shape (n,).
         lost: Whether something happened that cannot be undone, shape (n,): the domain says what,
             and what was let go of somewhere else than it should be is out of hand.
@@ -182,11 +183,14 @@ class Sight:
         ways = self._ways(state, hand)
         missing = self._missing(state, deficits, ways)
         done, settled = deficits < DONE, self.view.settled(state)
-        near = done.all(axis=-1) & settled
+        put = done.all(axis=-1)
+        near = put & settled
         dropped = done[:, self._empties].any(axis=-1) & settled & ~near
         return Look(
             self._observe(state, hand, missing),
-            self._potential(deficits, missing, ways) - STRAIN * self.view.strain(state),
+            self._potential(deficits, missing, ways)
+            - HANDS_OFF * np.where(put & ~settled, self._closeness(ways), 0.0)
+            - STRAIN * self.view.strain(state),
             near,
             self.view.lost(state) | dropped,
         )
@@ -240,6 +244,12 @@ class Sight:
         queue = QUEUE * np.maximum(left.sum(axis=-1) - 1, 0)
         potential: Array = -(WEIGHT * deficits.sum(axis=-1) + way + queue)
         return potential
+
+    def _closeness(self, ways: Array) -> Array:
+        """How close the hand is to the nearest object, 0 to 1: what it presses on does not rest."""
+        nearest = ways.min(axis=-1, initial=np.inf)
+        closeness: Array = np.maximum(1.0 - nearest / self.view.length_m, 0.0)
+        return closeness
 
     def _observe(self, state: State, hand: Array, missing: Array) -> NDArray[np.float32]:
         parts = [self.view.robot(state, hand)]
