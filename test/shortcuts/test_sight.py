@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from slap_ros.domains import get_domain
+from slap_ros.domains.tabletop.seeing import hand
 from slap_ros.physics.features import ROBOT
 from slap_ros.physics.panda import JOINT_HIGH
+from slap_ros.physics.scene import TABLE_TOP
 from slap_ros.relational import State
-from slap_ros.shortcuts.sight import STRAIN, Sight
+from slap_ros.shortcuts.sight import HANDS_OFF, STRAIN, Sight
 from slap_ros.shortcuts.signature import Change, Signature
 
 TOWER = get_domain("obstacle_tower", "paper")
@@ -52,3 +54,28 @@ def test_a_batch_is_strained_like_its_states(sight):
     alone = [TOWER.view.strain(State(state.layout, row[None]))[0] for row in rows]
     assert together == pytest.approx(np.array(alone))
     assert len(set(together)) == 20
+
+
+def after_the_slap(block_to_hand_m, speed):
+    """The target is free. A block of the tower moves, so far below the hand; the rest is away."""
+    state = TOWER.task(0).initial_state
+    x, y, z = hand(state.alone())[0, :3, 3]
+    features = {
+        (state.layout.object(f"block{number}"), axis): value
+        for number in (2, 3, 4)
+        for axis, value in zip("xyz", (0.4, 0.3, TABLE_TOP + 0.025 + 0.05 * number), strict=True)
+    }
+    below = zip("xyz", (x, y, z - 0.025 - block_to_hand_m), strict=True)
+    moving = state.layout.object("block2")
+    features |= {(moving, axis): value for axis, value in below}
+    return state.replace({**features, (moving, "vx"): speed})
+
+
+def test_the_hand_is_to_leave_what_is_done_but_does_not_rest(sight):
+    def look(block_to_hand_m, speed):
+        return sight.look(after_the_slap(block_to_hand_m, speed).alone())
+
+    near, far = look(0.02, 0.5), look(0.2, 0.5)
+    assert not near.near[0] and not far.near[0]
+    assert far.potential[0] - near.potential[0] == pytest.approx(0.8 * HANDS_OFF)
+    assert look(0.02, 0.0).potential[0] == pytest.approx(far.potential[0])  # it may rest there
