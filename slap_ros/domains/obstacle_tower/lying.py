@@ -90,6 +90,7 @@ class Rest(NamedTuple):
     on: Bools  # of blocks on things, shape (blocks * things,)
     room: Bools  # for a block on things, shape (things,)
     held: Bools  # shape (blocks,)
+    empty: Bools  # whether none is, shape (1,)
 
 
 @shared
@@ -117,7 +118,7 @@ def rest(state: State) -> Rest:
                 )
             if covers and (is_movable[i] or is_target[i]):
                 room[i] = False
-    return Rest(things, on.reshape(-1), room, np.array(held))
+    return Rest(things, on.reshape(-1), room, np.array(held), np.array([not any(held)]))
 
 
 def _is_centred(block: FloatBox, target: FloatBox) -> bool:

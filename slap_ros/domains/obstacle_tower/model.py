@@ -80,7 +80,7 @@ def _not_held(state: State, robot: Column, block: Column) -> Bools:
 
 def _gripper_empty(state: State, _: Column) -> Bools:
     if state.data.ndim == 1:
-        return np.array([not rest(state).held.any()])
+        return rest(state).empty
     held = _is(state, _all(state.layout, BLOCK), "held")
     empty: Bools = ~np.logical_or.reduce(held, axis=-1, keepdims=True)
     return empty

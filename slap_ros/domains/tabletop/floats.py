@@ -42,15 +42,19 @@ class FloatBox:
     def covers(self, other: FloatBox) -> bool:
         """Whether it is over the other somewhere, both seen from above along the other's axes."""
         x, y = self.x - other.x, self.y - other.y
-        least = min(other._half)  # a box reaches so far, whichever way one looks
-        if x * x + y * y <= least * least:
+        # However they are turned, a box reaches as far as its shortest half edge, and never as far
+        # as all three together.
+        distance2, least = x * x + y * y, min(other._half)
+        if distance2 <= least * least:
             return True
+        most = sum(self._half)
+        if distance2 > (most + sum(other._half)) ** 2:
+            return False
         (cos, sin), (ahead, aside) = other._frame or other._find_frame()
         ahead -= abs(cos * x + sin * y)
         aside -= abs(cos * y - sin * x)
         if ahead >= 0.0 and aside >= 0.0:
             return True  # its middle is
-        most = sum(self._half)
         if ahead + most < 0.0 or aside + most < 0.0:
             return False
         more_ahead, more_aside = self._reach(cos, sin)
