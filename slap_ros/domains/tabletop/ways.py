@@ -36,6 +36,7 @@ from slap_ros.physics.pose import Pose
 from slap_ros.relational import Object, State
 
 CLEARANCE = 0.05  # m, over a place before coming down to it and after leaving it
+RISES = (CLEARANCE, 2.0 * CLEARANCE)  # m, after leaving a place
 SEED = 0  # of motion plans: a plan is a function of the state alone
 ATTEMPTS = 2  # random paths for a motion that needs them; more shorten it by little
 PLANS = PlanCache(attempts=ATTEMPTS)
@@ -171,11 +172,22 @@ class Descent:
 
 @remembered
 def _departure(surroundings: Surroundings, state: State) -> Path | None:
-    """Straight up, where the fingers or the body in them are still close to something."""
-    q = joints_of(state)
+    """Straight up, where the fingers or the body in them are still close to something.
+
+    Higher, where one cannot go across from there: shortcuts leave a hand deep between things.
+    """
+    q, free = joints_of(state), _free(surroundings, state)
     if surroundings.checker(state, held_margin=AT_EASE)(q[None])[0]:
         return q[None]
-    return linear_motion(q, shifted(grasp_pose(q), (0.0, 0.0, CLEARANCE)))
+    first: Path | None = None
+    for rise in RISES:
+        up = linear_motion(q, shifted(grasp_pose(q), (0.0, 0.0, rise)))
+        if up is None:
+            break
+        first = up if first is None else first
+        if free(up[-1:])[0]:
+            return up
+    return first
 
 
 @remembered

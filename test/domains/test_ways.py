@@ -1,0 +1,50 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How the hand leaves where it is."""
+
+import pytest
+
+from slap_ros.domains import get_domain
+from slap_ros.domains.obstacle_tower.skills import SURROUNDINGS
+from slap_ros.domains.tabletop.grasps import from_above
+from slap_ros.domains.tabletop.reading import JOINT_NAMES, joints_of, pose_of
+from slap_ros.domains.tabletop.ways import CLEARANCE, Way
+from slap_ros.motion import nearest_configurations
+from slap_ros.physics.features import ROBOT
+from slap_ros.physics.panda import grasp_pose
+from slap_ros.physics.scene import CUBE_EDGE
+
+DOMAIN = get_domain("obstacle_tower", "paper")
+FINGERS = 0.042  # m, from the hand's middle to where an open finger ends
+ELSEWHERE = from_above((0.45, -0.3, 0.3), 0.0)
+
+
+def beside_the_tower(gap, blocks_up):
+    """The hand beside the tower, so many blocks over its foot; the gap to a finger, m."""
+    state = DOMAIN.task(0).initial_state
+    x, y, z = pose_of(state, state.layout.object("block2")).position
+    aside = y - CUBE_EDGE / 2 - FINGERS - gap
+    pose = from_above((x, aside, z + blocks_up * CUBE_EDGE), 0.0)
+    (joints,) = nearest_configurations([pose], joints_of(state))
+    (robot,) = state.layout.of_type(ROBOT)
+    features = zip(JOINT_NAMES, joints, strict=True)
+    return state.replace({(robot, name): float(value) for name, value in features})
+
+
+def rise(state):
+    """How far it goes up before it goes elsewhere, m."""
+    (descent,) = Way(SURROUNDINGS, state, [ELSEWHERE], ()).descents
+    before, after = grasp_pose(joints_of(state)), grasp_pose(descent.up[-1])
+    return after.position[2] - before.position[2]
+
+
+@pytest.mark.parametrize(
+    ("gap", "blocks_up", "expected"),
+    [
+        (0.05, 4, 0.0),  # nothing is near
+        (0.002, 2, CLEARANCE),  # over the tower's top after that
+        (0.002, 1, 2 * CLEARANCE),  # with a finger still beside its top block after the first
+    ],
+)
+def test_the_hand_rises_until_it_can_go_across(gap, blocks_up, expected):
+    assert rise(beside_the_tower(gap, blocks_up)) == pytest.approx(expected, abs=1e-4)
