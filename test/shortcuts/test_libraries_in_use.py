@@ -15,10 +15,11 @@ import slap_ros
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError
 from slap_ros.evaluation.approaches import PURE_PLANNING, approaches
+from slap_ros.evaluation.experiment import Experiment, run_all
 from slap_ros.shortcuts import shipped
 from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.shipped import chosen_library, require_usable, shipped_library
-from slap_ros.shortcuts.shortcut import Sampling
+from slap_ros.shortcuts.shortcut import DEFAULT, Sampling
 
 DATA = Path(__file__).parent / "data" / "obstacle2d"
 DOMAIN = get_domain("obstacle2d")
@@ -234,3 +235,15 @@ def test_a_rehearsal_is_the_same_in_every_process_and_needs_no_torch():
     ]
     assert told[0] == told[1]
     assert told[0][1] == "True"  # something was rehearsed
+
+
+def test_the_shipped_shortcut_halves_what_the_drawer_takes():
+    domain = get_domain("cluttered_drawer", "paper")
+    library = chosen_library(None, domain)
+    given, *_, learned = approaches(library, DEFAULT)
+    alone, together = (
+        next(iter(run_all(Experiment(domain, 1, 1, 0, "lazy"), approach, 1)))
+        for approach in (given, learned)
+    )
+    assert alone.success and together.success
+    assert together.plan_length < alone.plan_length / 2
