@@ -4,14 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.relational import Column, Object, Predicate, State
+from slap_ros.relational import Column, GroundAtom, Object, Predicate, State
 from slap_ros.relational.predicates import Bools
 from slap_ros.relational.state import Array
 
@@ -48,6 +48,10 @@ def _always(state: State) -> Bools:
     return np.ones(state.data.shape[:-1], dtype=bool)
 
 
+def _exactly(_: GroundAtom) -> float:
+    return 0.0
+
+
 @dataclass(frozen=True)
 class View:
     """Numbers about batches of states, of magnitude 1 or so where features are concerned.
@@ -64,9 +68,9 @@ class View:
         lost: Whether something happened that cannot be undone, shape (n,).
         strain: How close the robot is to where it cannot move on, shape (n,): 1 for each of its
             axes that is at its limit, 0 well before.
-        slack: By how much the margin of a predicate must pass its threshold before a shortcut
-            counts as done, in the margin's unit, by the predicate's name. Room for the gripper
-            beside what a shortcut left lying about, for instance.
+        slack: By how much an atom's margin must pass its threshold before a shortcut counts as
+            done, in the margin's unit. Room for the gripper beside what a shortcut left lying
+            about, for instance.
         grasping: Predicates about what is held. Only shortcuts that change one of their atoms
             have the gripper among their actions.
         length_m: What is far and what is near: the scale of distances and margins.
@@ -80,7 +84,7 @@ class View:
     settled: Callable[[State], Bools] = _always
     lost: Callable[[State], Bools] = _never
     strain: Callable[[State], Array] = _none
-    slack: Mapping[str, float] = field(default_factory=dict)
+    slack: Callable[[GroundAtom], float] = _exactly
     grasping: frozenset[Predicate] = frozenset()
     length_m: float = 0.1
 

@@ -80,7 +80,7 @@ class _Atoms:
     predicate: Predicate
     wanted: bool
     columns: tuple[Column, ...]
-    slack: float
+    slack: Array  # of each
 
     def deficits(self, state: State, length: float) -> Array:
         """0 where done, towards 1 the further away, shape (n, atoms)."""
@@ -160,7 +160,8 @@ class Sight:
 
     def _group(self, wanted: bool, predicate: Predicate, atoms: Sequence[GroundAtom]) -> _Atoms:
         columns = tuple(Column(objs) for objs in zip(*(a.objects for a in atoms), strict=True))
-        return _Atoms(predicate, wanted, columns, self.view.slack.get(predicate.name, 0.0))
+        slack = np.array([self.view.slack(atom) for atom in atoms])
+        return _Atoms(predicate, wanted, columns, slack)
 
     def _of_kinds(self) -> list[tuple[int, Column, NDArray[np.intp]]]:
         """For each kind: slots, objects, and their numbers."""

@@ -79,3 +79,23 @@ def test_the_hand_is_to_leave_what_is_done_but_does_not_rest(sight):
     assert not near.near[0] and not far.near[0]
     assert far.potential[0] - near.potential[0] == pytest.approx(0.8 * HANDS_OFF)
     assert look(0.02, 0.0).potential[0] == pytest.approx(far.potential[0])  # it may rest there
+
+
+@pytest.mark.parametrize(("name", "done"), [("block2", True), ("target", False)])
+def test_fingers_need_room_around_the_target_alone(name, done):
+    state = TOWER.task(0).initial_state
+    space, thing = TOWER.atom_space(state), state.layout.object(name)
+    moved = {
+        (state.layout.object(f"block{number}"), axis): value
+        for number in (2, 3, 4)
+        for axis, value in zip("xy", (0.4, 0.3 - 0.1 * number), strict=True)
+    }
+    state = state.replace(moved)
+    top = state.get(thing, "z") + state.get(thing, "half_z")
+    over = zip("xyz", (state.get(thing, "x"), state.get(thing, "y"), top + 0.031), strict=True)
+    hovering = {(state.layout.object("block3"), axis): value for axis, value in over}
+    state = state.replace(hovering)  # 6 mm over it: it lies on nothing, but not by a finger's width
+    change = Change(space.mask([space.atom("NothingOn", [name])]), 0)
+    sight = Sight(TOWER, space, Signature.of(change, space), change)
+    assert space.abstract(state) & change.add
+    assert sight.look(state.alone()).near[0] == done

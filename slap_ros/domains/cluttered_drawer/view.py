@@ -10,11 +10,12 @@ from slap_ros.domains.cluttered_drawer.model import BLOCK, GRASPING, SIDES, SURF
 from slap_ros.domains.cluttered_drawer.scenery import BOTTOM
 from slap_ros.domains.tabletop import seeing
 from slap_ros.domains.view import View
-from slap_ros.relational import Column, State
+from slap_ros.relational import Column, GroundAtom, State
 from slap_ros.relational.state import Array
 
 NEAR = 0.1  # m, the scale of what is beside the target block
 AROUND = 0.01  # m, of the hand over the target block's middle: fingers halfway down beside it
+CLEAR = frozenset(f"{side}Clear" for side in SIDES)
 FINGER_ROOM = 0.002  # m, more than blocks nothing: so much the next grasp may be off
 
 
@@ -57,6 +58,10 @@ def _target(state: State) -> Column:
     return seeing.alone(state.layout.of_type(TARGET)[0])
 
 
+def _slack(atom: GroundAtom) -> float:
+    return FINGER_ROOM if atom.predicate.name in CLEAR else 0.0
+
+
 VIEW = View(
     hand=seeing.hand,
     robot=seeing.robot,
@@ -66,7 +71,7 @@ VIEW = View(
     settled=seeing.settled,
     lost=seeing.lower_than(BOTTOM),
     strain=seeing.strain,
-    slack={f"{side}Clear": FINGER_ROOM for side in SIDES},
+    slack=_slack,
     grasping=GRASPING,
     length_m=0.05,
 )

@@ -6,13 +6,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from slap_ros.domains.obstacle_tower.model import GRIPPER_EMPTY, HOLDING, NOT_HOLDING
+from slap_ros.domains.obstacle_tower.model import GRIPPER_EMPTY, HOLDING, NOT_HOLDING, NOTHING_ON
 from slap_ros.domains.obstacle_tower.things import BLOCK, SURFACE
 from slap_ros.domains.tabletop import seeing
 from slap_ros.domains.view import View
 from slap_ros.physics.features import ROBOT
 from slap_ros.physics.scene import CUBE_EDGE, TABLE_TOP
-from slap_ros.relational import Column, State
+from slap_ros.relational import Column, GroundAtom, State
 from slap_ros.relational.state import Array
 
 NEAR = 0.1  # m, the scale of what is beside the target
@@ -68,6 +68,12 @@ def _distance(state: State, hand: Array, column: Column) -> Array:
     return np.where(state.stack(column, "is_target") > 0.5, distance, np.inf)
 
 
+def _slack(atom: GroundAtom) -> float:
+    """Fingers need room around the target; blocks may lie as they like."""
+    frees_target = atom.predicate == NOTHING_ON and atom.objects[0].type.is_a(SURFACE)
+    return FINGER_ROOM if frees_target else 0.0
+
+
 VIEW = View(
     hand=seeing.hand,
     robot=seeing.robot,
@@ -77,6 +83,6 @@ VIEW = View(
     settled=seeing.settled,
     lost=seeing.lower_than(FALLEN),
     strain=seeing.strain,
-    slack={"NothingOn": FINGER_ROOM},
+    slack=_slack,
     grasping=frozenset({HOLDING, NOT_HOLDING, GRIPPER_EMPTY}),
 )
