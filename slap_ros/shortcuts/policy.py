@@ -57,8 +57,8 @@ class Policy:
 
     def mean(self, observations: Weights) -> Weights:
         """The most likely actions, shape (n, actions), not yet clipped to [-1, 1]."""
-        some = [observations[i : i + TOGETHER] for i in range(0, len(observations), TOGETHER)]
-        return np.concatenate([self._mean(part) for part in some])
+        rows = range(0, max(len(observations), 1), TOGETHER)
+        return np.concatenate([self._mean(observations[i : i + TOGETHER]) for i in rows])
 
     def _mean(self, observations: Weights) -> Weights:
         hidden = self.normalisation(observations)

@@ -132,7 +132,7 @@ SETTINGS: Mapping[str, Mapping[str, TrainingSettings]] = {
             polish=replace(POLISH, total_steps=400_000),
             horizon=50,
             starts=1200,
-            shortcuts=1,
+            shortcuts=1,  # all that is found is the slap, from the one or the other state
         ),
         "cluttered_drawer": replace(
             OURS,

@@ -118,7 +118,7 @@ def rest(state: State) -> Rest:
                 )
             if covers and (is_movable[i] or is_target[i]):
                 room[i] = False
-    return Rest(things, on.reshape(-1), room, np.array(held), np.array([not any(held)]))
+    return Rest(things, on.reshape(-1), room, np.array(held, bool), np.array([not any(held)]))
 
 
 def _is_centred(block: FloatBox, target: FloatBox) -> bool:
