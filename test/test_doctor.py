@@ -48,8 +48,9 @@ def environment(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     if not entry_points(group="embedded_ros.interfaces", name="slap_msgs"):
         # A checkout that is not installed.
         monkeypatch.setenv("EMBEDDED_ROS_INTERFACES", f"slap_msgs={ROOT / 'msg_schemas'}")
+    before = set(psutil.Process().children(recursive=True))
     yield
-    assert not psutil.Process().children(recursive=True)
+    assert not set(psutil.Process().children(recursive=True)) - before
 
 
 @pytest.fixture(scope="module")

@@ -123,7 +123,7 @@ def test_a_held_body_pushes_others(scene):
 def test_an_arm_far_away_skips_what_rests_and_a_near_one_does_not():
     state = apart([0.0015 - float(shape.points[:, 2].min()) for shape in shipped().values()])
     with PandaWorld(TOYS, state) as world:
-        settled = settle(world, 5)
+        settled = settle(world)
         simulation, world._simulation = world._simulation, None  # asking it would fail
         assert world.step(STILL) == settled
         with pytest.raises(AttributeError):
