@@ -4,13 +4,13 @@
 
 import pytest
 
+from benchmarks.physics_step import with_joints
 from slap_ros.domains import get_domain
 from slap_ros.domains.obstacle_tower.skills import SURROUNDINGS
 from slap_ros.domains.tabletop.grasps import from_above
-from slap_ros.domains.tabletop.reading import JOINT_NAMES, joints_of, pose_of
+from slap_ros.domains.tabletop.reading import joints_of, pose_of
 from slap_ros.domains.tabletop.ways import CLEARANCE, Way
 from slap_ros.motion import nearest_configurations
-from slap_ros.physics.features import ROBOT
 from slap_ros.physics.panda import grasp_pose
 from slap_ros.physics.scene import CUBE_EDGE
 
@@ -26,9 +26,7 @@ def beside_the_tower(gap, blocks_up):
     aside = y - CUBE_EDGE / 2 - FINGERS - gap
     pose = from_above((x, aside, z + blocks_up * CUBE_EDGE), 0.0)
     (joints,) = nearest_configurations([pose], joints_of(state))
-    (robot,) = state.layout.of_type(ROBOT)
-    features = zip(JOINT_NAMES, joints, strict=True)
-    return state.replace({(robot, name): float(value) for name, value in features})
+    return with_joints(state, joints)
 
 
 def rise(state):

@@ -22,6 +22,7 @@ from slap_ros.errors import SkillNotApplicableError
 from slap_ros.motion import (
     CollisionChecker,
     Free,
+    Joints,
     MotionPlanningError,
     Path,
     PlanCache,
@@ -36,7 +37,6 @@ from slap_ros.physics.pose import Pose
 from slap_ros.relational import Object, State
 
 CLEARANCE = 0.05  # m, over a place before coming down to it and after leaving it
-RISES = (CLEARANCE, 2.0 * CLEARANCE)  # m, after leaving a place
 SEED = 0  # of motion plans: a plan is a function of the state alone
 ATTEMPTS = 2  # random paths for a motion that needs them; more shorten it by little
 PLANS = PlanCache(attempts=ATTEMPTS)
@@ -176,18 +176,18 @@ def _departure(surroundings: Surroundings, state: State) -> Path | None:
 
     Higher, where one cannot go across from there: shortcuts leave a hand deep between things.
     """
-    q, free = joints_of(state), _free(surroundings, state)
+    q = joints_of(state)
     if surroundings.checker(state, held_margin=AT_EASE)(q[None])[0]:
         return q[None]
-    first: Path | None = None
-    for rise in RISES:
-        up = linear_motion(q, shifted(grasp_pose(q), (0.0, 0.0, rise)))
-        if up is None:
-            break
-        first = up if first is None else first
-        if free(up[-1:])[0]:
-            return up
-    return first
+    low = _up(q, CLEARANCE)
+    if low is None or _free(surroundings, state)(low[-1:])[0]:
+        return low
+    high = _up(q, 2.0 * CLEARANCE)
+    return high if high is not None and _free(surroundings, state)(high[-1:])[0] else low
+
+
+def _up(q: Joints, rise: float) -> Path | None:
+    return linear_motion(q, shifted(grasp_pose(q), (0.0, 0.0, rise)))
 
 
 @remembered
