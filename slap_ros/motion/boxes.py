@@ -48,8 +48,13 @@ def apart(turn: Array, offset: Array, half_a: Array, half_b: Array, distance: Ar
         return found
     rest = (~found).nonzero()[0]
     pairs = turn[rest], offset[rest], half_a[rest], half_b[rest]
-    gap = np.maximum(_gaps_across_edges(*pairs), _gaps_between_nearest_points(*pairs))
+    gap, length = _gaps_between_nearest_points(*pairs)
     found[rest] = gap >= distance[rest]
+    # Two points of theirs that are too close settle it; mostly one of the two is so.
+    rest = rest[(gap < distance[rest]) & (length >= distance[rest])]
+    if len(rest):
+        pairs = turn[rest], offset[rest], half_a[rest], half_b[rest]
+        found[rest] = _gaps_across_edges(*pairs) >= distance[rest]
     return found
 
 
@@ -75,10 +80,12 @@ def _gaps_across_edges(turn: Array, offset: Array, half_a: Array, half_b: Array)
     return cast(Array, np.where(parallel, -np.inf, gap).max((1, 2)))
 
 
-def _gaps_between_nearest_points(turn: Array, offset: Array, half_a: Array, half_b: Array) -> Array:
-    """The gap along the line through a point of A and one of B that are nearest in the limit.
+def _gaps_between_nearest_points(
+    turn: Array, offset: Array, half_a: Array, half_b: Array
+) -> tuple[Array, Array]:
+    """The gap along the line through a point of A and one of B, and how far apart these are.
 
-    Each is projected onto the other's box in turn.
+    Each is projected onto the other's box in turn: in the limit they are the nearest.
     """
     back = turn.swapaxes(1, 2)
     in_b = offset  # the centre of A
@@ -92,7 +99,8 @@ def _gaps_between_nearest_points(turn: Array, offset: Array, half_a: Array, half
     shadow = np.abs((line * _apply(turn, offset)).sum(-1))
     length = np.linalg.norm(line, axis=-1)
     touching = length < _TOUCHING
-    return np.where(touching, -np.inf, (shadow - reach) / np.where(touching, 1.0, length))
+    gap = np.where(touching, -np.inf, (shadow - reach) / np.where(touching, 1.0, length))
+    return gap, length
 
 
 def _apply(matrices: Array, vectors: Array) -> Array:

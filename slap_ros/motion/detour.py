@@ -28,7 +28,7 @@ BENDS = 512  # to choose from
 SPREAD = 10.0  # control steps, the widest standard deviation of the bends from the straight way
 _MIDDLE = 0.2, 0.8  # where on the straight way
 _BATCH = 32  # bends that are looked at together
-_GLANCES = 2, 6  # configurations each way from a bend: by them most blocked paths are found out
+_GLANCES = 1, 3, 6  # configurations each way, up to a bend: most blocked paths show at a few
 
 
 def detour(

@@ -32,8 +32,10 @@ def shorten(
         if first == last:  # on the same straight piece
             continue
         a, b = points_at(path, times, np.array((begin, end)))
+        if control_steps(a, b) >= end - begin - _GAIN:
+            continue
         line = between(a, b, resolution)
-        if control_steps(a, b) < end - begin - _GAIN and free_count(line, free) == len(line):
+        if free_count(line, free) == len(line):
             path = np.concatenate([path[:first], [a, b], path[last:]])
     return without_repeats(path)
 
