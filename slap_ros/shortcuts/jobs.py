@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -19,12 +20,12 @@ from slap_ros.planning.planner import GraphPlanner, Problem
 from slap_ros.shortcuts.explore import Explorer, Origin
 from slap_ros.shortcuts.library import load_shortcut, save_shortcut
 from slap_ros.shortcuts.ppo_settings import PpoSettings
-from slap_ros.shortcuts.practice import Practice
 from slap_ros.shortcuts.repertoire import Repertoire
 from slap_ros.shortcuts.settings import TRAINING_SEED, Exploration, TrainingSettings
 from slap_ros.shortcuts.shortcut import Sampling, Shortcut
 from slap_ros.shortcuts.signature import Signature
-from slap_ros.shortcuts.starts import StartRecord, find_start, recall
+from slap_ros.shortcuts.starts import StartRecord, find_start
+from slap_ros.shortcuts.team import Exercise, practising
 
 if TYPE_CHECKING:
     from slap_ros.shortcuts.ppo import Learner, Progress
@@ -97,36 +98,39 @@ def learn(
     starts: tuple[StartRecord, ...],
     settings: TrainingSettings,
     folder: str,
+    processes: int,
 ) -> Shortcut:
     """Train a shortcut; what it is and how it goes is kept in ``folder``.
 
-    Begun before, it goes on from the last checkpoint; done before, it is read.
+    Begun before, it goes on from the last checkpoint; done before, it is read. How many processes
+    it uses makes no difference to what is learned.
     """
     from slap_ros.shortcuts.ppo import Learner, normalisation_of  # torch, here alone
 
     keep = Kept(Path(folder))
     if keep.finished.exists():
         return load_shortcut(keep.shortcut)
-    domain = place.make()
-    rng = np.random.default_rng([place.seed, len(starts)])
-    known = recall(domain, starts)
 
-    def practice(ppo: PpoSettings) -> Practice:
+    def exercises(stage: int, ppo: PpoSettings) -> list[Exercise]:
         rewards = replace(settings.rewards, discount=ppo.discount)
-        return Practice(domain, signature, known, ppo.environments, settings.horizon, rewards, rng)
+        seeds = [(place.seed, len(starts), stage, part) for part in range(ppo.parts)]
+        what = (place.domain, place.preset, signature, starts)
+        count = ppo.environments // ppo.parts
+        return [Exercise(*what, count, settings.horizon, rewards, seed) for seed in seeds]
 
-    normalisation = normalisation_of(practice(settings.ppo), rng, WARM_UP)
+    rng = np.random.default_rng([place.seed, len(starts)])
+    normalisation = normalisation_of(exercises(0, settings.ppo)[0].begin(), rng, WARM_UP)
     watch = Watch(keep)
     learner: Learner | None = None
     for stage, ppo in enumerate(settings.stages):
-        earlier = learner
-        learner = Learner(practice(ppo), normalisation, ppo, place.seed)
-        if earlier is not None:
-            learner.inherit(earlier)
-        if keep.checkpoint(stage).exists():
-            learner.resume(keep.checkpoint(stage))
-        learner.learn(watch.of(stage, learner), keep.path / "tensorboard")
-        learner.save(keep.checkpoint(stage))
+        with practising(exercises(stage, ppo), processes) as episodes:
+            earlier, learner = learner, Learner(episodes, normalisation, ppo, place.seed)
+            if earlier is not None:
+                learner.inherit(earlier)
+            if keep.checkpoint(stage).exists():
+                learner.resume(keep.checkpoint(stage))
+            learner.learn(watch.of(stage, learner), keep.path / "tensorboard")
+            learner.save(keep.checkpoint(stage))
     assert learner is not None  # there is one stage at least
     shortcut = Shortcut(signature, learner.policy(), learner.shortest, watch.record())
     save_shortcut(keep.shortcut, shortcut)
@@ -140,7 +144,7 @@ class Watch:
     def __init__(self, keep: Kept) -> None:
         self._keep = keep
         self._began = self._saved = monotonic()
-        self._cpu_s = process_time()
+        self._cpu_s = _cpu_s()
         self._latest: dict[int, Progress] = {}
 
     def of(self, stage: int, learner: Learner) -> Callable[[Progress], bool]:
@@ -167,8 +171,13 @@ class Watch:
             "episodes": sum(progress.episodes for progress in self._latest.values()),
             "success": last.success,
             "length": last.length if last.length == last.length else -1.0,
-            "cpu_s": process_time() - self._cpu_s,
+            "cpu_s": _cpu_s() - self._cpu_s,
         }
+
+
+def _cpu_s() -> float:
+    """Of this process, and of those that it started and that have ended."""
+    return sum(os.times()[:4])
 
 
 @dataclass(frozen=True)

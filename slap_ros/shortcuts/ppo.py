@@ -21,7 +21,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from slap_ros.errors import InvalidParameterError
 from slap_ros.shortcuts.policy import Normalisation, Policy
 from slap_ros.shortcuts.ppo_settings import PpoSettings
-from slap_ros.shortcuts.practice import Practice
+from slap_ros.shortcuts.practice import Episodes
 
 RECENT = 200  # episodes over which success and length are taken
 
@@ -41,7 +41,7 @@ class Progress:
 class _Adapter(VecEnv):
     """Practice as stable-baselines3 wants it."""
 
-    def __init__(self, practice: Practice, normalisation: Normalisation) -> None:
+    def __init__(self, practice: Episodes, normalisation: Normalisation) -> None:
         self.practice, self.normalisation = practice, normalisation
         self.history: deque[tuple[bool, int, bool]] = deque(maxlen=RECENT)
         self.episodes = 0
@@ -115,7 +115,7 @@ class _Watch(BaseCallback):
         return self._go_on
 
 
-def normalisation_of(practice: Practice, rng: np.random.Generator, steps: int) -> Normalisation:
+def normalisation_of(practice: Episodes, rng: np.random.Generator, steps: int) -> Normalisation:
     """From what random actions, each held for a while, let a policy see."""
     seen = []
     for step in range(steps):
@@ -129,7 +129,7 @@ class Learner:
     """PPO on one shortcut's practice."""
 
     def __init__(
-        self, practice: Practice, normalisation: Normalisation, settings: PpoSettings, seed: int
+        self, practice: Episodes, normalisation: Normalisation, settings: PpoSettings, seed: int
     ) -> None:
         torch.set_num_threads(1)  # tiny networks: more threads only wait for one another
         self.settings = settings

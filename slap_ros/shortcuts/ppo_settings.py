@@ -12,6 +12,7 @@ class PpoSettings:
     """PPO's hyper-parameters, under their usual names."""
 
     environments: int = 16
+    parts: int = 1  # of the environments, that may be stepped side by side
     rollout_steps: int = 64  # in each environment between updates
     batch_size: int = 256
     epochs: int = 10

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from slap_ros.domains import Domain
 from slap_ros.relational import AtomSpace, State
 from slap_ros.relational.predicates import Bools
 from slap_ros.relational.state import Array
+from slap_ros.shortcuts.action_map import ActionMap
 from slap_ros.shortcuts.sight import Sight
 from slap_ros.shortcuts.signature import Change, Signature
 
@@ -85,6 +86,34 @@ class Steps:
     def ended(self) -> Bools:
         """Whether the episode is over."""
         return self.done | self.lost | self.late
+
+
+class Episodes(Protocol):
+    """Episodes that are stepped together, wherever they are."""
+
+    @property
+    def episodes(self) -> int:
+        """How many."""
+        ...
+
+    @property
+    def horizon(self) -> int:
+        """Steps of each at most."""
+        ...
+
+    @property
+    def actions(self) -> ActionMap:
+        """What the policy's actions are."""
+        ...
+
+    @property
+    def observations(self) -> NDArray[np.float32]:
+        """The present ones, shape (episodes, size)."""
+        ...
+
+    def step(self, actions: Array) -> Steps:
+        """Take the policies' actions, shape (episodes, k), from -1 to 1."""
+        ...
 
 
 class Practice:

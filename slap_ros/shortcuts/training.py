@@ -186,7 +186,8 @@ class Training:
     def _learn(self, signature: Signature, starts: tuple[StartRecord, ...]) -> Shortcut:
         folder = self.folder / signature.name
         self.audience.learning(signature.name, folder, self.settings.total_steps)
-        work = [(self.place, signature, starts, self.settings, str(folder))]
+        processes = self.workers.processes
+        work = [(self.place, signature, starts, self.settings, str(folder), processes)]
         ((_, shortcut),) = self.workers.run(jobs.learn, work)
         return shortcut
 

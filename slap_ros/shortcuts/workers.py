@@ -22,6 +22,11 @@ WATCH_S = 1.0
 class Workers(Protocol):
     """Runs jobs side by side; each is a function of its arguments alone, wherever it runs."""
 
+    @property
+    def processes(self) -> int:
+        """How many a job that runs alone may use."""
+        ...
+
     def run(
         self, function: Callable[..., Result], jobs: Sequence[tuple[Any, ...]]
     ) -> Iterator[tuple[int, Result]]:
@@ -31,6 +36,8 @@ class Workers(Protocol):
 
 class NoWorkers:
     """This process does everything itself, one job after the other."""
+
+    processes = 1
 
     def run(
         self, function: Callable[..., Result], jobs: Sequence[tuple[Any, ...]]
@@ -43,8 +50,8 @@ class NoWorkers:
 class LocalWorkers:
     """Processes of this machine."""
 
-    def __init__(self, pool: ProcessPoolExecutor) -> None:
-        self._pool = pool
+    def __init__(self, pool: ProcessPoolExecutor, processes: int) -> None:
+        self._pool, self.processes = pool, processes
 
     def run(
         self, function: Callable[..., Result], jobs: Sequence[tuple[Any, ...]]
@@ -57,6 +64,8 @@ class LocalWorkers:
 
 class RayWorkers:
     """Processes of a Ray cluster, on which slap_ros must be installed."""
+
+    processes = 1  # a job has one core there
 
     def __init__(self, ray: Any) -> None:
         self._ray = ray
@@ -73,7 +82,7 @@ class RayWorkers:
             yield numbers[ready], self._ray.get(ready)
 
 
-def _end_with(parent: int) -> None:
+def end_with(parent: int) -> None:
     """Let this process end when its parent is no more, however that came about."""
 
     def watch() -> None:
@@ -90,10 +99,10 @@ def local_workers(count: int) -> Iterator[LocalWorkers]:
     # Spawned, not forked: physics clients and threads do not survive a fork.
     context = get_context("spawn")
     pool = ProcessPoolExecutor(
-        count, mp_context=context, initializer=_end_with, initargs=(os.getpid(),)
+        count, mp_context=context, initializer=end_with, initargs=(os.getpid(),)
     )
     try:
-        yield LocalWorkers(pool)
+        yield LocalWorkers(pool, count)
     except BaseException:
         for process in list((pool._processes or {}).values()):
             process.terminate()

@@ -4,40 +4,15 @@
 
 import numpy as np
 import pytest
+from pushing import DOMAIN, SIGNATURE, STARTS, overlap
 
-from slap_ros.domains import get_domain
-from slap_ros.planning.planner import Problem
 from slap_ros.relational import State
 from slap_ros.shortcuts.action_map import ActionMap
-from slap_ros.shortcuts.practice import Practice, Rewards, Start
+from slap_ros.shortcuts.practice import Practice, Rewards
 from slap_ros.shortcuts.sight import Sight
 from slap_ros.shortcuts.signature import Change, Signature
 
-DOMAIN = get_domain("obstacle2d", "fair")
 OURS = Rewards()
-
-
-def start_of(index):
-    """Holding the target block, to push the obstacle out of the target area."""
-    task = DOMAIN.task(21, index)
-    problem = Problem.of(DOMAIN, task.initial_state)
-    space = problem.model.space
-    (pick,) = [o for g, o in problem.operators if str(g) == "Pick(robot, block1, table)"]
-    (ground,) = [g for g, _ in problem.operators if str(g) == "Pick(robot, block1, table)"]
-    held = problem.model.roll_out(
-        pick, task.initial_state, ground.apply(space.abstract(task.initial_state))
-    )
-    assert held.reached
-    add = space.mask([space.atom("Clear", ["target"]), space.atom("On", ["block2", "table"])])
-    return Start(held.final, space, Change(add, space.mask([overlap(space)])))
-
-
-def overlap(space):
-    return space.atom("Overlap", ["block2", "target"])
-
-
-STARTS = [start_of(index) for index in range(8)]
-SIGNATURE = Signature.of(STARTS[0].change, STARTS[0].space)
 
 
 def practice(episodes=24, horizon=25, rewards=OURS, seed=3):
