@@ -7,7 +7,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from time import monotonic, process_time
 from typing import TYPE_CHECKING, Any
@@ -112,7 +112,7 @@ def learn(
         return load_shortcut(keep.shortcut)
 
     def exercises(stage: int, ppo: PpoSettings) -> list[Exercise]:
-        rewards = replace(settings.rewards, discount=ppo.discount)
+        rewards = settings.rewards_in(stage)
         seeds = [(place.seed, len(starts), stage, part) for part in range(ppo.parts)]
         what = (place.domain, place.preset, signature, starts)
         count = ppo.environments // ppo.parts

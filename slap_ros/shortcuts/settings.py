@@ -57,6 +57,7 @@ class TrainingSettings:
         ppo: How they are learned.
         polish: How they are made shorter then, with less noise.
         rewards: From what.
+        careful: From what, when they are made shorter: what noise still loses can then be spared.
         horizon: Environment steps of a training episode.
         starts: Initial states, each of another task.
         shortcuts: How many are trained at most, the most promising first.
@@ -69,6 +70,7 @@ class TrainingSettings:
     ppo: PpoSettings = LEARN
     polish: PpoSettings | None = POLISH
     rewards: Rewards = field(default_factory=Rewards)
+    careful: Rewards | None = None
     horizon: int = 100
     starts: int = 300
     shortcuts: int = 4
@@ -80,6 +82,11 @@ class TrainingSettings:
     def stages(self) -> tuple[PpoSettings, ...]:
         """What is done one after the other."""
         return (self.ppo,) if self.polish is None else (self.ppo, self.polish)
+
+    def rewards_in(self, stage: int) -> Rewards:
+        """From what is learned in a stage, with its discount."""
+        rewards = self.rewards if stage == 0 or self.careful is None else self.careful
+        return replace(rewards, discount=self.stages[stage].discount)
 
     @property
     def total_steps(self) -> int:
@@ -128,10 +135,13 @@ SETTINGS: Mapping[str, Mapping[str, TrainingSettings]] = {
         ),
         "obstacle_tower": replace(
             OURS,
-            ppo=replace(LEARN, rollout_steps=128, batch_size=512, total_steps=300_000),
-            polish=replace(POLISH, total_steps=400_000),
+            ppo=replace(LEARN, environments=32, parts=2, batch_size=512, total_steps=300_000),
+            polish=replace(
+                POLISH, environments=32, parts=2, batch_size=1024, total_steps=1_500_000
+            ),
+            careful=Rewards(lost=-30.0),
             horizon=50,
-            starts=1200,
+            starts=4000,
             shortcuts=1,  # all that is found is the slap, from the one or the other state
         ),
         "cluttered_drawer": replace(

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from slap_ros.domains import get_domain
-from slap_ros.domains.tabletop.seeing import hand
+from slap_ros.domains.tabletop.reading import JOINT_NAMES
+from slap_ros.domains.tabletop.seeing import SWIFT, along, hand, moving_hand
 from slap_ros.physics.features import ROBOT
-from slap_ros.physics.panda import JOINT_HIGH
+from slap_ros.physics.panda import JOINT_HIGH, JOINT_LOW, MAX_STEP
 from slap_ros.physics.scene import TABLE_TOP
 from slap_ros.relational import State
 from slap_ros.shortcuts.sight import HANDS_OFF, STRAIN, Sight
@@ -99,3 +100,17 @@ def test_fingers_need_room_around_the_target_alone(name, done):
     sight = Sight(TOWER, space, Signature.of(change, space), change)
     assert space.abstract(state) & change.add
     assert sight.look(state.alone()).near[0] == done
+
+
+def test_joints_are_seen_to_take_the_hand_as_far_as_they_do():
+    state, rng = TOWER.task(0).initial_state, np.random.default_rng(4)
+    (robot,) = state.layout.of_type(ROBOT)
+    joints = dict(zip(JOINT_NAMES, rng.uniform(JOINT_LOW, JOINT_HIGH), strict=True))
+    here = state.replace({(robot, name): value for name, value in joints.items()})
+    moving, way = moving_hand(here.alone()), rng.normal(size=3)
+    seen = along(moving, way[None, None])[0, 0]
+    part = 1e-5  # of a control step
+    for i, (name, value) in enumerate(joints.items()):
+        there = here.replace({(robot, name): value + part * MAX_STEP[i]})
+        shift = hand(there.alone())[0, :3, 3] - moving[0, :3, 3]
+        assert seen[i] == pytest.approx(shift @ way / np.linalg.norm(way) / part / SWIFT, abs=1e-4)

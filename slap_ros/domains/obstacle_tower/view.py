@@ -17,24 +17,39 @@ from slap_ros.relational.state import Array
 
 NEAR = 0.1  # m, the scale of what is beside the target
 FALLEN = TABLE_TOP - 0.05  # m, below which a block's centre is off the table
-FINGER_ROOM = 0.02  # m, between the target and what lies beside it, to put a block down there
+FINGER_ROOM = 0.005  # m, between the target and what lies beside it: enough for two fingers
 BESIDE, OVER = CUBE_EDGE / 2, CUBE_EDGE  # m, of the hand over a block's middle and a target's
 
 
 def _things(state: State, hand: Array, column: Column) -> Array:
-    """Where from the hand, in the base's axes.
+    """Where from the hand, in the base's axes; and which joints take the hand there.
 
-    Of blocks also: how fast, and where over the target. Of what is fixed: which way it is turned.
+    Of blocks also: how fast, where over the target, and which joints push them away from there. Of
+    what is fixed: which way it is turned.
     """
     if column.objects[0].type.is_a(ROBOT):
         return seeing.nothing(state, column)
     place = seeing.place(state, hand, column)
     if column.objects[0].type.is_a(BLOCK):
-        over = _over_target(state, column) / NEAR
-        return np.concatenate([place, seeing.speed(state, column), over], axis=-1)
+        parts = [
+            place,
+            seeing.speed(state, column),
+            _over_target(state, column) / NEAR,
+            seeing.along(hand, seeing.ways_over(state, hand, column, BESIDE)),
+            seeing.along(hand, _off_target(state, column)),
+        ]
+        return np.concatenate(parts, axis=-1)
     turn = state.gather(column, ("qz", "qw"))
     yaw = 8.0 * np.arctan2(turn[..., 0], turn[..., 1])  # a square looks the same four times
-    return np.concatenate([place, np.sin(yaw)[..., None], np.cos(yaw)[..., None]], axis=-1)
+    turned = np.stack([np.sin(yaw), np.cos(yaw)], axis=-1)
+    there = seeing.along(hand, seeing.ways_over(state, hand, column, OVER))
+    return np.concatenate([place, turned, there], axis=-1)
+
+
+def _off_target(state: State, column: Column) -> Array:
+    """The level ways from the middle of the target, m, shape (n, objects, 3)."""
+    ways = state.gather(column, ("x", "y")) - state.gather(_target(state), ("x", "y"))
+    return np.pad(ways, ((0, 0), (0, 0), (0, 1)))
 
 
 def _over_target(state: State, column: Column) -> Array:
@@ -75,7 +90,7 @@ def _slack(atom: GroundAtom) -> float:
 
 
 VIEW = View(
-    hand=seeing.hand,
+    hand=seeing.moving_hand,
     robot=seeing.robot,
     things=_things,
     distance=_distance,

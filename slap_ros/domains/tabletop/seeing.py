@@ -12,7 +12,7 @@ import numpy as np
 from slap_ros.domains.tabletop.reading import GRASP_NAMES, JOINT_NAMES, bodies
 from slap_ros.motion.kinematics import GRASP_IN_LAST_LINK, arm_frames, matrix
 from slap_ros.physics.features import ROBOT
-from slap_ros.physics.panda import GRASP_POINT, JOINT_HIGH, JOINT_LOW, JOINTS
+from slap_ros.physics.panda import GRASP_POINT, JOINT_HIGH, JOINT_LOW, JOINTS, MAX_STEP
 from slap_ros.physics.scene import TABLE_TOP
 from slap_ros.relational import Column, Object, State
 from slap_ros.relational.predicates import Bools
@@ -23,6 +23,8 @@ FAST = 0.5  # m/s
 STILL = 0.05  # m/s and rad/s, along each axis: a body so slow stays where it is
 AT_EASE = 0.8  # of a joint's range, from its middle to its limit
 OFF_CENTRE = 0.02  # m, the scale of where in the fingers a body is held
+SWIFT = 0.05  # m, the scale of how far the hand goes in a control step
+AT_IT = 0.02  # m, below which the way to a thing has no direction to speak of
 
 POSITION = ("x", "y", "z")
 VELOCITY = ("vx", "vy", "vz")
@@ -39,6 +41,35 @@ def hand(state: State) -> Array:
     return frame
 
 
+def moving_hand(state: State) -> Array:
+    """Beside its frame how far each joint moves the hand in a control step at full speed, m.
+
+    Shape (n, 4, 4 + joints), the last row of what is beside the frame 0.
+    """
+    links = arm_frames(_joints(state))
+    frame = links[:, -1] @ _GRASP_FRAME
+    levers = frame[:, None, :3, 3] - links[:, :, :3, 3]
+    moves = np.cross(links[:, :, :3, 2], levers) * np.array(MAX_STEP)[:, None]
+    beside = np.pad(moves, ((0, 0), (0, 0), (0, 1))).swapaxes(1, 2)
+    return np.concatenate([frame, beside], axis=-1)
+
+
+def along(hand: Array, ways: Array) -> Array:
+    """How far each joint takes a moving hand along some ways, shape (n, ways, joints).
+
+    What it takes to go somewhere differs with the arm's configuration; a small network that is
+    shown joints and places would have to learn the arm's kinematics first.
+
+    Args:
+        hand: What :func:`moving_hand` gives.
+        ways: m, shape (n, ways, 3).
+    """
+    lengths = np.sqrt(np.square(ways).sum(axis=-1, keepdims=True))
+    directions = ways / np.maximum(lengths, AT_IT)
+    far: Array = directions @ hand[:, :3, 4:] / SWIFT
+    return far
+
+
 def grasp_point(joints: Array) -> Array:
     """Where the point between the fingertips is, m: joint positions (..., 7) to (..., 3)."""
     frames = arm_frames(joints.reshape(-1, JOINTS))[:, -1]
@@ -52,7 +83,7 @@ def robot(state: State, hand: Array) -> Array:
     held = state.stack(bodies(layout), "held").max(axis=-1, keepdims=True)
     offset = state.gather(layout.column_of(ROBOT), GRASP_NAMES[:3])[:, 0] - _GRASP_OFFSET
     joints = _over_ranges(state)
-    height = (hand[:, 2, 3:] - TABLE_TOP) / FAR
+    height = (hand[:, 2, 3:4] - TABLE_TOP) / FAR
     axes = (hand[:, :3, 0], hand[:, :3, 2])
     return np.concatenate([joints, *axes, height, held, held * offset / OFF_CENTRE], axis=-1)
 
@@ -87,9 +118,15 @@ def never_near(state: State, column: Column) -> Array:
 
 def to_over(state: State, hand: Array, column: Column, height: float) -> Array:
     """From the hand to ``height`` m over the middles of things, m, shape (n, objects)."""
-    way = from_hand(state, hand, column) + np.array([0.0, 0.0, height])
-    distance: Array = np.sqrt(np.square(way).sum(axis=-1))
+    ways = ways_over(state, hand, column, height)
+    distance: Array = np.sqrt(np.square(ways).sum(axis=-1))
     return distance
+
+
+def ways_over(state: State, hand: Array, column: Column, height: float) -> Array:
+    """The ways from the hand to ``height`` m over the middles of things, m, (n, objects, 3)."""
+    ways: Array = from_hand(state, hand, column) + np.array([0.0, 0.0, height])
+    return ways
 
 
 def from_hand(state: State, hand: Array, column: Column) -> Array:
