@@ -127,7 +127,7 @@ class Training:
         explored = self._explore()
         ranked = rank(explored)
         self.audience.candidates(ranked)
-        operator_steps = _mean_steps(explored)
+        operator_steps = mean_steps(explored)
         length = baseline = self._plan_length(())
         tried: set[Learning] = set()
         for candidate in ranked:
@@ -263,7 +263,7 @@ class Training:
         }
 
 
-def _mean_steps(explored: Sequence[Explored]) -> dict[str, float]:
+def mean_steps(explored: Sequence[Explored]) -> dict[str, float]:
     """Of each operator, over all explored tasks."""
     steps: dict[str, list[float]] = {}
     for one in explored:
