@@ -4,6 +4,7 @@
 
 import itertools
 import socket
+from contextlib import contextmanager
 
 import pytest
 
@@ -24,12 +25,25 @@ def pytest_addoption(parser):
 @pytest.fixture
 def network(monkeypatch):
     """A DDS domain that no other worker, and no other run of these tests, uses meanwhile."""
+    with _domain() as number:
+        monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
+        monkeypatch.delenv("ROS_AUTOMATIC_DISCOVERY_RANGE", raising=False)
+        yield number
+
+
+@pytest.fixture
+def other_network():
+    """One more."""
+    with _domain() as number:
+        yield number
+
+
+@contextmanager
+def _domain():
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as claim:
         candidates = itertools.islice(_next_ids, len(DOMAIN_IDS))
         number = next((number for number in candidates if _claims(claim, number)), None)
         assert number is not None, "every domain is in use"
-        monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
-        monkeypatch.delenv("ROS_AUTOMATIC_DISCOVERY_RANGE", raising=False)
         yield number
 
 

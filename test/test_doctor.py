@@ -342,6 +342,8 @@ def test_probe_ends_when_the_doctor_dies() -> None:
     with doctor:
         assert doctor.stdout is not None
         probe = psutil.Process(int(doctor.stdout.readline()))
+        while not probe.cmdline():  # as long as it is being replaced by its program
+            time.sleep(0.01)
         assert PROBE in probe.cmdline()
         doctor.send_signal(signal.SIGKILL)
     for _ in range(600):

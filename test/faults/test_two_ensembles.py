@@ -101,16 +101,16 @@ def ensemble(namespace, settings):
         )
 
 
-def test_domain_ids_keep_two_ensembles_apart(network, tmp_path):
+def test_domain_ids_keep_two_ensembles_apart(network, other_network, tmp_path):
     runs = {
         side: subprocess.Popen(
             [sys.executable, "-m", "slap_ros.cli", "run", "obstacle2d", "--shortcuts", "none",
              "--seed", str(seed), "--record", str(tmp_path / side)],
-            env=os.environ | {"ROS_DOMAIN_ID": str(network + 50 * number)},
+            env=os.environ | {"ROS_DOMAIN_ID": str(number)},
             stderr=subprocess.PIPE,
             text=True,
         )
-        for number, (side, seed) in enumerate(SEEDS.items())
+        for number, (side, seed) in zip((network, other_network), SEEDS.items(), strict=True)
     }  # fmt: skip
     for side, run in runs.items():
         _, said = run.communicate(timeout=2 * LIMIT)
