@@ -50,7 +50,7 @@ def apart(turn: Array, offset: Array, half_a: Array, half_b: Array, distance: Ar
     pairs = turn[rest], offset[rest], half_a[rest], half_b[rest]
     gap, length = _gaps_between_nearest_points(*pairs)
     found[rest] = gap >= distance[rest]
-    # Two points of theirs that are too close settle it; mostly one of the two is so.
+    # Two points of theirs that are too close settle it as well; hardly any pair is left over.
     rest = rest[(gap < distance[rest]) & (length >= distance[rest])]
     if len(rest):
         pairs = turn[rest], offset[rest], half_a[rest], half_b[rest]

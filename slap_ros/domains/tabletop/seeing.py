@@ -55,7 +55,7 @@ def moving_hand(state: State) -> Array:
 
 
 def along(hand: Array, ways: Array) -> Array:
-    """How far each joint takes a moving hand along some ways, shape (n, ways, joints).
+    """How far each joint takes a moving hand along some ways, in SWIFT, (n, ways, joints).
 
     What it takes to go somewhere differs with the arm's configuration; a small network that is
     shown joints and places would have to learn the arm's kinematics first.
