@@ -19,14 +19,13 @@ from slap_ros.shortcuts.jobs import Place
 from slap_ros.shortcuts.practice import Start
 from slap_ros.shortcuts.settings import training_settings
 from slap_ros.shortcuts.shipped import chosen_library
-from slap_ros.shortcuts.shortcut import Shortcut
+from slap_ros.shortcuts.shortcut import DEFAULT, PAPER, Shortcut
 from slap_ros.shortcuts.sight import Sight
 from slap_ros.shortcuts.starts import find_start, recall
 from slap_ros.shortcuts.training import mean_steps, rank
 
 FRESH = 3_000_000  # the first seed of its tasks
-HORIZON = 100  # environment steps (the paper's T_eval)
-SOON = 40  # environment steps, the planner's default
+HORIZON, SOON = PAPER.horizon, DEFAULT.horizon  # environment steps of an attempt
 
 
 def starts_of(

@@ -31,12 +31,13 @@ def _things(state: State, hand: Array, column: Column) -> Array:
         return seeing.nothing(state, column)
     place = seeing.place(state, hand, column)
     if column.objects[0].type.is_a(BLOCK):
+        off = _off_target(state, column)
         parts = [
             place,
             seeing.speed(state, column),
-            _over_target(state, column) / NEAR,
+            _over_target(state, off) / NEAR,
             seeing.along(hand, seeing.ways_over(state, hand, column, BESIDE)),
-            seeing.along(hand, _off_target(state, column)),
+            seeing.along(hand, np.pad(off, ((0, 0), (0, 0), (0, 1)))),
         ]
         return np.concatenate(parts, axis=-1)
     turn = state.gather(column, ("qz", "qw"))
@@ -47,17 +48,16 @@ def _things(state: State, hand: Array, column: Column) -> Array:
 
 
 def _off_target(state: State, column: Column) -> Array:
-    """The level ways from the middle of the target, m, shape (n, objects, 3)."""
-    ways = state.gather(column, ("x", "y")) - state.gather(_target(state), ("x", "y"))
-    return np.pad(ways, ((0, 0), (0, 0), (0, 1)))
+    """Positions in the plane from the middle of the target, m, shape (n, objects, 2)."""
+    off: Array = state.gather(column, ("x", "y")) - state.gather(_target(state), ("x", "y"))
+    return off
 
 
-def _over_target(state: State, column: Column) -> Array:
-    """Positions in the plane along the axes of the target, from its middle, m, (n, objects, 2)."""
-    x, y, z, w = np.moveaxis(state.gather(_target(state), ("x", "y", "qz", "qw")), -1, 0)
+def _over_target(state: State, off: Array) -> Array:
+    """The same along the axes of the target."""
+    z, w = np.moveaxis(state.gather(_target(state), ("qz", "qw")), -1, 0)
     sin, cos = 2.0 * z * w, w * w - z * z
-    seen = state.gather(column, ("x", "y"))
-    dx, dy = seen[..., 0] - x, seen[..., 1] - y
+    dx, dy = off[..., 0], off[..., 1]
     return np.stack([cos * dx + sin * dy, cos * dy - sin * dx], axis=-1)
 
 
