@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.printing import show
+from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.motion import (
-    Box,
     CollisionChecker,
     Joints,
     MotionPlanningError,
@@ -33,7 +33,7 @@ from slap_ros.motion import (
 from slap_ros.physics.panda import HOME, JOINT_HIGH, JOINT_LOW, Pose, grasp_pose
 
 HALF = (0.025, 0.025, 0.025)  # m, of a block
-TABLE = Box(Pose((0.5, 0.0, -0.175)), (0.25, 0.4, 0.25))
+TABLE = OrientedBox(Pose((0.5, 0.0, -0.175)), (0.25, 0.4, 0.25))
 ON_TABLE = 0.1  # m, the height of a block's centre
 APPROACH = 0.05  # m
 LIFT = 0.005  # m, of a held block over the table where its carriage ends
@@ -45,14 +45,14 @@ Figures = dict[str, dict[str, float]]
 class Scene(NamedTuple):
     """A tower and where a block is taken from and carried to, past the tower."""
 
-    tower: list[Box]
-    block: Box
+    tower: list[OrientedBox]
+    block: OrientedBox
     place: tuple[float, float]  # m
 
 
-def block(x: float, y: float, z: float = ON_TABLE) -> Box:
+def block(x: float, y: float, z: float = ON_TABLE) -> OrientedBox:
     """A block, its centre in m."""
-    return Box(Pose((x, y, z)), HALF)
+    return OrientedBox(Pose((x, y, z)), HALF)
 
 
 def top_down(x: float, y: float, z: float, yaw: float = 0.0) -> Pose:
@@ -130,7 +130,7 @@ def measure_plans(queries: int) -> Figures:
         if grasp is None:
             failed["approach"] += 1
             continue
-        carrying = CollisionChecker([TABLE, *scene.tower], held=Box(Pose(), HALF))
+        carrying = CollisionChecker([TABLE, *scene.tower], held=OrientedBox(Pose(), HALF))
         place = top_down(*scene.place, ON_TABLE + LIFT)
         failed["carry"] += _plan(rows["carry"], grasp, place, carrying, seed) is None
     return {

@@ -26,6 +26,7 @@ import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
+from slap_ros.geometry.pose import Pose, conjugate, multiply
 from slap_ros.meshes.obj import to_obj
 from slap_ros.meshes.solid import Solid
 from slap_ros.physics.arm import Arm
@@ -40,7 +41,6 @@ from slap_ros.physics.panda import (
     grasp_pose,
     jacobian,
 )
-from slap_ros.physics.pose import Pose, conjugate, multiply
 from slap_ros.physics.scene import CUBE_EDGE, FRICTION, TABLE, TABLE_TOP, Body, Scene, cube
 from slap_ros.physics.simulation import PANDA, Drive, Simulation, Stepping
 from slap_ros.physics.snapshot import Motion, Reader

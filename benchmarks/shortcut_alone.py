@@ -12,7 +12,8 @@ import argparse
 from statistics import fmean
 
 from benchmarks.printing import show
-from slap_ros.domains import Domain, get_domain
+from slap_ros.core import Domain
+from slap_ros.domains import get_domain
 from slap_ros.shortcuts import jobs
 from slap_ros.shortcuts.explore import Explored
 from slap_ros.shortcuts.jobs import Place
@@ -45,7 +46,7 @@ def starts_of(
 def attempt(shortcut: Shortcut, domain: Domain, start: Start) -> int | None:
     """Steps until it is done; None where it is lost, or not done by the horizon."""
     sight = Sight(domain, start.space, shortcut.signature, start.change)
-    worlds = domain.make_worlds([start.state])
+    worlds = domain.make_vector_world([start.state])
     look = sight.look(worlds.states)
     for step in range(1, HORIZON + 1):
         choice = shortcut.policy.mean(look.observations)

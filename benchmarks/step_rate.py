@@ -23,7 +23,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.printing import show
-from slap_ros.domains import Domain, get_domain
+from slap_ros.core import Domain
+from slap_ros.domains import get_domain
 from slap_ros.domains.obstacle2d.dynamics import step
 from slap_ros.physics.panda import MAX_STEP
 from slap_ros.relational import State
@@ -130,7 +131,7 @@ def with_atoms(domain: Domain, initial: State | None = None) -> float:
     initial = initial or get_domain(domain.name, "paper").task(0).initial_state
     space, world = domain.atom_space(initial), domain.make_world(initial)
     rng = np.random.default_rng(0)
-    high = np.array([*domain.shortcut_actions.high[:-1], 0.0])
+    high = np.array([*domain.learned_actions.high[:-1], 0.0])
     seconds = 0.0
     for _ in range(SINGLE_STEPS // EPISODE):
         world.reset(initial)

@@ -12,8 +12,7 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import KeyValue
 from std_msgs.msg import Header
 
-from slap_ros.domains import Domain, Skill, Task
-from slap_ros.domains.domain import Action
+from slap_ros.core import Action, Domain, Skill, Task
 from slap_ros.perception import Percept
 from slap_ros.planning.options import OptionKind
 from slap_ros.planning.plan import Plan, PlanEdge
@@ -53,7 +52,7 @@ def domain_info(domain: Domain, stamp: Time) -> msgs.DomainInfo:
         operators_pddl=write_domain(domain.name, domain.types, domain.predicates, domain.operators),
         action_names=[axis.name for axis in arm],
         action_units=[axis.unit for axis in arm],
-        control_period=domain.control_period_s,
+        control_period=domain.execution.control_period_s,
         configuration=key_values(domain.configuration),
         versions=key_values(versions()),
     )

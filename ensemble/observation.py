@@ -13,7 +13,8 @@ from slap_msgs.msg import Task as TaskMessage
 
 from ensemble.interfaces import ATOMS, DOMAIN, STATE, TASK, Topic
 from ensemble.waiting import seconds, until
-from slap_ros.domains import Domain, Task, get_domain
+from slap_ros.core import Domain, Task
+from slap_ros.domains import get_domain
 from slap_ros.messages.decode import (
     decode_atoms,
     decode_goal,

@@ -10,7 +10,7 @@ from rclpy.node import Node
 
 from ensemble.observation import Episode
 from ensemble.parameters import parameter
-from slap_ros.domains import Domain
+from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.shortcuts.library import Library
 from slap_ros.shortcuts.repertoire import Repertoire

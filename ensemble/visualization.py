@@ -16,7 +16,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from ensemble import encode
 from ensemble.interfaces import JOINT_STATES, MARKERS, TF
-from slap_ros.domains.domain import Domain, VisibleBody
+from slap_ros.core import Domain, VisibleBody
 from slap_ros.messages.interfaces import BODIES
 from slap_ros.relational import State
 
@@ -37,9 +37,9 @@ class Visualizer:
 
     def show(self, state: State, stamp: Time) -> None:
         """Publish a state."""
-        bodies = self._domain.bodies(state)
+        bodies = self._domain.display.bodies(state)
         shown = markers(bodies, stamp)
-        shown.markers.extend(markers(self._domain.arm(state), stamp, ROBOT).markers)
+        shown.markers.extend(markers(self._domain.display.arm(state), stamp, ROBOT).markers)
         self._markers.publish(shown)
         self._frames.publish(frames(bodies, stamp))
         joints = joint_state(state, stamp)

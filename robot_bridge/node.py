@@ -72,7 +72,8 @@ from ensemble.running import run_node
 from ensemble.visualization import markers
 from ensemble.waiting import seconds
 from robot_bridge.robot import Robot, RobotParameters
-from slap_ros.domains import Task, get_domain
+from slap_ros.core import Task
+from slap_ros.domains import get_domain
 from slap_ros.errors import (
     BusyError,
     ControllerAbortedError,
@@ -327,7 +328,7 @@ class RobotBridge(Node):
 
     def _show(self, state: State, stamp: Time) -> None:
         # Not as frames or joint states: those are the robot's own to publish.
-        self._markers.publish(markers(self._domain.bodies(state), stamp))
+        self._markers.publish(markers(self._domain.display.bodies(state), stamp))
 
     def _on_reset(
         self, request: ResetTask.Request, response: ResetTask.Response

@@ -20,7 +20,7 @@ from robot_bridge.controllers import (
     action_name,
 )
 from robot_bridge.senses import Senses
-from slap_ros.domains import Domain
+from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError, NoJointStateError
 from slap_ros.relational import State
 from slap_ros.robot.cell import Cell

@@ -15,10 +15,10 @@ from tf2_msgs.msg import TFMessage
 from ensemble.interfaces import JOINT_STATES, SENSED, TF, TF_STATIC
 from ensemble.waiting import seconds
 from slap_ros.errors import InvalidMeasurementError
+from slap_ros.geometry.pose import Pose
+from slap_ros.geometry.static_transforms import StaticTransforms
 from slap_ros.messages.decode import NANOSECONDS, stamp_ns
-from slap_ros.physics.pose import Pose
 from slap_ros.robot.cell import Cell, Reading
-from slap_ros.robot.frames import StaticFrames
 from slap_ros.robot.tracking import measured_pose
 
 FINGERS = 2
@@ -33,7 +33,7 @@ class Senses:
         self._node, self._cell = node, cell
         self._arm = [f"{prefix}_joint{i + 1}" for i in range(7)]
         self._fingers = [f"{prefix}_finger_joint{i + 1}" for i in range(FINGERS)]
-        self._frames = StaticFrames(base)
+        self._frames = StaticTransforms(base)
         self.counts: Counter[str] = Counter(readings=0, detections=0, refused_measurements=0)
         self.gap: float | None = None  # m, between the fingers
         self.gap_s = 0.0  # stamp of the gap

@@ -44,7 +44,8 @@ from ensemble.interfaces import COMMAND, DOMAIN, FRESH, RESET_TASK, STATE, TASK
 from ensemble.parameters import parameter, read_parameters
 from ensemble.running import run_node
 from ensemble.visualization import Visualizer
-from slap_ros.domains import Domain, Task, World, get_domain
+from slap_ros.core import Domain, Task, World
+from slap_ros.domains import get_domain
 from slap_ros.errors import (
     ErrorCode,
     InvalidCommandError,

@@ -50,7 +50,7 @@ from ensemble.running import run_node
 from ensemble.shortcuts import Repertoires, ShortcutParameters
 from ensemble.waiting import run_in, seconds
 from skill_server.skill_run import SkillRun, requested_option, result
-from slap_ros.domains.domain import Action
+from slap_ros.core import Action
 from slap_ros.errors import ErrorCode, NoStateError, SlapError
 from slap_ros.planning.options import OptionExecution, Stopped
 

@@ -62,7 +62,7 @@ from robot_bridge.mock.noise import Disturbance, Noise
 from robot_bridge.mock.plant import Plant
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
-from slap_ros.physics.pose import Pose
+from slap_ros.geometry.pose import Pose
 from slap_ros.robot.workplace import DETECTED
 
 POST_PERIOD = 0.005  # s, between two looks at what is due to be published
@@ -107,7 +107,7 @@ class MockRobot(Node):
         if min(settings.rate, settings.joint_rate, settings.pace) <= 0.0:
             raise InvalidParameterError("parameters rate, joint_rate and pace must be above 0")
         domain = get_domain(settings.domain, settings.preset)
-        self._period_s = domain.control_period_s / settings.pace
+        self._period_s = domain.execution.control_period_s / settings.pace
         self._plant = Plant(domain, domain.task(settings.seed, settings.index).initial_state)
         self._noise = Noise(_disturbance(settings), np.random.default_rng(settings.noise_seed))
         self._counts = Counter(motions=0, grips=0, refused=0, aborted=0, canceled=0)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slap_ros.errors import InvalidParameterError
-from slap_ros.physics.pose import Pose, multiply
+from slap_ros.geometry.pose import Pose, multiply
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from slap_ros.domains import Domain
+from slap_ros.core import Domain
+from slap_ros.geometry.pose import Pose
 from slap_ros.physics.features import JOINT_FEATURES, POSE_FEATURES, ROBOT, VELOCITY_FEATURES
 from slap_ros.physics.panda import FINGER_OPEN, JOINTS, MAX_STEP
-from slap_ros.physics.pose import Pose
 from slap_ros.relational import State
 
 ARRIVED = 1e-6  # rad

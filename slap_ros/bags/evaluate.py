@@ -10,7 +10,7 @@ from pathlib import Path
 
 from slap_ros.bags.reader import Bag, read_bag
 from slap_ros.bags.recording import Episode, Recording, initial_state
-from slap_ros.domains import Domain
+from slap_ros.core import Domain
 from slap_ros.evaluation.metrics import AtomNames, RunLog, RunMetrics
 from slap_ros.messages.decode import decode_state
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from slap_ros.bags.reader import Bag
-from slap_ros.domains import Domain, get_domain
-from slap_ros.domains.domain import Action
+from slap_ros.core import Action, Domain
+from slap_ros.domains import get_domain
 from slap_ros.errors import ForeignBagError
 from slap_ros.evaluation.metrics import AtomNames, atom_names
 from slap_ros.messages.decode import decode_command, decode_state, stamp_ns

@@ -12,8 +12,7 @@ import numpy as np
 
 from slap_ros.bags.reader import read_bag
 from slap_ros.bags.recording import Episode, Recording, initial_state
-from slap_ros.domains import Domain, World
-from slap_ros.domains.domain import Action
+from slap_ros.core import Action, Domain, World
 from slap_ros.errors import DamagedBagError, InvalidCommandError, InvalidStateError
 from slap_ros.messages.decode import decode_state
 from slap_ros.relational import State

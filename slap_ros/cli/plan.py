@@ -11,7 +11,8 @@ import typer
 
 from slap_ros.cli.console import Goal, Index, Json, Planner, Preset, Seed, console, print_json
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose, sampling
-from slap_ros.domains import Domain, Task, get_domain
+from slap_ros.core import Domain, Task
+from slap_ros.domains import get_domain
 from slap_ros.drawing import draw_abstract_graph
 from slap_ros.errors import InvalidParameterError, StorageFullError
 from slap_ros.evaluation.approaches import approaches

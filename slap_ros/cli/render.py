@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from slap_ros.cli.console import console, progress
-from slap_ros.domains import Domain
+from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError, StorageFullError
 from slap_ros.physics.animation import WRITERS
 from slap_ros.relational import State
@@ -21,7 +21,7 @@ def check_renderable(domain: Domain, path: Path) -> None:
         InvalidParameterError: The domain has no pictures, or the file another ending than those
             of animations.
     """
-    if domain.animate is None:
+    if domain.display.animate is None:
         raise InvalidParameterError(f"{domain.name} has no pictures; leave out rendering")
     if path.suffix not in WRITERS:
         raise InvalidParameterError(
@@ -35,12 +35,12 @@ def render(domain: Domain, states: Sequence[State], path: Path) -> None:
     Raises:
         StorageFullError: It cannot be written.
     """
-    if domain.animate is None:
+    if domain.display.animate is None:
         raise InvalidParameterError(f"{domain.name} has no pictures")
     with progress() as bar:
         task = bar.add_task("rendering", total=len(states))
         try:
-            domain.animate(path, states, lambda done: bar.update(task, completed=done))
+            domain.display.animate(path, states, lambda done: bar.update(task, completed=done))
         except OSError as error:
             raise StorageFullError(f"cannot write {path}: {error.strerror or error}") from error
     console.print(f"animation: {path}", highlight=False)

@@ -85,6 +85,7 @@ def _table(recorded: Recorded, rehearsal: Rehearsal, arm: str) -> Table:
         if rehearsal.violations
         else f"{rehearsal.duration_s:.1f} s of motion"
     )
+    period_s = recorded.domain.execution.control_period_s
     table = Table(
         "closest to a limit",
         "value",
@@ -93,8 +94,7 @@ def _table(recorded: Recorded, rehearsal: Rehearsal, arm: str) -> Table:
         "step",
         title=(
             f"{recorded.domain.name}, seed {recorded.seed}, on {arm}: {steps} steps "
-            f"({steps * recorded.domain.control_period_s:.1f} s as recorded), {grips} grips, "
-            f"{verdict}"
+            f"({steps * period_s:.1f} s as recorded), {grips} grips, {verdict}"
         ),
     )
     for extreme in rehearsal.extremes:

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from slap_ros.cli.console import console
-from slap_ros.domains import Domain
+from slap_ros.core import Domain
 from slap_ros.shortcuts.library import Library
 from slap_ros.shortcuts.shipped import chosen_library
 from slap_ros.shortcuts.shortcut import DEFAULT, Sampling

@@ -2,17 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The domains, one folder each, and the registry that finds them."""
 
-from slap_ros.domains.domain import ActionSpace, Domain, Policy, Skill, Task, World
 from slap_ros.domains.registry import PRESETS, domain_names, get_domain
 
-__all__ = [
-    "PRESETS",
-    "ActionSpace",
-    "Domain",
-    "Policy",
-    "Skill",
-    "Task",
-    "World",
-    "domain_names",
-    "get_domain",
-]
+__all__ = ["PRESETS", "domain_names", "get_domain"]

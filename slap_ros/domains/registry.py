@@ -15,7 +15,7 @@ from functools import lru_cache
 from importlib import import_module
 from importlib.metadata import entry_points
 
-from slap_ros.domains.domain import Domain
+from slap_ros.core import Domain
 from slap_ros.domains.variation import parse_preset
 from slap_ros.errors import InvalidDomainError, InvalidParameterError, UnknownDomainError
 

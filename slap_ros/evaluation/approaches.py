@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from slap_ros.domains import Domain
+from slap_ros.core import Domain
 from slap_ros.planning.planner import Planner, make_planner
 from slap_ros.relational import State
 from slap_ros.shortcuts.library import Library

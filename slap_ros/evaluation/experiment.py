@@ -7,7 +7,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from slap_ros.domains import Domain, Task, get_domain
+from slap_ros.core import Domain, Task
+from slap_ros.domains import get_domain
 from slap_ros.evaluation.approaches import PURE_PLANNING, Approach
 from slap_ros.planning.execution import Episode, Executor
 from slap_ros.shortcuts.workers import local_workers

@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from slap_ros.errors import InvalidMeshError
+from slap_ros.geometry.pose import Vector
 from slap_ros.meshes.solid import Piece
-from slap_ros.physics.pose import Vector
 
 
 def to_obj(pieces: Sequence[Piece]) -> str:

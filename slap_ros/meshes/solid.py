@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slap_ros.errors import InvalidMeshError
-from slap_ros.physics.boxes import OrientedBox
-from slap_ros.physics.pose import Pose, Vector
+from slap_ros.geometry.oriented_box import OrientedBox
+from slap_ros.geometry.pose import Pose, Vector
 
 Array = NDArray[np.float64]
 LEAST_VOLUME = 1e-12  # m³: a cube of a tenth of a millimetre

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from slap_ros.domains.domain import Action
+from slap_ros.core import Action
 from slap_ros.errors import InvalidStateError
 from slap_ros.messages.protocols import (
     CommandMessage,

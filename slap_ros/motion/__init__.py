@@ -13,7 +13,6 @@ A motion to a pose is planned like this::
     positions = retime(path, free=free)  # one row a control step
 """
 
-from slap_ros.motion.boxes import Box
 from slap_ros.motion.cache import PlanCache
 from slap_ros.motion.collision import CollisionChecker
 from slap_ros.motion.errors import MotionPlanningError
@@ -37,7 +36,6 @@ from slap_ros.motion.planning import plan_path
 from slap_ros.motion.retiming import retime, retime_in_tens
 
 __all__ = [
-    "Box",
     "CollisionChecker",
     "Free",
     "Joints",

@@ -10,26 +10,26 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from slap_ros.motion.boxes import Box
-from slap_ros.physics.panda import Pose
+from slap_ros.geometry.oriented_box import OrientedBox
+from slap_ros.geometry.pose import Pose
 
 
 class RoundedBox(NamedTuple):
     """All points within ``radius`` (m) of a box that is fixed to a link."""
 
     link: str
-    box: Box  # its pose is in the link's frame
+    box: OrientedBox  # its pose is in the link's frame
     radius: float
 
 
 # Around link 0 and, wherever joint 1 turns it, link 1.
-BASE = Box(Pose((-0.006, 0.0, 0.195)), (0.153, 0.147, 0.198))
+BASE = OrientedBox(Pose((-0.006, 0.0, 0.195)), (0.153, 0.147, 0.198))
 
 _STRAIGHT = (0.0, 0.0, 0.0, 1.0)
 _EIGHTH_TURN = (0.0, 0.0, 0.3827, 0.9239)
 _TURN_3 = (-0.0669, -0.3758, 0.1659, 0.9093)
 _TURN_4 = (-0.1597, -0.0664, 0.3730, 0.9116)
-_FINGER = Box(Pose((0.0, 0.013, 0.027), _STRAIGHT), (0.010, 0.013, 0.027))
+_FINGER = OrientedBox(Pose((0.0, 0.013, 0.027), _STRAIGHT), (0.010, 0.013, 0.027))
 
 
 def _link(
@@ -39,7 +39,7 @@ def _link(
     half: tuple[float, float, float],
     radius: float,
 ) -> RoundedBox:
-    return RoundedBox(link, Box(Pose(centre, turn), half), radius)
+    return RoundedBox(link, OrientedBox(Pose(centre, turn), half), radius)
 
 
 ARM_SHAPES = (

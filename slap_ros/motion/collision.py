@@ -12,8 +12,9 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from slap_ros.geometry.box_separation import Flags, apart
+from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.motion.arm_shapes import ARM_SHAPES, BASE, BEHIND_ELBOW
-from slap_ros.motion.boxes import Box, Flags, apart
 from slap_ros.motion.joints import Array, Joints
 from slap_ros.motion.kinematics import GRASP_IN_LAST_LINK, LAST_LINK, arm_frames, matrix
 from slap_ros.physics.panda import FINGER_OPEN, JOINTS, LINKS, link_poses
@@ -34,9 +35,9 @@ class CollisionChecker:
 
     def __init__(
         self,
-        obstacles: Sequence[Box],
+        obstacles: Sequence[OrientedBox],
         *,
-        held: Box | None = None,
+        held: OrientedBox | None = None,
         finger: float = FINGER_OPEN,
         margin: float = MARGIN,
         held_margin: float = HELD_MARGIN,
@@ -107,7 +108,7 @@ class CollisionChecker:
 
 
 def _moving_shapes(
-    held: Box | None, finger: float, margin: float, held_margin: float
+    held: OrientedBox | None, finger: float, margin: float, held_margin: float
 ) -> tuple[NDArray[np.intp], Array, Array, Array]:
     """The arm's shapes and the held box, each fixed to one of link 1 to link 7.
 

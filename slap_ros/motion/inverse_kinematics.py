@@ -17,6 +17,7 @@ from typing import cast
 
 import numpy as np
 
+from slap_ros.geometry.pose import Pose
 from slap_ros.motion.joints import (
     HIGH,
     LOW,
@@ -28,7 +29,7 @@ from slap_ros.motion.joints import (
     within_limits,
 )
 from slap_ros.motion.kinematics import GRASP_IN_LAST_LINK, matrix
-from slap_ros.physics.panda import JOINTS, Pose
+from slap_ros.physics.panda import JOINTS
 
 SHOULDER = np.array([0.0, 0.0, 0.333])  # m, where the axes of joints 1, 2 and 3 meet
 UPPER_ARM, FOREARM = 0.316, 0.384  # m, along the axes of joints 3 and 5

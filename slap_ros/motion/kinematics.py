@@ -8,8 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from slap_ros.geometry.pose import Pose
 from slap_ros.motion.joints import Array, Joints
-from slap_ros.physics.panda import JOINTS, Pose, grasp_pose, link_poses
+from slap_ros.physics.panda import JOINTS, grasp_pose, link_poses
 
 LAST_LINK = JOINTS  # link 7, which carries the hand
 

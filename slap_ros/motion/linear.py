@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 
+from slap_ros.geometry.pose import ORIGIN, Pose, Vector, conjugate, multiply
 from slap_ros.motion.joints import (
     RESOLUTION,
     STEP,
@@ -19,8 +20,7 @@ from slap_ros.motion.joints import (
     path_configurations,
     within_limits,
 )
-from slap_ros.physics.panda import Pose, Reach, grasp_pose
-from slap_ros.physics.pose import ORIGIN, Vector, conjugate, multiply
+from slap_ros.physics.panda import Reach, grasp_pose
 
 INCREMENT = 0.0125  # m, between rows of the path: coming down, less than 1 mm off the line
 TURN_INCREMENT = 0.05  # rad

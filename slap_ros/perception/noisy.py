@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slap_ros.domains import Domain
+from slap_ros.core import Domain
 from slap_ros.perception.debounce import Debouncer
 from slap_ros.perception.percept import Percept
 from slap_ros.perception.quality import Quality
@@ -52,7 +52,7 @@ class NoisyPerceiver:
 
     def perceive(self, state: State) -> Percept:
         """See :class:`~slap_ros.perception.percept.Perceiver`."""
-        seen = self.domain.settle(self.sight.look(state))
+        seen = self.domain.execution.settle(self.sight.look(state))
         abstract = self.debouncer.add(self._abstract(seen))
         return Percept(seen, abstract, self.sight.missing, self.quality.exact)
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from slap_ros.geometry.pose import multiply, turn_about
 from slap_ros.perception.quality import Quality
-from slap_ros.physics.pose import multiply, turn_about
 from slap_ros.relational import Object, State
 
 POSITION = ("x", "y", "z")

@@ -12,10 +12,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from slap_ros.physics.boxes import OrientedBox
+from slap_ros.geometry.oriented_box import OrientedBox
+from slap_ros.geometry.pose import IDENTITY, Pose, Quaternion, Vector, conjugate, rotate
 from slap_ros.physics.links import LINK_SHAPES
 from slap_ros.physics.panda import HAND, link_poses
-from slap_ros.physics.pose import IDENTITY, Pose, Quaternion, Vector, conjugate, rotate
 from slap_ros.physics.scene import Body
 
 CLEARANCE = 0.003  # m, between the boxes around a link and a body, at which they do not touch

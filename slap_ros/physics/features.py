@@ -12,8 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from slap_ros.geometry.pose import IDENTITY, NO_TURN, ORIGIN, Pose, Vector
 from slap_ros.physics.panda import FINGER_OPEN, JOINTS
-from slap_ros.physics.pose import IDENTITY, NO_TURN, ORIGIN, Pose, Vector
 from slap_ros.physics.scene import CUBE_MATERIAL, Material
 from slap_ros.relational import Feature, Type
 

@@ -12,8 +12,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from slap_ros.geometry.pose import IDENTITY, Pose, conjugate, rotate
 from slap_ros.physics.panda import FINGER_OPEN, grasp_pose, hand_pose
-from slap_ros.physics.pose import IDENTITY, Pose, conjugate, rotate
 from slap_ros.physics.scene import Body, Scene
 from slap_ros.physics.snapshot import Motion, Snapshot
 

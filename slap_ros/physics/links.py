@@ -7,9 +7,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from slap_ros.physics.boxes import OrientedBox
+from slap_ros.geometry.oriented_box import OrientedBox
+from slap_ros.geometry.pose import Pose, Quaternion, Vector
 from slap_ros.physics.panda import LINKS
-from slap_ros.physics.pose import Pose, Quaternion, Vector
 
 
 @dataclass(frozen=True)

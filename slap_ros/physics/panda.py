@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.physics.pose import NO_TURN, ORIGIN, Pose, Vector, multiply, rotate
+from slap_ros.geometry.pose import NO_TURN, ORIGIN, Pose, Vector, multiply, rotate
 
 __all__ = [
     "CONTROL_PERIOD_S",

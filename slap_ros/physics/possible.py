@@ -8,10 +8,10 @@ import math
 from collections.abc import Sequence
 
 from slap_ros.errors import InvalidStateError
+from slap_ros.geometry.oriented_box import OrientedBox
+from slap_ros.geometry.pose import Pose
 from slap_ros.physics.arm import Arm, Obstacle, Sweep
-from slap_ros.physics.boxes import OrientedBox
 from slap_ros.physics.panda import FINGER_CLOSED, FINGER_OPEN, JOINT_HIGH, JOINT_LOW
-from slap_ros.physics.pose import Pose
 from slap_ros.physics.scene import Material, Scene
 from slap_ros.physics.snapshot import Snapshot
 

@@ -11,10 +11,10 @@ from types import TracebackType
 import numpy as np
 import pybullet
 
+from slap_ros.geometry.pose import Pose, Vector
 from slap_ros.meshes.solid import Piece, Solid
 from slap_ros.physics.animation import Picture, write_pictures
 from slap_ros.physics.panda import CONTROL_PERIOD_S
-from slap_ros.physics.pose import Pose, Vector
 from slap_ros.physics.scene import Body, Box, Scene
 from slap_ros.physics.simulation import PANDA
 from slap_ros.physics.snapshot import Reader

@@ -9,9 +9,9 @@ from functools import cached_property
 from typing import NamedTuple
 
 from slap_ros.errors import InvalidDomainError
+from slap_ros.geometry.oriented_box import OrientedBox
+from slap_ros.geometry.pose import IDENTITY, Pose, Vector
 from slap_ros.meshes.solid import Solid
-from slap_ros.physics.boxes import OrientedBox
-from slap_ros.physics.pose import IDENTITY, Pose, Vector
 
 Colour = tuple[float, float, float, float]  # red green blue opacity, 0 to 1
 Shape = Vector | Solid  # half the edges of a box, m; or convex pieces

@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from slap_ros.physics.boxes import OrientedBox
-from slap_ros.physics.pose import Pose, Quaternion, Vector, conjugate, multiply, rotate
+from slap_ros.geometry.oriented_box import OrientedBox
+from slap_ros.geometry.pose import Pose, Quaternion, Vector, conjugate, multiply, rotate
 from slap_ros.physics.scene import Body
 
 LEANING = 0.15  # rad; what is tilted by more does not lie on a face

@@ -24,11 +24,11 @@ from typing import NamedTuple
 
 import pybullet
 
+from slap_ros.geometry.pose import NO_TURN, ORIGIN, Pose, Vector, conjugate, multiply
 from slap_ros.meshes.obj import to_obj
 from slap_ros.meshes.solid import Solid, cuboid
 from slap_ros.physics.links import LINK_SHAPES
 from slap_ros.physics.panda import CONTROL_PERIOD_S
-from slap_ros.physics.pose import NO_TURN, ORIGIN, Pose, Vector, conjugate, multiply
 from slap_ros.physics.scene import FRICTION, Body, Material, Scene, Shape
 from slap_ros.physics.snapshot import Motion
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slap_ros.errors import InvalidStateError
+from slap_ros.geometry.pose import IDENTITY, ORIGIN, Pose, Vector
 from slap_ros.physics.features import (
     BODY_FEATURES,
     GRASP_FEATURES,
@@ -20,7 +21,6 @@ from slap_ros.physics.features import (
     POSE_FEATURES,
     ROBOT,
 )
-from slap_ros.physics.pose import IDENTITY, ORIGIN, Pose, Vector
 from slap_ros.physics.scene import Material, Scene
 from slap_ros.relational import Feature, Layout, Object, State
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from slap_ros.physics.pose import Vector
+from slap_ros.geometry.pose import Vector
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import weakref
 from dataclasses import replace
 from types import TracebackType
 
-from slap_ros.domains.domain import Action, ActionSpace
+from slap_ros.core import Action, ActionSpace
 from slap_ros.errors import InvalidStateError
 from slap_ros.physics.arm import Arm, Contact, Obstacle, Sweep
 from slap_ros.physics.clients import borrow, give_back

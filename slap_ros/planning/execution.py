@@ -12,8 +12,7 @@ from time import perf_counter
 
 import numpy as np
 
-from slap_ros.domains import Domain, World
-from slap_ros.domains.domain import Action
+from slap_ros.core import Action, Domain, World
 from slap_ros.errors import (
     ErrorCode,
     InvalidStateError,

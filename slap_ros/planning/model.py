@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from slap_ros.domains import ActionSpace, Domain, World
+from slap_ros.core import ActionSpace, Domain, World
 from slap_ros.errors import SkillNotApplicableError
 from slap_ros.planning.options import Option, OptionExecution, Stopped
 from slap_ros.relational import AtomSpace, State

@@ -10,8 +10,7 @@ from enum import Enum
 
 import numpy as np
 
-from slap_ros.domains import ActionSpace, Domain, Policy, Skill
-from slap_ros.domains.domain import Action
+from slap_ros.core import Action, ActionSpace, Domain, Policy, Skill
 from slap_ros.errors import ErrorCode, InvalidCommandError, UnknownSkillError
 from slap_ros.relational import Object, State
 

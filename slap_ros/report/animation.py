@@ -8,8 +8,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from slap_ros.domains.domain import VisibleBody
-from slap_ros.physics.pose import Vector
+from slap_ros.core import VisibleBody
+from slap_ros.geometry.pose import Vector
 from slap_ros.report.projection import (
     OBLIQUE,
     SIDE,

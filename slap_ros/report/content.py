@@ -11,7 +11,7 @@ from pathlib import Path
 
 from slap_ros.bags.evaluate import BagEvaluation, Reading, evaluate, read_runs
 from slap_ros.bags.recording import Episode, Recording
-from slap_ros.domains import Domain
+from slap_ros.core import Domain
 from slap_ros.errors import InvalidDomainError
 from slap_ros.evaluation.metrics import RunMetrics, RunTrace, describe
 from slap_ros.messages.protocols import KeyValueMessage

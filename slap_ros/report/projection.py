@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from itertools import product
 from math import cos, hypot, radians, sin
 
-from slap_ros.domains.domain import VisibleBody
-from slap_ros.physics.pose import Pose, Vector, rotate
+from slap_ros.core import VisibleBody
+from slap_ros.geometry.pose import Pose, Vector, rotate
 
 UNITS = 1000  # width of a drawing; whole units are fine enough on any screen
 EDGE_ON = 1e-6  # cosine at which a face can no longer be seen

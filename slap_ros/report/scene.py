@@ -10,15 +10,14 @@ from dataclasses import dataclass
 from math import hypot, nan
 
 from slap_ros.bags.recording import Episode, Recording
-from slap_ros.domains import Domain
-from slap_ros.domains.domain import VisibleBody
+from slap_ros.core import Domain, VisibleBody
 from slap_ros.evaluation.metrics import RunTrace
+from slap_ros.geometry.pose import Vector
 from slap_ros.messages.decode import decode_state, stamp_ns
 from slap_ros.messages.interfaces import BODIES
 from slap_ros.messages.protocols import MarkersMessage, StateMessage
 from slap_ros.physics.links import LINK_SHAPES
 from slap_ros.physics.panda import HAND, JOINTS, LINKS, link_poses
-from slap_ros.physics.pose import Vector
 from slap_ros.report.traces import ROBOT
 
 CUBE = 1  # Marker.CUBE
@@ -91,7 +90,7 @@ class _Pictures:
             newest = self._stamps[min(since, len(self._stamps) - 1)]
             shown = _of_markers(self._markers[newest])
         elif self._domain is not None:
-            shown = self._domain.bodies(decode_state(state, self._domain.types_by_name))
+            shown = self._domain.display.bodies(decode_state(state, self._domain.types_by_name))
         return tuple(_drawable(shown))[:MAX_BODIES]
 
 

@@ -14,14 +14,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
-from slap_ros.domains import Domain
-from slap_ros.domains.domain import Action
+from slap_ros.core import Action, Domain
 from slap_ros.errors import (
     InvalidMeasurementError,
     InvalidParameterError,
     InvalidStateError,
     UnsafeCommandError,
 )
+from slap_ros.geometry.pose import IDENTITY, ORIGIN, Pose, Vector
 from slap_ros.physics.features import (
     GRASP_FEATURES,
     JOINT_FEATURES,
@@ -30,7 +30,6 @@ from slap_ros.physics.features import (
     VELOCITY_FEATURES,
 )
 from slap_ros.physics.panda import FINGER_OPEN, JOINTS, hand_pose
-from slap_ros.physics.pose import IDENTITY, ORIGIN, Pose, Vector
 from slap_ros.physics.settling import settled
 from slap_ros.physics.world import PandaWorld
 from slap_ros.relational import Feature, Object, State
@@ -281,7 +280,7 @@ class Cell:
             raise UnsafeCommandError(
                 f"the arm was moved by {moved:.3f} rad since it was measured: call reset_task"
             )
-        motion = self.limits.motion(start, target, self.domain.control_period_s)
+        motion = self.limits.motion(start, target, self.domain.execution.control_period_s)
         return Step(self._grip(after), motion)
 
     def _grip(self, after: State) -> Grip:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from slap_ros.bags.reader import read_bag
 from slap_ros.bags.recording import Episode, Recording
-from slap_ros.domains import Domain
+from slap_ros.core import Domain
 from slap_ros.errors import DamagedBagError, InvalidParameterError, UnsafeCommandError
 from slap_ros.messages.decode import decode_goal, decode_state
 from slap_ros.physics.features import JOINT_FEATURES, ROBOT
@@ -165,7 +165,9 @@ def rehearse(recorded: Recorded, limits: Limits) -> Rehearsal:
     at = recorded.start
     for waypoint in recorded.waypoints:
         try:
-            motions.append(limits.motion(at, waypoint.joints, recorded.domain.control_period_s))
+            motions.append(
+                limits.motion(at, waypoint.joints, recorded.domain.execution.control_period_s)
+            )
         except UnsafeCommandError as error:
             violations.append((waypoint.step, str(error)))
         at = waypoint.joints

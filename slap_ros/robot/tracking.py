@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from slap_ros.errors import InvalidMeasurementError, InvalidParameterError
-from slap_ros.physics.pose import ORIGIN, Pose, Vector, conjugate, multiply
+from slap_ros.geometry.pose import ORIGIN, Pose, Vector, conjugate, multiply
 
 UNIT_TOLERANCE = 1e-2  # 1, of a measured quaternion's length: further off it is none
 SURPRISE = 4.5  # standard deviations beyond which a detection is not explained by noise

@@ -26,8 +26,9 @@ from typing import Any
 
 import yaml
 
-from slap_ros.domains import Domain
+from slap_ros.core import Domain
 from slap_ros.errors import InvalidMeasurementError, InvalidSceneError, InvalidStateError
+from slap_ros.geometry.pose import IDENTITY, ORIGIN, Pose
 from slap_ros.physics.features import (
     ROBOT,
     body_features,
@@ -35,7 +36,6 @@ from slap_ros.physics.features import (
     robot_features,
 )
 from slap_ros.physics.panda import HOME
-from slap_ros.physics.pose import IDENTITY, ORIGIN, Pose
 from slap_ros.relational import Object, State
 from slap_ros.robot.tracking import measured_pose
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from slap_ros.domains import Domain
+from slap_ros.core import Domain
 from slap_ros.relational.state import Array
 
 
@@ -14,7 +14,7 @@ class ActionMap:
     """The policy's actions, from -1 to 1, and the robot's."""
 
     def __init__(self, domain: Domain, gripper: bool) -> None:
-        space = domain.shortcut_actions
+        space = domain.learned_actions
         low, high = np.array(space.low), np.array(space.high)
         self._middle, self._half = (low + high) / 2, (high - low) / 2
         self._gripper = gripper

@@ -19,14 +19,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.domains import Domain
+from slap_ros.core import Domain
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
 from slap_ros.planning.planner import GraphPlanner, Problem
 from slap_ros.planning.search import Vertex
 from slap_ros.relational import State
 from slap_ros.shortcuts.action_map import ActionMap
 from slap_ros.shortcuts.settings import Exploration
-from slap_ros.shortcuts.sight import view_of
+from slap_ros.shortcuts.sight import learner_interface
 from slap_ros.shortcuts.signature import Change, Signature, context_of
 
 Origin = tuple[str, ...]  # operators by which a shortcut's source was reached
@@ -111,15 +111,17 @@ class Explorer:
         self._problem = Problem.of(domain, self.task.initial_state)
         self.space = self._problem.model.space
         self._grasping = self.space.mask(
-            atom for atom in self.space.atoms if atom.predicate in view_of(domain).grasping
+            atom
+            for atom in self.space.atoms
+            if atom.predicate in learner_interface(domain).grasping
         )
         goal = self.space.mask(self.task.goal)
         self._plan = GraphPlanner(self._problem).plan(self.task.initial_state, goal).plan
         self.graph = build_abstract_graph(
             self.space.abstract(self.task.initial_state), goal, self._problem.operators
         )
-        worlds = settings.rollouts if domain.make_many is not None else ONE_BY_ONE
-        self._worlds = domain.make_worlds([self.task.initial_state] * worlds)
+        worlds = settings.rollouts if domain.steps_together else ONE_BY_ONE
+        self._worlds = domain.make_vector_world([self.task.initial_state] * worlds)
         self._gripper = np.arange(worlds) % 2 == 1
         self._steps = 0
 
@@ -166,7 +168,7 @@ class Explorer:
         """What was found from a vertex, as a shortcut that begins there or before."""
         source = self.graph.nodes[beginning.node]
         change = Change.between(source, self.graph.nodes[j])
-        context = context_of(source, view_of(self._domain).grasping, self.space)
+        context = context_of(source, learner_interface(self._domain).grasping, self.space)
         motions = vertex.cost - beginning.cost
         steps = min(lengths)
         hoped = beginning.cost + MERGED * motions + steps
@@ -232,7 +234,7 @@ class Explorer:
 
     def _some_rollouts(self, state: State, index: Mapping[int, int]) -> list[dict[int, int]]:
         """In every world: the first step at which each node was reached, with all at rest."""
-        view, to_action = view_of(self._domain), ActionMap(self._domain, gripper=True)
+        learner, to_action = learner_interface(self._domain), ActionMap(self._domain, gripper=True)
         worlds = len(self._gripper)
         for world in range(worlds):
             self._worlds.reset(world, state)
@@ -242,9 +244,9 @@ class Explorer:
             if step % self._settings.hold == 0:
                 directions = self._directions(to_action.size)
             states = self._worlds.step(to_action(directions))
-            alive &= ~view.lost(states)
+            alive &= ~learner.failed(states)
             self._steps += int(alive.sum())
-            at_rest = np.flatnonzero(alive & view.settled(states))
+            at_rest = np.flatnonzero(alive & learner.at_rest(states))
             there = []
             if at_rest.size:
                 there = self.space.abstract_each(State(states.layout, states.data[at_rest]))

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from slap_ros.domains import Domain, get_domain
+from slap_ros.core import Domain
+from slap_ros.domains import get_domain
 from slap_ros.errors import SlapError
 from slap_ros.planning.planner import GraphPlanner, Problem
 from slap_ros.shortcuts.explore import Explorer, Origin

@@ -30,7 +30,7 @@ import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
-from slap_ros.domains import Domain
+from slap_ros.core import Domain
 from slap_ros.errors import InvalidLibraryError
 from slap_ros.shortcuts.policy import Normalisation, Policy, Weights
 from slap_ros.shortcuts.shortcut import Shortcut

@@ -16,7 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.domains import Domain
+from slap_ros.core import Domain
 from slap_ros.relational import AtomSpace, State
 from slap_ros.relational.predicates import Bools
 from slap_ros.relational.state import Array
@@ -180,7 +180,7 @@ class _Group:
         self.sight = Sight(domain, pool[0].space, signature, pool[0].change)
         drawn = [self._draw() for _ in range(size)]
         self._targets = [start.target for start in drawn]
-        self._worlds = domain.make_worlds([start.state for start in drawn])
+        self._worlds = domain.make_vector_world([start.state for start in drawn])
         self._look()
 
     def _draw(self) -> Start:

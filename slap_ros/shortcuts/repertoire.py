@@ -6,13 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from slap_ros.domains import Domain
+from slap_ros.core import Domain
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge
 from slap_ros.planning.options import Option, OptionKind
 from slap_ros.relational import State
 from slap_ros.shortcuts.reach import Reach
 from slap_ros.shortcuts.shortcut import DEFAULT, GroundShortcut, Rehearsal, Sampling, Shortcut
-from slap_ros.shortcuts.sight import Sight, view_of
+from slap_ros.shortcuts.sight import Sight, learner_interface
 from slap_ros.shortcuts.signature import Change, concerned
 
 
@@ -31,7 +31,8 @@ class Repertoire:
         self._space = domain.atom_space(initial)
         self._rehearsal = Rehearsal(domain, initial, sampling)
         self._reach = [
-            Reach(s.signature, self._space, view_of(domain).grasping) for s in self.shortcuts
+            Reach(s.signature, self._space, learner_interface(domain).grasping)
+            for s in self.shortcuts
         ]
         self._sights: dict[tuple[str, Change], Sight] = {}
 

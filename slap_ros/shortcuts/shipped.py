@@ -11,11 +11,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import slap_ros
-from slap_ros.domains import Domain, get_domain
+from slap_ros.core import Domain
+from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError
 from slap_ros.planning.planner import WITH_SHORTCUTS
 from slap_ros.shortcuts.library import LIBRARY, Library, load_library
-from slap_ros.shortcuts.sight import view_of
+from slap_ros.shortcuts.sight import learner_interface
 
 NONE = "none"  # the choice of no library
 SHARE = Path("share") / "slap_ros"  # under an installation's prefix
@@ -53,7 +54,7 @@ def chosen_library(choice: str | None, domain: Domain, planner: str = "lazy") ->
     if path is None:
         return None
     library = load_library(path, domain)
-    view_of(domain)
+    learner_interface(domain)
     return library
 
 

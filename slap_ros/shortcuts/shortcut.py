@@ -11,10 +11,8 @@ from hashlib import sha256
 
 import numpy as np
 
-from slap_ros.domains import Domain
-from slap_ros.domains import Policy as Control
-from slap_ros.domains.domain import Action
-from slap_ros.domains.view import Worlds
+from slap_ros.core import Action, Domain, VectorWorld
+from slap_ros.core import Policy as Control
 from slap_ros.errors import SkillNotApplicableError
 from slap_ros.relational import Object, State
 from slap_ros.shortcuts.policy import Policy, Weights
@@ -134,11 +132,13 @@ class Rehearsal:
     def __init__(self, domain: Domain, initial: State, sampling: Sampling) -> None:
         """Rehearse with the objects of ``initial``."""
         self.sampling = sampling
-        together = domain.make_many is not None
+        together = domain.steps_together
         self._count = (sampling.samples - 1) * (sampling.crowd if together else 1)  # with noise
         self._at_once = self._count + 1 if together else 1
-        self._alone = domain.make_worlds([initial])
-        self._crowd = domain.make_worlds([initial] * self._at_once) if together else self._alone
+        self._alone = domain.make_vector_world([initial])
+        self._crowd = (
+            domain.make_vector_world([initial] * self._at_once) if together else self._alone
+        )
         self._memory: dict[tuple[str, Change, bytes], tuple[Attempt, ...]] = {}
         self._failures: Counter[str] = Counter()  # more than expected, of each shortcut
 
@@ -193,7 +193,7 @@ class Rehearsal:
             found.add(self._attempt(self._crowd, sight, state, script, limit))
 
     def _attempt(
-        self, worlds: Worlds, sight: Sight, state: State, choose: Choose, limit: int
+        self, worlds: VectorWorld, sight: Sight, state: State, choose: Choose, limit: int
     ) -> list[Attempt]:
         """Run in all of the worlds for at most ``limit`` steps, and stop when enough succeeded."""
         target = sight.change.apply(sight.space.abstract(state))

@@ -17,8 +17,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.domains import Domain
-from slap_ros.domains.view import View
+from slap_ros.core import Domain, LearnerInterface
 from slap_ros.errors import InvalidDomainError
 from slap_ros.relational import AtomSpace, Column, GroundAtom, Object, State
 from slap_ros.relational.predicates import Bools, Predicate
@@ -33,22 +32,23 @@ STRAIN = 3.0  # of an axis at its limit, against the same: a policy that drives 
 DONE = 1e-9  # deficit below which an atom counts as done
 
 
-def view_of(domain: Domain) -> View:
-    """The domain's view.
+def learner_interface(domain: Domain) -> LearnerInterface:
+    """What the domain tells learners.
 
     Raises:
-        InvalidDomainError: It has none.
+        InvalidDomainError: Nothing: ``Domain.learning`` is None.
     """
-    if domain.view is None:
+    if domain.learning is None:
         raise InvalidDomainError(
-            f"domain {domain.name} has no view, so that nothing can be learned in it"
+            f"domain {domain.name} has no learner's interface, so that nothing can be learned in "
+            "it; see Domain.learning"
         )
-    return domain.view
+    return domain.learning.interface
 
 
 def uses_gripper(domain: Domain, signature: Signature) -> bool:
     """Whether the shortcut is to change what is held, and so has the gripper among its actions."""
-    grasping = {predicate.name for predicate in view_of(domain).grasping}
+    grasping = {predicate.name for predicate in learner_interface(domain).grasping}
     return any(predicate in grasping for _, predicate, _ in signature.patterns)
 
 
@@ -59,7 +59,7 @@ def action_map(domain: Domain, signature: Signature) -> ActionMap:
 
 def observation_size(domain: Domain, signature: Signature) -> int | None:
     """How much the policy sees; None where no task at hand has objects of all its kinds."""
-    view, state = view_of(domain), domain.task(0).initial_state
+    view, state = learner_interface(domain), domain.task(0).initial_state
     kind = kinds(domain.atom_space(state))
     examples = {name: obj for obj, name in kind.items()}
     if not set(signature.slots) <= set(examples):
@@ -68,7 +68,7 @@ def observation_size(domain: Domain, signature: Signature) -> int | None:
     hand = view.hand(batch)
     size = view.robot(batch, hand).shape[-1]
     for name, slots in signature.slots.items():
-        seen = view.things(batch, hand, Column((examples[name],)))
+        seen = view.objects(batch, hand, Column((examples[name],)))
         size += slots * (2 + seen.shape[-1])  # whether there is one, and what is missing
     return int(size)
 
@@ -122,7 +122,7 @@ class Sight:
         self, domain: Domain, space: AtomSpace, signature: Signature, change: Change
     ) -> None:
         self.domain, self.space, self.signature, self.change = domain, space, signature, change
-        self.view = view_of(domain)
+        self.view = learner_interface(domain)
         self.objects = concerned(change, space)
         self._number = {obj: i for i, obj in enumerate(self.objects)}
         self._atoms = [
@@ -141,7 +141,7 @@ class Sight:
             [
                 sign == "+"
                 and atom.predicate in self.view.grasping
-                and all(obj.type in domain.unread_types for obj in atom.objects)
+                and all(obj.type in domain.robot_types for obj in atom.objects)
                 for sign, atom in change.atoms(space)
             ]
         )
@@ -151,7 +151,7 @@ class Sight:
         self.robot_features = np.array(  # where a state has the robot's own
             [
                 layout.column(obj, feature.name)
-                for kind in sorted(domain.unread_types, key=str)
+                for kind in sorted(domain.robot_types, key=str)
                 for obj in layout.of_type(kind)
                 for feature in kind.features
             ],
@@ -160,7 +160,7 @@ class Sight:
 
     def _group(self, wanted: bool, predicate: Predicate, atoms: Sequence[GroundAtom]) -> _Atoms:
         columns = tuple(Column(objs) for objs in zip(*(a.objects for a in atoms), strict=True))
-        slack = np.array([self.view.slack(atom) for atom in atoms])
+        slack = np.array([self.view.success_tolerance(atom) for atom in atoms])
         return _Atoms(predicate, wanted, columns, slack)
 
     def _of_kinds(self) -> list[tuple[int, Column, NDArray[np.intp]]]:
@@ -183,7 +183,7 @@ class Sight:
         hand = self.view.hand(state)
         ways = self._ways(state, hand)
         missing = self._missing(state, deficits, ways)
-        done, settled = deficits < DONE, self.view.settled(state)
+        done, settled = deficits < DONE, self.view.at_rest(state)
         put = done.all(axis=-1)
         near = put & settled
         dropped = done[:, self._empties].any(axis=-1) & settled & ~near
@@ -191,9 +191,9 @@ class Sight:
             self._observe(state, hand, missing),
             self._potential(deficits, missing, ways)
             - HANDS_OFF * np.where(put & ~settled, self._closeness(ways), 0.0)
-            - STRAIN * self.view.strain(state),
+            - STRAIN * self.view.joint_limit_penalty(state),
             near,
-            self.view.lost(state) | dropped,
+            self.view.failed(state) | dropped,
         )
 
     def done(self, state: State, look: Look, targets: Sequence[int]) -> Bools:
@@ -230,7 +230,7 @@ class Sight:
         due = (deficits[:, orphans, None] * self._about[orphans]).max(axis=1)
         rows = np.arange(len(missing))
         for i in np.flatnonzero(self._about[orphans].any(axis=0)):
-            nearest = choice[self.view.apart(state, self.objects[i], column).argmin(axis=-1)]
+            nearest = choice[self.view.separation(state, self.objects[i], column).argmin(axis=-1)]
             missing[rows, nearest] = np.maximum(missing[rows, nearest], due[:, i])
         return missing
 
@@ -255,7 +255,7 @@ class Sight:
     def _observe(self, state: State, hand: Array, missing: Array) -> NDArray[np.float32]:
         parts = [self.view.robot(state, hand)]
         for slots, column, numbers in self._kinds:
-            seen = self.view.things(state, hand, column)
+            seen = self.view.objects(state, hand, column)
             there = np.ones((*seen.shape[:2], 1))
             seen = np.concatenate([there, missing[:, numbers, None], seen], axis=-1)
             parts.append(_into_slots(seen, slots).reshape(len(seen), -1))

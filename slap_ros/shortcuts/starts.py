@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from slap_ros.domains import Domain
+from slap_ros.core import Domain
 from slap_ros.errors import SlapError
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
 from slap_ros.planning.planner import Problem
@@ -22,7 +22,7 @@ from slap_ros.relational import AtomSpace, State
 from slap_ros.shortcuts.explore import Origin, ways_to_goal
 from slap_ros.shortcuts.practice import Start
 from slap_ros.shortcuts.reach import Reach
-from slap_ros.shortcuts.sight import view_of
+from slap_ros.shortcuts.sight import learner_interface
 from slap_ros.shortcuts.signature import Change, Signature
 
 
@@ -90,7 +90,7 @@ def find_start(
     except SlapError:  # a task that cannot be solved teaches nothing here
         return None
     to_go = ways_to_goal(graph, operator_steps)
-    reach = Reach(signature, space, view_of(domain).grasping)
+    reach = Reach(signature, space, learner_interface(domain).grasping)
     choices = [
         (to_go[j], path, j)
         for path in _paths(graph, origin)

@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Protocol, TypeVar
 
-from slap_ros.domains import Domain, get_domain
+from slap_ros.core import Domain
+from slap_ros.domains import get_domain
 from slap_ros.evaluation.approaches import Approach
 from slap_ros.evaluation.experiment import Experiment, Trial, run_all
 from slap_ros.evaluation.summary import Spread, Summary

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from slap_ros.domains import Domain, Task, get_domain
+from slap_ros.core import Domain, Task
+from slap_ros.domains import get_domain
 from slap_ros.drawing.palette import MUTED
 from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.evaluation.approaches import Approach

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from slap_ros.domains import Domain
+from slap_ros.core import Domain
 from slap_ros.domains.variation import parse_preset
 from slap_ros.errors import InvalidParameterError
 

@@ -122,7 +122,7 @@ class Script:
             operators_pddl="",
             action_names=[],
             action_units=[],
-            control_period=domain.control_period_s,
+            control_period=domain.execution.control_period_s,
             configuration=[],
             versions=[version],
         )

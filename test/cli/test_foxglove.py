@@ -114,12 +114,12 @@ def test_a_viewer_gets_the_whole_run_as_ros_has_it(network: int) -> None:
     holding = {(a.predicate, *a.objects) for a in viewer.heard["/slap/atoms"][-1].atoms}
     assert {(a.predicate.name, *(o.name for o in a.objects)) for a in task.goal} <= holding
     for marker, body in zip(
-        viewer.heard["/slap/markers"][-1].markers, domain.bodies(last), strict=True
+        viewer.heard["/slap/markers"][-1].markers, domain.display.bodies(last), strict=True
     ):
         at = marker.pose.position
         assert (marker.text, at.x, at.y, at.z) == (body.name, *body.position)
     frames = {transform.child_frame_id for transform in viewer.heard["/tf"][-1].transforms}
-    assert frames == {body.name for body in domain.bodies(last)}
+    assert frames == {body.name for body in domain.display.bodies(last)}
     assert late.heard["/slap/plan"][-1].edges == viewer.heard["/slap/plan"][-1].edges
     assert [e.name for e in late.heard["/slap/plan"][-1].edges][-1] == "PlaceInTarget"
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from slap_ros.domains import Domain, Task
+from slap_ros.core import Domain, Task
 from slap_ros.planning.execution import Episode, Executor
 from slap_ros.planning.planner import make_planner
 from slap_ros.relational import State

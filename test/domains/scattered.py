@@ -10,7 +10,7 @@ import numpy as np
 
 from slap_ros.domains.obstacle_tower.lying import CENTRED, TOUCHING
 from slap_ros.domains.obstacle_tower.things import BLOCK, SURFACE
-from slap_ros.physics.pose import Pose, multiply, rotate
+from slap_ros.geometry.pose import Pose, multiply, rotate
 from slap_ros.physics.scene import CUBE_EDGE, TABLE_TOP
 from slap_ros.relational import Object, State
 

@@ -26,10 +26,10 @@ from slap_ros.domains.cleanup_table.scenery import BIN, FLOOR_TOP, TABLE, scene_
 from slap_ros.domains.cleanup_table.shapes import TOYS, WIPER, shipped
 from slap_ros.domains.cleanup_table.tasks import make_task
 from slap_ros.errors import ErrorCode, InvalidParameterError
+from slap_ros.geometry.pose import Pose, rotate
 from slap_ros.meshes.solid import Solid, cuboid
 from slap_ros.physics.features import ROBOT
 from slap_ros.physics.panda import JOINT_HIGH, JOINT_LOW, MAX_STEP, grasp_pose
-from slap_ros.physics.pose import Pose, rotate
 from slap_ros.physics.world import PandaWorld
 from slap_ros.planning.planner import GraphPlanner, Problem
 from slap_ros.planning.search import search_exhaustively, search_lazily

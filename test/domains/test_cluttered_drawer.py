@@ -17,9 +17,9 @@ from slap_ros.domains.cluttered_drawer.tasks import NEIGHBOUR, PaperTasks, Rando
 from slap_ros.domains.tabletop.grasps import from_above
 from slap_ros.domains.tabletop.reading import joints_of, pose_of
 from slap_ros.errors import InvalidParameterError, InvalidStateError, SkillNotApplicableError
+from slap_ros.geometry.pose import multiply, rotate
 from slap_ros.motion import linear_motion, nearest_configurations, retime
 from slap_ros.physics.panda import MAX_STEP, grasp_pose
-from slap_ros.physics.pose import multiply, rotate
 from slap_ros.physics.scene import TABLE_TOP
 from slap_ros.planning.abstract_graph import build_abstract_graph
 from slap_ros.planning.model import Model
@@ -303,8 +303,8 @@ def test_a_hand_that_turns_around_the_block_frees_two_sides_and_holds_nothing():
             state = world.step(np.array([*action, 0.0]))
     for _ in range(5):
         state = world.step(np.zeros(8))
-    assert PAPER.view.settled(state.alone())[0]
-    assert not PAPER.view.lost(state.alone())[0]
+    assert PAPER.learning.interface.at_rest(state.alone())[0]
+    assert not PAPER.learning.interface.failed(state.alone())[0]
     clear = {atom for atom in sides(state, PAPER) if "Clear" in atom}
     assert clear in (
         {"FrontClear(block1)", "BackClear(block1)"},

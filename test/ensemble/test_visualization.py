@@ -20,7 +20,7 @@ STAMP = Time(sec=1, nanosec=2)
 def test_every_object_but_the_arm_is_a_marker_and_a_frame(name):
     domain = get_domain(name)
     state = domain.task(0).initial_state
-    bodies = domain.bodies(state)
+    bodies = domain.display.bodies(state)
     shown = {marker.text for marker in markers(bodies, STAMP).markers}
     framed = {frame.child_frame_id for frame in frames(bodies, STAMP).transforms}
     everything = {obj.name for obj in state.objects}
@@ -31,7 +31,7 @@ def test_every_object_but_the_arm_is_a_marker_and_a_frame(name):
 def test_blocks_of_the_tower_are_where_they_are_and_as_large():
     domain = get_domain("obstacle_tower")
     state = domain.task(0).initial_state
-    for marker in markers(domain.bodies(state), STAMP).markers:
+    for marker in markers(domain.display.bodies(state), STAMP).markers:
         obj = state.layout.object(marker.text)
         position = [marker.pose.position.x, marker.pose.position.y, marker.pose.position.z]
         assert np.array_equal(position, state[obj][:3])
@@ -41,7 +41,7 @@ def test_blocks_of_the_tower_are_where_they_are_and_as_large():
 def test_meshes_are_shown_by_their_triangles():
     domain = get_domain("cleanup_table", "paper")
     state = domain.task(0).initial_state
-    shown = {marker.text: marker for marker in markers(domain.bodies(state), STAMP).markers}
+    shown = {marker.text: marker for marker in markers(domain.display.bodies(state), STAMP).markers}
     duck, table = shown["duck"], shown["table"]
     assert (duck.type, table.type) == (Marker.TRIANGLE_LIST, Marker.CUBE)
     assert (duck.scale.x, duck.scale.y, duck.scale.z) == (1.0, 1.0, 1.0)
@@ -54,7 +54,7 @@ def test_meshes_are_shown_by_their_triangles():
 def test_the_arm_is_shown_where_it_is():
     domain = get_domain("obstacle_tower")
     state = domain.task(0).initial_state
-    shown = {body.name: body for body in domain.arm(state)}
+    shown = {body.name: body for body in domain.display.arm(state)}
     assert len(shown) == 11
     x, y, z = grasp_pose(state.data[:7]).position
     hand = shown["panda_hand"]

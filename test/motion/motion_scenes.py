@@ -6,18 +6,18 @@ import math
 
 import numpy as np
 
-from slap_ros.motion import Box
+from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.physics.panda import HOME, JOINT_HIGH, JOINT_LOW, Pose
 
 STRAIGHT = (0.0, 0.0, 0.0, 1.0)
 HALF = (0.025, 0.025, 0.025)  # m, of a block
-TABLE = Box(Pose((0.5, 0.0, -0.175), STRAIGHT), (0.25, 0.4, 0.25))  # its top at z = 0.075 m
-HELD = Box(Pose(), HALF)
+TABLE = OrientedBox(Pose((0.5, 0.0, -0.175), STRAIGHT), (0.25, 0.4, 0.25))  # its top at z = 0.075 m
+HELD = OrientedBox(Pose(), HALF)
 START = np.array(HOME)
 
 
 def block(x, y, z, yaw=0.0):
-    return Box(Pose((x, y, z), (0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))), HALF)
+    return OrientedBox(Pose((x, y, z), (0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))), HALF)
 
 
 def tower(x, y, blocks=3):
@@ -38,4 +38,6 @@ def random_box(rng):
     quaternion /= np.linalg.norm(quaternion)
     position = rng.uniform((-0.2, -0.6, 0.0), (0.8, 0.6, 0.9))
     half = rng.uniform(0.02, 0.15, 3)
-    return Box(Pose(tuple(position.tolist()), tuple(quaternion.tolist())), tuple(half.tolist()))
+    return OrientedBox(
+        Pose(tuple(position.tolist()), tuple(quaternion.tolist())), tuple(half.tolist())
+    )

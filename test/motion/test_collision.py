@@ -16,8 +16,9 @@ from motion_scenes import (
     tower,
 )
 
-from slap_ros.motion import Box, CollisionChecker, inverse_kinematics
-from slap_ros.motion.boxes import apart
+from slap_ros.geometry.box_separation import apart
+from slap_ros.geometry.oriented_box import OrientedBox
+from slap_ros.motion import CollisionChecker, inverse_kinematics
 from slap_ros.motion.kinematics import matrix
 from slap_ros.physics.panda import FINGER_OPEN, HAND, LINKS, Pose, link_poses
 
@@ -214,7 +215,7 @@ def test_around_a_tower_too(bullet):
 
 
 def test_an_obstacle_far_off_does_not_matter():
-    far = Box(Pose((5.0, 5.0, 5.0), STRAIGHT), (0.1, 0.1, 0.1))
+    far = OrientedBox(Pose((5.0, 5.0, 5.0), STRAIGHT), (0.1, 0.1, 0.1))
     assert CollisionChecker([far], base=False)(
         random_configurations(np.random.default_rng(7), 100)
     ).all()

@@ -23,10 +23,10 @@ from materials import mixed
 from toys import TOYS, heap
 
 from benchmarks.physics_step import SCENE, pushes, tower, with_joints
+from slap_ros.geometry.pose import Pose
 from slap_ros.physics.features import ROBOT, body_features, robot_features
 from slap_ros.physics.gripper import finger_around
 from slap_ros.physics.panda import GRASP_POINT, HOME, MAX_STEP, hand_pose
-from slap_ros.physics.pose import Pose
 from slap_ros.physics.scene import Scene
 from slap_ros.physics.world import PandaWorld
 from slap_ros.relational import State

@@ -13,9 +13,9 @@ import pytest
 from pairs import Pairs, record
 
 from benchmarks.physics_step import BLOCK, NAMES, SCENE, tower
+from slap_ros.geometry.pose import Pose
 from slap_ros.physics.clients import release_idle
 from slap_ros.physics.features import POSE_FEATURES, pose_features
-from slap_ros.physics.pose import Pose
 from slap_ros.physics.scene import TABLE, Box, Scene
 from slap_ros.physics.world import PandaWorld
 from slap_ros.relational import State, Type

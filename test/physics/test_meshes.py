@@ -11,10 +11,10 @@ from toys import TOYS, heap
 from benchmarks.physics_step import BLOCK, NAMES, SCENE, tower
 from slap_ros.domains.cleanup_table.shapes import make, shipped
 from slap_ros.errors import InvalidStateError
+from slap_ros.geometry.pose import Pose
 from slap_ros.meshes.solid import Solid
 from slap_ros.physics.gripper import finger_around
 from slap_ros.physics.panda import HOME
-from slap_ros.physics.pose import Pose
 from slap_ros.physics.rendering import Camera
 from slap_ros.physics.scene import CUBE_EDGE, CUBE_MATERIAL, TABLE, TABLE_TOP, Mesh, Scene, cube
 from slap_ros.physics.simulation import Simulation, Stepping

@@ -10,6 +10,7 @@ import numpy as np
 import pybullet
 import pytest
 
+from slap_ros.geometry.pose import Pose, multiply
 from slap_ros.physics.links import LINK_SHAPES
 from slap_ros.physics.panda import (
     FINGER_OPEN,
@@ -25,7 +26,6 @@ from slap_ros.physics.panda import (
     jacobian,
     link_poses,
 )
-from slap_ros.physics.pose import Pose, multiply
 from slap_ros.physics.simulation import MESHES, PANDA
 
 URDF_LINKS = {  # name here: index there

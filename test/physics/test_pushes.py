@@ -10,10 +10,10 @@ import pytest
 from pairs import HIGH, holding
 
 from benchmarks.physics_step import NAMES, SCENE, pushes, tower, truth, with_joints
+from slap_ros.geometry.oriented_box import OrientedBox
+from slap_ros.geometry.pose import Pose
 from slap_ros.physics.arm import Arm
-from slap_ros.physics.boxes import OrientedBox
 from slap_ros.physics.panda import FINGER_OPEN, HOME, MAX_STEP
-from slap_ros.physics.pose import Pose
 from slap_ros.physics.scene import CUBE_EDGE, FLOOR_TOP, TABLE, TABLE_TOP, cube
 from slap_ros.physics.simulation import Drive, Simulation, Stepping
 from slap_ros.physics.snapshot import Motion

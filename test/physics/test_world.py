@@ -13,6 +13,7 @@ from pairs import HIGH, holding
 
 from benchmarks.physics_step import BLOCK, NAMES, SCENE, pushes, reach, tower, with_joints
 from slap_ros.errors import InvalidCommandError, InvalidDomainError, InvalidStateError
+from slap_ros.geometry.pose import Pose
 from slap_ros.physics import clients
 from slap_ros.physics.arm import Arm, Obstacle, Sweep
 from slap_ros.physics.features import ROBOT, body_features, robot_features
@@ -25,7 +26,6 @@ from slap_ros.physics.panda import (
     grasp_pose,
     hand_pose,
 )
-from slap_ros.physics.pose import Pose
 from slap_ros.physics.scene import TABLE, Box, Scene, cube
 from slap_ros.physics.world import ACTION_SPACE, PandaWorld
 from slap_ros.relational import State, Type

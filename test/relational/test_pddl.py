@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slap_ros.domains.domain import Task
+from slap_ros.core import Task
 from slap_ros.domains.registry import get_domain
 from slap_ros.errors import (
     InvalidDomainError,

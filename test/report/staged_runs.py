@@ -37,7 +37,7 @@ def with_markers(script: Script) -> list[Published]:
         if item.type_name == interfaces.PLAN:
             item.message.library, item.message.samples = "", 0
         if item.type_name == interfaces.STATE:
-            bodies = script.domain.bodies(decode_state(item.message, types))
+            bodies = script.domain.display.bodies(decode_state(item.message, types))
             markers = make(
                 "visualization_msgs/msg/MarkerArray",
                 markers=[_marker(body, item.message.header) for body in bodies],

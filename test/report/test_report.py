@@ -104,7 +104,7 @@ def test_what_cannot_be_drawn_is_left_out(script: Script, tmp_path: Path, number
     (run,) = read_report(tmp_path / "bag").runs
     assert run.scene is not None
     left = {body.name for frame in run.scene.frames for body in frame.bodies}
-    shown = script.domain.bodies(script.domain.task(7).initial_state)
+    shown = script.domain.display.bodies(script.domain.task(7).initial_state)
     assert left == {body.name for body in shown[2:]}
     page_of(tmp_path / "bag")
 

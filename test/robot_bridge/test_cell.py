@@ -16,8 +16,8 @@ from slap_ros.errors import (
     InvalidStateError,
     UnsafeCommandError,
 )
+from slap_ros.geometry.pose import IDENTITY, Pose
 from slap_ros.physics.features import JOINT_FEATURES, POSE_FEATURES
-from slap_ros.physics.pose import IDENTITY, Pose
 from slap_ros.robot.cell import Cell, Grip, Reading
 from slap_ros.robot.limits import PANDA, Workspace
 from slap_ros.robot.workplace import read_workplace, sampled_workplace

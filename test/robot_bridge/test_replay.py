@@ -97,7 +97,7 @@ def test_every_motion_of_a_rehearsal_keeps_the_limits(bag):
     shares = {re.sub(r" of joint \d", "", e.quantity): e.share for e in found.extremes}
     assert shares["velocity"] == pytest.approx((fastest / HALF.velocity).max(), rel=1e-2)
     assert shares["acceleration"] == pytest.approx((hardest / HALF.acceleration).max(), rel=1e-2)
-    assert found.duration_s > len(recorded.waypoints) * recorded.domain.control_period_s
+    assert found.duration_s > len(recorded.waypoints) * recorded.domain.execution.control_period_s
 
 
 @pytest.mark.parametrize(

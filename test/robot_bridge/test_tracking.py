@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from slap_ros.errors import InvalidMeasurementError
-from slap_ros.physics.pose import NO_TURN, Pose
+from slap_ros.geometry.pose import NO_TURN, Pose
+from slap_ros.geometry.static_transforms import StaticTransforms
 from slap_ros.physics.scene import TABLE, TABLE_TOP, cube
 from slap_ros.physics.settling import settled
-from slap_ros.robot.frames import StaticFrames
 from slap_ros.robot.tracking import Detection, Sensing, Track, measured_pose
 
 SENSING = Sensing(position_noise_m=0.002)
@@ -115,7 +115,7 @@ def test_what_leans_or_floats_is_left_as_it_was_seen():
 
 
 def test_cameras_hang_from_the_base_by_static_frames():
-    frames = StaticFrames("fr3_link0")
+    frames = StaticTransforms("fr3_link0")
     half = math.sqrt(0.5)
     frames.add("fr3_link0", "post", Pose((1.0, 0.0, 0.0)))
     frames.add("post", "camera", Pose((0.0, 0.0, 1.0), (0.0, half, 0.0, half)))

@@ -43,7 +43,7 @@ def hostile(domain, seed, value, count):
     changes = {}
     for i, j in graph.candidates():
         change = Change.between(graph.nodes[i], graph.nodes[j])
-        context = context_of(graph.nodes[i], domain.view.grasping, space)
+        context = context_of(graph.nodes[i], domain.learning.interface.grasping, space)
         changes.setdefault(Signature.of(change, space, context), change)
         if len(changes) == count:
             break

@@ -56,7 +56,7 @@ def test_each_attempt_does_in_a_world_of_its_own_what_it_says():
 
 def test_worlds_that_cannot_be_stepped_together_try_one_after_the_other():
     """Without noise a crowd has nothing to add: both find the same."""
-    apart = replace(DOMAIN, make_many=None)
+    apart = replace(DOMAIN, learning=replace(DOMAIN.learning, make_vector_world=None))
     for sight, state in situations():
         alone = Sampling(samples=1, refinements=0)
         one, many = (attempts(domain, alone, sight, state) for domain in (apart, DOMAIN))

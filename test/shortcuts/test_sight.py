@@ -51,8 +51,11 @@ def test_a_batch_is_strained_like_its_states(sight):
     for joint in range(7):
         column = state.layout.column(robot, f"joint{joint + 1}")
         rows[:, column] = rng.uniform(-2.8, 0.0 if joint == 3 else 2.8, 20)
-    together = TOWER.view.strain(State(state.layout, rows))
-    alone = [TOWER.view.strain(State(state.layout, row[None]))[0] for row in rows]
+    together = TOWER.learning.interface.joint_limit_penalty(State(state.layout, rows))
+    alone = [
+        TOWER.learning.interface.joint_limit_penalty(State(state.layout, row[None]))[0]
+        for row in rows
+    ]
     assert together == pytest.approx(np.array(alone))
     assert len(set(together)) == 20
 

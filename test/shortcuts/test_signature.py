@@ -100,7 +100,7 @@ def test_it_may_delete_more_about_the_same_objects_but_add_nothing_else():
 
 def test_what_is_held_is_part_of_what_was_learned():
     space, change = tower(3)
-    grasping = make("fair").view.grasping
+    grasping = make("fair").learning.interface.grasping
     empty = space.mask([space.atom("GripperEmpty", ["robot"])])
     holding = space.mask([space.atom("Holding", ["robot", "block1"])])
     before = change.delete & ~change.add
@@ -114,7 +114,7 @@ def test_what_is_held_is_part_of_what_was_learned():
 def test_all_of_it_or_nothing():
     """Of a higher tower, a part falling over is also a change that suits: it is left out."""
     space, change = tower(3)
-    grasping = make("fair").view.grasping
+    grasping = make("fair").learning.interface.grasping
     source = change.delete
     part = space.mask([space.atom("On", ["block4", "block3"])])  # carried along
     carried = space.mask(
@@ -162,7 +162,7 @@ def test_reach_finds_exactly_the_pairs_that_suit():
         )
         pairs = graph.candidates()
         changes = {pair: Change.between(*(graph.nodes[i] for i in pair)) for pair in pairs}
-        grasping = domain.view.grasping
+        grasping = domain.learning.interface.grasping
         signatures = {
             Signature.of(change, space, context_of(graph.nodes[i], grasping, space))
             for (i, _), change in changes.items()

@@ -15,9 +15,9 @@ from types import MappingProxyType
 
 from marbles import model, skills
 from marbles.environment import MAX_STEP, PERIOD, MarblesEnv
-from marbles.view import VIEW
-from slap_ros.domains import ActionSpace, Domain
-from slap_ros.domains.gymnasium_world import GymnasiumWorld
+from marbles.learner_interface import LEARNER_INTERFACE
+from slap_ros.core import ActionSpace, Display, Domain, Execution, Learning
+from slap_ros.core.gymnasium_world import GymnasiumWorld
 from slap_ros.domains.variation import varied
 from slap_ros.relational import Feature
 
@@ -39,12 +39,18 @@ def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Doma
         operators=model.OPERATORS,
         skills={skill.name: skill for skill in skills.SKILLS},
         action_space=ACTIONS,
-        control_period_s=PERIOD,
         sample_task=tasks.sample,
         make_world=GymnasiumWorld.maker(MarblesEnv, ACTIONS),
         default_goal=model.all_in_the_gutter,
         step_limit=model.STEP_LIMIT,
-        unread_types=frozenset({model.ROBOT}),
-        bodies=model.visible_bodies,
-        view=VIEW,
+        robot_types=frozenset({model.ROBOT}),
+        execution=Execution(
+            control_period_s=PERIOD,
+        ),
+        display=Display(
+            bodies=model.visible_bodies,
+        ),
+        learning=Learning(
+            interface=LEARNER_INTERFACE,
+        ),
     )

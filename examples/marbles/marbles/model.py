@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from marbles.environment import GUTTER
-from slap_ros.domains.domain import Task, VisibleBody
+from slap_ros.core import Task, VisibleBody
 from slap_ros.relational import (
     Column,
     Feature,

@@ -11,7 +11,7 @@ import numpy as np
 
 from marbles.environment import IN_GUTTER, MAX_STEP
 from marbles.model import ROBOT
-from slap_ros.domains.domain import Action, Policy
+from slap_ros.core import Action, Policy
 from slap_ros.relational import Object, State
 
 HIGH = 0.1  # where the hand crosses the tray without touching anything

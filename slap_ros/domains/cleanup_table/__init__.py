@@ -14,11 +14,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
+from slap_ros.core import ActionSpace, Display, Domain, Execution, Learning
 from slap_ros.domains.cleanup_table import model, skills, tasks
+from slap_ros.domains.cleanup_table.learner_interface import LEARNER_INTERFACE
 from slap_ros.domains.cleanup_table.scenery import scene_of
 from slap_ros.domains.cleanup_table.shapes import shipped
-from slap_ros.domains.cleanup_table.view import VIEW
-from slap_ros.domains.domain import ActionSpace, Domain
 from slap_ros.domains.tabletop.settling import settling
 from slap_ros.domains.tabletop.showing import animation, visible_arm, visible_bodies
 from slap_ros.domains.tabletop.timing import AtSpeedLimit, InTens, Timing
@@ -68,16 +68,22 @@ def make(
         operators=model.OPERATORS,
         skills=skills.skills(TIMINGS[preset]),
         action_space=actions,
-        control_period_s=CONTROL_PERIOD_S,
         sample_task=lambda rng: settings.sample(rng, shapes),
         make_world=lambda state: PandaWorld(scene(state), state, actions=actions),
         default_goal=tasks.everything_in_the_bin,
         step_limit=tasks.STEP_LIMIT,
-        settle=settling(scene),
-        bodies=lambda state: visible_bodies(scene(state), state),
-        arm=visible_arm,
-        animate=animation(scene, FROM_THE_LEFT),
-        view=VIEW,
-        learned_actions=ACTION_SPACE,
+        execution=Execution(
+            control_period_s=CONTROL_PERIOD_S,
+            settle=settling(scene),
+        ),
+        display=Display(
+            bodies=lambda state: visible_bodies(scene(state), state),
+            arm=visible_arm,
+            animate=animation(scene, FROM_THE_LEFT),
+        ),
+        learning=Learning(
+            interface=LEARNER_INTERFACE,
+            actions=ACTION_SPACE,
+        ),
         configuration=settings.as_configuration(),
     )

@@ -9,18 +9,18 @@ from collections.abc import Iterable, Mapping
 from slap_ros.domains.cleanup_table.model import BLOCK, HALF, MIDDLE, SURFACE, WALL
 from slap_ros.domains.tabletop.reading import box_of, pose_of
 from slap_ros.domains.tabletop.surroundings import Surroundings
+from slap_ros.geometry.oriented_box import OrientedBox
+from slap_ros.geometry.pose import Pose, Vector
 from slap_ros.meshes.solid import Solid
-from slap_ros.motion import Box as Space
-from slap_ros.physics.pose import Pose, Vector
 from slap_ros.physics.scene import FRICTION, WOOD, Box, Colour, Material, Mesh, Scene
 from slap_ros.relational import Object, State
 
 TABLE_TOP = 0.0
 FLOOR_TOP = -0.325
-TABLE = Space(
+TABLE = OrientedBox(
     Pose((0.5, 0.0, (TABLE_TOP + FLOOR_TOP) / 2)), (0.3, 0.3, (TABLE_TOP - FLOOR_TOP) / 2)
 )
-BIN = Space(Pose((0.5, 0.45, -0.275)), (0.3, 0.15, 0.05))
+BIN = OrientedBox(Pose((0.5, 0.45, -0.275)), (0.3, 0.15, 0.05))
 DEEP = 0.3  # of the bin's floor, which reaches into the ground: what falls on it cannot pass it
 FLOOR = 0.003  # of the bin over the ground
 MATERIAL = Material(mass_kg=0.01, friction=FRICTION)  # of blocks, unless the state says otherwise
@@ -58,37 +58,37 @@ def scene_of(state: State, shapes: Mapping[str, Solid]) -> Scene:
     return Scene(tuple(bodies), floor_m=FLOOR_TOP)
 
 
-def _parts(half: Vector) -> Mapping[str, Space]:
+def _parts(half: Vector) -> Mapping[str, OrientedBox]:
     """Floor and walls of a bin, in its own frame."""
     x, y, z = half
     thin = WALL / 2
     return {
-        "floor": Space(Pose((0.0, 0.0, FLOOR - z - DEEP / 2)), (x, y, DEEP / 2)),
-        "front": Space(Pose((x - thin, 0.0, 0.0)), (thin, y, z)),
-        "back": Space(Pose((thin - x, 0.0, 0.0)), (thin, y, z)),
-        "left": Space(Pose((0.0, y - thin, 0.0)), (x, thin, z)),
-        "right": Space(Pose((0.0, thin - y, 0.0)), (x, thin, z)),
+        "floor": OrientedBox(Pose((0.0, 0.0, FLOOR - z - DEEP / 2)), (x, y, DEEP / 2)),
+        "front": OrientedBox(Pose((x - thin, 0.0, 0.0)), (thin, y, z)),
+        "back": OrientedBox(Pose((thin - x, 0.0, 0.0)), (thin, y, z)),
+        "left": OrientedBox(Pose((0.0, y - thin, 0.0)), (x, thin, z)),
+        "right": OrientedBox(Pose((0.0, thin - y, 0.0)), (x, thin, z)),
     }
 
 
-def solid(state: State) -> Iterable[tuple[Object, Space]]:
+def solid(state: State) -> Iterable[tuple[Object, OrientedBox]]:
     """The boxes that things fill: a block, the box around it."""
     for block in state.layout.of_type(BLOCK):
         frame, half = carried(state, block)
-        yield block, Space(pose_of(state, block).compose(frame), half)
+        yield block, OrientedBox(pose_of(state, block).compose(frame), half)
     for surface in state.layout.of_type(SURFACE):
         pose, half = box_of(state, surface)
         if state.get(surface, "is_drawer") > 0.5:
             for frame, size in _parts(half).values():
-                yield surface, Space(pose.compose(frame), size)
+                yield surface, OrientedBox(pose.compose(frame), size)
         else:
-            yield surface, Space(pose, half)
+            yield surface, OrientedBox(pose, half)
 
 
-def carried(state: State, block: Object) -> Space:
+def carried(state: State, block: Object) -> OrientedBox:
     """The box around a block, in its own frame."""
     x, y, z, u, v, w = (float(state.get(block, name)) for name in (*MIDDLE, *HALF))
-    return Space(Pose((x, y, z)), (u, v, w))
+    return OrientedBox(Pose((x, y, z)), (u, v, w))
 
 
 SURROUNDINGS = Surroundings(solid, carried)

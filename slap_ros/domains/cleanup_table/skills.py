@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from slap_ros.core import Action, Policy, Skill
 from slap_ros.domains.cleanup_table.model import (
     BLOCK,
     HAND_CLEAR,
@@ -23,7 +24,6 @@ from slap_ros.domains.cleanup_table.model import (
     scenery,
 )
 from slap_ros.domains.cleanup_table.scenery import SURROUNDINGS, carried
-from slap_ros.domains.domain import Action, Policy, Skill
 from slap_ros.domains.tabletop import seeing
 from slap_ros.domains.tabletop.grasps import from_above
 from slap_ros.domains.tabletop.places import Place, free_places
@@ -40,8 +40,9 @@ from slap_ros.domains.tabletop.surroundings import CARRYING
 from slap_ros.domains.tabletop.timing import Timing
 from slap_ros.domains.tabletop.ways import CLEARANCE, PLANS, SEED, remembered
 from slap_ros.errors import SkillNotApplicableError
+from slap_ros.geometry.oriented_box import OrientedBox
+from slap_ros.geometry.pose import Pose, Vector, conjugate, rotate
 from slap_ros.motion import (
-    Box,
     Free,
     Joints,
     MotionPlanningError,
@@ -54,7 +55,6 @@ from slap_ros.motion import (
 from slap_ros.physics.features import ROBOT
 from slap_ros.physics.gripper import GRASP_REACH
 from slap_ros.physics.panda import FINGER_OPEN, JOINTS, grasp_pose
-from slap_ros.physics.pose import Pose, Vector, conjugate, rotate
 from slap_ros.relational import Object, State
 from slap_ros.relational.predicates import Bools
 
@@ -115,7 +115,7 @@ def _across(state: State, ends: Sequence[Pose], accepts: Callable[[Pose, Joints]
 def grasps(state: State, block: Object, table: Object) -> list[Pose]:
     """Poses of the grasp point from above, where the fingers fit around a block."""
     frame, half = carried(state, block)
-    box = Box(pose_of(state, block).compose(frame), half)
+    box = OrientedBox(pose_of(state, block).compose(frame), half)
     x, y, z = pose_of(state, block).position
     lowest = max(z, top_of(box_of(state, table)) + UNDER, top_of(box) - PALM)
     yaw = _yaw(pose_of(state, block))
@@ -135,14 +135,14 @@ def _yaw(pose: Pose) -> float:
     return math.atan2(y, x)
 
 
-def _fits(box: Box, grasp: Pose) -> bool:
+def _fits(box: OrientedBox, grasp: Pose) -> bool:
     """Whether the fingers, opened wide, go down at both sides of a box."""
     along = rotate(grasp.quaternion, (0.0, 1.0, 0.0))  # the way the fingers move
     off = sum(a * (b - c) for a, b, c in zip(along, box.pose.position, grasp.position, strict=True))
     return abs(off) + _reach(box, along) <= FINGER_OPEN - FINGER_ROOM
 
 
-def _reach(box: Box, axis: Vector) -> float:
+def _reach(box: OrientedBox, axis: Vector) -> float:
     """How far a box reaches from its middle along an axis, m."""
     seen = rotate(conjugate(box.pose.quaternion), axis)
     return sum(abs(a) * half for a, half in zip(seen, box.half, strict=True))
@@ -169,14 +169,16 @@ def _drops(state: State, block: Object, drawer: Object) -> Iterator[list[Pose]]:
     yield found
 
 
-def _over(state: State, block: Object, space: Box, place: Place, height: float) -> list[Pose]:
+def _over(
+    state: State, block: Object, space: OrientedBox, place: Place, height: float
+) -> list[Pose]:
     """Poses from which the held block falls into the bin between its walls."""
     grasp, (frame, half) = grasp_of(state), carried(state, block)
     yaw = _yaw(grasp_pose(joints_of(state)))
     poses = []
     for k in range(YAWS):
         hand = from_above((*place, height), yaw + 2.0 * math.pi * k / YAWS)
-        box = Box(hand.compose(grasp).compose(frame), half)
+        box = OrientedBox(hand.compose(grasp).compose(frame), half)
         if all(
             abs(box.pose.position[i] - space.pose.position[i]) + _reach(box, axis)
             <= space.half[i] - WALL - INSIDE

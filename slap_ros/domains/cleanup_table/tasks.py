@@ -11,13 +11,14 @@ from itertools import islice
 
 import numpy as np
 
+from slap_ros.core import Task
 from slap_ros.domains.cleanup_table.model import BLOCK, HALF, IS_DRAWER, MIDDLE, ON, SURFACE, TOOL
 from slap_ros.domains.cleanup_table.scenery import BIN, MATERIAL, TABLE, TABLE_TOP, kind_of
 from slap_ros.domains.cleanup_table.shapes import WIPER
-from slap_ros.domains.domain import Task
 from slap_ros.errors import InvalidParameterError, InvalidStateError
+from slap_ros.geometry.oriented_box import OrientedBox
+from slap_ros.geometry.pose import Vector
 from slap_ros.meshes.solid import Solid
-from slap_ros.motion import Box
 from slap_ros.physics.features import (
     ROBOT,
     body_features,
@@ -26,7 +27,6 @@ from slap_ros.physics.features import (
     robot_features,
 )
 from slap_ros.physics.panda import HOME
-from slap_ros.physics.pose import Vector
 from slap_ros.physics.scene import Material
 from slap_ros.relational import GroundAtom, Object, State
 
@@ -153,7 +153,7 @@ def _block(shape: Solid, material: Material, x: float, y: float, yaw: float) -> 
     }
 
 
-def _surface(box: Box, is_drawer: float) -> Mapping[str, float]:
+def _surface(box: OrientedBox, is_drawer: float) -> Mapping[str, float]:
     return {
         **pose_features(box.pose),
         **_thing((0.0, 0.0, 0.0), box.half, is_movable=0.0, is_drawer=is_drawer),

@@ -14,10 +14,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
+from slap_ros.core import ActionSpace, Display, Domain, Execution, Learning
 from slap_ros.domains.cluttered_drawer import model, skills, tasks
+from slap_ros.domains.cluttered_drawer.learner_interface import LEARNER_INTERFACE
 from slap_ros.domains.cluttered_drawer.scenery import scene_of
-from slap_ros.domains.cluttered_drawer.view import VIEW
-from slap_ros.domains.domain import ActionSpace, Domain
 from slap_ros.domains.tabletop.settling import settling
 from slap_ros.domains.tabletop.showing import animation, visible_arm, visible_bodies
 from slap_ros.domains.tabletop.timing import AtSpeedLimit, InTens, Timing
@@ -51,18 +51,24 @@ def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Doma
         operators=model.OPERATORS,
         skills=skills.skills(TIMINGS[preset]),
         action_space=actions,
-        control_period_s=CONTROL_PERIOD_S,
         sample_task=settings.sample,
         make_world=lambda state: PandaWorld(scene_of(state), state, actions=actions),
         default_goal=tasks.target_block_on_table,
         step_limit=tasks.STEP_LIMIT,
-        unread_types=frozenset({ROBOT}),
-        reading=model.HAND_PREDICATES,
-        settle=settling(scene_of),
-        bodies=lambda state: visible_bodies(scene_of(state), state),
-        arm=visible_arm,
-        animate=animation(scene_of, LOOK),
-        view=VIEW,
-        learned_actions=ACTION_SPACE,
+        robot_types=frozenset({ROBOT}),
+        robot_predicates=model.HAND_PREDICATES,
+        execution=Execution(
+            control_period_s=CONTROL_PERIOD_S,
+            settle=settling(scene_of),
+        ),
+        display=Display(
+            bodies=lambda state: visible_bodies(scene_of(state), state),
+            arm=visible_arm,
+            animate=animation(scene_of, LOOK),
+        ),
+        learning=Learning(
+            interface=LEARNER_INTERFACE,
+            actions=ACTION_SPACE,
+        ),
         configuration=settings.as_configuration(),
     )

@@ -7,9 +7,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+from slap_ros.core import Skill
 from slap_ros.domains.cluttered_drawer.model import BLOCK, DRAWER, SIDES, TABLE, TARGET, WALL
 from slap_ros.domains.cluttered_drawer.tasks import APART
-from slap_ros.domains.domain import Skill
 from slap_ros.domains.tabletop.grasps import from_above, grasps_to_stand, quarter_turns
 from slap_ros.domains.tabletop.places import GAP, free_places
 from slap_ros.domains.tabletop.reading import box_of, held_body, pose_of, top_of, yaw_of
@@ -18,8 +18,8 @@ from slap_ros.domains.tabletop.surroundings import Surroundings
 from slap_ros.domains.tabletop.timing import Timing
 from slap_ros.domains.tabletop.ways import Way, remembered
 from slap_ros.errors import SkillNotApplicableError
-from slap_ros.motion import Box
-from slap_ros.physics.pose import IDENTITY
+from slap_ros.geometry.oriented_box import OrientedBox
+from slap_ros.geometry.pose import IDENTITY
 from slap_ros.relational import Object, State
 
 LIFT = 0.02  # m, of a block that counts as picked; it still blocks what it blocked
@@ -33,14 +33,16 @@ ANY = (*LEFT_RIGHT, *FRONT_BACK)
 DIAGONALLY = tuple(turn + math.pi / 4 for turn in ANY)
 
 
-def _solid(state: State) -> Iterator[tuple[Object, Box]]:
+def _solid(state: State) -> Iterator[tuple[Object, OrientedBox]]:
     """Blocks, the table, and all of the drawer."""
     for kind in (BLOCK, TABLE, DRAWER, WALL):
         for thing in state.layout.of_type(kind):
             yield thing, box_of(state, thing)
 
 
-SURROUNDINGS = Surroundings(_solid, lambda state, body: Box(IDENTITY, box_of(state, body).half))
+SURROUNDINGS = Surroundings(
+    _solid, lambda state, body: OrientedBox(IDENTITY, box_of(state, body).half)
+)
 
 
 def _least_turned(yaw: float) -> float:

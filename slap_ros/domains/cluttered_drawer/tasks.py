@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
+from slap_ros.core import Task
 from slap_ros.domains.cluttered_drawer.model import (
     BLOCK,
     ON,
@@ -20,9 +21,9 @@ from slap_ros.domains.cluttered_drawer.model import (
     lie_with,
 )
 from slap_ros.domains.cluttered_drawer.scenery import BOTTOM, FIXED, HALF_WIDTH, MIDDLE, OPENING
-from slap_ros.domains.domain import Task
 from slap_ros.domains.tabletop.places import GAP
 from slap_ros.errors import InvalidParameterError, InvalidStateError
+from slap_ros.geometry.pose import Pose
 from slap_ros.physics.features import (
     ROBOT,
     body_features,
@@ -31,7 +32,6 @@ from slap_ros.physics.features import (
     robot_features,
 )
 from slap_ros.physics.panda import HOME
-from slap_ros.physics.pose import Pose
 from slap_ros.physics.scene import CUBE_EDGE, CUBE_MATERIAL, Material
 from slap_ros.relational import GroundAtom, Object, State
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from slap_ros.domains.domain import Domain
+from slap_ros.core import Display, Domain, Execution, Learning
 from slap_ros.domains.obstacle2d import model, skills, tasks
 from slap_ros.domains.obstacle2d.bodies import visible_bodies
 from slap_ros.domains.obstacle2d.dynamics import (
@@ -22,7 +22,7 @@ from slap_ros.domains.obstacle2d.dynamics import (
     Obstacle2DWorlds,
     settle,
 )
-from slap_ros.domains.obstacle2d.view import VIEW
+from slap_ros.domains.obstacle2d.learner_interface import LEARNER_INTERFACE
 from slap_ros.domains.variation import varied
 
 
@@ -37,15 +37,21 @@ def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Doma
         operators=model.OPERATORS,
         skills={skill.name: skill for skill in skills.SKILLS},
         action_space=ACTION_SPACE,
-        control_period_s=CONTROL_PERIOD,
         sample_task=settings.sample,
         make_world=Obstacle2DWorld,
         default_goal=tasks.target_block_in_target_area,
         step_limit=tasks.STEP_LIMIT,
-        unread_types=frozenset({model.ROBOT}),
-        settle=settle,
-        bodies=visible_bodies,
-        view=VIEW,
-        make_many=Obstacle2DWorlds,
+        robot_types=frozenset({model.ROBOT}),
+        execution=Execution(
+            control_period_s=CONTROL_PERIOD,
+            settle=settle,
+        ),
+        display=Display(
+            bodies=visible_bodies,
+        ),
+        learning=Learning(
+            interface=LEARNER_INTERFACE,
+            make_vector_world=Obstacle2DWorlds,
+        ),
         configuration=settings.as_configuration(),
     )

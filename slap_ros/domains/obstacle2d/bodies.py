@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from slap_ros.domains.domain import VisibleBody
+from slap_ros.core import VisibleBody
 from slap_ros.domains.obstacle2d.model import BLOCK, BLOCK_SIZE, ROBOT, SURFACE
 from slap_ros.relational import Object, State
 

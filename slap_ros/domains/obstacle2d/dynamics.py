@@ -17,7 +17,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.domains.domain import Action, ActionSpace
+from slap_ros.core import Action, ActionSpace
 from slap_ros.domains.obstacle2d.model import BLOCK, BLOCK_SIZE, ROBOT, X, Y
 from slap_ros.errors import InvalidStateError
 from slap_ros.relational import Feature, Layout, State

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slap_ros.domains.domain import Action, Policy
+from slap_ros.core import Action, Policy
 from slap_ros.domains.obstacle2d.dynamics import CONTACT, MAX_STEP
 from slap_ros.domains.obstacle2d.model import BLOCK, BLOCK_SIZE, SURFACE
 from slap_ros.errors import SkillNotApplicableError

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from slap_ros.domains.domain import Task
+from slap_ros.core import Task
 from slap_ros.domains.obstacle2d.model import BLOCK, BLOCK_SIZE, IS_TARGET, ON, ROBOT, SURFACE
 from slap_ros.domains.obstacle2d.skills import nearest_free_place
 from slap_ros.errors import InvalidParameterError, InvalidStateError

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from slap_ros.domains.domain import Skill
+from slap_ros.core import Skill
 from slap_ros.domains.obstacle_tower.things import BLOCK, SURFACE
 from slap_ros.domains.tabletop.grasps import grasps_along_faces, grasps_to_stand, quarter_turns
 from slap_ros.domains.tabletop.places import GAP, Place, free_places
@@ -20,22 +20,24 @@ from slap_ros.domains.tabletop.surroundings import Surroundings
 from slap_ros.domains.tabletop.timing import Timing
 from slap_ros.domains.tabletop.ways import Way, remembered
 from slap_ros.errors import SkillNotApplicableError
-from slap_ros.motion import Box
-from slap_ros.physics.pose import IDENTITY
+from slap_ros.geometry.oriented_box import OrientedBox
+from slap_ros.geometry.pose import IDENTITY
 from slap_ros.relational import Object, State
 
 LIFT = 0.02  # m, of a block that counts as picked; the fingers go as far in a control step
 TABLE_MARGIN = 0.05  # m, of places on the table from its edges
 
 
-def _solid(state: State) -> Iterator[tuple[Object, Box]]:
+def _solid(state: State) -> Iterator[tuple[Object, OrientedBox]]:
     """Blocks and the table; targets are flush with it."""
     for thing in (*state.layout.of_type(BLOCK), *state.layout.of_type(SURFACE)):
         if state.get(thing, "is_target") < 0.5:
             yield thing, box_of(state, thing)
 
 
-SURROUNDINGS = Surroundings(_solid, lambda state, body: Box(IDENTITY, box_of(state, body).half))
+SURROUNDINGS = Surroundings(
+    _solid, lambda state, body: OrientedBox(IDENTITY, box_of(state, body).half)
+)
 
 
 @remembered

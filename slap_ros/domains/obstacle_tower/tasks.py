@@ -10,11 +10,12 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from slap_ros.domains.domain import Task
+from slap_ros.core import Task
 from slap_ros.domains.obstacle_tower.model import NOT_IS_TARGET, ON
 from slap_ros.domains.obstacle_tower.things import BLOCK, SURFACE
 from slap_ros.domains.tabletop.places import GAP
 from slap_ros.errors import InvalidParameterError, InvalidStateError
+from slap_ros.geometry.pose import Pose
 from slap_ros.physics.features import (
     ROBOT,
     body_features,
@@ -23,7 +24,6 @@ from slap_ros.physics.features import (
     robot_features,
 )
 from slap_ros.physics.panda import HOME
-from slap_ros.physics.pose import Pose
 from slap_ros.physics.scene import CUBE_EDGE, CUBE_MATERIAL, TABLE, TABLE_TOP, Material
 from slap_ros.relational import GroundAtom, Object, State
 

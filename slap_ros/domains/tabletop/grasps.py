@@ -8,8 +8,8 @@ import math
 from collections.abc import Iterable
 
 from slap_ros.domains.tabletop.reading import grasp_of, yaw_of
-from slap_ros.motion import Box
-from slap_ros.physics.pose import ORIGIN, Pose, Vector
+from slap_ros.geometry.oriented_box import OrientedBox
+from slap_ros.geometry.pose import ORIGIN, Pose, Vector
 from slap_ros.relational import State
 
 DROP = 0.001  # m, height over its place at which a body is let go
@@ -31,7 +31,11 @@ def grasps_along_faces(pose: Pose) -> list[Pose]:
 
 
 def grasps_to_stand(
-    state: State, body: Box, place: tuple[float, float], height: float, yaws: Iterable[float]
+    state: State,
+    body: OrientedBox,
+    place: tuple[float, float],
+    height: float,
+    yaws: Iterable[float],
 ) -> list[Pose]:
     """Where the held body stands upright at a place.
 

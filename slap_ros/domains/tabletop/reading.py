@@ -10,7 +10,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from slap_ros.motion import Box, Joints
+from slap_ros.geometry.oriented_box import OrientedBox
+from slap_ros.geometry.pose import Pose, conjugate, rotate
+from slap_ros.motion import Joints
 from slap_ros.physics.features import (
     BODY_FEATURES,
     GRASP_FEATURES,
@@ -19,7 +21,6 @@ from slap_ros.physics.features import (
     ROBOT,
 )
 from slap_ros.physics.panda import GRASP_POINT
-from slap_ros.physics.pose import Pose, conjugate, rotate
 from slap_ros.relational import Column, Layout, Object, State
 
 JOINT_NAMES = tuple(feature.name for feature in JOINT_FEATURES)
@@ -65,13 +66,13 @@ def pose_of(state: State, obj: Object) -> Pose:
     return Pose((x, y, z), (qx, qy, qz, qw))
 
 
-def box_of(state: State, obj: Object) -> Box:
+def box_of(state: State, obj: Object) -> OrientedBox:
     """An object that is a box, and says so by its features."""
     half_x, half_y, half_z = _features(state, obj, HALF_NAMES)
-    return Box(pose_of(state, obj), (half_x, half_y, half_z))
+    return OrientedBox(pose_of(state, obj), (half_x, half_y, half_z))
 
 
-def top_of(box: Box) -> float:
+def top_of(box: OrientedBox) -> float:
     """Height of a box's highest point."""
     up = rotate(conjugate(box.pose.quaternion), (0.0, 0.0, 1.0))
     return box.pose.position[2] + sum(abs(u) * h for u, h in zip(up, box.half, strict=True))

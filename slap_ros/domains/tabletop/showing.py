@@ -7,12 +7,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from slap_ros.domains.domain import Animate, VisibleBody
+from slap_ros.core import Animate, VisibleBody
 from slap_ros.domains.tabletop.reading import finger_of, joints_of, pose_of
+from slap_ros.geometry.pose import IDENTITY
 from slap_ros.meshes.solid import Solid
 from slap_ros.motion.arm_shapes import ARM_SHAPES, BASE
 from slap_ros.physics.panda import LINKS, link_poses
-from slap_ros.physics.pose import IDENTITY
 from slap_ros.physics.scene import Body, Scene
 from slap_ros.physics.viewpoint import View
 from slap_ros.relational import State

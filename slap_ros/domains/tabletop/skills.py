@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slap_ros.domains.domain import Action, Policy
+from slap_ros.core import Action, Policy
 from slap_ros.domains.tabletop.reading import joints_of
 from slap_ros.domains.tabletop.timing import ROUNDING, Timing
 from slap_ros.domains.tabletop.ways import Way

@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from slap_ros.domains.tabletop.reading import finger_of, grasp_of, held_body
-from slap_ros.motion import Box, CollisionChecker
+from slap_ros.geometry.oriented_box import OrientedBox
+from slap_ros.motion import CollisionChecker
 from slap_ros.relational import Object, State
 
 # Distances in m that a held body keeps from others: so far away it may be turned as one likes,
@@ -27,8 +28,8 @@ class Surroundings:
         carried: The box around a body in that body's own frame, were it in the hand.
     """
 
-    solid: Callable[[State], Iterable[tuple[Object, Box]]]
-    carried: Callable[[State, Object], Box]
+    solid: Callable[[State], Iterable[tuple[Object, OrientedBox]]]
+    carried: Callable[[State, Object], OrientedBox]
 
     def checker(
         self, state: State, touched: tuple[Object, ...] = (), held_margin: float = SETTING_DOWN
@@ -51,6 +52,6 @@ class Surroundings:
             held_margin=held_margin,
         )
 
-    def _in_hand(self, state: State, held: Object) -> Box:
+    def _in_hand(self, state: State, held: Object) -> OrientedBox:
         pose, half = self.carried(state, held)
-        return Box(grasp_of(state).compose(pose), half)
+        return OrientedBox(grasp_of(state).compose(pose), half)

@@ -19,6 +19,7 @@ from slap_ros.domains.tabletop.reading import joints_of
 from slap_ros.domains.tabletop.surroundings import AT_EASE, CARRYING, Surroundings
 from slap_ros.domains.tabletop.timing import Timing
 from slap_ros.errors import SkillNotApplicableError
+from slap_ros.geometry.pose import Pose
 from slap_ros.motion import (
     CollisionChecker,
     Free,
@@ -33,7 +34,6 @@ from slap_ros.motion import (
     shifted,
 )
 from slap_ros.physics.panda import grasp_pose
-from slap_ros.physics.pose import Pose
 from slap_ros.relational import Object, State
 
 CLEARANCE = 0.05  # m, over a place before coming down to it and after leaving it

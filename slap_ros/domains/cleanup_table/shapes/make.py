@@ -12,9 +12,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from slap_ros.geometry.pose import Vector
 from slap_ros.meshes.obj import to_obj
 from slap_ros.meshes.solid import Piece
-from slap_ros.physics.pose import Vector
 
 SIDES = 8  # of a ring
 DIGITS = 5  # of a coordinate: hundredths of a millimetre

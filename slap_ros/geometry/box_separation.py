@@ -1,30 +1,21 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Boxes, and whether they keep a distance from each other."""
+"""Whether many pairs of oriented boxes keep a distance from each other."""
 
 from __future__ import annotations
 
-from typing import NamedTuple, cast
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.motion.joints import Array
-from slap_ros.physics.panda import Pose
-
+Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _NEXT, _AFTER = [1, 2, 0], [2, 0, 1]  # the other two axes of each axis
 _NEARLY_PARALLEL = 1e-3  # least sine of the angle between two edges that is told from 0
 _TOUCHING = 1e-9  # m, below which two points are one
 _PROJECTIONS = 3  # from box to box, in search of their nearest points
-
-
-class Box(NamedTuple):
-    """A solid box: the pose of its centre and its half extents in m."""
-
-    pose: Pose
-    half: tuple[float, float, float]
 
 
 def apart(turn: Array, offset: Array, half_a: Array, half_b: Array, distance: Array) -> Flags:

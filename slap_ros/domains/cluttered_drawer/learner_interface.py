@@ -6,10 +6,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from slap_ros.core import LearnerInterface
 from slap_ros.domains.cluttered_drawer.model import BLOCK, GRASPING, SIDES, SURFACE, TARGET
 from slap_ros.domains.cluttered_drawer.scenery import BOTTOM
 from slap_ros.domains.tabletop import seeing
-from slap_ros.domains.view import View
 from slap_ros.relational import Column, GroundAtom, State
 from slap_ros.relational.state import Array
 
@@ -62,16 +62,16 @@ def _slack(atom: GroundAtom) -> float:
     return FINGER_ROOM if atom.predicate.name in CLEAR else 0.0
 
 
-VIEW = View(
+LEARNER_INTERFACE = LearnerInterface(
     hand=seeing.hand,
     robot=seeing.robot,
-    things=_things,
+    objects=_things,
     distance=_distance,
-    apart=seeing.apart,
-    settled=seeing.settled,
-    lost=seeing.lower_than(BOTTOM),
-    strain=seeing.strain,
-    slack=_slack,
+    separation=seeing.apart,
+    at_rest=seeing.settled,
+    failed=seeing.lower_than(BOTTOM),
+    joint_limit_penalty=seeing.strain,
+    success_tolerance=_slack,
     grasping=GRASPING,
     length_m=0.05,
 )

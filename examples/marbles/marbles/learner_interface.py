@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from marbles.model import HAND_EMPTY, HOLDING, ROBOT
-from slap_ros.domains.view import View
+from slap_ros.core import LearnerInterface
 from slap_ros.relational import Column, Object, State
 from slap_ros.relational.state import Array
 
@@ -47,11 +47,11 @@ def _apart(state: State, thing: Object, column: Column) -> Array:
     return apart
 
 
-VIEW = View(
+LEARNER_INTERFACE = LearnerInterface(
     hand=_hand,
     robot=_robot,
-    things=_things,
+    objects=_things,
     distance=_distance,
-    apart=_apart,
+    separation=_apart,
     grasping=frozenset({HOLDING, HAND_EMPTY}),
 )

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from slap_ros.core import LearnerInterface
 from slap_ros.domains.obstacle2d.model import BLOCK, BLOCK_SIZE, GRIPPER_EMPTY, HOLDING, ROBOT
-from slap_ros.domains.view import View
 from slap_ros.relational import Column, Object, State
 from slap_ros.relational.state import Array
 
@@ -56,11 +56,11 @@ def _apart(state: State, thing: Object, column: Column) -> Array:
     return apart
 
 
-VIEW = View(
+LEARNER_INTERFACE = LearnerInterface(
     hand=_hand,
     robot=_robot,
-    things=_things,
+    objects=_things,
     distance=_distance,
-    apart=_apart,
+    separation=_apart,
     grasping=frozenset({HOLDING, GRIPPER_EMPTY}),
 )

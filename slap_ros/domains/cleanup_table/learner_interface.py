@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from slap_ros.core import LearnerInterface
 from slap_ros.domains.cleanup_table.model import (
     BLOCK,
     GRIPPER_EMPTY,
@@ -15,7 +16,6 @@ from slap_ros.domains.cleanup_table.model import (
     Things,
 )
 from slap_ros.domains.tabletop import seeing
-from slap_ros.domains.view import View
 from slap_ros.relational import Column, State
 from slap_ros.relational.predicates import Bools
 from slap_ros.relational.state import Array
@@ -67,14 +67,14 @@ def _lost(state: State) -> Bools:
     return lost
 
 
-VIEW = View(
+LEARNER_INTERFACE = LearnerInterface(
     hand=seeing.hand,
     robot=seeing.robot,
-    things=_things,
+    objects=_things,
     distance=_distance,
-    apart=seeing.apart,
-    settled=seeing.settled,
-    lost=_lost,
-    strain=seeing.strain,
+    separation=seeing.apart,
+    at_rest=seeing.settled,
+    failed=_lost,
+    joint_limit_penalty=seeing.strain,
     grasping=frozenset({HOLDING, NOT_HOLDING, GRIPPER_EMPTY}),
 )

@@ -59,11 +59,11 @@ def test_what_is_said_to_be_unread_changes_no_atom(name):
     rng = np.random.default_rng(0)
     data = np.repeat(initial.data[None], 200, axis=0)
     for obj in initial.objects:
-        if obj.type in domain.unread_types:
+        if obj.type in domain.robot_types:
             part = initial.layout.slices[obj]
             data[:, part] = rng.uniform(-3, 3, data[:, part].shape)
     truth = space.truth(State(initial.layout, data))
-    read = [atom.predicate in domain.reading for atom in space.atoms]
+    read = [atom.predicate in domain.robot_predicates for atom in space.atoms]
     assert (truth == truth[0])[:, ~np.array(read)].all()
     assert space.abstract_each(State(initial.layout, data)) == [
         space.abstract(State(initial.layout, row)) for row in data

@@ -8,8 +8,8 @@ import numpy as np
 import pybullet
 import pytest
 
-from slap_ros.physics.boxes import OrientedBox
-from slap_ros.physics.pose import Pose
+from slap_ros.geometry.oriented_box import OrientedBox
+from slap_ros.geometry.pose import Pose
 
 UNSURE = 2e-3  # m, distance within which either answer will do: PyBullet keeps margins
 

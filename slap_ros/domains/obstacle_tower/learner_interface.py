@@ -6,10 +6,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from slap_ros.core import LearnerInterface
 from slap_ros.domains.obstacle_tower.model import GRIPPER_EMPTY, HOLDING, NOT_HOLDING, NOTHING_ON
 from slap_ros.domains.obstacle_tower.things import BLOCK, SURFACE
 from slap_ros.domains.tabletop import seeing
-from slap_ros.domains.view import View
 from slap_ros.physics.features import ROBOT
 from slap_ros.physics.scene import CUBE_EDGE, TABLE_TOP
 from slap_ros.relational import Column, GroundAtom, State
@@ -89,15 +89,15 @@ def _slack(atom: GroundAtom) -> float:
     return FINGER_ROOM if frees_target else 0.0
 
 
-VIEW = View(
+LEARNER_INTERFACE = LearnerInterface(
     hand=seeing.moving_hand,
     robot=seeing.robot,
-    things=_things,
+    objects=_things,
     distance=_distance,
-    apart=seeing.apart,
-    settled=seeing.settled,
-    lost=seeing.lower_than(FALLEN),
-    strain=seeing.strain,
-    slack=_slack,
+    separation=seeing.apart,
+    at_rest=seeing.settled,
+    failed=seeing.lower_than(FALLEN),
+    joint_limit_penalty=seeing.strain,
+    success_tolerance=_slack,
     grasping=frozenset({HOLDING, NOT_HOLDING, GRIPPER_EMPTY}),
 )

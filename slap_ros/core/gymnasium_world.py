@@ -21,7 +21,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from slap_ros.domains.domain import Action, ActionSpace
+from slap_ros.core import Action, ActionSpace
 from slap_ros.errors import InvalidDomainError, InvalidStateError
 from slap_ros.relational import Layout, State
 
@@ -41,7 +41,7 @@ class Environment(Protocol):
 
 
 class GymnasiumWorld:
-    """An environment that is reset to states and stepped; see ``slap_ros.domains.World``."""
+    """An environment that is reset to states and stepped; see ``slap_ros.core.World``."""
 
     def __init__(self, environment: Environment, state: State, actions: ActionSpace) -> None:
         """Begin in ``state``; nobody else may use the environment.

@@ -4,10 +4,10 @@
 
 from __future__ import annotations
 
-from slap_ros.physics.pose import IDENTITY, Pose
+from slap_ros.geometry.pose import IDENTITY, Pose
 
 
-class StaticFrames:
+class StaticTransforms:
     """What ``/tf_static`` said."""
 
     def __init__(self, base: str) -> None:

@@ -8,7 +8,7 @@ import math
 from itertools import product
 from typing import NamedTuple
 
-from slap_ros.physics.pose import Pose, Quaternion, Vector, conjugate, multiply, rotate
+from slap_ros.geometry.pose import Pose, Quaternion, Vector, conjugate, multiply, rotate
 
 PARALLEL = 1e-9  # edges whose cross product is shorter than this span no axis of their own
 

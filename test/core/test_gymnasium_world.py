@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from executed import executed
 
-from slap_ros.domains.gymnasium_world import GymnasiumWorld, state_of
+from slap_ros.core.gymnasium_world import GymnasiumWorld, state_of
 from slap_ros.errors import InvalidCommandError, InvalidDomainError, InvalidStateError
 from slap_ros.relational import State
 

@@ -1,0 +1,30 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The contract between domains and everything that plans, learns, executes or shows."""
+
+from slap_ros.core.action_space import Action, ActionSpace
+from slap_ros.core.display import Animate, Display, VisibleBody
+from slap_ros.core.domain import Domain, Execution
+from slap_ros.core.learner_interface import LearnerInterface, Learning
+from slap_ros.core.skill import Policy, Skill
+from slap_ros.core.task import Task
+from slap_ros.core.world import MakeVectorWorld, SyncVectorWorld, VectorWorld, World
+
+__all__ = [
+    "Action",
+    "ActionSpace",
+    "Animate",
+    "Display",
+    "Domain",
+    "Execution",
+    "LearnerInterface",
+    "Learning",
+    "MakeVectorWorld",
+    "Policy",
+    "Skill",
+    "SyncVectorWorld",
+    "Task",
+    "VectorWorld",
+    "VisibleBody",
+    "World",
+]

@@ -1,0 +1,43 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How a domain looks: bodies for viewers and reports, and its own animations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from slap_ros.relational import State
+
+
+@dataclass(frozen=True)
+class VisibleBody:
+    """A box to be shown, or a body of triangles; pose in the world frame."""
+
+    name: str
+    position: tuple[float, float, float]  # m, of its centre
+    quaternion: tuple[float, float, float, float]  # x y z w
+    size: tuple[float, float, float]  # m, its edges
+    colour: tuple[float, float, float, float]  # red green blue opacity, 0 to 1
+    # Three corners each, m, in the body's own frame; without any it is a box.
+    triangles: tuple[tuple[float, float, float], ...] = ()
+
+
+# Writes states, one a control step, as a GIF or MP4; tells how many frames are done.
+Animate = Callable[[Path, Sequence[State], Callable[[int], None]], None]
+
+
+@dataclass(frozen=True)
+class Display:
+    """What a person is shown of a state; nothing of it matters to planning.
+
+    Args:
+        bodies: The bodies of a state, in an order that does not change.
+        arm: The robot's own shapes in a state, unless it is one of the bodies.
+        animate: Writes an animation; without it the domain cannot be rendered.
+    """
+
+    bodies: Callable[[State], Sequence[VisibleBody]] = lambda _: ()
+    arm: Callable[[State], Sequence[VisibleBody]] = lambda _: ()
+    animate: Animate | None = None

@@ -1,0 +1,151 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The domain: what planning, execution, display and learning need, bound together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from slap_ros.core.action_space import ActionSpace
+from slap_ros.core.display import Display
+from slap_ros.core.learner_interface import Learning
+from slap_ros.core.skill import Skill
+from slap_ros.core.task import Task
+from slap_ros.core.world import SyncVectorWorld, VectorWorld, World
+from slap_ros.errors import InvalidDomainError
+from slap_ros.relational import (
+    AtomSpace,
+    GroundAtom,
+    GroundOperator,
+    LiftedOperator,
+    Predicate,
+    State,
+    Type,
+    ground_operators,
+    static_predicates,
+)
+
+
+@dataclass(frozen=True)
+class Execution:
+    """How a domain's world runs in time, and how it is seen.
+
+    Args:
+        control_period_s: What one environment step takes, s.
+        settle: Puts measured poses where physics would have them: what rests on something still
+            does.
+    """
+
+    control_period_s: float
+    settle: Callable[[State], State] = lambda state: state
+
+
+@dataclass(frozen=True)
+class Domain:
+    """A planning domain together with its world."""
+
+    name: str
+    preset: str
+    types: tuple[Type, ...]
+    predicates: tuple[Predicate, ...]
+    operators: tuple[LiftedOperator, ...]
+    skills: Mapping[str, Skill]  # by operator name
+    action_space: ActionSpace
+    sample_task: Callable[[np.random.Generator], Task]
+    make_world: Callable[[State], World]  # in that state; others of the same objects by reset
+    default_goal: Callable[[State], frozenset[GroundAtom]]  # of a state given without a goal
+    step_limit: int  # environment steps of a task
+    execution: Execution
+    # Types of the robot itself: no predicate depends on their features, but for those below.
+    robot_types: frozenset[Type] = frozenset()
+    robot_predicates: frozenset[Predicate] = frozenset()
+    display: Display = field(default_factory=Display)
+    learning: Learning | None = None  # without it there are no shortcuts
+    configuration: Mapping[str, str | int | float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Check that the parts fit.
+
+        Raises:
+            InvalidDomainError: A name occurs twice, an operator uses an unknown predicate or
+                type, or has no skill.
+        """
+        for kind, names in (
+            ("type", [t.name for t in self.types]),
+            ("predicate", [p.name for p in self.predicates]),
+            ("operator", [o.name for o in self.operators]),
+        ):
+            for name in names:
+                if names.count(name) > 1:
+                    raise InvalidDomainError(f"domain {self.name}: two {kind}s named {name}")
+        for t in self.types:
+            if t.parent is not None and t.parent not in self.types:
+                raise InvalidDomainError(
+                    f"domain {self.name}: type {t} descends from {t.parent}, which is not "
+                    "among the domain's types"
+                )
+        for operator in self.operators:
+            self._check_operator(operator)
+
+    def _check_operator(self, operator: LiftedOperator) -> None:
+        where = f"domain {self.name}, operator {operator.name}"
+        for atom in operator.preconditions | operator.add_effects | operator.delete_effects:
+            if atom.predicate not in self.predicates:
+                raise InvalidDomainError(
+                    f"{where}: unknown predicate {atom.predicate.name!r} in {atom}; the domain has "
+                    f"{', '.join(p.name for p in self.predicates)}"
+                )
+        for variable in operator.parameters:
+            if variable.type not in self.types:
+                raise InvalidDomainError(f"{where}: unknown type {variable.type.name!r}")
+        if operator.name not in self.skills:
+            raise InvalidDomainError(f"{where}: no skill; add one to the domain's skills")
+
+    @property
+    def learned_actions(self) -> ActionSpace:
+        """What a learned policy may command."""
+        learned = self.learning.actions if self.learning is not None else None
+        return learned or self.action_space
+
+    @property
+    def steps_together(self) -> bool:
+        """Whether many worlds are stepped faster together than one after the other."""
+        return self.learning is not None and self.learning.make_vector_world is not None
+
+    @cached_property
+    def types_by_name(self) -> dict[str, Type]:
+        """The types, as decoding a state wants them."""
+        return {t.name: t for t in self.types}
+
+    @cached_property
+    def static_predicates(self) -> frozenset[Predicate]:
+        """The predicates that no operator changes."""
+        return static_predicates(self.predicates, self.operators)
+
+    def atom_space(self, initial: State) -> AtomSpace:
+        """The ground atoms over a task's objects."""
+        return AtomSpace.of_state(
+            self.predicates,
+            self.static_predicates,
+            initial,
+            self.robot_types,
+            self.robot_predicates,
+        )
+
+    def ground(self, space: AtomSpace) -> tuple[GroundOperator, ...]:
+        """The operators over a task's objects."""
+        return ground_operators(self.operators, space)
+
+    def make_vector_world(self, states: Sequence[State]) -> VectorWorld:
+        """VectorWorld of the same objects, one in each of these states."""
+        if self.learning is not None and self.learning.make_vector_world is not None:
+            return self.learning.make_vector_world(states)
+        return SyncVectorWorld(self.make_world, states)
+
+    def task(self, seed: int, index: int = 0) -> Task:
+        """The ``index``-th task of a seed; every (seed, index) has a stream of its own."""
+        return self.sample_task(np.random.default_rng([seed, index]))

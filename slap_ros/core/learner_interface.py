@@ -1,0 +1,89 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a learner needs from a domain, as functions of many states at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from slap_ros.core.action_space import ActionSpace
+from slap_ros.core.world import MakeVectorWorld
+from slap_ros.relational import Column, GroundAtom, Object, Predicate, State
+from slap_ros.relational.predicates import Bools
+from slap_ros.relational.state import Array
+
+
+def _never(state: State) -> Bools:
+    return np.zeros(state.data.shape[:-1], dtype=bool)
+
+
+def _no_penalty(state: State) -> Array:
+    return np.zeros(state.data.shape[:-1])
+
+
+def _always(state: State) -> Bools:
+    return np.ones(state.data.shape[:-1], dtype=bool)
+
+
+def _exactly(_: GroundAtom) -> float:
+    return 0.0
+
+
+@dataclass(frozen=True)
+class LearnerInterface:
+    """What learners observe, as functions of a batch of n states.
+
+    Features are of magnitude 1 or so.
+
+    Args:
+        hand: (state) to where the robot acts from, in whatever form ``robot``, ``objects`` and
+            ``distance`` take it; computed once for each batch.
+        robot: (state, hand) to the robot's features, shape (n, k).
+        objects: (state, hand, objects of one kind) to their features relative to the hand, shape
+            (n, objects, f).
+        distance: (state, hand, objects) to the distance of the hand, or of what it holds, from
+            each, m, shape (n, objects); infinite for what there is no point in going to.
+        separation: (state, object, objects) to the distance of each from the first, m, shape
+            (n, objects).
+        at_rest: (state) to whether nothing would move by itself any more, shape (n,).
+        failed: (state) to whether something happened that cannot be undone, shape (n,).
+        joint_limit_penalty: (state) to how close the robot is to its joint limits, shape (n,): 1
+            for each axis at its limit, 0 well before.
+        success_tolerance: (ground atom) to how far its margin must be past its threshold before
+            a shortcut counts as done, in the margin's unit: room for the gripper beside what a
+            shortcut moved, for instance.
+        grasping: Predicates about what is held. Only shortcuts that change one of their atoms
+            have the gripper among their actions.
+        length_m: The scale of distances and margins.
+    """
+
+    hand: Callable[[State], Array]
+    robot: Callable[[State, Array], Array]
+    objects: Callable[[State, Array, Column], Array]
+    distance: Callable[[State, Array, Column], Array]
+    separation: Callable[[State, Object, Column], Array]
+    at_rest: Callable[[State], Bools] = _always
+    failed: Callable[[State], Bools] = _never
+    joint_limit_penalty: Callable[[State], Array] = _no_penalty
+    success_tolerance: Callable[[GroundAtom], float] = _exactly
+    grasping: frozenset[Predicate] = frozenset()
+    length_m: float = 0.1
+
+
+@dataclass(frozen=True)
+class Learning:
+    """What a domain offers to those who learn in it.
+
+    Args:
+        interface: Observations and distances; see :class:`LearnerInterface`.
+        actions: What a learned policy may command, where that is less than the action space.
+        make_vector_world: Makes worlds that are stepped together, where that is faster than one
+            after the other.
+    """
+
+    interface: LearnerInterface
+    actions: ActionSpace | None = None
+    make_vector_world: MakeVectorWorld | None = None
