@@ -67,6 +67,8 @@ TEST = [
     "unified-planning>=1.1",
     "up-aries>=0.4",
     "colcon-common-extensions>=0.3",
+    "build>=1",  # makes the sdists and wheels that a test installs
+    "hatchling>=1.24",  # embedded_ros is built with it
     "mypy>=1.13",
     "ruff>=0.9",
     "pre-commit>=4",
@@ -99,10 +101,21 @@ setup(
         "Abstract planning with learned shortcuts (SLAP) and language-guided skills (LG-SAIL) "
         "for ROS 2 Jazzy"
     ),
+    long_description=Path("README.md").read_text(encoding="utf-8"),
+    long_description_content_type="text/markdown",
     author="The slap_ros authors",
     maintainer="The slap_ros authors",
-    maintainer_email="maintainers@slap-ros.example.org",
     license="Apache-2.0",
+    classifiers=[
+        "Development Status :: 4 - Beta",
+        "Intended Audience :: Science/Research",
+        "Operating System :: POSIX :: Linux",
+        "Programming Language :: Python :: 3.11",
+        "Programming Language :: Python :: 3.12",
+        "Topic :: Scientific/Engineering :: Artificial Intelligence",
+        "Typing :: Typed",
+    ],
+    keywords="ros2 task-and-motion-planning reinforcement-learning robotics",
     python_requires=">=3.11,<3.13",
     # msg_schemas is a ROS package of its own; its text is needed to read bags without ROS.
     packages=[

@@ -2,4 +2,4 @@
 # SPDX-License-Identifier: Apache-2.0
 """slap_ros: abstract planning with learned shortcuts. The core; it imports no ROS."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

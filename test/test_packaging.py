@@ -2,14 +2,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """What colcon and pip see."""
 
+import json
 import os
 import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
+import zipfile
+from email import message_from_bytes
+from importlib import metadata
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+
+import slap_ros
 
 ROOT = Path(__file__).parent.parent
 
@@ -31,6 +38,7 @@ def checkout(tmp_path):
         "pyproject.toml",
         "package.xml",
         "README.md",
+        "LICENSE",
         "colcon_defaults.yaml",
     ):
         shutil.copy(ROOT / name, tmp_path / name)
@@ -88,9 +96,75 @@ def test_colcon_builds_executables_where_ros2_run_looks_for_them(checkout, optio
     assert refused.returncode == 10, refused.stderr
 
 
-def test_manifests_agree_on_name_version_and_licence():
-    import slap_ros
+def build(source, folder):
+    """Make the sdist, and from it the wheel, as whoever publishes does."""
+    command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(folder)]
+    subprocess.run([*command, str(source)], check=True, capture_output=True)
 
+
+def requirements(wheel):
+    """The distributions, by name, that a wheel's installation brings along, all the way down."""
+    with zipfile.ZipFile(wheel) as archive:
+        (name,) = (n for n in archive.namelist() if n.endswith(".dist-info/METADATA"))
+        found = message_from_bytes(archive.read(name)).get_all("Requires-Dist", [])
+    queue, seen = found, set()
+    while queue:
+        wanted = Requirement(queue.pop())
+        if wanted.name in seen or (wanted.marker and not wanted.marker.evaluate({"extra": ""})):
+            continue
+        seen.add(wanted.name)
+        queue.extend(metadata.distribution(wanted.name).requires or [])
+    return seen
+
+
+def install(names, folder):
+    """Put installed distributions, and nothing else, into a folder: no index is asked."""
+    folder.mkdir()
+    for name in names:
+        distribution = metadata.distribution(name)
+        for top in {Path(file).parts[0] for file in distribution.files if ".." not in str(file)}:
+            if top != "__pycache__" and not (folder / top).exists():
+                (folder / top).symlink_to(distribution.locate_file(top))
+
+
+def test_the_published_wheels_run_in_an_empty_environment(checkout, tmp_path):
+    """With what they require and no more, away from any checkout, shipped shortcuts included."""
+    shutil.rmtree(checkout / "models")
+    shutil.copytree(ROOT / "models", checkout / "models")
+    shutil.copytree(ROOT / "embedded_ros", checkout / "embedded_ros")
+    dist = tmp_path / "dist"
+    for source in (checkout, checkout / "embedded_ros"):
+        build(source, dist)
+    wheels = sorted(dist.glob("*.whl"))
+    names = [f"{name}-{slap_ros.__version__}" for name in ("embedded_ros", "slap_ros")]
+    ends = ("-py3-none-any.whl", ".tar.gz")
+    assert {path.name for path in dist.iterdir()} == {n + end for n in names for end in ends}
+
+    python = tmp_path / "venv/bin/python"
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", tmp_path / "venv"], check=True)
+    pip = [sys.executable, "-m", "pip", "--python", str(python), "install", "-q", "--no-deps"]
+    subprocess.run([*pip, "--no-index", *map(str, wheels)], check=True)
+    libraries = tmp_path / "libraries"
+    install(set().union(*map(requirements, wheels)), libraries)
+
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    environment = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "AMENT"))}
+    run = subprocess.run(
+        [python.with_name("slap"), "run", "obstacle2d", "--seed", "1", "--json"],
+        cwd=empty,
+        env={**environment, "PYTHONPATH": str(libraries)},
+        capture_output=True,
+        text=True,
+    )
+    assert run.returncode == 0, run.stderr
+    result = json.loads(run.stdout)
+    assert result["success"]
+    assert result["shortcut_steps"] > 0
+    assert not list(empty.iterdir())
+
+
+def test_manifests_agree_on_name_version_and_licence():
     for path in (ROOT / "package.xml", ROOT / "msg_schemas" / "package.xml"):
         root = ET.parse(path).getroot()
         assert root.get("format") == "3"

@@ -9,4 +9,4 @@ is on the path, which then wins.
 This module stays empty because it is imported at every interpreter start.
 """
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
