@@ -33,7 +33,7 @@ from ensemble.spinning import Spinner, spinning
 from slap_ros.cli.console import progress
 from slap_ros.evaluation.metrics import RunLog
 from slap_ros.studies.figures import LINES, picture, require_matplotlib
-from slap_ros.studies.results import Table, pretty
+from slap_ros.studies.results import MarkdownTable, pretty
 from slap_ros.versions import versions
 
 if TYPE_CHECKING:
@@ -229,7 +229,7 @@ def draw(figure: Figure, soaked: Soaked) -> None:
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
 
 
-def table(soaked: Soaked) -> Table:
+def table(soaked: Soaked) -> MarkdownTable:
     """A row a process."""
     rows = []
     for node, samples in soaked.samples.items():
@@ -240,7 +240,7 @@ def table(soaked: Soaked) -> Table:
         ]
         memory = [f"{s.memory_mib:.1f}" for s in (samples[0], middle, samples[-1])]
         rows.append([f"`{node}`", *memory, f"{soaked.growth(node):.2f}", *spans])
-    return Table(
+    return MarkdownTable(
         [
             "process",
             "memory after 1 task [MiB]",

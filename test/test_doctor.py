@@ -54,9 +54,9 @@ def environment(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def about() -> ros.About:
+def about() -> ros.RclpyStatus:
     """What there is on this machine."""
-    return ros.About.ask()
+    return ros.RclpyStatus.ask()
 
 
 def expect_problem(check: Check, *words: str) -> None:
@@ -97,7 +97,7 @@ def test_healthy(tmp_path: Path) -> None:
 
 
 def test_prints_nothing(capfd: pytest.CaptureFixture[str]) -> None:
-    dds.conversation(ros.About())
+    dds.conversation(ros.RclpyStatus())
     libraries.pybullet()
     assert capfd.readouterr() == ("", "")
 
@@ -119,7 +119,7 @@ def test_impossible_domain(monkeypatch: pytest.MonkeyPatch, domain: str) -> None
 @pytest.mark.parametrize("domain", ["abc", "500"])
 def test_conversation_in_an_impossible_domain(monkeypatch: pytest.MonkeyPatch, domain: str) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", domain)
-    check = dds.conversation(ros.About())
+    check = dds.conversation(ros.RclpyStatus())
     expect_problem(check, domain)
     assert "ROS_DOMAIN_ID" in check.advice
 
@@ -134,7 +134,7 @@ def test_domain_with_ports_that_others_may_have(monkeypatch: pytest.MonkeyPatch)
 def test_unknown_discovery_range(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "GALAXY")
     expect_problem(ros.settings(), "GALAXY")
-    expect_problem(dds.conversation(ros.About()))
+    expect_problem(dds.conversation(ros.RclpyStatus()))
 
 
 def test_discovery_switched_off(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -145,7 +145,7 @@ def test_discovery_switched_off(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_nodes_that_do_not_see_each_other(
-    monkeypatch: pytest.MonkeyPatch, about: ros.About
+    monkeypatch: pytest.MonkeyPatch, about: ros.RclpyStatus
 ) -> None:
     if not about.embedded:
         pytest.skip("CycloneDDS may not be the middleware")
@@ -165,7 +165,7 @@ def test_nodes_that_do_not_see_each_other(
     ],
 )
 def test_impossible_cyclonedds_uri(
-    monkeypatch: pytest.MonkeyPatch, about: ros.About, uri: str, cause: str
+    monkeypatch: pytest.MonkeyPatch, about: ros.RclpyStatus, uri: str, cause: str
 ) -> None:
     if not about.embedded:
         pytest.skip("CycloneDDS may not be the middleware")
@@ -178,12 +178,12 @@ def test_impossible_cyclonedds_uri(
 # -- ROS 2 --------------------------------------------------------------------------------------
 
 
-def test_other_distribution(monkeypatch: pytest.MonkeyPatch, about: ros.About) -> None:
+def test_other_distribution(monkeypatch: pytest.MonkeyPatch, about: ros.RclpyStatus) -> None:
     monkeypatch.setenv("ROS_DISTRO", "humble")
     expect_problem(ros.installation(about), "humble")
 
 
-def test_jazzy_of_another_python(monkeypatch: pytest.MonkeyPatch, about: ros.About) -> None:
+def test_jazzy_of_another_python(monkeypatch: pytest.MonkeyPatch, about: ros.RclpyStatus) -> None:
     if not about.embedded:
         pytest.skip("a real ROS 2 is sourced")
     monkeypatch.setenv("ROS_DISTRO", "jazzy")
@@ -193,7 +193,7 @@ def test_jazzy_of_another_python(monkeypatch: pytest.MonkeyPatch, about: ros.Abo
 
 
 def test_other_middleware_beside_embedded_nodes(
-    monkeypatch: pytest.MonkeyPatch, about: ros.About
+    monkeypatch: pytest.MonkeyPatch, about: ros.RclpyStatus
 ) -> None:
     if not about.embedded:
         pytest.skip("a real ROS 2 is sourced")
@@ -212,7 +212,7 @@ def test_sourced_ros(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     )
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setenv("ROS_DISTRO", "jazzy")
-    about = ros.About.ask()
+    about = ros.RclpyStatus.ask()
     assert ros.installation(about) == Check("ROS 2", "ok", "ROS 2 jazzy is sourced")
     assert ros.middleware(about).status == "warning"
     expect_problem(ros.interfaces(about), "slap_msgs")
@@ -222,12 +222,12 @@ def test_sourced_ros(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_broken_rclpy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "rclpy.py").write_text("raise ImportError('librcl.so: cannot open')")
     monkeypatch.syspath_prepend(str(tmp_path))
-    about = ros.About.ask()
+    about = ros.RclpyStatus.ask()
     expect_problem(ros.installation(about), "librcl.so")
     expect_problem(ros.middleware(about))
     expect_problem(ros.interfaces(about))
     expect_problem(dds.conversation(about))
-    expect_problem(dds.conversation(ros.About()), "librcl.so")
+    expect_problem(dds.conversation(ros.RclpyStatus()), "librcl.so")
 
 
 # -- libraries ----------------------------------------------------------------------------------
@@ -320,7 +320,7 @@ def test_middleware_that_hangs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setattr(dds, "LIMIT_S", 2.0)
     started = time.monotonic()
-    expect_problem(dds.conversation(ros.About()), "did not end in time")
+    expect_problem(dds.conversation(ros.RclpyStatus()), "did not end in time")
     assert time.monotonic() - started < 50  # s: sooner than it would end by itself
 
 

@@ -19,7 +19,7 @@ from rosbags.typesys import (
 )
 from rosbags.typesys.store import Typestore
 
-from slap_ros.bags.raw import Channel, Definition, one_line
+from slap_ros.bags.raw import Channel, MessageDefinition, one_line
 from slap_ros.errors import DamagedBagError, ForeignBagError
 from slap_ros.messages.interfaces import PACKAGE, definition, message_texts, typestore
 
@@ -72,7 +72,7 @@ def store_for(channel: Channel) -> Typestore:
     return store
 
 
-def _parse(given: Definition, type_name: str) -> Typesdict:
+def _parse(given: MessageDefinition, type_name: str) -> Typesdict:
     if given.encoding != "ros2idl":
         return get_types_from_msg(given.text, type_name)
     types: Typesdict = {}

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from slap_ros.bags.reader import Bag, read_bag
-from slap_ros.bags.recording import Episode, Recording, initial_state
+from slap_ros.bags.recording import RecordedEpisode, Recording, initial_state
 from slap_ros.core import Domain
 from slap_ros.evaluation.metrics import AtomNames, RunLog, RunMetrics
 from slap_ros.messages.decode import decode_state
@@ -39,7 +39,7 @@ class BagEvaluation:
 
 
 @dataclass(frozen=True)
-class Reading:
+class BagContents:
     """A bag's messages, sorted by what they tell."""
 
     bag: Bag
@@ -47,14 +47,14 @@ class Reading:
     recording: Recording
 
 
-def read_runs(path: Path | str) -> Reading:
+def read_runs(path: Path | str) -> BagContents:
     """Read a bag once, for everything that is to be known of its runs.
 
     Raises:
         DamagedBagError: Nothing in it can be read.
         ForeignBagError: It is not of an ensemble, or of another version of one.
     """
-    reading = Reading(read_bag(path), RunLog(), Recording())
+    reading = BagContents(read_bag(path), RunLog(), Recording())
     for _, type_name, _, message in reading.bag:
         reading.log.add(type_name, message)
         reading.recording.add(type_name, message)
@@ -74,7 +74,7 @@ def evaluate_bag(path: Path | str) -> BagEvaluation:
     return evaluate(reading, reading.recording.domain())
 
 
-def evaluate(reading: Reading, domain: Domain | None) -> BagEvaluation:
+def evaluate(reading: BagContents, domain: Domain | None) -> BagEvaluation:
     """What a bag tells; without its domain, no atoms are recomputed.
 
     Raises:
@@ -97,7 +97,7 @@ def evaluate(reading: Reading, domain: Domain | None) -> BagEvaluation:
     )
 
 
-def _mismatches(number: int, episode: Episode, domain: Domain) -> Iterator[AtomMismatch]:
+def _mismatches(number: int, episode: RecordedEpisode, domain: Domain) -> Iterator[AtomMismatch]:
     start = initial_state(episode, domain)
     if start is None:
         return

@@ -23,11 +23,11 @@ from slap_ros.bags.mcap_records import (
     MESSAGE,
     RECORD,
     SEQUENCE_MASK,
-    Fields,
     MalformedRecordError,
     Opcode,
+    RecordFields,
 )
-from slap_ros.bags.raw import Channel, Definition, RawMessage, one_line
+from slap_ros.bags.raw import Channel, MessageDefinition, RawMessage, one_line
 from slap_ros.errors import DamagedBagError
 
 UNREADABLE = (MalformedRecordError, UnicodeDecodeError, OSError)
@@ -72,7 +72,7 @@ class _McapScan:
         self._file = file
         self._size = size
         self._position = 0
-        self._schemas: dict[int, tuple[str, Definition]] = {}
+        self._schemas: dict[int, tuple[str, MessageDefinition]] = {}
         self._channels: dict[int, Channel] = {}
         self._count = 0  # messages so far
         self._numbered = False  # whether the file's messages are numbered throughout
@@ -109,7 +109,7 @@ class _McapScan:
             except _EndOfFileError:
                 return {}
             if opcode == Opcode.METADATA:
-                fields = Fields(content)
+                fields = RecordFields(content)
                 if fields.string() == name:
                     return fields.string_map()
             elif opcode != Opcode.HEADER:
@@ -137,7 +137,7 @@ class _McapScan:
 
     def _top_level(self, opcode: int, content: bytes) -> Iterator[RawMessage]:
         if opcode == Opcode.HEADER:
-            fields = Fields(content)
+            fields = RecordFields(content)
             fields.string()  # profile
             self._numbered = fields.string().startswith(LIBRARY)
         elif opcode not in IGNORED and opcode < FIRST_PRIVATE_OPCODE:
@@ -145,7 +145,7 @@ class _McapScan:
 
     def _chunk(self, content: bytes) -> memoryview:
         """The records of a complete chunk, checked and uncompressed."""
-        fields = Fields(content)
+        fields = RecordFields(content)
         _, _, size, crc = CHUNK.unpack(fields.take(CHUNK.size))
         compression = fields.string()
         if fields.u64() != fields.left:
@@ -160,7 +160,7 @@ class _McapScan:
     def _truncated_chunk(self, content: bytes) -> Iterator[RawMessage]:
         """What can be read of a chunk that the file breaks off in."""
         try:
-            fields = Fields(content)
+            fields = RecordFields(content)
             fields.take(CHUNK.size)
             compression, _ = fields.string(), fields.u64()
             if not compression:
@@ -169,7 +169,7 @@ class _McapScan:
             return  # here the file ends, as the caller reports
 
     def _records(self, data: memoryview) -> Iterator[RawMessage]:
-        fields = Fields(data)
+        fields = RecordFields(data)
         while fields.left:
             opcode, length = RECORD.unpack(fields.take(RECORD.size))
             yield from self._record(opcode, fields.take(length))
@@ -178,13 +178,13 @@ class _McapScan:
         if opcode == Opcode.MESSAGE:
             yield self._message(content)
         elif opcode == Opcode.SCHEMA:
-            fields = Fields(content)
+            fields = RecordFields(content)
             number, name = fields.u16(), fields.string()
-            self._schemas[number] = (name, Definition(fields.string(), fields.string()))
+            self._schemas[number] = (name, MessageDefinition(fields.string(), fields.string()))
         elif opcode == Opcode.CHANNEL:
-            fields = Fields(content)
+            fields = RecordFields(content)
             number, schema = fields.u16(), fields.u16()
-            type_name, definition = self._schemas.get(schema, ("", Definition()))
+            type_name, definition = self._schemas.get(schema, ("", MessageDefinition()))
             self._channels[number] = Channel(
                 fields.string(), type_name, fields.string(), definition
             )
@@ -192,7 +192,7 @@ class _McapScan:
             raise MalformedRecordError(f"there is no record of kind {opcode:#04x}")
 
     def _message(self, content: memoryview) -> RawMessage:
-        fields = Fields(content)
+        fields = RecordFields(content)
         number, sequence, log_time, _ = MESSAGE.unpack(fields.take(MESSAGE.size))
         if number not in self._channels:
             raise MalformedRecordError(f"a message of the unknown channel {number}")
@@ -210,7 +210,7 @@ class _McapScan:
                 opcode, content = self._next_record()
             except _EndOfFileError:
                 raise MalformedRecordError("the index is incomplete") from None
-            if opcode == Opcode.STATISTICS and (told := Fields(content).u64()) != self._count:
+            if opcode == Opcode.STATISTICS and (told := RecordFields(content).u64()) != self._count:
                 raise MalformedRecordError(f"has {self._count} messages and claims {told}")
             if opcode == Opcode.FOOTER:
                 return self._check_magic("the index is damaged")

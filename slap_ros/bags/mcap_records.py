@@ -66,7 +66,7 @@ def string_map(entries: Mapping[str, str]) -> bytes:
     return prefixed(b"".join(string(key) + string(value) for key, value in entries.items()))
 
 
-class Fields:
+class RecordFields:
     """Takes the fields of a record one after the other.
 
     Every method raises :class:`MalformedRecordError` where the record is too short, and
@@ -118,7 +118,7 @@ class Fields:
 
     def string_map(self) -> dict[str, str]:
         """A map from strings to strings."""
-        entries, found = Fields(self.prefixed()), {}
+        entries, found = RecordFields(self.prefixed()), {}
         while entries.left:
             key = entries.string()
             found[key] = entries.string()

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 
 @dataclass(frozen=True)
-class Definition:
+class MessageDefinition:
     """What a bag itself says of a message type; empty where it says nothing."""
 
     encoding: str = ""  # ros2msg or ros2idl
@@ -23,7 +23,7 @@ class Channel:
     topic: str
     type_name: str
     serialization: str  # cdr, or something that we do not read
-    definition: Definition
+    definition: MessageDefinition
 
 
 LONGEST_CAUSE = 160  # characters

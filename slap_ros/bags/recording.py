@@ -35,7 +35,7 @@ from slap_ros.relational import State
 
 
 @dataclass
-class Episode:
+class RecordedEpisode:
     """What is known of an episode; everything by step."""
 
     task: TaskMessage | None = None
@@ -49,7 +49,7 @@ class Recording:
     """Collects the messages of an ensemble by episode."""
 
     def __init__(self) -> None:
-        self.episodes: dict[int, Episode] = {}
+        self.episodes: dict[int, RecordedEpisode] = {}
         self.domain_info: DomainInfoMessage | None = None
         self.markers: dict[int, MarkersMessage] = {}  # by stamp, ns
         self._add: Mapping[str, Callable[[Any], None]] = {
@@ -74,8 +74,8 @@ class Recording:
         if type_name in self._add:
             self._add[type_name](message)
 
-    def _episode(self, number: int) -> Episode:
-        return self.episodes.setdefault(number, Episode())
+    def _episode(self, number: int) -> RecordedEpisode:
+        return self.episodes.setdefault(number, RecordedEpisode())
 
     def _add_domain(self, msg: DomainInfoMessage) -> None:
         self.domain_info = msg
@@ -122,7 +122,7 @@ class Recording:
         return domain
 
 
-def initial_state(episode: Episode, domain: Domain) -> tuple[int, State] | None:
+def initial_state(episode: RecordedEpisode, domain: Domain) -> tuple[int, State] | None:
     """The task's initial state, or else the first one recorded, with its step.
 
     Raises:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from slap_ros.bags.reader import read_bag
-from slap_ros.bags.recording import Episode, Recording, initial_state
+from slap_ros.bags.recording import RecordedEpisode, Recording, initial_state
 from slap_ros.core import Action, Domain, World
 from slap_ros.errors import DamagedBagError, InvalidCommandError, InvalidStateError
 from slap_ros.messages.decode import decode_state
@@ -112,7 +112,7 @@ class _Replay:
         return bool(after)
 
 
-def _replay(episode: Episode, domain: Domain) -> Iterator[tuple[int, State, State | None]]:
+def _replay(episode: RecordedEpisode, domain: Domain) -> Iterator[tuple[int, State, State | None]]:
     """Step, recorded and replayed state, for every state of an episode."""
     start = initial_state(episode, domain)
     if start is None:

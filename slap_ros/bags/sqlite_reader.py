@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
-from slap_ros.bags.raw import Channel, Definition, RawMessage, one_line
+from slap_ros.bags.raw import Channel, MessageDefinition, RawMessage, one_line
 from slap_ros.errors import DamagedBagError
 
 
@@ -37,13 +37,13 @@ def _channels(database: sqlite3.Connection) -> dict[int, Channel]:
     topics = database.execute("SELECT id, name, type, serialization_format FROM topics")
     return {
         number: Channel(
-            str(name), str(type_name), str(form), definitions.get(type_name, Definition())
+            str(name), str(type_name), str(form), definitions.get(type_name, MessageDefinition())
         )
         for number, name, type_name, form in topics
     }
 
 
-def _definitions(database: sqlite3.Connection) -> dict[str, Definition]:
+def _definitions(database: sqlite3.Connection) -> dict[str, MessageDefinition]:
     """By type name; none in bags from before Iron."""
     table = "SELECT name FROM sqlite_master WHERE name = 'message_definitions'"
     if database.execute(table).fetchone() is None:
@@ -51,4 +51,4 @@ def _definitions(database: sqlite3.Connection) -> dict[str, Definition]:
     rows = database.execute(
         "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
     )
-    return {name: Definition(str(encoding), str(text)) for name, encoding, text in rows}
+    return {name: MessageDefinition(str(encoding), str(text)) for name, encoding, text in rows}

@@ -45,7 +45,7 @@ PHASES = {
 
 
 @dataclass(frozen=True)
-class _Progress:
+class _EdgeProgress:
     """How far an edge has come."""
 
     kind: PlanEventKind
@@ -54,7 +54,7 @@ class _Progress:
 
 
 @dataclass(frozen=True)
-class _Change:
+class _AtomChange:
     """Atoms that began to hold, and that ceased to."""
 
     step: int
@@ -79,8 +79,8 @@ class RunView:
     step: int = 0
     phase: str = "waiting"
     plan: PlanMessage | None = None
-    edges: dict[tuple[int, int], _Progress] = field(default_factory=dict)  # by plan and edge
-    changes: tuple[_Change, ...] = ()  # the newest last
+    edges: dict[tuple[int, int], _EdgeProgress] = field(default_factory=dict)  # by plan and edge
+    changes: tuple[_AtomChange, ...] = ()  # the newest last
     atoms: AtomNames | None = None
 
     def add(self, type_name: str, message: Any) -> None:
@@ -99,9 +99,9 @@ class RunView:
         self.phase = PHASES[kind]
         key = (message.plan_number, message.edge)
         if kind == PlanEventKind.EDGE_STARTED:
-            self.edges[key] = _Progress(kind, message.step)
+            self.edges[key] = _EdgeProgress(kind, message.step)
         elif kind in MARKS and key in self.edges:
-            self.edges[key] = _Progress(kind, self.edges[key].start, message.step)
+            self.edges[key] = _EdgeProgress(kind, self.edges[key].start, message.step)
 
     def _add_state(self, message: StateMessage) -> None:
         self.step = message.step
@@ -109,7 +109,7 @@ class RunView:
     def _add_atoms(self, message: AtomsMessage) -> None:
         atoms = atom_names(message.atoms)
         if self.atoms is not None and atoms != self.atoms:
-            change = _Change(message.step, atoms - self.atoms, self.atoms - atoms)
+            change = _AtomChange(message.step, atoms - self.atoms, self.atoms - atoms)
             self.changes = (*self.changes, change)[-CHANGES:]
         self.atoms = atoms
 
@@ -135,7 +135,9 @@ class RunView:
                 table.add_row(*self._row(edge, self.edges.get((self.plan.number, number))))
         return table
 
-    def _row(self, edge: PlanEdgeMessage, progress: _Progress | None) -> tuple[Text, Text, Text]:
+    def _row(
+        self, edge: PlanEdgeMessage, progress: _EdgeProgress | None
+    ) -> tuple[Text, Text, Text]:
         sign, style = MARKS[progress.kind] if progress is not None else TO_COME
         name = Text(f"{edge.name}({', '.join(edge.objects)})", style)
         if edge.kind == OptionKind.SHORTCUT.value:

@@ -229,10 +229,10 @@ def _broadcast(live: bool, port: int | None, watched: bool) -> Iterator[Broadcas
 
 def _narrator(live: bool) -> AbstractContextManager[Callable[[str, Any], None]]:
     """Whoever tells the run: in place on a terminal, in lines elsewhere."""
-    return Dashboard(console) if live and console.is_terminal else nullcontext(Narrator())
+    return Dashboard(console) if live and console.is_terminal else nullcontext(EventPrinter())
 
 
-class Narrator:
+class EventPrinter:
     """Tells the run as it goes, a line for each event."""
 
     def __init__(self) -> None:

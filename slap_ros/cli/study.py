@@ -24,7 +24,7 @@ from slap_ros.studies import dynamics, generalisation, perception, planning_time
 from slap_ros.studies import goals as sampled
 from slap_ros.studies.comparison import Comparison
 from slap_ros.studies.figures import require_matplotlib
-from slap_ros.studies.results import Data, Origin, Report, describe_library, write
+from slap_ros.studies.results import Data, Provenance, StudyReport, describe_library, write
 from slap_ros.studies.trainings import TrainingFolder
 from slap_ros.studies.variations import NUMBERS, offered, parse_variation
 
@@ -59,7 +59,7 @@ def dynamics_(domain: Domain, work: Work, output: Output = RESULTS) -> None:
     folders = [TrainingFolder(folder) for folder in work]
     report = dynamics.study(domain, folders)
     command = _command("dynamics", domain, work=work)
-    _write(output, report, Origin(domain, command, _trainings(folders)))
+    _write(output, report, Provenance(domain, command, _trainings(folders)))
 
 
 @app.command("generalisation")
@@ -79,10 +79,10 @@ def generalisation_(
     comparison, settings = _compare(domain, preset, shortcuts, samples, tasks, seeds, jobs)
     chosen = [parse_variation(text) for text in vary or ()] or offered(comparison.domain)
     ends = replace(comparison, approaches=_first_and_last(comparison.approaches))
-    with _Show() as show:
+    with _StudyBars() as show:
         report = generalisation.study(ends, chosen, show)
     command = _command("generalisation", domain, vary=vary, shortcuts=shortcuts, **settings)
-    _write(output, report, Origin(domain, command, settings))
+    _write(output, report, Provenance(domain, command, settings))
 
 
 @app.command("goals")
@@ -101,10 +101,10 @@ def goals_(
     """SLAP Fig. 9: pure planning and SLAP for goals that the library was not trained for."""
     comparison, settings = _compare(domain, preset, shortcuts, samples, tasks, seeds, jobs)
     ends = replace(comparison, approaches=_first_and_last(comparison.approaches))
-    with _Show() as show:
+    with _StudyBars() as show:
         report = sampled.study(ends, goals, show)
     command = _command("goals", domain, goals=goals, shortcuts=shortcuts, **settings)
-    _write(output, report, Origin(domain, command, {"goals": goals, **settings}))
+    _write(output, report, Provenance(domain, command, {"goals": goals, **settings}))
 
 
 @app.command("pruning")
@@ -130,13 +130,13 @@ def pruning_(
     if work:
         folders = [TrainingFolder(folder) for folder in work]
         explored, how = pruning.explored_in(folders, domain)
-        origin = Origin(domain, _command("pruning", domain, work=work), _trainings(folders))
+        origin = Provenance(domain, _command("pruning", domain, work=work), _trainings(folders))
     else:
         how = training_settings(settings, domain).exploration
-        with _Show() as show:
+        with _StudyBars() as show:
             explored = pruning.explore(domain, preset, seeds, tasks, how, jobs, show)
         options = {"preset": preset, "tasks": tasks, "seeds": seeds, "settings": settings}
-        origin = Origin(domain, _command("pruning", domain, **options), options)
+        origin = Provenance(domain, _command("pruning", domain, **options), options)
     _write(output, pruning.study(domain, explored, how), origin)
 
 
@@ -156,12 +156,12 @@ def perception_(
     """SLAP D.3, D.4: success, length and replans while perception errs in several ways."""
     comparison, settings = _compare(domain, preset, shortcuts, samples, tasks, seeds, jobs)
     ends = replace(comparison, approaches=_first_and_last(comparison.approaches))
-    with _Show() as show:
+    with _StudyBars() as show:
         report = perception.study(ends, max_replans, show)
     settings = {"max_replans": max_replans, **settings}
     options = {name.replace("_", "-"): value for name, value in settings.items()}
     command = _command("perception", domain, shortcuts=shortcuts, **options)
-    _write(output, report, Origin(domain, command, settings))
+    _write(output, report, Provenance(domain, command, settings))
 
 
 @app.command("planning_time")
@@ -183,10 +183,10 @@ def planning_time_(
     """SLAP Table 4: seconds of planning, edges rolled out, size of the graph."""
     comparison, settings = _compare(domain, preset, shortcuts, samples, tasks, seeds, jobs)
     chosen = parse_variation(vary) if vary else offered(comparison.domain, NUMBERS)[0]
-    with _Show() as show:
+    with _StudyBars() as show:
         report = planning_time.study(comparison, chosen, show)
     command = _command("planning_time", domain, vary=vary, shortcuts=shortcuts, **settings)
-    _write(output, report, Origin(domain, command, settings))
+    _write(output, report, Provenance(domain, command, settings))
 
 
 def _compare(
@@ -239,19 +239,19 @@ def _command(study: str, domain: str, **options: Any) -> str:
     return shlex.join(parts)
 
 
-def _write(output: Path, report: Report, origin: Origin) -> None:
+def _write(output: Path, report: StudyReport, origin: Provenance) -> None:
     paths = write(output, report, origin)
     console.print(f"{report.title}: {', '.join(map(str, paths))}", highlight=False, markup=False)
 
 
-class _Show:
+class _StudyBars:
     """Progress on the terminal, a bar a kind of jobs."""
 
     def __init__(self) -> None:
         self._bars = progress()
         self._bar: TaskID | None = None
 
-    def __enter__(self) -> _Show:
+    def __enter__(self) -> _StudyBars:
         self._bars.start()
         return self
 
@@ -264,11 +264,11 @@ class _Show:
             self._bars.remove_task(self._bar)
         self._bar = self._bars.add_task(what, total=total)
 
-    def done(self) -> None:
-        """One of them is done."""
+    def advance(self) -> None:
+        """One of them has ended."""
         if self._bar is not None:
             self._bars.advance(self._bar)
 
-    def failed(self, complaint: str) -> None:
+    def report_failure(self, complaint: str) -> None:
         """A task was not solved, and why."""
         console.print(complaint, highlight=False, markup=False)

@@ -64,7 +64,7 @@ def train(
     output = output or Path("runs/models") / domain
     work = work or output.with_name(f"{output.name}-training")
     began = monotonic()
-    with _workers(jobs, ray) as workers, _Show() as show:
+    with _workers(jobs, ray) as workers, _TrainingBars() as show:
         library = Training(Place(domain, preset, seed), chosen, work, workers, show).run()
     command = _command(domain, preset, seed, settings, steps)
     library = replace(library, record={"command": command, **library.record})
@@ -98,7 +98,7 @@ def _require_torch() -> None:
         ) from error
 
 
-class _Show:
+class _TrainingBars:
     """Progress on the terminal. What is learned elsewhere is followed by its progress file."""
 
     def __init__(self) -> None:
@@ -113,7 +113,7 @@ class _Show:
         self._counting: dict[str, TaskID] = {}
         self._following: tuple[Event, Thread] | None = None
 
-    def __enter__(self) -> _Show:
+    def __enter__(self) -> _TrainingBars:
         self._bars.start()
         return self
 

@@ -22,7 +22,7 @@ def diagnose(runs: Path = RUNS) -> list[Check]:
     Args:
         runs: The folder in which runs are to be recorded; it need not exist yet.
     """
-    about = ros.About.ask()
+    about = ros.RclpyStatus.ask()
     return [
         machine.python_version(),
         ros.installation(about),

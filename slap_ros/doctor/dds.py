@@ -13,8 +13,8 @@ from uuid import uuid4
 
 from slap_ros.doctor import settings
 from slap_ros.doctor.check import Check
-from slap_ros.doctor.processes import PROBE, Outcome, finished, started
-from slap_ros.doctor.ros import About
+from slap_ros.doctor.processes import PROBE, ProcessResult, finished, started
+from slap_ros.doctor.ros import RclpyStatus
 
 NAME = "DDS between two processes"
 LIMIT_S = 10.0  # for everything
@@ -25,7 +25,7 @@ SLOW_ROUND_TRIP_S = 0.02
 _CYCLONE = re.compile(r"^\d+\.\d+ \[\d+\]\s+\S+?: (.+)$", re.MULTILINE)
 
 
-def conversation(about: About) -> Check:
+def conversation(about: RclpyStatus) -> Check:
     """Start two nodes and let them talk, with the environment as it is."""
     if about.error:
         return Check(NAME, "problem", "not tried, without rclpy", "See ROS 2.")
@@ -42,7 +42,7 @@ def conversation(about: About) -> Check:
     return _measured(max(discovery_s, 0.0), here["median"], here["trips"], used)
 
 
-def _converse() -> tuple[Outcome, Outcome]:
+def _converse() -> tuple[ProcessResult, ProcessResult]:
     """How the asking and the answering process ended; both are gone."""
     deadline, token = monotonic() + LIMIT_S, uuid4().hex[:8]
     with ExitStack() as stack:
@@ -52,12 +52,12 @@ def _converse() -> tuple[Outcome, Outcome]:
         return asked, finished(answering, deadline - monotonic())
 
 
-def _report(outcome: Outcome) -> dict[str, Any]:
+def _report(outcome: ProcessResult) -> dict[str, Any]:
     report: dict[str, Any] = json.loads(outcome.output.splitlines()[-1])
     return report
 
 
-def _cause(outcome: Outcome) -> str:
+def _cause(outcome: ProcessResult) -> str:
     """CycloneDDS's own words where it has any: its exceptions say nothing."""
     said = _CYCLONE.findall(outcome.errors)
     return str(said[0]) if said else outcome.last_error

@@ -18,7 +18,7 @@ PROBE = "slap_ros.doctor.probe"
 
 
 @dataclass(frozen=True)
-class Outcome:
+class ProcessResult:
     """How a process ended."""
 
     code: int | None  # None: it had to be stopped at its time limit
@@ -34,7 +34,7 @@ class Outcome:
         return lines[-1] if lines else f"it ended with exit code {self.code}"
 
 
-def run_python(arguments: list[str], limit_s: float) -> Outcome:
+def run_python(arguments: list[str], limit_s: float) -> ProcessResult:
     """Run this Python with arguments, for so long at most."""
     with started(arguments) as process:
         return finished(process, limit_s)
@@ -64,15 +64,15 @@ def started(arguments: list[str]) -> Iterator[subprocess.Popen[str]]:
             process.kill()
 
 
-def finished(process: subprocess.Popen[str], limit_s: float) -> Outcome:
+def finished(process: subprocess.Popen[str], limit_s: float) -> ProcessResult:
     """Close its standard input and wait for its end, for so long at most; then stop it."""
     try:
         output, errors = process.communicate(timeout=max(limit_s, 0.0))
     except subprocess.TimeoutExpired:
         process.kill()
         output, errors = process.communicate()
-        return Outcome(None, output, errors)
-    return Outcome(process.returncode, output, errors)
+        return ProcessResult(None, output, errors)
+    return ProcessResult(process.returncode, output, errors)
 
 
 def _module_path() -> list[str]:

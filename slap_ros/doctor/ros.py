@@ -19,7 +19,7 @@ IMPORT_LIMIT_S = 15.0
 
 
 @dataclass(frozen=True)
-class About:
+class RclpyStatus:
     """What a process that imports rclpy says about it."""
 
     error: str = ""  # why there is none
@@ -29,7 +29,7 @@ class About:
     versions: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
-    def ask(cls) -> About:
+    def ask(cls) -> RclpyStatus:
         """Import rclpy in another process."""
         outcome = run_python(["-m", PROBE, "about"], IMPORT_LIMIT_S)
         if outcome.code != 0:
@@ -46,7 +46,7 @@ class About:
         )
 
 
-def installation(about: About) -> Check:
+def installation(about: RclpyStatus) -> Check:
     """A sourced ROS 2 Jazzy, or else the embedded runtime."""
     name, distro = "ROS 2", os.environ.get("ROS_DISTRO", "")
     if about.error:
@@ -77,7 +77,7 @@ def installation(about: About) -> Check:
     return Check(name, "ok", f"not sourced, and not needed: {runtime} serves")
 
 
-def middleware(about: About) -> Check:
+def middleware(about: RclpyStatus) -> Check:
     """CycloneDDS on all sides: services and actions do not cross to another middleware."""
     name, wanted = "ROS 2 middleware", os.environ.get("RMW_IMPLEMENTATION", "")
     advice = f"export RMW_IMPLEMENTATION={CYCLONE} for every node."
@@ -103,7 +103,7 @@ def middleware(about: About) -> Check:
     return Check(name, "ok", about.middleware)
 
 
-def interfaces(about: About) -> Check:
+def interfaces(about: RclpyStatus) -> Check:
     """The message types of slap_msgs."""
     name = "slap_msgs"
     if about.error:

@@ -21,7 +21,7 @@ RANGES = ("LOCALHOST", "SUBNET", "SYSTEM_DEFAULT", "OFF")
 
 
 @dataclass(frozen=True)
-class Fault:
+class SettingFault:
     """A setting that keeps nodes from finding each other, or may."""
 
     status: Status
@@ -36,7 +36,7 @@ def described() -> str:
     )
 
 
-def faults() -> list[Fault]:
+def faults() -> list[SettingFault]:
     """What is wrong with the values, as far as can be seen without trying."""
     return [*_domain_faults(), *_range_faults()]
 
@@ -60,26 +60,28 @@ def _value(name: str) -> str:
     return value if len(value) <= 60 else f"{value[:59]}…"
 
 
-def _domain_faults() -> list[Fault]:
+def _domain_faults() -> list[SettingFault]:
     text = os.environ.get(DOMAIN_ID, "").strip() or "0"
     safe = f"Set {DOMAIN_ID} to a number from 0 to {SAFE_DOMAIN_IDS[-1]}, the same for all nodes."
     # int() refuses some characters that isdecimal() takes for digits, hence isascii().
     if not (text.isascii() and text.isdecimal()) or int(text) > MAX_DOMAIN_ID:
         found = f"{DOMAIN_ID} is {text!r}, not a number from 0 to {MAX_DOMAIN_ID}"
-        return [Fault("problem", found, safe)]
+        return [SettingFault("problem", found, safe)]
     if int(text) in UNSAFE_DOMAIN_IDS:
         found = f"the ports of {DOMAIN_ID} {text} may be taken by other programs"
-        return [Fault("warning", found, safe)]
+        return [SettingFault("warning", found, safe)]
     return []
 
 
-def _range_faults() -> list[Fault]:
+def _range_faults() -> list[SettingFault]:
     if os.environ.get("ROS_LOCALHOST_ONLY") == "1":
         return []  # it overrides the range
     text = os.environ.get(RANGE, "").strip().upper() or RANGES[0]
     advice = f"Set {RANGE} to LOCALHOST for nodes on this machine, or to SUBNET for several."
     if text not in RANGES:
-        return [Fault("problem", f"{RANGE} is {text!r}, none of {', '.join(RANGES)}", advice)]
+        return [
+            SettingFault("problem", f"{RANGE} is {text!r}, none of {', '.join(RANGES)}", advice)
+        ]
     if text == "OFF":
-        return [Fault("problem", f"{RANGE} is OFF: no node finds another", advice)]
+        return [SettingFault("problem", f"{RANGE} is OFF: no node finds another", advice)]
     return []

@@ -9,11 +9,11 @@ from collections.abc import Iterator, Sequence
 
 from slap_ros.drawing.captions import PAGE_MARGIN_PX, draw_legend, state_facts, write_header
 from slap_ros.drawing.cards import LARGE, SMALL, Card, cut, list_bodies, make_card, make_label
-from slap_ros.drawing.layout import Box, Layout, Link, Route, lay_out
+from slap_ros.drawing.layout import EdgeLink, GraphLayout, NodeBox, Route, lay_out
 from slap_ros.drawing.palette import BACKGROUND, PENS
 from slap_ros.drawing.selection import Selection, ShownEdge, select
-from slap_ros.drawing.svg import Curve, Group, Picture, Shape
-from slap_ros.drawing.words import Words, counted
+from slap_ros.drawing.svg import SvgCurve, SvgGroup, SvgPicture, SvgShape
+from slap_ros.drawing.words import AtomNaming, counted
 from slap_ros.planning.abstract_graph import AbstractGraph
 from slap_ros.planning.plan import Plan
 from slap_ros.relational import AtomSpace
@@ -44,9 +44,9 @@ def draw_abstract_graph(
     return compose(graph, space, plan, title).markup()
 
 
-def compose(graph: AbstractGraph, space: AtomSpace, plan: Plan | None, title: str) -> Picture:
+def compose(graph: AbstractGraph, space: AtomSpace, plan: Plan | None, title: str) -> SvgPicture:
     """The picture as shapes; see :func:`draw_abstract_graph`."""
-    selection, words = select(graph, plan), Words(space)
+    selection, words = select(graph, plan), AtomNaming(space)
     many = len(selection.nodes) > MANY_NODES
     cards = _cards(selection, words, graph.nodes[0], many)
     labels = [
@@ -60,17 +60,17 @@ def compose(graph: AbstractGraph, space: AtomSpace, plan: Plan | None, title: st
     top = header[-1].area.bottom + ABOVE_PX
     layout = layout.moved(PAGE_MARGIN_PX + (width - layout.width) / 2, top)
     legend, bottom = draw_legend(selection, top + layout.height + BELOW_PX, width)
-    shapes: list[Shape] = [
+    shapes: list[SvgShape] = [
         *header,
         *_draw_edges(selection, labels, layout),
         *_draw_nodes(selection, cards, layout, words),
         *legend,
     ]
     size = width + 2 * PAGE_MARGIN_PX, bottom + PAGE_MARGIN_PX
-    return Picture(*size, title, " ".join(facts), BACKGROUND, shapes)
+    return SvgPicture(*size, title, " ".join(facts), BACKGROUND, shapes)
 
 
-def _cards(selection: Selection, words: Words, start: int, many: bool) -> list[Card]:
+def _cards(selection: Selection, words: AtomNaming, start: int, many: bool) -> list[Card]:
     """Of many, only the plan's have room for everything."""
     bodies = list_bodies(selection, words, start)
     common = Counter(line.content for body in bodies for line in body)
@@ -81,41 +81,43 @@ def _cards(selection: Selection, words: Words, start: int, many: bool) -> list[C
     return cards
 
 
-def _arrange(selection: Selection, cards: Sequence[Card], labels: Sequence[Card | None]) -> Layout:
+def _arrange(
+    selection: Selection, cards: Sequence[Card], labels: Sequence[Card | None]
+) -> GraphLayout:
     boxes = [
-        Box(node.depth, card.size, CARD_MARGIN * card.style.text_px)
+        NodeBox(node.depth, card.size, CARD_MARGIN * card.style.text_px)
         for node, card in zip(selection.nodes, cards, strict=True)
     ]
     links = [
-        Link(edge.source, edge.target, label.size if label else None, edge.step is not None)
+        EdgeLink(edge.source, edge.target, label.size if label else None, edge.step is not None)
         for edge, label in zip(selection.edges, labels, strict=True)
     ]
     return lay_out(boxes, links)
 
 
 def _draw_nodes(
-    selection: Selection, cards: Sequence[Card], layout: Layout, words: Words
-) -> Iterator[Group]:
+    selection: Selection, cards: Sequence[Card], layout: GraphLayout, words: AtomNaming
+) -> Iterator[SvgGroup]:
     for node, card, area in zip(selection.nodes, cards, layout.boxes, strict=True):
-        yield Group(f"State {node.number}: {words.sentence(node.atoms)}", card.shapes(area))
+        yield SvgGroup(f"State {node.number}: {words.sentence(node.atoms)}", card.shapes(area))
 
 
 def _draw_edges(
-    selection: Selection, labels: Sequence[Card | None], layout: Layout
-) -> Iterator[Group]:
+    selection: Selection, labels: Sequence[Card | None], layout: GraphLayout
+) -> Iterator[SvgGroup]:
     """Those that lead back first, so that the plan's lie on top."""
     drawn = list(zip(selection.edges, labels, layout.routes, strict=True))
     drawn.sort(key=lambda item: (item[0].step is not None, item[0].is_forward))
     for edge, label, route in drawn:
-        shapes: list[Shape] = list(_curves(edge, route))
+        shapes: list[SvgShape] = list(_curves(edge, route))
         if label is not None and route.label is not None:
             shapes += label.shapes(route.label)
-        yield Group(_edge_title(edge, selection), shapes)
+        yield SvgGroup(_edge_title(edge, selection), shapes)
 
 
-def _curves(edge: ShownEdge, route: Route) -> Iterator[Curve]:
+def _curves(edge: ShownEdge, route: Route) -> Iterator[SvgCurve]:
     for i, waypoints in enumerate(route.curves, start=1):
-        yield Curve(waypoints, PENS[edge.mark], i == len(route.curves))
+        yield SvgCurve(waypoints, PENS[edge.mark], i == len(route.curves))
 
 
 def _edge_title(edge: ShownEdge, selection: Selection) -> str:

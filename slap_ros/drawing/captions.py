@@ -8,11 +8,11 @@ from collections.abc import Iterator, Sequence
 
 from slap_ros.drawing import text
 from slap_ros.drawing.cards import SMALL, Card, difference_colour
-from slap_ros.drawing.layout import Area, Waypoint
+from slap_ros.drawing.layout import Area, RoutePoint
 from slap_ros.drawing.palette import CARD, GOAL, INK, MUTED, PENS
 from slap_ros.drawing.selection import Selection
-from slap_ros.drawing.svg import Curve, Shape, Text
-from slap_ros.drawing.words import ADDED, REMOVED, Words, counted
+from slap_ros.drawing.svg import SvgCurve, SvgShape, SvgText
+from slap_ros.drawing.words import ADDED, REMOVED, AtomNaming, counted
 from slap_ros.planning.abstract_graph import AbstractGraph
 from slap_ros.planning.options import OptionKind
 from slap_ros.planning.plan import Plan
@@ -29,7 +29,7 @@ MEANINGS = {
 
 
 def state_facts(
-    graph: AbstractGraph, words: Words, plan: Plan | None, selection: Selection
+    graph: AbstractGraph, words: AtomNaming, plan: Plan | None, selection: Selection
 ) -> list[str]:
     """Sentences under the title."""
     nodes, edges = counted(len(graph.nodes), "abstract state"), counted(len(graph.edges), "option")
@@ -54,28 +54,28 @@ def _plan_fact(plan: Plan | None) -> str:
     return f"Plan: {counted(len(plan.edges), 'option')}{shortcuts}, {steps} predicted."
 
 
-def write_header(title: str, facts: Sequence[str], width: float) -> Iterator[Text]:
+def write_header(title: str, facts: Sequence[str], width: float) -> Iterator[SvgText]:
     """The title and the facts below it, broken into lines."""
     y = PAGE_MARGIN_PX
     for line in text.wrap(title, TITLE_PX, width, bold=True):
-        yield Text(PAGE_MARGIN_PX, y + TITLE_PX * 0.8, line, TITLE_PX, INK, bold=True)
+        yield SvgText(PAGE_MARGIN_PX, y + TITLE_PX * 0.8, line, TITLE_PX, INK, bold=True)
         y += TITLE_PX * 1.35
     for fact in facts:
         for line in text.wrap(fact, FACT_PX, width):
-            yield Text(PAGE_MARGIN_PX, y + FACT_PX * 0.9, line, FACT_PX, MUTED)
+            yield SvgText(PAGE_MARGIN_PX, y + FACT_PX * 0.9, line, FACT_PX, MUTED)
             y += FACT_PX * 1.4
 
 
-def draw_legend(selection: Selection, y: float, width: float) -> tuple[list[Shape], float]:
+def draw_legend(selection: Selection, y: float, width: float) -> tuple[list[SvgShape], float]:
     """What marks mean, of those that occur, in rows; and where the last row ends."""
-    shapes: list[Shape] = []
+    shapes: list[SvgShape] = []
     x, row_px, sample_px = PAGE_MARGIN_PX, 24.0, 30.0
     for kind, meaning in _legend_entries(selection):
         needed = sample_px + 6 + text.width_px(meaning, LEGEND_PX)
         if x > PAGE_MARGIN_PX and x + needed > PAGE_MARGIN_PX + width:
             x, y = PAGE_MARGIN_PX, y + row_px
         shapes += _sample(kind, Area(x, y, sample_px, 14.0))
-        shapes.append(Text(x + sample_px + 6, y + 11.0, meaning, LEGEND_PX, INK))
+        shapes.append(SvgText(x + sample_px + 6, y + 11.0, meaning, LEGEND_PX, INK))
         x += needed + 22
     return shapes, y + row_px
 
@@ -90,11 +90,13 @@ def _legend_entries(selection: Selection) -> Iterator[tuple[str, str]]:
     yield from ((mark, meaning) for mark, meaning in MEANINGS.items() if mark in occurring)
 
 
-def _sample(kind: str, area: Area) -> list[Shape]:
+def _sample(kind: str, area: Area) -> list[SvgShape]:
     """A small picture of a mark."""
     if kind in (ADDED, REMOVED):
-        return [Text(area.x + 10, area.y + 11, kind.strip(), 13.0, difference_colour(kind), True)]
+        return [
+            SvgText(area.x + 10, area.y + 11, kind.strip(), 13.0, difference_colour(kind), True)
+        ]
     if kind == "goal":
         return Card((), SMALL, CARD, GOAL, 1.0, double=True).shapes(area)
-    ends = Waypoint(area.x, area.middle, 1), Waypoint(area.right, area.middle, 1)
-    return [Curve(ends, PENS[kind])]
+    ends = RoutePoint(area.x, area.middle, 1), RoutePoint(area.right, area.middle, 1)
+    return [SvgCurve(ends, PENS[kind])]

@@ -25,8 +25,8 @@ from slap_ros.drawing.palette import (
     START,
 )
 from slap_ros.drawing.selection import Selection, ShownEdge, ShownNode
-from slap_ros.drawing.svg import Rectangle, Shape, Text
-from slap_ros.drawing.words import ADDED, REMOVED, Words, counted
+from slap_ros.drawing.svg import SvgRectangle, SvgShape, SvgText
+from slap_ros.drawing.words import ADDED, REMOVED, AtomNaming, counted
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ LABEL = CardStyle(text_px=10.5, padding_px=5.0, max_lines=4, max_text_px=220.0)
 
 
 @dataclass(frozen=True)
-class Line:
+class CardLine:
     """A line on a card."""
 
     content: str
@@ -62,7 +62,7 @@ class Line:
 class Card:
     """Lines of text in a frame."""
 
-    lines: tuple[Line, ...]
+    lines: tuple[CardLine, ...]
     style: CardStyle
     fill: str
     stroke: str
@@ -77,45 +77,45 @@ class Card:
         height = len(self.lines) * style.line_px
         return Size(max(widths) + 2 * style.padding_px, height + 2 * style.padding_px)
 
-    def shapes(self, area: Area) -> list[Shape]:
+    def shapes(self, area: Area) -> list[SvgShape]:
         """The card in its place, text to the left, a frame around the whole area."""
-        shapes: list[Shape] = [Rectangle(area, self.fill, self.stroke, self.stroke_px)]
+        shapes: list[SvgShape] = [SvgRectangle(area, self.fill, self.stroke, self.stroke_px)]
         if self.double:
             inner = Area(area.x + 3, area.y + 3, area.width - 6, area.height - 6)
-            shapes.append(Rectangle(inner, "none", self.stroke, 1.0, 2.0))
+            shapes.append(SvgRectangle(inner, "none", self.stroke, 1.0, 2.0))
         return [*shapes, *self._text(area)]
 
-    def _text(self, area: Area) -> Iterator[Text]:
+    def _text(self, area: Area) -> Iterator[SvgText]:
         style = self.style
         for i, line in enumerate(self.lines):
             baseline = area.y + style.padding_px + i * style.line_px + style.text_px
             x = area.x + style.padding_px
-            yield Text(x, baseline, line.content, style.text_px, line.fill, line.bold)
+            yield SvgText(x, baseline, line.content, style.text_px, line.fill, line.bold)
 
 
-def list_bodies(selection: Selection, words: Words, start: int) -> list[list[Line]]:
+def list_bodies(selection: Selection, words: AtomNaming, start: int) -> list[list[CardLine]]:
     """What each card would list if it had room for it."""
     return [
-        [Line(d, difference_colour(d)) for d in words.differences(start, node.atoms)]
+        [CardLine(d, difference_colour(d)) for d in words.differences(start, node.atoms)]
         if node.number > 0
-        else [Line(atom) for atom in words.atoms(node.atoms)]
+        else [CardLine(atom) for atom in words.atoms(node.atoms)]
         for node in selection.nodes
     ]
 
 
-def cut(lines: list[Line], limit: int, common: Counter[str]) -> list[Line]:
+def cut(lines: list[CardLine], limit: int, common: Counter[str]) -> list[CardLine]:
     """The lines, or as many as there is room for of those on the fewest cards, which tell most."""
     if len(lines) <= limit:
         return lines
     rarest = sorted(lines, key=lambda line: common[line.content])[: limit - 1]
     kept = [line for line in lines if line in rarest]
-    return [*kept, Line(f"… {len(lines) - len(kept)} more", MUTED)]
+    return [*kept, CardLine(f"… {len(lines) - len(kept)} more", MUTED)]
 
 
-def make_card(node: ShownNode, body: Sequence[Line], style: CardStyle) -> Card:
+def make_card(node: ShownNode, body: Sequence[CardLine], style: CardStyle) -> Card:
     """A node's card."""
     heading, colour = _heading(node)
-    lines = [Line(heading, colour, bold=True), *body]
+    lines = [CardLine(heading, colour, bold=True), *body]
     return Card(
         tuple(_fitting(line, style) for line in lines),
         style,
@@ -138,22 +138,25 @@ def difference_colour(difference: str) -> str:
     return {ADDED: GAINED, REMOVED: LOST}[difference[: len(ADDED)]]
 
 
-def _fitting(line: Line, style: CardStyle) -> Line:
+def _fitting(line: CardLine, style: CardStyle) -> CardLine:
     content = text.shorten(line.content, style.text_px, style.max_text_px, line.bold)
-    return Line(content, line.fill, line.bold)
+    return CardLine(content, line.fill, line.bold)
 
 
-def make_label(edge: ShownEdge, words: Words) -> Card:
+def make_label(edge: ShownEdge, words: AtomNaming) -> Card:
     """An edge's label; the plan's have their place in the plan and their steps as well."""
     name, *rest = words.option(edge.option)
     if edge.step is None:
-        lines = [Line(name), *(Line(line, MUTED) for line in rest)]
+        lines = [CardLine(name), *(CardLine(line, MUTED) for line in rest)]
         return _label_card(lines, BACKGROUND, BACKGROUND)
-    lines = [Line(f"{edge.step}. {name}", CARD, bold=True), *(Line(line, CARD) for line in rest)]
-    lines.append(Line(counted(edge.predicted_steps or 0, "step"), CARD, bold=True))
+    lines = [
+        CardLine(f"{edge.step}. {name}", CARD, bold=True),
+        *(CardLine(line, CARD) for line in rest),
+    ]
+    lines.append(CardLine(counted(edge.predicted_steps or 0, "step"), CARD, bold=True))
     colour = SHORTCUT if edge.is_shortcut else PLAN
     return _label_card(lines, colour, colour)
 
 
-def _label_card(lines: Sequence[Line], fill: str, stroke: str) -> Card:
+def _label_card(lines: Sequence[CardLine], fill: str, stroke: str) -> Card:
     return Card(tuple(_fitting(line, LABEL) for line in lines), LABEL, fill, stroke, 1.0)

@@ -65,7 +65,7 @@ class Area:
 
 
 @dataclass(frozen=True)
-class Box:
+class NodeBox:
     """A box to be placed in the column of its layer."""
 
     layer: int
@@ -74,7 +74,7 @@ class Box:
 
 
 @dataclass(frozen=True)
-class Link:
+class EdgeLink:
     """A link to be routed between two boxes. Those of the spine run level, one after the other."""
 
     source: int
@@ -84,7 +84,7 @@ class Link:
 
 
 @dataclass(frozen=True)
-class Waypoint:
+class RoutePoint:
     """A point that a link passes horizontally: heading 1 is to the right, -1 to the left."""
 
     x: float
@@ -96,19 +96,19 @@ class Waypoint:
 class Route:
     """A link's way: one curve, or with a label two, one up to the label and one on from it."""
 
-    curves: tuple[tuple[Waypoint, ...], ...]
+    curves: tuple[tuple[RoutePoint, ...], ...]
     label: Area | None = None
 
     def moved(self, x: float, y: float) -> Route:
         """The same, so much further right and down."""
         curves = (
-            tuple(Waypoint(p.x + x, p.y + y, p.heading) for p in curve) for curve in self.curves
+            tuple(RoutePoint(p.x + x, p.y + y, p.heading) for p in curve) for curve in self.curves
         )
         return Route(tuple(curves), self.label.moved(x, y) if self.label else None)
 
 
 @dataclass(frozen=True)
-class Layout:
+class GraphLayout:
     """Areas of the boxes and routes of the links, in the order in which they were given."""
 
     boxes: tuple[Area, ...]
@@ -116,9 +116,9 @@ class Layout:
     width: float
     height: float
 
-    def moved(self, x: float, y: float) -> Layout:
+    def moved(self, x: float, y: float) -> GraphLayout:
         """The same, so much further right and down."""
-        return Layout(
+        return GraphLayout(
             tuple(box.moved(x, y) for box in self.boxes),
             tuple(route.moved(x, y) for route in self.routes),
             self.width,
@@ -138,7 +138,7 @@ class _Slot:
     neighbours: list[int] = field(default_factory=list)
 
 
-def lay_out(boxes: Sequence[Box], links: Sequence[Link]) -> Layout:
+def lay_out(boxes: Sequence[NodeBox], links: Sequence[EdgeLink]) -> GraphLayout:
     """Place the boxes and route the links. The same input gives the same output."""
     slots = [_Slot(2 * box.layer, box.size, box.margin) for box in boxes]
     chains = [_chain(slots, link) for link in links]
@@ -152,10 +152,10 @@ def lay_out(boxes: Sequence[Box], links: Sequence[Link]) -> Layout:
         for link, chain, port in zip(links, chains, ports, strict=True)
     )
     bottom = max(slot.y + slot.size.height / 2 for slot in slots)
-    return Layout(areas, routes, columns[-1].right, bottom)
+    return GraphLayout(areas, routes, columns[-1].right, bottom)
 
 
-def _chain(slots: list[_Slot], link: Link) -> list[int]:
+def _chain(slots: list[_Slot], link: EdgeLink) -> list[int]:
     """Give a link its slots, in order from source to target, and connect them."""
     start, end = slots[link.source].rank, slots[link.target].rank
     step = 1 if end > start else -1
@@ -292,7 +292,7 @@ class _End:
 
 
 def _ports(
-    slots: list[_Slot], areas: Sequence[Area], links: Sequence[Link], chains: list[list[int]]
+    slots: list[_Slot], areas: Sequence[Area], links: Sequence[EdgeLink], chains: list[list[int]]
 ) -> list[tuple[float, float]]:
     """Heights at which each link leaves its source and enters its target."""
     sides: dict[tuple[int, bool], list[_End]] = {}  # by box and whether on its right
@@ -322,16 +322,16 @@ def _port_heights(area: Area, ends: Sequence[_End]) -> list[float]:
 def _route(
     slots: list[_Slot],
     columns: list[Area],
-    link: Link,
+    link: EdgeLink,
     chain: list[int],
     ports: tuple[float, float],
 ) -> Route:
     start, end = slots[link.source].rank, slots[link.target].rank
     heading = 1 if end >= start else -1
     arriving = heading if end != start else -1
-    leave = Waypoint(_edge(columns[start], heading), ports[0], heading)
-    enter = Waypoint(_edge(columns[end], -arriving), ports[1], arriving)
-    curves: list[list[Waypoint]] = [[leave]]
+    leave = RoutePoint(_edge(columns[start], heading), ports[0], heading)
+    enter = RoutePoint(_edge(columns[end], -arriving), ports[1], arriving)
+    curves: list[list[RoutePoint]] = [[leave]]
     label = None
     for i in chain:
         slot, column = slots[i], columns[slots[i].rank]
@@ -339,24 +339,24 @@ def _route(
             into, out = _turn(slot, column)
         else:
             into, out = (
-                Waypoint(_edge(column, side), slot.y, heading) for side in (-heading, heading)
+                RoutePoint(_edge(column, side), slot.y, heading) for side in (-heading, heading)
             )
         curves[-1].append(into)
         if link.label and slot.size is link.label:
             label = _centred(slot, column)
             inner = (_edge(label, into.heading * -1), _edge(label, out.heading))
-            curves[-1].append(Waypoint(inner[0], into.y, into.heading))
-            curves.append([Waypoint(inner[1], out.y, out.heading)])
+            curves[-1].append(RoutePoint(inner[0], into.y, into.heading))
+            curves.append([RoutePoint(inner[1], out.y, out.heading)])
         if out != into:
             curves[-1].append(out)
     curves[-1].append(enter)
     return Route(tuple(tuple(curve) for curve in curves), label)
 
 
-def _turn(slot: _Slot, column: Area) -> tuple[Waypoint, Waypoint]:
+def _turn(slot: _Slot, column: Area) -> tuple[RoutePoint, RoutePoint]:
     """Into a column from the left and out again to the left."""
     apart = TURN_PX / 2
-    return Waypoint(column.x, slot.y - apart / 2, 1), Waypoint(column.x, slot.y + apart / 2, -1)
+    return RoutePoint(column.x, slot.y - apart / 2, 1), RoutePoint(column.x, slot.y + apart / 2, -1)
 
 
 def _centred(slot: _Slot, column: Area) -> Area:

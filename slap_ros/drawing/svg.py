@@ -16,7 +16,7 @@ from itertools import pairwise
 from typing import Protocol
 from xml.sax.saxutils import escape, quoteattr
 
-from slap_ros.drawing.layout import Area, Waypoint
+from slap_ros.drawing.layout import Area, RoutePoint
 from slap_ros.drawing.text import width_px
 
 FONTS = "system-ui, 'Segoe UI', Roboto, 'Helvetica Neue', 'DejaVu Sans', Arial, sans-serif"
@@ -27,7 +27,7 @@ Cubic = tuple[Point, Point, Point, Point]  # start, two control points, end
 _NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-class Shape(Protocol):
+class SvgShape(Protocol):
     """Anything that can be written."""
 
     def markup(self) -> str:
@@ -36,7 +36,7 @@ class Shape(Protocol):
 
 
 @dataclass(frozen=True)
-class Text:
+class SvgText:
     """A line of text."""
 
     x: float
@@ -56,7 +56,7 @@ class Text:
         return Area(left, self.y - ASCENT * self.size_px, width, height)
 
     def markup(self) -> str:
-        """See :class:`Shape`."""
+        """See :class:`SvgShape`."""
         attributes = {
             "x": number(self.x),
             "y": number(self.y),
@@ -71,7 +71,7 @@ class Text:
 
 
 @dataclass(frozen=True)
-class Rectangle:
+class SvgRectangle:
     """A filled rectangle with round corners."""
 
     area: Area
@@ -81,7 +81,7 @@ class Rectangle:
     radius_px: float = 4.0
 
     def markup(self) -> str:
-        """See :class:`Shape`."""
+        """See :class:`SvgShape`."""
         return element(
             "rect",
             {
@@ -108,10 +108,10 @@ class Pen:
 
 
 @dataclass(frozen=True)
-class Curve:
+class SvgCurve:
     """A smooth line through waypoints, with or without an arrowhead at its end."""
 
-    waypoints: Sequence[Waypoint]
+    waypoints: Sequence[RoutePoint]
     pen: Pen
     has_head: bool = True
 
@@ -120,7 +120,7 @@ class Curve:
         points = list(self.waypoints)
         end = points[-1]
         if self.has_head:
-            points[-1] = Waypoint(end.x - end.heading * self.pen.arrow_px, end.y, end.heading)
+            points[-1] = RoutePoint(end.x - end.heading * self.pen.arrow_px, end.y, end.heading)
         for a, b in pairwise(points):
             reach = abs(b.x - a.x) / 2
             if a.heading != b.heading:  # turning back
@@ -133,7 +133,7 @@ class Curve:
             )
 
     def markup(self) -> str:
-        """See :class:`Shape`."""
+        """See :class:`SvgShape`."""
         pieces = list(self.beziers())
         path = f"M{_point(pieces[0][0])}" + "".join(_piece(*piece) for piece in pieces)
         attributes = {
@@ -155,20 +155,20 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Group:
+class SvgGroup:
     """Shapes that are one thing, with a title that viewers show and screen readers read."""
 
     title: str
-    shapes: Sequence[Shape]
+    shapes: Sequence[SvgShape]
 
     def markup(self) -> str:
-        """See :class:`Shape`."""
+        """See :class:`SvgShape`."""
         inner = "".join(shape.markup() for shape in self.shapes)
         return element("g", {}, element("title", {}, clean(self.title)) + inner)
 
 
 @dataclass(frozen=True)
-class Picture:
+class SvgPicture:
     """A whole drawing."""
 
     width: float
@@ -176,7 +176,7 @@ class Picture:
     title: str
     description: str
     background: str
-    shapes: Sequence[Shape] = field(default_factory=tuple)
+    shapes: Sequence[SvgShape] = field(default_factory=tuple)
 
     def markup(self) -> str:
         """The SVG document, without an XML declaration so that HTML can include it."""
@@ -200,19 +200,21 @@ class Picture:
             "\n"
             + element("title", {"id": f"{name}-title"}, clean(self.title))
             + element("desc", {"id": f"{name}-desc"}, clean(self.description))
-            + Rectangle(Area(0, 0, self.width, self.height), self.background, radius_px=0).markup()
+            + SvgRectangle(
+                Area(0, 0, self.width, self.height), self.background, radius_px=0
+            ).markup()
             + "\n"
             + inner
             + "\n",
         )
 
 
-def texts(shapes: Sequence[Shape]) -> Iterator[Text]:
+def texts(shapes: Sequence[SvgShape]) -> Iterator[SvgText]:
     """Every line of text, those in groups included."""
     for shape in shapes:
-        if isinstance(shape, Group):
+        if isinstance(shape, SvgGroup):
             yield from texts(shape.shapes)
-        elif isinstance(shape, Text):
+        elif isinstance(shape, SvgText):
             yield shape
 
 

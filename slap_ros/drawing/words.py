@@ -13,7 +13,7 @@ from slap_ros.relational import AtomSpace, GroundAtom, Object, Type
 ADDED, REMOVED = "+ ", "\N{MINUS SIGN} "
 
 
-class Words:
+class AtomNaming:
     """Names for the atoms and options of one task.
 
     An object that is the only one of its kind (the robot, mostly) is understood and left out.

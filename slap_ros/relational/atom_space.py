@@ -16,7 +16,7 @@ from slap_ros.relational.objects import Column, Object, Type
 from slap_ros.relational.predicates import Classifier, GroundAtom, Margin, Predicate
 from slap_ros.relational.state import Layout, State
 
-MOST_REMEMBERED = 1024  # states perceived
+MAX_CACHED_STATES = 1024  # states perceived
 
 
 class AtomSpace:
@@ -79,7 +79,7 @@ class AtomSpace:
             if predicate in about_something
         ]
         self._reread = self.mask(atom for atom in self.atoms if atom.predicate in reading)
-        self._perceived: dict[bytes, int] = {}
+        self._cached_masks: dict[bytes, int] = {}
         self._truth = np.array([bool(statics.get(a, 0) & self.static_truth) for a in self.atoms])
 
     @classmethod
@@ -99,12 +99,12 @@ class AtomSpace:
     def abstract(self, state: State) -> int:
         """The abstract state of a single state."""
         read = state.data.take(self._read).tobytes()
-        mask = self._perceived.get(read)
+        mask = self._cached_masks.get(read)
         if mask is None:
             mask = _mask(self.truth(state))
-            if len(self._perceived) == MOST_REMEMBERED:
-                self._perceived.clear()
-            self._perceived[read] = mask & ~self._reread
+            if len(self._cached_masks) == MAX_CACHED_STATES:
+                self._cached_masks.clear()
+            self._cached_masks[read] = mask & ~self._reread
         elif self._rereading:
             mask |= _mask(self._evaluate(self._rereading, state, np.zeros_like(self._truth)))
         return mask

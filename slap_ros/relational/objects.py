@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Places = tuple[object, dict[Any, NDArray[np.intp]]]  # of a layout: what it remembers, by feature
+# The layout asked last, and the indices of what was asked of it, by feature.
+IndexCache = tuple[object, dict[Any, NDArray[np.intp]]]
 
 
 @dataclass(frozen=True)
@@ -56,18 +57,19 @@ class Column:
     """Objects side by side, for asking the same of all of them at once."""
 
     objects: tuple[Object, ...]
-    _places: Places = field(default=(None, {}), init=False, repr=False)
+    _cache: IndexCache = field(default=(None, {}), init=False, repr=False)
 
-    def places(self, layout: object) -> dict[Any, NDArray[np.intp]]:
-        """What a layout remembers of it; it goes with the column, as layouts outlive episodes.
+    def cached_indices(self, layout: object) -> dict[Any, NDArray[np.intp]]:
+        """A layout's cache for this column; kept with the column, as layouts outlive episodes.
 
-        A column is as good as always asked about by the same layout, so the latest one's is kept.
+        A column is as good as always asked about by the same layout, so only the latest one's
+        cache is kept.
         """
-        known = self._places  # read once: threads may remember twice, but never mix up layouts
-        if known[0] is not layout:
-            known = (layout, {})
-            object.__setattr__(self, "_places", known)
-        return known[1]
+        cache = self._cache  # read once: threads may compute twice, but never mix up layouts
+        if cache[0] is not layout:
+            cache = (layout, {})
+            object.__setattr__(self, "_cache", cache)
+        return cache[1]
 
 
 @dataclass(frozen=True)

@@ -71,7 +71,7 @@ class Predicate:
 def shared(compute: Callable[[State], T]) -> Callable[[State], T]:
     """Compute once what several predicates ask of the same state one after the other.
 
-    The latest state is remembered with its answer, and so lives on until another is asked about.
+    The latest state is cached with its answer, and stays in memory until another is asked about.
     """
     latest: tuple[State, T] | None = None
 

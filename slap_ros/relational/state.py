@@ -89,18 +89,18 @@ class Layout:
         return np.array([self.column(obj, feature) for obj in objects], dtype=np.intp)
 
     def indices(self, column: Column, feature: str) -> NDArray[np.intp]:
-        """Indices of one feature of a column of objects; remembered as long as the column."""
-        places = column.places(self)
-        if feature not in places:
-            places[feature] = self.columns(column.objects, feature)
-        return places[feature]
+        """Indices of one feature of a column of objects; cached with the column."""
+        cached = column.cached_indices(self)
+        if feature not in cached:
+            cached[feature] = self.columns(column.objects, feature)
+        return cached[feature]
 
     def grid(self, column: Column, features: tuple[str, ...]) -> NDArray[np.intp]:
         """Indices of features of a column of objects, shape (objects, features); as above."""
-        places = column.places(self)
-        if features not in places:
-            places[features] = np.stack([self.columns(column.objects, f) for f in features], -1)
-        return places[features]
+        cached = column.cached_indices(self)
+        if features not in cached:
+            cached[features] = np.stack([self.columns(column.objects, f) for f in features], -1)
+        return cached[features]
 
     @cached_property
     def _by_type(self) -> dict[Type, Column]:

@@ -16,11 +16,11 @@ from slap_ros.report.projection import (
     TOP,
     Canvas,
     Point,
-    View,
+    Projection,
     box_paths,
     corners,
 )
-from slap_ros.report.scene import Frame, Scene
+from slap_ros.report.scene import RecordedScene, SceneFrame
 
 MARGIN = 0.08  # around what moves, of its extent
 ARM_WIDTH_M = 0.075
@@ -30,7 +30,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class Shape:
+class AnimatedShape:
     """A body or the arm in one view."""
 
     fill: str  # colour of a body; empty: the arm
@@ -45,11 +45,11 @@ class Drawing:
     view: str
     height: int  # units; the width is UNITS
     arm_width: int  # units
-    shapes: tuple[Shape, ...]
+    shapes: tuple[AnimatedShape, ...]
     orders: tuple[tuple[int, ...], ...]  # shapes from back to front
     order_at: tuple[int, ...]  # which of the orders, by frame
 
-    def shown(self, frame: int) -> list[tuple[int, Shape, tuple[str, ...]]]:
+    def shown(self, frame: int) -> list[tuple[int, AnimatedShape, tuple[str, ...]]]:
         """The shapes of a frame from back to front, with their numbers and paths."""
         order = self.orders[self.order_at[frame]]
         return [(i, self.shapes[i], self.shapes[i].poses[self.shapes[i].at[frame]]) for i in order]
@@ -63,7 +63,7 @@ class Drawing:
         }
 
 
-def draw(scenes: Sequence[Scene]) -> list[tuple[Drawing, ...]]:
+def draw(scenes: Sequence[RecordedScene]) -> list[tuple[Drawing, ...]]:
     """Drawings of every scene, all of them to the same scale, so that they compare."""
     frames = [frame for scene in scenes for frame in scene.frames]
     moving = [_moving(scene) for scene in scenes]
@@ -77,13 +77,13 @@ def draw(scenes: Sequence[Scene]) -> list[tuple[Drawing, ...]]:
     ]
 
 
-def _views(frames: Iterable[Frame]) -> tuple[View, ...]:
+def _views(frames: Iterable[SceneFrame]) -> tuple[Projection, ...]:
     """All, or only the side view of a world that is a side view itself."""
     depths = {round(body.position[1], 6) for frame in frames for body in frame.bodies}
     return (SIDE,) if len(depths) == 1 else (OBLIQUE, SIDE, TOP)
 
 
-def _moving(scene: Scene) -> frozenset[int]:
+def _moving(scene: RecordedScene) -> frozenset[int]:
     """The numbers of the bodies that move; all of them where none does."""
     first = scene.frames[0].bodies
     moving = frozenset(
@@ -95,12 +95,12 @@ def _moving(scene: Scene) -> frozenset[int]:
     return moving or frozenset(range(_count(scene)))
 
 
-def _count(scene: Scene) -> int:
+def _count(scene: RecordedScene) -> int:
     """How many bodies there are: as many as in the fullest frame."""
     return max(len(frame.bodies) for frame in scene.frames)
 
 
-def _reach(scene: Scene, moving: frozenset[int]) -> Iterable[Vector]:
+def _reach(scene: RecordedScene, moving: frozenset[int]) -> Iterable[Vector]:
     for frame in scene.frames:
         yield from frame.arm
         for i, body in enumerate(frame.bodies):
@@ -108,7 +108,9 @@ def _reach(scene: Scene, moving: frozenset[int]) -> Iterable[Vector]:
                 yield from corners(body)
 
 
-def _draw(scene: Scene, view: View, canvas: Canvas, moving: frozenset[int]) -> Drawing:
+def _draw(
+    scene: RecordedScene, view: Projection, canvas: Canvas, moving: frozenset[int]
+) -> Drawing:
     numbers = range(_count(scene))
     samples = [next(f.bodies[i] for f in scene.frames if i < len(f.bodies)) for i in numbers]
     shapes = [
@@ -136,8 +138,8 @@ def _draw(scene: Scene, view: View, canvas: Canvas, moving: frozenset[int]) -> D
     )
 
 
-def _shape(fill: str, poses: Sequence[tuple[str, ...]]) -> Shape:
-    return Shape(fill, *_unique(poses))
+def _shape(fill: str, poses: Sequence[tuple[str, ...]]) -> AnimatedShape:
+    return AnimatedShape(fill, *_unique(poses))
 
 
 def _unique(values: Sequence[T]) -> tuple[tuple[T, ...], tuple[int, ...]]:
@@ -147,7 +149,7 @@ def _unique(values: Sequence[T]) -> tuple[tuple[T, ...], tuple[int, ...]]:
     return tuple(numbers), at
 
 
-def _line(frame: Frame, view: View, canvas: Canvas) -> tuple[str, ...]:
+def _line(frame: SceneFrame, view: Projection, canvas: Canvas) -> tuple[str, ...]:
     """The arm, for its outline and for its inside."""
     points: list[Point] = [view.project(point) for point in frame.arm]
     path = canvas.path(points, closed=False) if points else ""
@@ -155,8 +157,8 @@ def _line(frame: Frame, view: View, canvas: Canvas) -> tuple[str, ...]:
 
 
 def _order(
-    frame: Frame,
-    view: View,
+    frame: SceneFrame,
+    view: Projection,
     moving: frozenset[int],
     samples: Sequence[VisibleBody],
     has_arm: bool,

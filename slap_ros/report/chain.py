@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from slap_ros.bags.recording import Episode
+from slap_ros.bags.recording import RecordedEpisode
 from slap_ros.evaluation.metrics import AtomNames, RunTrace, atom_names
 from slap_ros.messages.events import PlanEventKind
 from slap_ros.messages.protocols import PlanMessage
@@ -17,7 +17,7 @@ ENDS = {PlanEventKind.EDGE_REACHED: "reached", PlanEventKind.DIVERGED: "diverged
 
 
 @dataclass(frozen=True)
-class Link:
+class ChainEdge:
     """An edge of a plan, and the abstract state to which it leads."""
 
     text: str  # the option with its objects
@@ -29,17 +29,17 @@ class Link:
 
 
 @dataclass(frozen=True)
-class Chain:
+class PlanChain:
     """A plan from the abstract state in which it was made."""
 
     number: int  # 0 for the first of a run
     step: int  # at which it was made, from the run's start
     start: tuple[str, ...]  # atoms of its first state that one of its edges changes
-    links: tuple[Link, ...]
+    edges: tuple[ChainEdge, ...]
     predicted_steps: int
 
 
-def chains(trace: RunTrace, episode: Episode) -> tuple[Chain, ...]:
+def chains(trace: RunTrace, episode: RecordedEpisode) -> tuple[PlanChain, ...]:
     """The plans of a run, in order."""
     return tuple(_chain(plan, trace, episode) for plan in trace.plans)
 
@@ -49,7 +49,7 @@ def texts(atoms: AtomNames) -> tuple[str, ...]:
     return tuple(call(*atom) for atom in sorted(atoms))
 
 
-def _chain(plan: PlanMessage, trace: RunTrace, episode: Episode) -> Chain:
+def _chain(plan: PlanMessage, trace: RunTrace, episode: RecordedEpisode) -> PlanChain:
     events = [event for event in trace.events if event.plan_number == plan.number]
     made = next((e.step for e in events if e.kind == PlanEventKind.PLANNED), trace.first_step)
     outcomes: dict[int, str] = {}
@@ -60,13 +60,13 @@ def _chain(plan: PlanMessage, trace: RunTrace, episode: Episode) -> Chain:
             outcomes[event.edge] = ENDS[PlanEventKind(event.kind)]
     # Without perceived atoms nothing is known of the first state, nor of what changes from it.
     before = episode.atoms.get(made)
-    start, touched, links = before or frozenset(), AtomNames(), []
+    start, touched, edges = before or frozenset(), AtomNames(), []
     for number, edge in enumerate(plan.edges):
         after = atom_names(edge.expected_atoms)
         known = after if before is None else before
         touched |= after ^ known
-        links.append(
-            Link(
+        edges.append(
+            ChainEdge(
                 text=call(edge.name, tuple(edge.objects)),
                 is_shortcut=edge.kind == OptionKind.SHORTCUT.value,
                 added=texts(after - known),
@@ -76,10 +76,10 @@ def _chain(plan: PlanMessage, trace: RunTrace, episode: Episode) -> Chain:
             )
         )
         before = after
-    return Chain(
+    return PlanChain(
         number=plan.number,
         step=made - trace.first_step,
         start=texts(start & touched),
-        links=tuple(links),
+        edges=tuple(edges),
         predicted_steps=plan.predicted_steps,
     )

@@ -9,17 +9,17 @@ from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 
-from slap_ros.bags.evaluate import BagEvaluation, Reading, evaluate, read_runs
-from slap_ros.bags.recording import Episode, Recording
+from slap_ros.bags.evaluate import BagContents, BagEvaluation, evaluate, read_runs
+from slap_ros.bags.recording import RecordedEpisode, Recording
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidDomainError
 from slap_ros.evaluation.metrics import RunMetrics, RunTrace, describe
 from slap_ros.messages.protocols import KeyValueMessage
-from slap_ros.report.chain import Chain, chains
-from slap_ros.report.scene import Scene, scene
-from slap_ros.report.timeline import Incident, Span, incidents, spans
+from slap_ros.report.atom_timeline import AtomTimeline, atom_timeline
+from slap_ros.report.chain import PlanChain, chains
+from slap_ros.report.scene import RecordedScene, scene
+from slap_ros.report.timeline import Incident, OptionSpan, incidents, spans
 from slap_ros.report.traces import Series, robot_series
-from slap_ros.report.truth import Truth, truth
 
 USUAL_PERIOD_S = 0.1  # of a control step, where the bag has none that could be
 LONGEST_PERIOD_S = 10.0
@@ -35,12 +35,12 @@ class RunReport:
     task: object  # equal for runs of the same task
     goal: str
     length: int  # steps that its drawings show, from its start
-    spans: tuple[Span, ...]
+    spans: tuple[OptionSpan, ...]
     incidents: tuple[Incident, ...]
-    chains: tuple[Chain, ...]
-    truth: Truth
+    chains: tuple[PlanChain, ...]
+    atom_timeline: AtomTimeline
     series: tuple[Series, ...]
-    scene: Scene | None
+    scene: RecordedScene | None
     control_period_s: float
     configuration: dict[str, str]
     versions: dict[str, str]
@@ -95,9 +95,9 @@ def read_report(path: Path | str) -> BagReport:
     return BagReport(name, runs, evaluate(reading, domain), unchecked)
 
 
-def _report(name: str, reading: Reading, trace: RunTrace, domain: Domain | None) -> RunReport:
+def _report(name: str, reading: BagContents, trace: RunTrace, domain: Domain | None) -> RunReport:
     recording = reading.recording
-    episode = recording.episodes.get(trace.episode, Episode())
+    episode = recording.episodes.get(trace.episode, RecordedEpisode())
     info = recording.domain_info
     return RunReport(
         bag=name,
@@ -108,7 +108,7 @@ def _report(name: str, reading: Reading, trace: RunTrace, domain: Domain | None)
         spans=spans(trace),
         incidents=incidents(trace),
         chains=chains(trace, episode),
-        truth=truth(trace, episode),
+        atom_timeline=atom_timeline(trace, episode),
         series=robot_series(trace, episode, recording),
         scene=scene(trace, episode, recording, domain),
         control_period_s=_period(recording),
@@ -117,7 +117,7 @@ def _report(name: str, reading: Reading, trace: RunTrace, domain: Domain | None)
     )
 
 
-def _task(episode: Episode, trace: RunTrace) -> object:
+def _task(episode: RecordedEpisode, trace: RunTrace) -> object:
     """Where a run began and what it was to reach; of an unknown start, equal to nothing else."""
     start = episode.states.get(trace.first_step)
     if start is None:
@@ -131,7 +131,7 @@ def _period(recording: Recording) -> float:
     return period if isfinite(period) and 0.0 < period <= LONGEST_PERIOD_S else USUAL_PERIOD_S
 
 
-def _setting(episode: Episode, configuration: Iterable[KeyValueMessage]) -> dict[str, str]:
+def _setting(episode: RecordedEpisode, configuration: Iterable[KeyValueMessage]) -> dict[str, str]:
     settings = {entry.key: entry.value for entry in configuration}
     if episode.task is not None:
         settings["step limit"] = str(episode.task.step_limit)

@@ -35,7 +35,7 @@ TURNING = re.compile("[\u200e\u200f\u202a-\u202e\u2066-\u2069]")
 
 
 @dataclass(frozen=True)
-class Shown:
+class PageRun:
     """A run on the page."""
 
     number: int  # from 1
@@ -117,11 +117,11 @@ def _readable(value: object) -> object:
     return value
 
 
-def _shown(runs: Sequence[RunReport]) -> list[Shown]:
+def _shown(runs: Sequence[RunReport]) -> list[PageRun]:
     scenes = [run.scene for run in runs if run.scene is not None]
     drawings = iter(draw(scenes) if scenes else [])
     return [
-        Shown(
+        PageRun(
             number=number,
             label=label,
             run=run,
@@ -157,7 +157,7 @@ def _relative_length(run: RunReport, runs: Sequence[RunReport]) -> float | None:
     return None
 
 
-def _summary(shown: Sequence[Shown]) -> list[str]:
+def _summary(shown: Sequence[PageRun]) -> list[str]:
     """What came out, in a sentence each."""
     sentences = []
     for one in shown:
@@ -187,7 +187,7 @@ def _ticks(last: int) -> list[int]:
     return list(range(0, last + 1, spacing))
 
 
-def _player(shown: Sequence[Shown], last: int) -> dict[str, Any]:
+def _player(shown: Sequence[PageRun], last: int) -> dict[str, Any]:
     """What the page's script plays."""
     periods = [one.run.control_period_s for one in shown]
     return {

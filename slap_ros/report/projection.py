@@ -26,7 +26,7 @@ Face = tuple[float, list[Vector]]  # cosine with the light; corners in order
 
 
 @dataclass(frozen=True)
-class View:
+class Projection:
     """A direction to look from."""
 
     name: str
@@ -48,15 +48,15 @@ class View:
         return _dot(self.toward, point)
 
 
-def _oblique(turn: float, height: float) -> View:
+def _oblique(turn: float, height: float) -> Projection:
     """From the right of the robot and above; rad from its right side, and from the ground."""
     up = (-sin(turn) * sin(height), cos(turn) * sin(height), cos(height))
-    return View("From the front right", (cos(turn), sin(turn), 0.0), up)
+    return Projection("From the front right", (cos(turn), sin(turn), 0.0), up)
 
 
 OBLIQUE = _oblique(radians(38.0), radians(28.0))
-SIDE = View("From the side", (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-TOP = View("From above", (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+SIDE = Projection("From the side", (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+TOP = Projection("From above", (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class Canvas:
         return "M" + " ".join(f"{x} {y}" for x, y in at) + ("Z" if closed else "")
 
 
-def box_paths(body: VisibleBody, view: View, canvas: Canvas) -> tuple[str, str, str]:
+def box_paths(body: VisibleBody, view: Projection, canvas: Canvas) -> tuple[str, str, str]:
     """The visible faces of a box; of them, those in the light, and those in the shade."""
     drawn = [
         (light, canvas.path(map(view.project, corners))) for light, corners in _seen(body, view)
@@ -114,7 +114,7 @@ def corners(body: VisibleBody) -> list[Vector]:
     return [pose.apply(corner) for corner in product((-x, x), (-y, y), (-z, z))]
 
 
-def _seen(body: VisibleBody, view: View) -> Iterator[Face]:
+def _seen(body: VisibleBody, view: Projection) -> Iterator[Face]:
     pose, toward = _pose(body), view.toward
     half = [size / 2 for size in body.size]
     for axis, sign in product(range(3), (-1.0, 1.0)):

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from math import hypot, nan
 
-from slap_ros.bags.recording import Episode, Recording
+from slap_ros.bags.recording import RecordedEpisode, Recording
 from slap_ros.core import Domain, VisibleBody
 from slap_ros.evaluation.metrics import RunTrace
 from slap_ros.geometry.pose import Vector
@@ -30,7 +30,7 @@ METAL = (0.62, 0.65, 0.69, 1.0)  # of the hand
 
 
 @dataclass(frozen=True)
-class Frame:
+class SceneFrame:
     """A moment."""
 
     step: int  # from the run's start
@@ -39,10 +39,10 @@ class Frame:
 
 
 @dataclass(frozen=True)
-class Scene:
+class RecordedScene:
     """A run to be watched."""
 
-    frames: tuple[Frame, ...]  # in the order of their steps
+    frames: tuple[SceneFrame, ...]  # in the order of their steps
 
     @property
     def ends(self) -> list[tuple[VisibleBody, VisibleBody]]:
@@ -51,8 +51,8 @@ class Scene:
 
 
 def scene(
-    trace: RunTrace, episode: Episode, recording: Recording, domain: Domain | None
-) -> Scene | None:
+    trace: RunTrace, episode: RecordedEpisode, recording: Recording, domain: Domain | None
+) -> RecordedScene | None:
     """The frames of a run; None where the bag does not tell what anything looks like.
 
     Bodies are those of the recorded markers. Without markers the domain says what to show.
@@ -66,15 +66,15 @@ def scene(
     chosen = steps[:: 1 + len(steps) // MAX_FRAMES]
     if chosen[-1] != steps[-1]:
         chosen.append(steps[-1])
-    pictures, frames = _Pictures(recording, domain), []
+    pictures, frames = _BodyFinder(recording, domain), []
     for step in chosen:
         hand, arm = _arm(episode.states[step], recording)
         bodies = (*hand, *pictures.of(episode.states[step]))
-        frames.append(Frame(step - trace.first_step, bodies, arm))
-    return Scene(tuple(frames)) if any(f.bodies or f.arm for f in frames) else None
+        frames.append(SceneFrame(step - trace.first_step, bodies, arm))
+    return RecordedScene(tuple(frames)) if any(f.bodies or f.arm for f in frames) else None
 
 
-class _Pictures:
+class _BodyFinder:
     """Finds the bodies that were shown of a state."""
 
     def __init__(self, recording: Recording, domain: Domain | None) -> None:

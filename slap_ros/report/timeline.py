@@ -13,7 +13,7 @@ from slap_ros.messages.protocols import PlanEdgeMessage, PlanEventMessage
 
 
 @dataclass(frozen=True)
-class Span:
+class OptionSpan:
     """An option as it was executed; steps count from the run's start."""
 
     number: int  # from 1
@@ -51,7 +51,7 @@ def call(name: str, objects: tuple[str, ...]) -> str:
     return f"{name}({', '.join(objects)})"
 
 
-def spans(trace: RunTrace) -> tuple[Span, ...]:
+def spans(trace: RunTrace) -> tuple[OptionSpan, ...]:
     """The options of a run in the order in which they began."""
     planned = list(_begun_edges(trace))
     found = []
@@ -61,7 +61,7 @@ def spans(trace: RunTrace) -> tuple[Span, ...]:
         key = (start, option.name, option.objects)
         at = next((i for i, (step, edge) in enumerate(planned) if key == _key(step, edge)), None)
         predicted = planned.pop(at)[1].predicted_steps if at is not None else None
-        found.append(Span(number, option, start - trace.first_step, predicted))
+        found.append(OptionSpan(number, option, start - trace.first_step, predicted))
     return tuple(found)
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import isfinite
 
-from slap_ros.bags.recording import Episode, Recording
+from slap_ros.bags.recording import RecordedEpisode, Recording
 from slap_ros.evaluation.metrics import RunTrace
 
 ROBOT = "robot"  # the type of what acts, in every domain
@@ -43,7 +43,9 @@ class Series:
         return " ".join(f"{s},{y:.3f}" for s, y in zip(self.steps, level, strict=True))
 
 
-def robot_series(trace: RunTrace, episode: Episode, recording: Recording) -> tuple[Series, ...]:
+def robot_series(
+    trace: RunTrace, episode: RecordedEpisode, recording: Recording
+) -> tuple[Series, ...]:
     """Every feature of the robot that moves, in the order of its type."""
     info = recording.domain_info
     steps = sorted(s for s in episode.states if trace.first_step <= s <= trace.last_step)

@@ -14,7 +14,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from slap_ros.bags.reader import read_bag
-from slap_ros.bags.recording import Episode, Recording
+from slap_ros.bags.recording import RecordedEpisode, Recording
 from slap_ros.core import Domain
 from slap_ros.errors import DamagedBagError, InvalidParameterError, UnsafeCommandError
 from slap_ros.messages.decode import decode_goal, decode_state
@@ -88,7 +88,7 @@ def recorded_motion(path: Path) -> Recorded:
     )
 
 
-def _states(episode: Episode, domain: Domain) -> Iterator[State]:
+def _states(episode: RecordedEpisode, domain: Domain) -> Iterator[State]:
     for number, step in enumerate(sorted(episode.states)):
         if step != number:
             raise DamagedBagError(f"the state of step {number} is not in the bag")

@@ -15,27 +15,27 @@ from slap_ros.evaluation.experiment import Experiment, Trial, run_all
 from slap_ros.evaluation.summary import Spread, Summary
 from slap_ros.shortcuts.workers import local_workers
 
-Outcome = TypeVar("Outcome")
+Result = TypeVar("Result")
 
 
-class Audience(Protocol):
-    """Is told how a study goes."""
+class StudyProgress(Protocol):
+    """Is called as the jobs of a study begin and end, to show its progress."""
 
     def begin(self, what: str, total: int) -> None:
         """So many jobs of a kind follow."""
         ...
 
-    def done(self) -> None:
-        """One of them is done."""
+    def advance(self) -> None:
+        """One of them has ended."""
         ...
 
-    def failed(self, complaint: str) -> None:
+    def report_failure(self, complaint: str) -> None:
         """A task was not solved, and why."""
         ...
 
 
 @dataclass(frozen=True)
-class Measured:
+class ApproachResult:
     """One approach on all tasks of an experiment."""
 
     summary: Summary
@@ -79,27 +79,29 @@ class Comparison:
         """Which tasks."""
         return Experiment(self.domain, self.tasks, self.seeds, planner=self.planner)
 
-    def measure(self, audience: Audience) -> tuple[Measured, ...]:
+    def measure(self, progress: StudyProgress) -> tuple[ApproachResult, ...]:
         """Solve every task in every way; one that is not solved counts as failed."""
         experiment = self.experiment
-        measured: list[Measured] = []
-        audience.begin(self.domain.preset, len(experiment) * len(self.approaches))
+        measured: list[ApproachResult] = []
+        progress.begin(self.domain.preset, len(experiment) * len(self.approaches))
         for approach in self.approaches:
             trials = []
             for trial in run_all(experiment, approach, self.jobs):
                 trials.append(trial)
-                audience.done()
+                progress.advance()
                 if not trial.success:
-                    audience.failed(complaint(approach, trial.seed, trial.index, trial.reason))
+                    progress.report_failure(
+                        complaint(approach, trial.seed, trial.index, trial.reason)
+                    )
             trials.sort(key=lambda trial: (trial.seed, trial.index))
             yardstick = measured[0].trials if measured else trials
             summary = Summary.of(experiment, approach.name, trials, yardstick)
-            measured.append(Measured(summary, tuple(trials)))
+            measured.append(ApproachResult(summary, tuple(trials)))
         return tuple(measured)
 
-    def each(
-        self, function: Callable[..., Outcome], approach: Approach, jobs: Sequence[tuple[Any, ...]]
-    ) -> Iterator[tuple[int, Outcome]]:
+    def map_jobs(
+        self, function: Callable[..., Result], approach: Approach, jobs: Sequence[tuple[Any, ...]]
+    ) -> Iterator[tuple[int, Result]]:
         """Number and outcome of each job, as they end.
 
         Every job is given what makes domain and planner anew, then its own arguments. Every
@@ -120,6 +122,6 @@ def spread_of(values: Sequence[float]) -> Spread | None:
     return Spread.of(values) if values else None
 
 
-def said(spread: Spread | None, digits: int) -> str:
+def format_spread(spread: Spread | None, digits: int) -> str:
     """Mean ± sample standard deviation, for a table."""
     return "-" if spread is None else f"{spread.mean:.{digits}f} ± {spread.sd:.{digits}f}"

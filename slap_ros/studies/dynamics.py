@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.summary import Spread
-from slap_ros.studies.comparison import said, spread_of
+from slap_ros.studies.comparison import format_spread, spread_of
 from slap_ros.studies.figures import LINES
-from slap_ros.studies.results import Report, Table
-from slap_ros.studies.trainings import Curve, TrainingFolder
+from slap_ros.studies.results import MarkdownTable, StudyReport
+from slap_ros.studies.trainings import LearningCurve, TrainingFolder
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,7 +31,7 @@ standard deviation."""
 
 
 @dataclass(frozen=True)
-class Moment:
+class AveragedPoint:
     """How trainings of the same shortcut stood after as many environment steps."""
 
     steps: int
@@ -49,12 +49,12 @@ class Moment:
 
 
 @dataclass(frozen=True)
-class Dynamics:
+class LearningDynamics:
     """How one shortcut was learned, in one training or several."""
 
     shortcut: str
     trainings: int
-    moments: tuple[Moment, ...]
+    moments: tuple[AveragedPoint, ...]
     stages: tuple[int, ...]  # where each but the first begins, in environment steps
 
     def as_json(self) -> dict[str, Any]:
@@ -76,14 +76,14 @@ class Dynamics:
             yield [
                 self.shortcut,
                 f"{moment.steps:,}",
-                said(percent, 0) if several else f"{percent.mean:.0f}",
-                said(moment.length, 1)
+                format_spread(percent, 0) if several else f"{percent.mean:.0f}",
+                format_spread(moment.length, 1)
                 if several or not moment.length
                 else f"{moment.length.mean:.1f}",
             ]
 
 
-def study(domain: str, folders: Sequence[TrainingFolder]) -> Report:
+def study(domain: str, folders: Sequence[TrainingFolder]) -> StudyReport:
     """The curves in the work folders of trainings.
 
     Raises:
@@ -94,12 +94,12 @@ def study(domain: str, folders: Sequence[TrainingFolder]) -> Report:
     curves = [curve for folder in folders for curve in folder.curves()]
     names = dict.fromkeys(curve.shortcut for curve in curves)
     learned = [_together([c for c in curves if c.shortcut == name]) for name in names]
-    return Report(
+    return StudyReport(
         study="dynamics",
         source="SLAP Fig. 4",
         title=f"Learning dynamics: {domain}",
         measured=MEASURED,
-        table=Table(
+        table=MarkdownTable(
             ["shortcut", "environment steps", "success [%]", "length [steps]"],
             [row for one in learned for row in one.as_rows()],
         ),
@@ -109,7 +109,7 @@ def study(domain: str, folders: Sequence[TrainingFolder]) -> Report:
     )
 
 
-def _together(curves: Sequence[Curve]) -> Dynamics:
+def _together(curves: Sequence[LearningCurve]) -> LearningDynamics:
     """Curves of one shortcut, at the step counts that all of them have."""
     by_steps = [{point.steps: point for point in curve.points} for curve in curves]
     moments = []
@@ -117,16 +117,16 @@ def _together(curves: Sequence[Curve]) -> Dynamics:
         points = [one[steps] for one in by_steps]
         success = Spread.of([point.success for point in points])
         lengths = [point.length for point in points if point.length is not None]
-        moments.append(Moment(steps, success, spread_of(lengths)))
+        moments.append(AveragedPoint(steps, success, spread_of(lengths)))
     if not moments:
         raise InvalidParameterError(
             f"{curves[0].shortcut}: these trainings have no step count in common: they had "
             "other settings; give trainings that differ in their seeds alone"
         )
-    return Dynamics(curves[0].shortcut, len(curves), tuple(moments), curves[0].stages)
+    return LearningDynamics(curves[0].shortcut, len(curves), tuple(moments), curves[0].stages)
 
 
-def draw(figure: Figure, learned: Sequence[Dynamics]) -> None:
+def draw(figure: Figure, learned: Sequence[LearningDynamics]) -> None:
     """Success above, length below, a line a shortcut."""
     above, below = figure.subplots(2, 1, sharex=True)
     for number, one in enumerate(learned):

@@ -45,7 +45,7 @@ LINES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 
 
 @dataclass(frozen=True)
-class Mark:
+class ApproachStyle:
     """How an approach is drawn: told apart by colour and by shape."""
 
     label: str
@@ -53,16 +53,16 @@ class Mark:
     marker: str
 
 
-MARKS = {
-    "pure_planning": Mark("pure planning", PLAN, "o"),
-    "slap_1_sample": Mark("SLAP, 1 sample", MUTED, "^"),
-    "slap": Mark("SLAP", SHORTCUT, "s"),
+APPROACH_STYLES = {
+    "pure_planning": ApproachStyle("pure planning", PLAN, "o"),
+    "slap_1_sample": ApproachStyle("SLAP, 1 sample", MUTED, "^"),
+    "slap": ApproachStyle("SLAP", SHORTCUT, "s"),
 }
 
 
 def label(approach: str) -> str:
     """An approach as people read it."""
-    return MARKS[approach].label
+    return APPROACH_STYLES[approach].label
 
 
 def require_matplotlib() -> None:
@@ -116,7 +116,7 @@ def plot_values(
 
 
 def _pen(approach: str) -> dict[str, Any]:
-    mark = MARKS[approach]
+    mark = APPROACH_STYLES[approach]
     return {
         "color": mark.colour,
         "marker": mark.marker,

@@ -11,9 +11,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from slap_ros.studies.comparison import Audience, Comparison, Measured, said
+from slap_ros.studies.comparison import ApproachResult, Comparison, StudyProgress, format_spread
 from slap_ros.studies.figures import dodged, label, legend_above, plot_spreads, plot_values
-from slap_ros.studies.results import Report, Table
+from slap_ros.studies.results import MarkdownTable, StudyReport
 from slap_ros.studies.variations import Variation
 
 if TYPE_CHECKING:
@@ -30,13 +30,13 @@ planning, on tasks that both solved. A task for which no plan is found counts as
 
 
 @dataclass(frozen=True)
-class Condition:
+class StudyCondition:
     """One value of one setting; neither, where the preset is unchanged."""
 
     setting: str | None
     value: str | None
     preset: str
-    measured: tuple[Measured, ...]  # an approach each
+    measured: tuple[ApproachResult, ...]  # an approach each
 
     def as_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -57,12 +57,14 @@ class Condition:
                 where,
                 label(summary.approach),
                 f"{summary.success_rate:.0%}",
-                said(summary.plan_length, 1),
+                format_spread(summary.plan_length, 1),
                 "-" if relative is None else f"{relative:.2f}",
             ]
 
 
-def study(comparison: Comparison, variations: Sequence[Variation], audience: Audience) -> Report:
+def study(
+    comparison: Comparison, variations: Sequence[Variation], progress: StudyProgress
+) -> StudyReport:
     """Measure under every value of every setting.
 
     Raises:
@@ -75,15 +77,15 @@ def study(comparison: Comparison, variations: Sequence[Variation], audience: Aud
         for value in one.values
     ]
     conditions = [
-        Condition(setting, value, under.domain.preset, under.measure(audience))
+        StudyCondition(setting, value, under.domain.preset, under.measure(progress))
         for setting, value, under in planned
     ]
-    return Report(
+    return StudyReport(
         study="generalisation",
         source="SLAP Fig. 5",
         title=f"Generalisation: {comparison.domain.name}",
         measured=MEASURED,
-        table=Table(
+        table=MarkdownTable(
             ["setting", "approach", "success", "length [steps]", "relative length"],
             [row for condition in conditions for row in condition.as_rows()],
         ),
@@ -93,7 +95,9 @@ def study(comparison: Comparison, variations: Sequence[Variation], audience: Aud
     )
 
 
-def draw(figure: Figure, conditions: Sequence[Condition], variations: Sequence[Variation]) -> None:
+def draw(
+    figure: Figure, conditions: Sequence[StudyCondition], variations: Sequence[Variation]
+) -> None:
     """A column a setting: success above, length below; first, apart, the unchanged preset."""
     unchanged, *others = conditions
     grid = figure.subplots(
@@ -116,7 +120,9 @@ def draw(figure: Figure, conditions: Sequence[Condition], variations: Sequence[V
     legend_above(figure, grid[1, 0])
 
 
-def _plot(column: Sequence[Axes], places: Sequence[int], conditions: Sequence[Condition]) -> None:
+def _plot(
+    column: Sequence[Axes], places: Sequence[int], conditions: Sequence[StudyCondition]
+) -> None:
     """Success into the upper axes, length into the lower; approaches beside each other."""
     above, below = column
     count = len(conditions[0].measured)

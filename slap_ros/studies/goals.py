@@ -27,15 +27,15 @@ from slap_ros.planning.abstract_graph import build_abstract_graph
 from slap_ros.planning.planner import Problem
 from slap_ros.relational import AtomSpace, GroundAtom
 from slap_ros.shortcuts.workers import in_order
-from slap_ros.studies.comparison import Audience, Comparison, complaint, said
-from slap_ros.studies.figures import MARKS, label
-from slap_ros.studies.results import Report, Table
+from slap_ros.studies.comparison import Comparison, StudyProgress, complaint, format_spread
+from slap_ros.studies.figures import APPROACH_STYLES, label
+from slap_ros.studies.results import MarkdownTable, StudyReport
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Goal = tuple[GroundAtom, ...]
-Named = tuple[tuple[str, tuple[str, ...]], ...]  # a goal as names, for another process
+NamedGoal = tuple[tuple[str, tuple[str, ...]], ...]  # a goal as names, for another process
 
 GOALS = 9  # tells the random numbers of goals from those of tasks
 MOST_ATOMS = 2  # of a goal
@@ -88,10 +88,10 @@ def _goals_of(space: AtomSpace, atoms: int, rng: np.random.Generator) -> Iterato
 
 
 @dataclass(frozen=True)
-class Outcome:
+class GoalTrials:
     """A goal, and what came of it: a trial an approach, pure planning first."""
 
-    goal: Named
+    goal: NamedGoal
     trials: tuple[Trial, ...]
 
     @property
@@ -101,7 +101,7 @@ class Outcome:
         return (pure.plan_length, slap.plan_length) if pure.success and slap.success else None
 
 
-def study(comparison: Comparison, count: int, audience: Audience) -> Report:
+def study(comparison: Comparison, count: int, progress: StudyProgress) -> StudyReport:
     """Sample ``count`` goals for each task and solve them all in every way.
 
     Raises:
@@ -110,23 +110,24 @@ def study(comparison: Comparison, count: int, audience: Audience) -> Report:
     jobs = [
         (seed, index, goal)
         for seed, index in comparison.experiment
-        for goal in _goals(comparison.domain, seed, index, count, audience)
+        for goal in _goals(comparison.domain, seed, index, count, progress)
     ]
     if not jobs:
         raise UnsolvableError("operators can reach no goal in any of the tasks")
-    audience.begin("goals", len(jobs) * len(comparison.approaches))
+    progress.begin("goals", len(jobs) * len(comparison.approaches))
     trials = [
-        _solve_all(comparison, approach, jobs, audience) for approach in comparison.approaches
+        _solve_all(comparison, approach, jobs, progress) for approach in comparison.approaches
     ]
     outcomes = [
-        Outcome(goal, own) for (*_, goal), own in zip(jobs, zip(*trials, strict=True), strict=True)
+        GoalTrials(goal, own)
+        for (*_, goal), own in zip(jobs, zip(*trials, strict=True), strict=True)
     ]
     summaries = [
         Summary.of(comparison.experiment, approach.name, own, trials[0])
         for approach, own in zip(comparison.approaches, trials, strict=True)
     ]
     names = [approach.name for approach in comparison.approaches]
-    return Report(
+    return StudyReport(
         study="goals",
         source="SLAP Fig. 9",
         title=f"Other goals: {comparison.domain.name}",
@@ -141,13 +142,15 @@ def study(comparison: Comparison, count: int, audience: Audience) -> Report:
     )
 
 
-def _goals(domain: Domain, seed: int, index: int, count: int, audience: Audience) -> list[Named]:
+def _goals(
+    domain: Domain, seed: int, index: int, count: int, progress: StudyProgress
+) -> list[NamedGoal]:
     """Goals for one task; none where its graph cannot be built."""
     rng = np.random.default_rng([seed, index, GOALS])
     try:
         sampled = sample_goals(domain, domain.task(seed, index), count, rng)
     except (UnsolvableError, PlanningLimitError) as error:
-        audience.failed(f"seed {seed}, task {index} has no goals: {error}")
+        progress.report_failure(f"seed {seed}, task {index} has no goals: {error}")
         return []
     return [
         tuple((atom.predicate.name, tuple(obj.name for obj in atom.objects)) for atom in goal)
@@ -158,22 +161,28 @@ def _goals(domain: Domain, seed: int, index: int, count: int, audience: Audience
 def _solve_all(
     comparison: Comparison,
     approach: Approach,
-    jobs: Sequence[tuple[int, int, Named]],
-    audience: Audience,
+    jobs: Sequence[tuple[int, int, NamedGoal]],
+    progress: StudyProgress,
 ) -> list[Trial]:
     """A trial a job."""
     ended = []
-    for number, trial in comparison.each(_solve, approach, jobs):
+    for number, trial in comparison.map_jobs(_solve, approach, jobs):
         ended.append((number, trial))
-        audience.done()
+        progress.advance()
         if not trial.success:
             reason = f"{' and '.join(_words(jobs[number][2]))}: {trial.reason}"
-            audience.failed(complaint(approach, trial.seed, trial.index, reason))
+            progress.report_failure(complaint(approach, trial.seed, trial.index, reason))
     return in_order(ended)
 
 
 def _solve(
-    domain: str, preset: str, planner: str, approach: Approach, seed: int, index: int, goal: Named
+    domain: str,
+    preset: str,
+    planner: str,
+    approach: Approach,
+    seed: int,
+    index: int,
+    goal: NamedGoal,
 ) -> Trial:
     """One task with another goal; the domain is made anew where this runs."""
     chosen = get_domain(domain, preset)
@@ -183,7 +192,7 @@ def _solve(
     return Trial.of(seed, index, solve(chosen, replace(task, goal=atoms), approach, planner))
 
 
-def _as_json(outcome: Outcome, names: Sequence[str]) -> dict[str, Any]:
+def _as_json(outcome: GoalTrials, names: Sequence[str]) -> dict[str, Any]:
     first = outcome.trials[0]
     whose = {"seed": first.seed, "index": first.index}
     trials = [
@@ -193,11 +202,11 @@ def _as_json(outcome: Outcome, names: Sequence[str]) -> dict[str, Any]:
     return {**whose, "goal": _words(outcome.goal), **dict(zip(names, trials, strict=True))}
 
 
-def _words(goal: Named) -> list[str]:
+def _words(goal: NamedGoal) -> list[str]:
     return [f"{predicate}({', '.join(objects)})" for predicate, objects in goal]
 
 
-def _compared(outcomes: Sequence[Outcome]) -> str:
+def _compared(outcomes: Sequence[GoalTrials]) -> str:
     """How often SLAP's plans are shorter, in words."""
     pairs = [outcome.lengths for outcome in outcomes if outcome.lengths is not None]
     shorter = sum(slap < pure for pure, slap in pairs)
@@ -208,15 +217,15 @@ def _compared(outcomes: Sequence[Outcome]) -> str:
     )
 
 
-def _table(goals: int, summaries: Sequence[Summary]) -> Table:
-    return Table(
+def _table(goals: int, summaries: Sequence[Summary]) -> MarkdownTable:
+    return MarkdownTable(
         ["approach", "goals", "success", "length [steps]", "relative length"],
         [
             [
                 label(summary.approach),
                 str(goals),
                 f"{summary.success_rate:.0%}",
-                said(summary.plan_length, 1),
+                format_spread(summary.plan_length, 1),
                 "-" if summary.relative_length is None else f"{summary.relative_length:.2f}",
             ]
             for summary in summaries
@@ -224,7 +233,7 @@ def _table(goals: int, summaries: Sequence[Summary]) -> Table:
     )
 
 
-def draw(figure: Figure, outcomes: Sequence[Outcome]) -> None:
+def draw(figure: Figure, outcomes: Sequence[GoalTrials]) -> None:
     """A dot for each pair of lengths, the larger the more goals have it."""
     axes = figure.subplots()
     counted = Counter(outcome.lengths for outcome in outcomes if outcome.lengths is not None)
@@ -235,7 +244,7 @@ def draw(figure: Figure, outcomes: Sequence[Outcome]) -> None:
         [pure for pure, _ in counted],
         [slap for _, slap in counted],
         [DOT * count for count in counted.values()],
-        color=MARKS["slap"].colour,
+        color=APPROACH_STYLES["slap"].colour,
         alpha=0.6,
         linewidths=0,
         label="goals; area: how many",

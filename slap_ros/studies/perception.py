@@ -20,9 +20,15 @@ from slap_ros.evaluation.approaches import Approach
 from slap_ros.evaluation.summary import Spread
 from slap_ros.perception import NoisyPerceiver, Quality
 from slap_ros.planning.execution import Executor
-from slap_ros.studies.comparison import Audience, Comparison, complaint, said, spread_of
+from slap_ros.studies.comparison import (
+    Comparison,
+    StudyProgress,
+    complaint,
+    format_spread,
+    spread_of,
+)
 from slap_ros.studies.figures import dodged, label, legend_above, plot_spreads, plot_values
-from slap_ros.studies.results import Report, Table
+from slap_ros.studies.results import MarkdownTable, StudyReport
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,7 +51,7 @@ all tasks."""
 
 
 @dataclass(frozen=True)
-class Kind:
+class NoiseKind:
     """One way in which perception errs, at several levels."""
 
     name: str  # for an axis, with the unit
@@ -56,22 +62,24 @@ def _position(mm: float) -> Quality:
     return Quality(position_noise_m=mm / 1e3, turn_noise_rad=TURN_FOR_POSITION * mm / 1e3)
 
 
-KINDS = (
-    Kind("position noise [mm]", tuple((f"{mm:g}", _position(mm)) for mm in (1.0, 2.0, 5.0))),
-    Kind(
+NOISE_KINDS = (
+    NoiseKind("position noise [mm]", tuple((f"{mm:g}", _position(mm)) for mm in (1.0, 2.0, 5.0))),
+    NoiseKind(
         "threshold noise [mm]",
         tuple((f"{mm:g}", Quality(threshold_noise=mm / 1e3)) for mm in (1.0, 2.0, 5.0)),
     ),
-    Kind(
+    NoiseKind(
         "debounced at 2 mm\nposition noise [times]",
         tuple((str(n), replace(_position(2.0), debounce=n)) for n in (2, 3)),
     ),
-    Kind("sightings lost", tuple((f"{share:.0%}", Quality(dropout=share)) for share in (0.3, 0.8))),
+    NoiseKind(
+        "sightings lost", tuple((f"{share:.0%}", Quality(dropout=share)) for share in (0.3, 0.8))
+    ),
 )
 
 
 @dataclass(frozen=True)
-class Attempt:
+class NoisyTrial:
     """What came of one task."""
 
     seed: int
@@ -85,29 +93,29 @@ class Attempt:
 
 
 @dataclass(frozen=True)
-class Level:
+class NoiseLevel:
     """What came of an approach at one level of one kind of noise."""
 
     kind: str
     value: str
     quality: Quality
     approach: str
-    attempts: tuple[Attempt, ...]  # by seed and index
+    trials: tuple[NoisyTrial, ...]  # by seed and index
 
     @property
     def success_rate(self) -> float:
         """Part of the tasks solved in the world."""
-        return fmean(one.success for one in self.attempts)
+        return fmean(one.success for one in self.trials)
 
     @property
     def length(self) -> Spread | None:
         """Environment steps of solved tasks."""
-        return spread_of([float(one.plan_length) for one in self.attempts if one.success])
+        return spread_of([float(one.plan_length) for one in self.trials if one.success])
 
     @property
     def replans(self) -> Spread:
         """Of all tasks."""
-        return Spread.of([float(one.replans) for one in self.attempts])
+        return Spread.of([float(one.replans) for one in self.trials])
 
     def as_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -119,7 +127,7 @@ class Level:
             "success_rate": self.success_rate,
             "plan_length": asdict(self.length) if self.length else None,
             "replans": asdict(self.replans),
-            "attempts": [asdict(one) for one in self.attempts],
+            "attempts": [asdict(one) for one in self.trials],
         }
 
     def as_row(self) -> list[str]:
@@ -129,30 +137,32 @@ class Level:
             " ".join(where.split()),
             label(self.approach),
             f"{self.success_rate:.0%}",
-            said(self.length, 1),
-            said(self.replans, 1),
+            format_spread(self.length, 1),
+            format_spread(self.replans, 1),
         ]
 
 
-def study(comparison: Comparison, max_replans: int, audience: Audience) -> Report:
+def study(comparison: Comparison, max_replans: int, progress: StudyProgress) -> StudyReport:
     """Measure at every level of every kind of noise."""
     planned = [(EXACT, EXACT, Quality())]
-    planned += [(kind.name, value, quality) for kind in KINDS for value, quality in kind.levels]
-    levels = [
-        level for one in planned for level in _measure(comparison, *one, max_replans, audience)
+    planned += [
+        (kind.name, value, quality) for kind in NOISE_KINDS for value, quality in kind.levels
     ]
-    return Report(
+    levels = [
+        level for one in planned for level in _measure(comparison, *one, max_replans, progress)
+    ]
+    return StudyReport(
         study="perception",
         source="SLAP D.3 and D.4",
         title=f"Noise in perception: {comparison.domain.name}",
         measured=MEASURED,
-        table=Table(
+        table=MarkdownTable(
             ["perception", "approach", "success", "length [steps]", "replans"],
             [level.as_row() for level in levels],
         ),
         found={"levels": [level.as_json() for level in levels]},
         draw=lambda figure: draw(figure, levels),
-        size=(1.2 + 2.3 * len(KINDS), 5.2),
+        size=(1.2 + 2.3 * len(NOISE_KINDS), 5.2),
     )
 
 
@@ -162,24 +172,24 @@ def _measure(
     value: str,
     quality: Quality,
     max_replans: int,
-    audience: Audience,
-) -> Iterator[Level]:
+    progress: StudyProgress,
+) -> Iterator[NoiseLevel]:
     """One approach after the other."""
     tasks = list(comparison.experiment)
-    audience.begin(" ".join(f"{kind} {value}".split()), len(tasks) * len(comparison.approaches))
+    progress.begin(" ".join(f"{kind} {value}".split()), len(tasks) * len(comparison.approaches))
     for approach in comparison.approaches:
-        attempts = []
+        trials = []
         jobs = [(quality, max_replans, seed, index) for seed, index in tasks]
-        for _, one in comparison.each(attempt, approach, jobs):
-            attempts.append(one)
-            audience.done()
+        for _, one in comparison.map_jobs(solve_perceived, approach, jobs):
+            trials.append(one)
+            progress.advance()
             if not one.success:
-                audience.failed(complaint(approach, one.seed, one.index, one.reason))
-        attempts.sort(key=lambda one: (one.seed, one.index))
-        yield Level(kind, value, quality, approach.name, tuple(attempts))
+                progress.report_failure(complaint(approach, one.seed, one.index, one.reason))
+        trials.sort(key=lambda one: (one.seed, one.index))
+        yield NoiseLevel(kind, value, quality, approach.name, tuple(trials))
 
 
-def attempt(
+def solve_perceived(
     domain: str,
     preset: str,
     planner: str,
@@ -188,7 +198,7 @@ def attempt(
     max_replans: int,
     seed: int,
     index: int,
-) -> Attempt:
+) -> NoisyTrial:
     """Solve one task as it is perceived; the domain is made anew where this runs."""
     chosen = get_domain(domain, preset)
     task = chosen.task(seed, index)
@@ -209,7 +219,7 @@ def attempt(
     ).run()
     holds = space.abstract(world.state) & goal == goal
     reason = episode.error.reason or ("" if holds else "solved, as far as was seen, and is not")
-    return Attempt(
+    return NoisyTrial(
         seed,
         index,
         episode.success and holds,
@@ -221,13 +231,13 @@ def attempt(
     )
 
 
-def draw(figure: Figure, levels: Sequence[Level]) -> None:
+def draw(figure: Figure, levels: Sequence[NoiseLevel]) -> None:
     """A column a kind of noise: success, length, replans; first, apart, exact perception."""
     exact = [one for one in levels if one.kind == EXACT]
     grid = figure.subplots(
-        3, len(KINDS), squeeze=False, sharex="col", sharey="row", height_ratios=(1, 1.6, 1.2)
+        3, len(NOISE_KINDS), squeeze=False, sharex="col", sharey="row", height_ratios=(1, 1.6, 1.2)
     )
-    for column, kind in zip(grid.T, KINDS, strict=True):
+    for column, kind in zip(grid.T, NOISE_KINDS, strict=True):
         own = [one for one in levels if one.kind == kind.name]
         _plot(column, exact, [EXACT])
         _plot(column, own, [value for value, _ in kind.levels])
@@ -247,7 +257,7 @@ def draw(figure: Figure, levels: Sequence[Level]) -> None:
     legend_above(figure, grid[1, 0])
 
 
-def _plot(column: Sequence[Axes], levels: Sequence[Level], values: Sequence[str]) -> None:
+def _plot(column: Sequence[Axes], levels: Sequence[NoiseLevel], values: Sequence[str]) -> None:
     """Approaches beside each other; exact perception at 0, the others from 1 on."""
     names = list(dict.fromkeys(one.approach for one in levels))
     places = range(len(values)) if values == [EXACT] else range(1, len(values) + 1)

@@ -17,9 +17,15 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.evaluation.approaches import Approach
 from slap_ros.evaluation.summary import Spread
-from slap_ros.studies.comparison import Audience, Comparison, complaint, said, spread_of
+from slap_ros.studies.comparison import (
+    Comparison,
+    StudyProgress,
+    complaint,
+    format_spread,
+    spread_of,
+)
 from slap_ros.studies.figures import dodged, label, legend_above, plot_spreads
-from slap_ros.studies.results import Report, Table
+from slap_ros.studies.results import MarkdownTable, StudyReport
 from slap_ros.studies.variations import Variation
 
 if TYPE_CHECKING:
@@ -39,7 +45,7 @@ Obstacle Tower."""
 
 
 @dataclass(frozen=True)
-class Planned:
+class PlanningTrial:
     """What planning for one task took."""
 
     seed: int
@@ -54,12 +60,12 @@ class Planned:
 
 
 @dataclass(frozen=True)
-class Cost:
+class PlanningCost:
     """What planning took an approach under one value of the setting."""
 
     value: str
     approach: str
-    planned: tuple[Planned, ...]  # by seed and index
+    planned: tuple[PlanningTrial, ...]  # by seed and index
 
     @property
     def success_rate(self) -> float:
@@ -72,7 +78,7 @@ class Cost:
         return Spread.of([one.seconds for one in self.planned])
 
     def spread(self, quantity: str) -> Spread | None:
-        """Of one of the fields of :class:`Planned`, over plans found."""
+        """Of one of the fields of :class:`PlanningTrial`, over plans found."""
         return spread_of([float(getattr(one, quantity)) for one in self.planned if one.success])
 
     def as_json(self) -> dict[str, Any]:
@@ -91,7 +97,7 @@ class Cost:
 QUANTITIES = ("edges_rolled_out", "graph_nodes", "graph_edges", "predicted_steps")
 
 
-def study(comparison: Comparison, variation: Variation, audience: Audience) -> Report:
+def study(comparison: Comparison, variation: Variation, progress: StudyProgress) -> StudyReport:
     """Plan under every value of a setting.
 
     Raises:
@@ -101,8 +107,8 @@ def study(comparison: Comparison, variation: Variation, audience: Audience) -> R
     planned = [
         (value, comparison.under(variation.preset(base, value))) for value in variation.values
     ]
-    costs = [cost for value, under in planned for cost in _measure(value, under, audience)]
-    return Report(
+    costs = [cost for value, under in planned for cost in _measure(value, under, progress)]
+    return StudyReport(
         study="planning_time",
         source="SLAP Table 4",
         title=f"Planning time: {comparison.domain.name}",
@@ -114,24 +120,24 @@ def study(comparison: Comparison, variation: Variation, audience: Audience) -> R
     )
 
 
-def _measure(value: str, comparison: Comparison, audience: Audience) -> Iterator[Cost]:
+def _measure(value: str, comparison: Comparison, progress: StudyProgress) -> Iterator[PlanningCost]:
     """One approach after the other."""
     tasks = list(comparison.experiment)
-    audience.begin(comparison.domain.preset, len(tasks) * len(comparison.approaches))
+    progress.begin(comparison.domain.preset, len(tasks) * len(comparison.approaches))
     for approach in comparison.approaches:
         planned = []
-        for _, one in comparison.each(plan_once, approach, tasks):
+        for _, one in comparison.map_jobs(plan_once, approach, tasks):
             planned.append(one)
-            audience.done()
+            progress.advance()
             if not one.success:
-                audience.failed(complaint(approach, one.seed, one.index, one.reason))
+                progress.report_failure(complaint(approach, one.seed, one.index, one.reason))
         planned.sort(key=lambda one: (one.seed, one.index))
-        yield Cost(value, approach.name, tuple(planned))
+        yield PlanningCost(value, approach.name, tuple(planned))
 
 
 def plan_once(
     domain: str, preset: str, planner: str, approach: Approach, seed: int, index: int
-) -> Planned:
+) -> PlanningTrial:
     """Plan for one task; the domain is made anew where this runs."""
     chosen = get_domain(domain, preset)
     task = chosen.task(seed, index)
@@ -142,8 +148,8 @@ def plan_once(
     try:
         result = planning.plan(state, goal)
     except (UnsolvableError, PlanningLimitError) as error:
-        return Planned(seed, index, False, perf_counter() - began, 0, 0, 0, 0, str(error))
-    return Planned(
+        return PlanningTrial(seed, index, False, perf_counter() - began, 0, 0, 0, 0, str(error))
+    return PlanningTrial(
         seed,
         index,
         True,
@@ -156,8 +162,8 @@ def plan_once(
     )
 
 
-def _table(variation: Variation, costs: Sequence[Cost]) -> Table:
-    return Table(
+def _table(variation: Variation, costs: Sequence[PlanningCost]) -> MarkdownTable:
+    return MarkdownTable(
         [
             variation.label,
             "approach",
@@ -172,15 +178,15 @@ def _table(variation: Variation, costs: Sequence[Cost]) -> Table:
                 cost.value,
                 label(cost.approach),
                 f"{cost.success_rate:.0%}",
-                said(cost.seconds, 3),
-                *(said(cost.spread(name), 1) for name in QUANTITIES[:3]),
+                format_spread(cost.seconds, 3),
+                *(format_spread(cost.spread(name), 1) for name in QUANTITIES[:3]),
             ]
             for cost in costs
         ],
     )
 
 
-def draw(figure: Figure, variation: Variation, costs: Sequence[Cost]) -> None:
+def draw(figure: Figure, variation: Variation, costs: Sequence[PlanningCost]) -> None:
     """Seconds, edges rolled out and the graph's edges beside each other, by the setting's value."""
     panels = figure.subplots(1, 3)
     places = range(len(variation.values))

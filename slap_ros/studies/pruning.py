@@ -16,9 +16,9 @@ from slap_ros.shortcuts.explore import Explored
 from slap_ros.shortcuts.jobs import Place
 from slap_ros.shortcuts.settings import Exploration
 from slap_ros.shortcuts.workers import in_order, local_workers
-from slap_ros.studies.comparison import Audience, said
+from slap_ros.studies.comparison import StudyProgress, format_spread
 from slap_ros.studies.figures import legend_above
-from slap_ros.studies.results import Report, Table
+from slap_ros.studies.results import MarkdownTable, StudyReport
 from slap_ros.studies.trainings import TrainingFolder
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ here pairs are counted."""
 
 
 @dataclass(frozen=True)
-class Pruned:
+class PrunedCandidates:
     """What is left of one task's candidates.
 
     Args:
@@ -79,8 +79,8 @@ def explore(
     tasks: int,
     settings: Exploration,
     jobs: int,
-    audience: Audience,
-) -> tuple[Pruned, ...]:
+    progress: StudyProgress,
+) -> tuple[PrunedCandidates, ...]:
     """Explore the first ``tasks`` tasks of trainings with seeds from 0 on, as training does.
 
     Raises:
@@ -92,32 +92,32 @@ def explore(
         for index in range(tasks)
     ]
     ended = []
-    audience.begin(f"exploring {domain}", len(work))
+    progress.begin(f"exploring {domain}", len(work))
     with local_workers(jobs) as workers:
         for number, outcome in workers.run(_explore, work):
             ended.append((number, outcome))
-            audience.done()
+            progress.advance()
             if isinstance(outcome, str):
                 place, index, _ = work[number]
-                audience.failed(f"seed {place.seed}, task {index} not explored: {outcome}")
-    explored = [outcome for outcome in in_order(ended) if isinstance(outcome, Pruned)]
+                progress.report_failure(f"seed {place.seed}, task {index} not explored: {outcome}")
+    explored = [outcome for outcome in in_order(ended) if isinstance(outcome, PrunedCandidates)]
     if not explored:
         raise UnsolvableError(f"none of the {len(work)} tasks could be explored")
     return tuple(explored)
 
 
-def _explore(place: Place, index: int, settings: Exploration) -> Pruned | str:
+def _explore(place: Place, index: int, settings: Exploration) -> PrunedCandidates | str:
     """Explore one task, or say why it cannot be."""
     try:
         data = training_jobs.explore(place, index, settings)
     except (UnsolvableError, PlanningLimitError) as error:
         return str(error)
-    return Pruned(place.seed, index, Explored.from_json(data))
+    return PrunedCandidates(place.seed, index, Explored.from_json(data))
 
 
 def explored_in(
     folders: Sequence[TrainingFolder], domain: str
-) -> tuple[tuple[Pruned, ...], Exploration]:
+) -> tuple[tuple[PrunedCandidates, ...], Exploration]:
     """What trainings have explored already, and how all of them did.
 
     Raises:
@@ -133,14 +133,14 @@ def explored_in(
                 "that differ in their seeds alone"
             )
     pruned = tuple(
-        Pruned(folder.place()["seed"], index, explored)
+        PrunedCandidates(folder.place()["seed"], index, explored)
         for folder in folders
         for index, explored in enumerate(folder.explored())
     )
     return pruned, how
 
 
-def study(domain: str, pruned: Sequence[Pruned], settings: Exploration) -> Report:
+def study(domain: str, pruned: Sequence[PrunedCandidates], settings: Exploration) -> StudyReport:
     """What is left, by the number of rollouts that must succeed."""
     thresholds = _thresholds(settings)
     signatures = {
@@ -148,7 +148,7 @@ def study(domain: str, pruned: Sequence[Pruned], settings: Exploration) -> Repor
         for one in pruned
         for find in one.explored.finds
     }
-    return Report(
+    return StudyReport(
         study="pruning",
         source="SLAP §4.2 and Table 2",
         title=f"Pruning: {domain}",
@@ -172,7 +172,7 @@ def _said(settings: Exploration) -> str:
     )
 
 
-def _overall(pruned: Sequence[Pruned], settings: Exploration) -> str:
+def _overall(pruned: Sequence[PrunedCandidates], settings: Exploration) -> str:
     candidates = sum(one.explored.candidates for one in pruned)
     remaining = sum(one.remaining(settings.hits) for one in pruned)
     part = 100.0 * remaining / max(1, candidates)
@@ -190,7 +190,7 @@ def _thresholds(settings: Exploration) -> list[int]:
     return thresholds
 
 
-def _at(hits: int, pruned: Sequence[Pruned], settings: Exploration) -> dict[str, Any]:
+def _at(hits: int, pruned: Sequence[PrunedCandidates], settings: Exploration) -> dict[str, Any]:
     """What is left at one threshold."""
     return {
         "k": hits,
@@ -200,7 +200,9 @@ def _at(hits: int, pruned: Sequence[Pruned], settings: Exploration) -> dict[str,
     }
 
 
-def _table(pruned: Sequence[Pruned], settings: Exploration, different: int) -> Table:
+def _table(
+    pruned: Sequence[PrunedCandidates], settings: Exploration, different: int
+) -> MarkdownTable:
     """A row a task, then all of them."""
     hits = settings.hits
     candidates = sum(one.explored.candidates for one in pruned)
@@ -216,15 +218,15 @@ def _table(pruned: Sequence[Pruned], settings: Exploration, different: int) -> T
         ]
         for one in pruned
     ]
-    percent = said(Spread.of([one.percent(hits) for one in pruned]), 1)
+    percent = format_spread(Spread.of([one.percent(hits) for one in pruned]), 1)
     total = ["all", str(len(pruned)), f"{candidates:,}", str(remaining), percent, str(different)]
-    return Table(
+    return MarkdownTable(
         ["seed", "task", "candidates", "remaining", "remaining [%]", "different up to objects"],
         [*rows, [f"**{cell}**" for cell in total]],
     )
 
 
-def draw(figure: Figure, pruned: Sequence[Pruned], settings: Exploration) -> None:
+def draw(figure: Figure, pruned: Sequence[PrunedCandidates], settings: Exploration) -> None:
     """What remains against K/N: a thin line a task, the mean with its spread."""
     axes = figure.subplots()
     thresholds = _thresholds(settings)

@@ -21,7 +21,7 @@ Data = Mapping[str, Any]  # plain: what JSON can say
 
 
 @dataclass(frozen=True)
-class Table:
+class MarkdownTable:
     """A table of a page; every row has an entry a column."""
 
     columns: Sequence[str]
@@ -34,7 +34,7 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Report:
+class StudyReport:
     """What a study came to.
 
     Args:
@@ -52,14 +52,14 @@ class Report:
     source: str
     title: str
     measured: str
-    table: Table
+    table: MarkdownTable
     found: Data
     draw: Callable[[Figure], None]
     size: Size
 
 
 @dataclass(frozen=True)
-class Origin:
+class Provenance:
     """From what a report was made.
 
     Args:
@@ -82,7 +82,7 @@ class Origin:
         }
 
 
-def write(folder: Path, report: Report, origin: Origin) -> list[Path]:
+def write(folder: Path, report: StudyReport, origin: Provenance) -> list[Path]:
     """Write a report's files, in place of those of an earlier one. Returns where they are."""
     name = f"{report.study}_{origin.domain}"
     data = {
@@ -133,7 +133,7 @@ def _is_nested(value: object) -> bool:
     return isinstance(value, Mapping | list | tuple)
 
 
-def _page(name: str, report: Report, origin: Origin) -> str:
+def _page(name: str, report: StudyReport, origin: Provenance) -> str:
     data = f"[{name}.json]({name}.json)"
     settings = [f"- {key}: {_said(value)}" for key, value in origin.settings.items()]
     listed = "\n".join([*settings, f"- versions and every number: {data}"])

@@ -17,7 +17,7 @@ from slap_ros.shortcuts.settings import Exploration
 
 
 @dataclass(frozen=True)
-class Point:
+class LearningPoint:
     """How learning stood at one time; success and length are over recent episodes, with noise."""
 
     steps: int  # environment steps of all stages so far
@@ -26,7 +26,7 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Curve:
+class LearningCurve:
     """How one shortcut was learned.
 
     Args:
@@ -36,7 +36,7 @@ class Curve:
     """
 
     shortcut: str
-    points: tuple[Point, ...]
+    points: tuple[LearningPoint, ...]
     stages: tuple[int, ...]
 
 
@@ -91,7 +91,7 @@ class TrainingFolder:
         except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
             raise _damaged(path, error) from error
 
-    def curves(self) -> tuple[Curve, ...]:
+    def curves(self) -> tuple[LearningCurve, ...]:
         """Those of all shortcuts that were, or are being, learned; by name.
 
         Raises:
@@ -113,7 +113,7 @@ class TrainingFolder:
         return dict(settings[name])
 
 
-def read_curve(path: Path) -> Curve:
+def read_curve(path: Path) -> LearningCurve:
     """The curve in a progress file: a JSON object a line, as training appends them.
 
     Stages are put one after the other. A training that was interrupted went on from a checkpoint:
@@ -122,7 +122,7 @@ def read_curve(path: Path) -> Curve:
     Raises:
         InvalidParameterError: A line is damaged, or there is none; names file and line.
     """
-    stages: dict[int, list[Point]] = {}
+    stages: dict[int, list[LearningPoint]] = {}
     try:
         complete = path.read_text(encoding="utf-8").split("\n")[:-1]
     except (OSError, ValueError) as error:
@@ -135,21 +135,24 @@ def read_curve(path: Path) -> Curve:
         points.append(point)
     if not stages:
         raise InvalidParameterError(f"{path}: nothing learned so far; try again later")
-    joined: list[Point] = []
+    joined: list[LearningPoint] = []
     begins: list[int] = []
     for stage in sorted(stages):
         before = joined[-1].steps if joined else 0
         begins.append(before)
-        joined += [Point(before + p.steps, p.success, p.length) for p in stages[stage]]
-    return Curve(path.parent.name, tuple(joined), tuple(begins[1:]))
+        joined += [LearningPoint(before + p.steps, p.success, p.length) for p in stages[stage]]
+    return LearningCurve(path.parent.name, tuple(joined), tuple(begins[1:]))
 
 
-def _parse(line: str, where: str) -> tuple[int, Point]:
+def _parse(line: str, where: str) -> tuple[int, LearningPoint]:
     """Stage, and point with the steps of that stage."""
     try:
         data = json.loads(line)
         length = None if data["length"] is None else float(data["length"])
-        stage, point = int(data["stage"]), Point(int(data["steps"]), float(data["success"]), length)
+        stage, point = (
+            int(data["stage"]),
+            LearningPoint(int(data["steps"]), float(data["success"]), length),
+        )
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise _damaged(where, error) from error
     numbers = [point.success, *([] if length is None else [length])]

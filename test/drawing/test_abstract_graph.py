@@ -24,7 +24,7 @@ from slap_ros.drawing.abstract_graph import compose
 from slap_ros.drawing.layout import Area
 from slap_ros.drawing.palette import OTHER_SHORTCUT_PEN, SHORTCUT_PEN
 from slap_ros.drawing.selection import MAX_NODES
-from slap_ros.drawing.svg import Curve, Group, Picture, Rectangle, Text, texts
+from slap_ros.drawing.svg import SvgCurve, SvgGroup, SvgPicture, SvgRectangle, SvgText, texts
 from slap_ros.drawing.text import shorten, width_px, wrap
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
 from slap_ros.planning.options import Option, OptionKind, given_option
@@ -44,7 +44,7 @@ class Case:
     space: AtomSpace
     plan: Plan
 
-    def compose(self, title: str = "A graph") -> Picture:
+    def compose(self, title: str = "A graph") -> SvgPicture:
         return compose(self.graph, self.space, self.plan, title)
 
     def draw(self, title: str = "A graph") -> str:
@@ -128,27 +128,27 @@ def group_titles(svg: str) -> list[str]:
     return [group.findtext(f"{SVG}title") or "" for group in root.iter(f"{SVG}g")]
 
 
-def groups(picture: Picture) -> Iterator[Group]:
-    return (shape for shape in picture.shapes if isinstance(shape, Group))
+def groups(picture: SvgPicture) -> Iterator[SvgGroup]:
+    return (shape for shape in picture.shapes if isinstance(shape, SvgGroup))
 
 
-def card_areas(picture: Picture) -> list[Area]:
+def card_areas(picture: SvgPicture) -> list[Area]:
     return [
         shape.area
         for group in groups(picture)
         if re.match(r"State \d+:", group.title)
         for shape in group.shapes[:1]
-        if isinstance(shape, Rectangle)
+        if isinstance(shape, SvgRectangle)
     ]
 
 
-def label_areas(picture: Picture) -> dict[str, Area]:
+def label_areas(picture: SvgPicture) -> dict[str, Area]:
     return {
         group.title: shape.area
         for group in groups(picture)
         if " to state " in group.title
         for shape in group.shapes
-        if isinstance(shape, Rectangle)
+        if isinstance(shape, SvgRectangle)
     }
 
 
@@ -164,7 +164,7 @@ def overlaps(areas: list[Area]) -> list[tuple[Area, Area]]:
     return found
 
 
-def points_on(curve: Curve) -> Iterator[tuple[float, float]]:
+def points_on(curve: SvgCurve) -> Iterator[tuple[float, float]]:
     for piece in curve.beziers():
         for t in (i / 24 for i in range(25)):
             weights = ((1 - t) ** 3, 3 * (1 - t) ** 2 * t, 3 * (1 - t) * t**2, t**3)
@@ -263,7 +263,7 @@ def test_no_two_texts_overlap(case: Case) -> None:
 def test_text_stays_on_its_card_and_in_the_picture(case: Case) -> None:
     picture = case.compose()
     for group in groups(picture):
-        frames = [s.area for s in group.shapes if isinstance(s, Rectangle)]
+        frames = [s.area for s in group.shapes if isinstance(s, SvgRectangle)]
         for text in texts(group.shapes):
             area = text.area
             assert frames[0].x <= area.x and area.right <= frames[0].right, text.content
@@ -282,7 +282,7 @@ def test_edges_run_through_no_card_and_no_other_label(case: Case) -> None:
     picture = case.compose()
     cards, labels = card_areas(picture), label_areas(picture)
     for group in groups(picture):
-        for curve in (shape for shape in group.shapes if isinstance(shape, Curve)):
+        for curve in (shape for shape in group.shapes if isinstance(shape, SvgCurve)):
             points = list(points_on(curve))
             near = bounds(points)
             for area in cards:
@@ -298,7 +298,7 @@ def test_edges_begin_and_end_at_their_cards(case: Case) -> None:
     cards = card_areas(picture)
     for group in groups(picture):
         if match := re.match(r"State (\d+) to state (\d+):", group.title):
-            curves = [shape for shape in group.shapes if isinstance(shape, Curve)]
+            curves = [shape for shape in group.shapes if isinstance(shape, SvgCurve)]
             for number, end in (
                 (int(match[1]), curves[0].waypoints[0]),
                 (int(match[2]), curves[-1].waypoints[-1]),
@@ -315,7 +315,7 @@ def test_plan_that_goes_from_layer_to_layer_runs_level() -> None:
         for group in groups(picture)
         if "of the plan" in group.title
         for shape in group.shapes
-        if isinstance(shape, Curve)
+        if isinstance(shape, SvgCurve)
         for point in shape.waypoints
     }
     assert len(heights) == 1
@@ -435,9 +435,9 @@ def test_shortcuts_look_different_on_the_plan_and_off_it() -> None:
     plan = Plan((PlanEdge(shortcut, graph.nodes[7], 6),))
     for taken, meaning in ((plan, "a learned shortcut on the plan"), (None, "another learned")):
         picture = compose(graph, case.space, taken, "shortcuts")
-        edges = [shape for shape in picture.shapes if isinstance(shape, Group)]
+        edges = [shape for shape in picture.shapes if isinstance(shape, SvgGroup)]
         (drawn,) = [e for e in edges if e.title.startswith("State 0 to state 7")]
-        pens = {shape.pen for shape in drawn.shapes if isinstance(shape, Curve)}
+        pens = {shape.pen for shape in drawn.shapes if isinstance(shape, SvgCurve)}
         assert pens == {SHORTCUT_PEN if taken else OTHER_SHORTCUT_PEN}
         assert any(meaning in text.content for text in texts(picture.shapes))
 
@@ -453,9 +453,9 @@ def luminance(colour: str) -> float:
 
 def test_text_contrast() -> None:
     picture = obstacle2d(TWO_BYSTANDERS).compose()
-    pairs = {(t.fill, picture.background) for t in picture.shapes if isinstance(t, Text)}
+    pairs = {(t.fill, picture.background) for t in picture.shapes if isinstance(t, SvgText)}
     for group in groups(picture):
-        fills = [s.fill for s in group.shapes if isinstance(s, Rectangle)]
+        fills = [s.fill for s in group.shapes if isinstance(s, SvgRectangle)]
         pairs |= {(text.fill, fills[0]) for text in texts(group.shapes)}
     assert len(pairs) > 5
     for ink, paper in pairs:

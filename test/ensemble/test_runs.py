@@ -17,7 +17,7 @@ from ensemble.nodes import RunSettings
 from ensemble.run import RunRequest, run
 from slap_ros.bags import bag_digest, bag_info, evaluate_bag, read_bag, replay_bag
 from slap_ros.cli import app
-from slap_ros.cli.run import Narrator
+from slap_ros.cli.run import EventPrinter
 from slap_ros.domains import get_domain
 from slap_ros.evaluation.experiment import Experiment
 from slap_ros.messages.decode import stamp_ns
@@ -196,7 +196,7 @@ def test_running_out_of_steps_says_so(network):
 
 
 def test_the_story_of_a_run_is_told(network, capsys):
-    assert run(request(), Narrator()).success
+    assert run(request(), EventPrinter()).success
     told = capsys.readouterr().err
     assert "plan 0:" in told
     assert "PlaceInTarget(robot, block1, target): reached" in told

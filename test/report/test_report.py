@@ -56,7 +56,7 @@ def test_a_run_is_told_from_its_first_step_to_its_last(bags: Bags) -> None:
     assert (incident.kind, incident.reason) == ("diverged", "it ended elsewhere")
     assert incident.step == run.spans[1].start
     assert run.replan_steps == (incident.step,)
-    outcomes = [[link.outcome for link in chain.links] for chain in run.chains]
+    outcomes = [[edge.outcome for edge in chain.edges] for chain in run.chains]
     rest = len(run.spans) - 1
     assert outcomes == [["reached", "diverged"] + ["not begun"] * (rest - 1), ["reached"] * rest]
     assert run.scene is not None
@@ -67,11 +67,11 @@ def test_the_chain_of_states_is_that_of_the_perceived_atoms(bags: Bags) -> None:
     """In Obstacle 2D every option does what its operator says, so both must agree."""
     (run,) = read_report(bags["pure"]).runs
     (chain,) = run.chains
-    rows = {row.text: row.intervals for row in run.truth.rows}
+    rows = {row.text: row.intervals for row in run.atom_timeline.rows}
     held = set(chain.start)
-    for link, span in zip(chain.links, run.spans, strict=True):
-        assert link.text == span.text
-        held = (held | set(link.added)) - set(link.removed)
+    for edge, span in zip(chain.edges, run.spans, strict=True):
+        assert edge.text == span.text
+        held = (held | set(edge.added)) - set(edge.removed)
         perceived = {
             text
             for text, stretches in rows.items()

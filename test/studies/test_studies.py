@@ -309,23 +309,23 @@ def test_pruning_counts_what_a_training_has_explored(tmp_path, training):
     for row in data["found"]["thresholds"]:
         assert row["remaining"] == sum(hit >= row["k"] for hit in hits)
     assert data["found"]["thresholds"][0]["remaining"] == len(hits) > 0
-    fresh = pruning.explore("obstacle2d", "fair", 1, 1, how, 1, Deaf())
+    fresh = pruning.explore("obstacle2d", "fair", 1, 1, how, 1, SilentProgress())
     assert (
         fresh[0].explored.candidates
         == jobs.explore(Place("obstacle2d", "fair", 0), 0, how)["candidates"]
     )
 
 
-class Deaf:
-    """Hears nothing."""
+class SilentProgress:
+    """Shows nothing."""
 
     def begin(self, what, total):
         pass
 
-    def done(self):
+    def advance(self):
         pass
 
-    def failed(self, complaint):
+    def report_failure(self, complaint):
         pass
 
 
@@ -391,7 +391,7 @@ def test_without_matplotlib_nothing_is_begun(monkeypatch):
 
 
 def test_noise_in_perception_is_measured_in_the_world(tmp_path, monkeypatch):
-    monkeypatch.setattr(perception, "KINDS", perception.KINDS[1:2])
+    monkeypatch.setattr(perception, "NOISE_KINDS", perception.NOISE_KINDS[1:2])
     arguments = ("perception", "obstacle2d", "--tasks", 2, "--seeds", 1, *PLANNING)
     data = study(tmp_path / "once", *arguments)
     levels = data["found"]["levels"]

@@ -18,10 +18,10 @@ from slap_ros.relational.pddl.names import OBJECT, Names, check_words
 from slap_ros.relational.pddl.sections import read_definition
 from slap_ros.relational.pddl.sexpr import (
     MAX_DEPTH,
-    Group,
+    ListNode,
     Node,
     Word,
-    expect_group,
+    expect_list,
     expect_word,
 )
 from slap_ros.relational.pddl.task import PddlDomain
@@ -52,7 +52,7 @@ def parse_domain(text: str, source: str = "<domain>") -> PddlDomain:
     definition = read_definition(text, source, "domain", _SECTIONS)
     declared = read_names("type", definition.optional(":types"))
     signatures = [_read_signature(node) for node in definition.optional(":predicates")]
-    actions = [_read_action(group) for group in definition.sections.get(":action", [])]
+    actions = [_read_action(listed) for listed in definition.sections.get(":action", [])]
     check_words("predicate", (signature.name for signature in signatures))
     check_words("operator", (action.name for action in actions))
 
@@ -94,25 +94,25 @@ class _Action:
 
 
 def _read_signature(node: Node) -> _Signature:
-    group = expect_group(node, "a predicate")
-    if not group.items:
-        raise MalformedPddlError(f"{group.position}: expected a predicate, found an empty list")
-    name = expect_word(group.items[0], "the name of a predicate")
-    return _Signature(name, read_variables(group.items[1:]))
+    listed = expect_list(node, "a predicate")
+    if not listed.items:
+        raise MalformedPddlError(f"{listed.position}: expected a predicate, found an empty list")
+    name = expect_word(listed.items[0], "the name of a predicate")
+    return _Signature(name, read_variables(listed.items[1:]))
 
 
-def _read_action(group: Group) -> _Action:
-    if len(group.items) < 2:
-        raise MalformedPddlError(f"{group.position}: an action without a name")
-    name = expect_word(group.items[1], "the name of an action")
-    parts = _action_parts(name, group.items[2:])
+def _read_action(listed: ListNode) -> _Action:
+    if len(listed.items) < 2:
+        raise MalformedPddlError(f"{listed.position}: an action without a name")
+    name = expect_word(listed.items[1], "the name of an action")
+    parts = _action_parts(name, listed.items[2:])
     if ":parameters" not in parts:
         raise MalformedPddlError(f"{name.position}: action {name.text} has no :parameters")
-    nothing = Group((), name.position)
+    nothing = ListNode((), name.position)
     add_effects, delete_effects = read_effect(parts.get(":effect", nothing))
     return _Action(
         name,
-        read_variables(expect_group(parts[":parameters"], "a list of parameters").items),
+        read_variables(expect_list(parts[":parameters"], "a list of parameters").items),
         read_conjunction(parts.get(":precondition", nothing)),
         add_effects,
         delete_effects,

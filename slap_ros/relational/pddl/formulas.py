@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from slap_ros.errors import MalformedPddlError
 from slap_ros.relational.pddl.names import UNSUPPORTED
-from slap_ros.relational.pddl.sexpr import Group, Node, Word, expect_group, expect_word
+from slap_ros.relational.pddl.sexpr import ListNode, Node, Word, expect_list, expect_word
 from slap_ros.relational.pddl.tokens import Position
 
 
@@ -32,13 +32,13 @@ def read_formula(node: Node) -> Formula:
     Raises:
         MalformedPddlError: Anything else.
     """
-    group = expect_group(node, "an atom")
-    if group.head in UNSUPPORTED:
-        raise MalformedPddlError(f"{group.position}: {UNSUPPORTED[group.head]} are not supported")
-    if not group.items:
-        raise MalformedPddlError(f"{group.position}: expected an atom, found an empty list")
-    predicate = expect_word(group.items[0], "the name of a predicate")
-    return Formula(predicate, tuple(expect_word(n, "an argument") for n in group.items[1:]))
+    listed = expect_list(node, "an atom")
+    if listed.head in UNSUPPORTED:
+        raise MalformedPddlError(f"{listed.position}: {UNSUPPORTED[listed.head]} are not supported")
+    if not listed.items:
+        raise MalformedPddlError(f"{listed.position}: expected an atom, found an empty list")
+    predicate = expect_word(listed.items[0], "the name of a predicate")
+    return Formula(predicate, tuple(expect_word(n, "an argument") for n in listed.items[1:]))
 
 
 def read_conjunction(node: Node) -> list[Formula]:
@@ -47,7 +47,7 @@ def read_conjunction(node: Node) -> list[Formula]:
     Raises:
         MalformedPddlError: Anything else.
     """
-    return [read_formula(group) for group in _conjuncts(node)]
+    return [read_formula(listed) for listed in _conjuncts(node)]
 
 
 def read_effect(node: Node) -> tuple[list[Formula], list[Formula]]:
@@ -57,20 +57,20 @@ def read_effect(node: Node) -> tuple[list[Formula], list[Formula]]:
         MalformedPddlError: Anything else.
     """
     added, deleted = [], []
-    for group in _conjuncts(node):
-        if group.head != "not":
-            added.append(read_formula(group))
-        elif len(group.items) == 2:
-            deleted.append(read_formula(group.items[1]))
+    for listed in _conjuncts(node):
+        if listed.head != "not":
+            added.append(read_formula(listed))
+        elif len(listed.items) == 2:
+            deleted.append(read_formula(listed.items[1]))
         else:
-            raise MalformedPddlError(f"{group.position}: 'not' takes one atom")
+            raise MalformedPddlError(f"{listed.position}: 'not' takes one atom")
     return added, deleted
 
 
-def _conjuncts(node: Node) -> Iterator[Group]:
-    group = expect_group(node, "an atom or a conjunction")
-    if group.head == "and":
-        for item in group.items[1:]:
+def _conjuncts(node: Node) -> Iterator[ListNode]:
+    listed = expect_list(node, "an atom or a conjunction")
+    if listed.head == "and":
+        for item in listed.items[1:]:
             yield from _conjuncts(item)
-    elif group.items:
-        yield group
+    elif listed.items:
+        yield listed

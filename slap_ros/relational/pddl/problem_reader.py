@@ -17,7 +17,7 @@ from slap_ros.relational.objects import Type
 from slap_ros.relational.pddl.formulas import Formula, read_conjunction, read_formula
 from slap_ros.relational.pddl.names import OBJECT, Names
 from slap_ros.relational.pddl.sections import read_definition
-from slap_ros.relational.pddl.sexpr import Node, expect_word, read_group
+from slap_ros.relational.pddl.sexpr import Node, expect_word, read_list
 from slap_ros.relational.pddl.task import PddlDomain, PddlProblem
 from slap_ros.relational.pddl.tokens import located
 from slap_ros.relational.pddl.typed_list import read_names
@@ -71,7 +71,7 @@ def parse_goal(text: str, space: AtomSpace, source: str = "<goal>") -> frozenset
         MismatchedAtomError: An atom with the wrong number or types of objects, or with one
             object twice.
     """
-    return _ground(read_conjunction(read_group(text, source)), space.predicates, space.layout)
+    return _ground(read_conjunction(read_list(text, source)), space.predicates, space.layout)
 
 
 def _check_domain(node: Node, domain: PddlDomain) -> None:

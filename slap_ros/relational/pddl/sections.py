@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from slap_ros.errors import MalformedPddlError
 from slap_ros.relational.pddl.names import check_name
-from slap_ros.relational.pddl.sexpr import Group, Node, Word, expect_group, expect_word, read_group
+from slap_ros.relational.pddl.sexpr import ListNode, Node, Word, expect_list, expect_word, read_list
 from slap_ros.relational.pddl.tokens import located
 
 REQUIREMENTS = (":strips", ":typing")
@@ -24,11 +24,11 @@ _UNSUPPORTED = {
 
 
 @dataclass(frozen=True)
-class Definition:
+class PddlDefinition:
     """A domain or a problem, cut into its sections."""
 
     name: Word
-    sections: dict[str, list[Group]]  # by keyword, in the order of the text
+    sections: dict[str, list[ListNode]]  # by keyword, in the order of the text
 
     def optional(self, keyword: str) -> tuple[Node, ...]:
         """What follows the keyword of a section that may be missing.
@@ -56,7 +56,7 @@ class Definition:
         return entries[0]
 
 
-def read_definition(text: str, source: str, kind: str, keywords: Collection[str]) -> Definition:
+def read_definition(text: str, source: str, kind: str, keywords: Collection[str]) -> PddlDefinition:
     """Cut a text into sections.
 
     Args:
@@ -68,26 +68,26 @@ def read_definition(text: str, source: str, kind: str, keywords: Collection[str]
     Raises:
         MalformedPddlError: No such definition, or with a section or requirement unknown to us.
     """
-    group = read_group(text, source)
-    title = group.items[1] if len(group.items) > 1 else None
-    if group.head != "define" or not isinstance(title, Group) or title.head != kind:
-        raise MalformedPddlError(f"{group.position}: expected (define ({kind} NAME) ...)")
+    listed = read_list(text, source)
+    title = listed.items[1] if len(listed.items) > 1 else None
+    if listed.head != "define" or not isinstance(title, ListNode) or title.head != kind:
+        raise MalformedPddlError(f"{listed.position}: expected (define ({kind} NAME) ...)")
     if len(title.items) != 2:
         raise MalformedPddlError(f"{title.position}: expected ({kind} NAME)")
     name = expect_word(title.items[1], f"the name of the {kind}")
     with located(name.position):
         check_name(kind, name.text)
-    sections: dict[str, list[Group]] = {}
-    for node in group.items[2:]:
-        section = expect_group(node, "a section")
+    sections: dict[str, list[ListNode]] = {}
+    for node in listed.items[2:]:
+        section = expect_list(node, "a section")
         _check_section(section, keywords)
         sections.setdefault(section.head, []).append(section)
-    definition = Definition(name, sections)
+    definition = PddlDefinition(name, sections)
     _check_requirements(definition.optional(":requirements"))
     return definition
 
 
-def _check_section(section: Group, keywords: Collection[str]) -> None:
+def _check_section(section: ListNode, keywords: Collection[str]) -> None:
     if section.head in _UNSUPPORTED:
         what = _UNSUPPORTED[section.head]
         raise MalformedPddlError(f"{section.position}: {what} ({section.head}) are not supported")

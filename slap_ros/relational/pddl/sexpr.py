@@ -29,7 +29,7 @@ class Word:
 
 
 @dataclass(frozen=True)
-class Group:
+class ListNode:
     """What stands between two parentheses."""
 
     items: tuple[Node, ...]
@@ -45,10 +45,10 @@ class Group:
         return "a list"
 
 
-Node = Word | Group
+Node = Word | ListNode
 
 
-def read_group(text: str, source: str) -> Group:
+def read_list(text: str, source: str) -> ListNode:
     """The one group that a text consists of.
 
     Raises:
@@ -66,7 +66,7 @@ def read_group(text: str, source: str) -> Group:
             if not starts:
                 raise MalformedPddlError(f"{token.position}: ')' closes nothing")
             items = tuple(levels.pop())
-            levels[-1].append(Group(items, starts.pop()))
+            levels[-1].append(ListNode(items, starts.pop()))
         else:
             levels[-1].append(Word(token.text, token.position))
     if starts:
@@ -74,12 +74,12 @@ def read_group(text: str, source: str) -> Group:
     return _only(levels[0], Position(source, 1, 1))
 
 
-def _only(nodes: list[Node], start: Position) -> Group:
+def _only(nodes: list[Node], start: Position) -> ListNode:
     if not nodes:
         raise MalformedPddlError(f"{start}: there is nothing but blanks and comments")
-    if len(nodes) > 1 and isinstance(nodes[0], Group):
+    if len(nodes) > 1 and isinstance(nodes[0], ListNode):
         raise MalformedPddlError(f"{nodes[1].position}: the text should end before {nodes[1]}")
-    return expect_group(nodes[0], "'('")
+    return expect_list(nodes[0], "'('")
 
 
 def expect_word(node: Node, what: str) -> Word:
@@ -88,12 +88,12 @@ def expect_word(node: Node, what: str) -> Word:
     Raises:
         MalformedPddlError: It is a group.
     """
-    if isinstance(node, Group):
+    if isinstance(node, ListNode):
         raise MalformedPddlError(f"{node.position}: expected {what}, found {node}")
     return node
 
 
-def expect_group(node: Node, what: str) -> Group:
+def expect_list(node: Node, what: str) -> ListNode:
     """The node, which must be a group.
 
     Raises:

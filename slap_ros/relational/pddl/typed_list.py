@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from slap_ros.errors import MalformedPddlError
 from slap_ros.relational.pddl.names import OBJECT, UNSUPPORTED, bare_variable, check_words
-from slap_ros.relational.pddl.sexpr import Group, Node, Word, expect_word
+from slap_ros.relational.pddl.sexpr import ListNode, Node, Word, expect_word
 from slap_ros.relational.pddl.tokens import located
 
 
@@ -69,6 +69,6 @@ def _read(kind: str, nodes: Iterable[Node]) -> list[Typed]:
 def _type_name(node: Node | None, dash: Word) -> Word:
     if node is None:
         raise MalformedPddlError(f"{dash.position}: the name of a type is missing after '-'")
-    if isinstance(node, Group) and node.head in UNSUPPORTED:
+    if isinstance(node, ListNode) and node.head in UNSUPPORTED:
         raise MalformedPddlError(f"{node.position}: {UNSUPPORTED[node.head]} are not supported")
     return expect_word(node, "the name of a type")

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 
-from slap_ros.bags.recording import Episode
+from slap_ros.bags.recording import RecordedEpisode
 from slap_ros.evaluation.metrics import RunTrace
 from slap_ros.report.chain import texts
 from slap_ros.report.timeline import call
@@ -24,7 +24,7 @@ class AtomRow:
 
 
 @dataclass(frozen=True)
-class Truth:
+class AtomTimeline:
     """The atoms of a run."""
 
     rows: tuple[AtomRow, ...]  # in the order in which they changed first
@@ -32,12 +32,12 @@ class Truth:
     constant: tuple[str, ...]  # what held throughout
 
 
-def truth(trace: RunTrace, episode: Episode) -> Truth:
+def atom_timeline(trace: RunTrace, episode: RecordedEpisode) -> AtomTimeline:
     """The atoms of a run over its steps; a step without perception continues the one before."""
     steps = sorted(s for s in episode.atoms if trace.first_step <= s <= trace.last_step)
     held = [episode.atoms[step] for step in steps]
     if not held:
-        return Truth((), 0, ())
+        return AtomTimeline((), 0, ())
     always = frozenset.intersection(*held)
     changed_at: dict[tuple[str, tuple[str, ...]], int] = {}
     for (_, before), (step, after) in pairwise(zip(steps, held, strict=True)):
@@ -47,7 +47,7 @@ def truth(trace: RunTrace, episode: Episode) -> Truth:
     for name, objects in list(changed_at)[:MAX_ROWS]:
         holds = [(name, objects) in atoms for atoms in held]
         rows.append(AtomRow(call(name, objects), _intervals(steps, holds, trace)))
-    return Truth(tuple(rows), len(changed_at) - len(rows), texts(always))
+    return AtomTimeline(tuple(rows), len(changed_at) - len(rows), texts(always))
 
 
 def _intervals(steps: list[int], holds: list[bool], trace: RunTrace) -> tuple[tuple[int, int], ...]:
