@@ -4,6 +4,7 @@
 
 from slap_ros.relational.atom_space import AtomSpace
 from slap_ros.relational.grounding import ground_operators
+from slap_ros.relational.metrics import Condition, Metric, Normalisation
 from slap_ros.relational.objects import Column, Feature, Object, Type
 from slap_ros.relational.operators import (
     GroundOperator,
@@ -18,12 +19,15 @@ from slap_ros.relational.state import Layout, State
 __all__ = [
     "AtomSpace",
     "Column",
+    "Condition",
     "Feature",
     "GroundAtom",
     "GroundOperator",
     "Layout",
     "LiftedAtom",
     "LiftedOperator",
+    "Metric",
+    "Normalisation",
     "Object",
     "Predicate",
     "State",

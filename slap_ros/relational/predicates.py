@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import wraps
 from typing import TypeVar
@@ -12,7 +12,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.errors import MismatchedAtomError
+from slap_ros.errors import InvalidDomainError, MismatchedAtomError
+from slap_ros.relational.metrics import Condition, typed_arguments, variable_names
 from slap_ros.relational.objects import Column, Object, Type
 from slap_ros.relational.state import Array, State
 
@@ -37,6 +38,8 @@ class Predicate:
     types: tuple[Type, ...]
     classifier: Classifier = field(compare=False, repr=False)
     margin: Margin | None = field(default=None, compare=False, repr=False)
+    conditions: tuple[Condition, ...] = field(default=(), compare=False, repr=False)
+    description: str = field(default="", compare=False, repr=False)  # what conditions do not say
 
     @classmethod
     def threshold(cls, name: str, types: tuple[Type, ...], margin: Margin) -> Predicate:
@@ -46,6 +49,57 @@ class Predicate:
             return margin(state, *columns) >= 0.0
 
         return cls(name, types, classifier, margin)
+
+    @classmethod
+    def of(
+        cls,
+        name: str,
+        types: tuple[Type, ...],
+        conditions: Sequence[Condition],
+        description: str = "",
+    ) -> Predicate:
+        """A predicate that holds where all conditions on metrics do.
+
+        Args:
+            name: The predicate's.
+            types: Of the objects it relates.
+            conditions: At least one; their arguments are positions in ``types``.
+            description: What its conditions do not say, for people and for prompts.
+
+        Returns:
+            A predicate whose margin is the least of the conditions', each in units of its own
+            threshold.
+
+        Raises:
+            InvalidDomainError: No condition, or one about an object or a type that it has not.
+        """
+        if not conditions:
+            raise InvalidDomainError(f"predicate {name} has no conditions; it needs at least one")
+        for condition in conditions:
+            _check_arguments(name, types, condition)
+
+        def margin(state: State, *columns: Column) -> Array:
+            least = conditions[0].margin(state, columns)
+            for condition in conditions[1:]:
+                least = np.minimum(least, condition.margin(state, columns))
+            return least
+
+        def classifier(state: State, *columns: Column) -> Bools:
+            return margin(state, *columns) >= 0.0
+
+        return cls(name, types, classifier, margin, tuple(conditions), description)
+
+    @property
+    def signature(self) -> str:
+        """Name and typed arguments, as in ``In(?peg: peg, ?hole: hole)``."""
+        return f"{self.name}({typed_arguments(self.types)})"
+
+    @property
+    def text(self) -> str:
+        """What it means, generated from its conditions; empty where there is nothing to say."""
+        names = variable_names(self.types)
+        parts = [" and ".join(condition.text(names) for condition in self.conditions)]
+        return "; ".join(part for part in (*parts, self.description) if part)
 
     def __call__(self, *objects: Object) -> GroundAtom:
         """The atom that applies this predicate to objects.
@@ -66,6 +120,20 @@ class Predicate:
 
     def __str__(self) -> str:
         return self.name
+
+
+def _check_arguments(name: str, types: tuple[Type, ...], condition: Condition) -> None:
+    for position, wanted in zip(condition.arguments, condition.metric.types, strict=True):
+        if not 0 <= position < len(types):
+            raise InvalidDomainError(
+                f"predicate {name}: a condition on {condition.metric.name} is about object "
+                f"{position}, but the predicate relates {len(types)}"
+            )
+        if not types[position].is_a(wanted):
+            raise InvalidDomainError(
+                f"predicate {name}: {condition.metric.signature} wants a {wanted}, but object "
+                f"{position} is a {types[position]}"
+            )
 
 
 def shared(compute: Callable[[State], T]) -> Callable[[State], T]:
