@@ -7,7 +7,7 @@ from __future__ import annotations
 import typer
 
 from slap_ros import __version__
-from slap_ros.cli import bag, domains, evaluate, plan, report, run, study, train
+from slap_ros.cli import bag, check, domains, evaluate, plan, report, run, study, train
 from slap_ros.cli import doctor as doctor_command
 from slap_ros.cli.console import exits
 
@@ -29,6 +29,7 @@ app.command("report")(exits(report.report))
 app.command("train")(exits(train.train))
 app.add_typer(study.app, name="study")
 app.add_typer(bag.app, name="bag")
+app.command("check")(exits(check.check))
 app.command("domains")(exits(domains.domains))
 app.command("doctor")(exits(doctor_command.doctor))
 

@@ -1,0 +1,47 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``slap check``."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+
+from slap_ros.cli.console import Json, Preset, Seed, console, print_json
+from slap_ros.cli.doctor import STYLE
+from slap_ros.domain_check import check_domain
+from slap_ros.domains import get_domain
+from slap_ros.errors import ErrorCode
+
+
+def check(
+    domain: Annotated[str, typer.Argument(help="One of `slap domains`.")],
+    preset: Preset = "fair",
+    seed: Seed = 0,
+    tasks: Annotated[int, typer.Option(min=1, help="Tasks that are planned and executed.")] = 50,
+    states: Annotated[
+        int, typer.Option(min=10, help="States that are reset to and stepped from again.")
+    ] = 200,
+    json: Json = False,
+) -> int:
+    """Check whether a domain keeps to the contract: Markov states, margins, bounds, tasks."""
+    findings = []
+    with console.status(f"checking {domain}") as status:
+        for found in check_domain(get_domain(domain, preset), seed, tasks, states):
+            findings.append(found)
+            status.update(f"checking {domain}: {found.name} done")
+            if not json:
+                console.print(
+                    f"[{STYLE[found.status]}]{found.status:8}[/]{found.name}: "
+                    f"{escape(found.found)}",
+                    highlight=False,
+                )
+                if found.advice:
+                    console.print(f"        {escape(found.advice)}", highlight=False)
+    if json:
+        print_json([asdict(found) for found in findings])
+    problem = any(found.status == "problem" for found in findings)
+    return int(ErrorCode.INVALID_DOMAIN) if problem else 0

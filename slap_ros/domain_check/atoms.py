@@ -1,0 +1,79 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Whether predicates and their margins agree, and how close initial states are to thresholds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from slap_ros.core import Domain
+from slap_ros.doctor.check import Check
+from slap_ros.domain_check.experience import Experience
+from slap_ros.relational import Column, GroundAtom, State
+
+JITTER = 1e-9  # in the margin's unit: what rounding may change
+
+
+def margins(domain: Domain, experience: Experience) -> Check:
+    """Whether an atom holds exactly where its margin is at least 0, in every state seen."""
+    compared = 0
+    for state in experience.states:
+        space = domain.atom_space(state)
+        truth = space.truth(state)
+        for i, atom in enumerate(space.atoms):
+            if (margin := margin_of(atom, state)) is None:
+                continue
+            compared += 1
+            if (margin >= 0.0) != bool(truth[i]):
+                return Check(
+                    "margins",
+                    "problem",
+                    f"{atom} {'holds' if truth[i] else 'does not hold'}, but its margin is "
+                    f"{margin}",
+                    "a margin is positive or 0 exactly where the predicate holds; "
+                    "Predicate.threshold makes the one from the other",
+                )
+    fluent = (p for p in domain.predicates if p not in domain.static_predicates)
+    without = sorted(p.name for p in fluent if p.margin is None)
+    found = f"{compared} atoms agree with their margins"
+    if without:  # learned from as well, but without a direction
+        found += f"; true or false alone: {', '.join(without)}"
+    return Check("margins", "ok", found)
+
+
+def thresholds(domain: Domain, seed: int, count: int) -> Check:
+    """Whether atoms of initial states are so close to their thresholds that rounding decides.
+
+    Args:
+        domain: Whose tasks.
+        seed: Whose tasks.
+        count: How many.
+
+    Returns:
+        The finding, with the closest atom.
+    """
+    close: dict[str, float] = {}
+    for index in range(count):
+        state = domain.task(seed, index).initial_state
+        for atom in domain.atom_space(state).atoms:
+            margin = margin_of(atom, state)
+            if margin is not None and abs(margin) <= JITTER:
+                close[str(atom)] = margin
+    if close:
+        closest = min(close, key=lambda name: abs(close[name]))
+        return Check(
+            "thresholds",
+            "warning",
+            f"{len(close)} kinds of atoms are within {JITTER} of their thresholds in initial "
+            f"states, {closest} by {close[closest]:.2g}",
+            "another machine's rounding may find another atom there: leave a tolerance",
+        )
+    return Check("thresholds", "ok", f"no atom of {count} initial states is decided by rounding")
+
+
+def margin_of(atom: GroundAtom, state: State) -> float | None:
+    """An atom's margin in a single state; None where its predicate has none."""
+    if atom.predicate.margin is None:
+        return None
+    columns = [Column((obj,)) for obj in atom.objects]
+    return float(np.asarray(atom.predicate.margin(state, *columns))[..., 0])

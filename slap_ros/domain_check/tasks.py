@@ -1,0 +1,103 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Whether the sampled tasks are worth having: different, and solved by planning alone."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+from slap_ros.core import Domain
+from slap_ros.doctor.check import Check
+from slap_ros.errors import SlapError
+from slap_ros.evaluation.approaches import PURE_PLANNING
+from slap_ros.evaluation.experiment import solve
+from slap_ros.planning.execution import Episode
+
+SHOWN = 3  # reasons for failures that are told
+
+
+def different(domain: Domain, seed: int, count: int) -> Check:
+    """Whether the same seed gives the same task, other seeds other tasks, and goals lie ahead."""
+    name = "tasks"
+    samples = [domain.task(seed, index) for index in range(count)]
+    again = [domain.task(seed, index) for index in range(count)]
+    for index, (one, other) in enumerate(zip(samples, again, strict=True)):
+        if one.initial_state.key != other.initial_state.key or one.goal != other.goal:
+            return Check(
+                name,
+                "problem",
+                f"task {index} of seed {seed} is another one when it is sampled again",
+                "draw from the Generator that sample_task is given, and from nothing else",
+            )
+    reached = [i for i, t in enumerate(samples) if all(a.holds(t.initial_state) for a in t.goal)]
+    if reached:
+        return Check(
+            name,
+            "problem",
+            f"the goal of task {reached[0]} of seed {seed} holds at the start, as do those of "
+            f"{len(reached) - 1} other tasks",
+            "sample initial states in which the goal does not hold",
+        )
+    distinct = len({(task.initial_state.key, task.goal) for task in samples})
+    if distinct == 1 < count:
+        return Check(name, "warning", f"all {count} tasks are the same", "training needs others")
+    return Check(name, "ok", f"{distinct} different tasks among {count}")
+
+
+@dataclass(frozen=True)
+class Solved:
+    """What came of planning and executing tasks without shortcuts.
+
+    Args:
+        seed: Of the tasks.
+        episodes: Those that were executed, successful or not.
+        failures: Reasons of those that were not solved, by task index.
+        count: Tasks.
+    """
+
+    seed: int
+    episodes: tuple[Episode, ...]
+    failures: dict[int, str]
+    count: int
+
+    @classmethod
+    def of(cls, domain: Domain, seed: int, count: int) -> Solved:
+        """Plan and execute the first tasks of a seed.
+
+        Args:
+            domain: Whose tasks.
+            seed: Whose tasks.
+            count: How many.
+
+        Returns:
+            What came of each.
+        """
+        episodes, failures = [], {}
+        for index in range(count):
+            try:
+                episode = solve(domain, domain.task(seed, index), PURE_PLANNING)
+            except SlapError as error:
+                failures[index] = f"{type(error).__name__}: {error}"
+                continue
+            episodes.append(episode)
+            if not episode.success:
+                failures[index] = episode.error.reason
+        return cls(seed, tuple(episodes), failures, count)
+
+    def check(self) -> Check:
+        """How many were solved, and why the others were not."""
+        solved = self.count - len(self.failures)
+        if not self.failures:
+            steps = [episode.plan_length for episode in self.episodes]
+            found = f"all {self.count} tasks, in {min(steps)} to {max(steps)} steps"
+            return Check("pure planning", "ok", found)
+        reasons = Counter(self.failures.values()).most_common(SHOWN)
+        told = "; ".join(f"{number} x {reason}" for reason, number in reasons)
+        return Check(
+            "pure planning",
+            "problem" if solved == 0 else "warning",
+            f"{solved} of {self.count} tasks solved; not so: {told}",
+            f"look at one: slap run DOMAIN --seed {self.seed} --index {min(self.failures)} "
+            "--shortcuts none",
+        )

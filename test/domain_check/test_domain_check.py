@@ -1,0 +1,162 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""`slap check` passes sound domains, and names what is wrong with others."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from slap_ros.cli import app
+from slap_ros.core import Task
+from slap_ros.domain_check import check_domain
+from slap_ros.domains import domain_names, get_domain
+from slap_ros.domains.obstacle2d.dynamics import Obstacle2DWorld
+from slap_ros.relational import Predicate, State
+
+FLAT = get_domain("obstacle2d")
+PHYSICS = {"obstacle_tower", "cluttered_drawer", "cleanup_table"}
+
+
+def findings(domain, tasks=3, states=40):
+    return {check.name: check for check in check_domain(domain, 0, tasks, states)}
+
+
+@pytest.mark.parametrize("name", domain_names())
+def test_every_domain_keeps_to_the_contract(name):
+    if name in PHYSICS:
+        pytest.importorskip("pybullet")
+    found = findings(get_domain(name), tasks=1 if name in PHYSICS else 10)
+    assert not {check.name: check.found for check in found.values() if check.status == "problem"}
+    assert re.fullmatch(r"all \d+ tasks?, in \d+ to \d+ steps", found["pure planning"].found)
+    assert found["Markov"].found.startswith("40 steps")
+
+
+class Drifting(Obstacle2DWorld):
+    """Goes on from where a hidden counter says, which no reset sets."""
+
+    steps = 0
+
+    def step(self, action):
+        self.steps += 1
+        state = super().step(action)
+        robot = state.layout.object("robot")
+        return state.replace({(robot, "x"): float(state.get(robot, "x")) + 1e-12 * self.steps})
+
+
+def test_a_world_that_remembers_what_the_state_does_not_say_is_not_markov():
+    found = findings(replace(FLAT, make_world=Drifting))["Markov"]
+    assert found.status == "problem"
+    assert "robot.x" in found.found
+    assert "RebuildEachStep" in found.advice
+
+
+class Rounding(Obstacle2DWorld):
+    """Takes states over in single precision."""
+
+    def reset(self, state):
+        super().reset(State(state.layout, state.data.astype(np.float32)))
+
+
+def test_a_reset_that_rounds_is_found():
+    assert findings(replace(FLAT, make_world=Rounding))["reset"].status == "problem"
+
+
+def with_predicate(name, **changes):
+    old = next(p for p in FLAT.predicates if p.name == name)
+    predicates = tuple(replace(p, **changes) if p is old else p for p in FLAT.predicates)
+    return replace(FLAT, predicates=predicates)
+
+
+def test_a_margin_that_contradicts_its_predicate_is_found():
+    on = next(p for p in FLAT.predicates if p.name == "On")
+    found = findings(with_predicate("On", margin=lambda *a: -on.margin(*a) - 1e-4))["margins"]
+    assert found.status == "problem"
+    assert re.match(r"On\(\w+, \w+\) (holds, .* -|does not hold, .* )\d", found.found)
+
+
+def test_initial_states_on_a_threshold_are_found():
+    clear: Predicate = next(p for p in FLAT.predicates if p.name == "Clear")
+    touchy = with_predicate("Clear", margin=lambda *a: np.where(clear.margin(*a) >= 0, 0.0, -1.0))
+    found = findings(touchy)["thresholds"]
+    assert (found.status, "Clear(" in found.found) == ("warning", True)
+
+
+class TooHigh:
+    """A skill that claims to need more steps than it does."""
+
+    least_steps = 1
+
+    def __init__(self, skill):
+        self.skill = skill
+        self.name, self.step_limit = skill.name, skill.step_limit
+
+    def lower_bound(self, state, objects):
+        return self.skill.lower_bound(state, objects) + 5
+
+    def start(self, state, objects):
+        return self.skill.start(state, objects)
+
+
+def test_a_bound_that_hides_plans_is_found():
+    skills = {name: TooHigh(skill) for name, skill in FLAT.skills.items()}
+    found = findings(replace(FLAT, skills=skills))["lower bounds"]
+    assert found.status == "problem"
+    assert re.search(r"took (\d+) steps; its skill says at least (\d+)", found.found)
+
+
+class Moody(TooHigh):
+    """A skill that is a little slower every time."""
+
+    starts = 0
+
+    def lower_bound(self, state, objects):
+        return 1
+
+    def start(self, state, objects):
+        policy = self.skill.start(state, objects)
+        Moody.starts += 1
+        slow = 1.0 - 1e-9 * Moody.starts
+        return lambda state: None if (action := policy(state)) is None else action * [slow, slow, 1]
+
+
+def test_a_skill_with_a_memory_is_found():
+    skills = {name: Moody(skill) for name, skill in FLAT.skills.items()}
+    assert findings(replace(FLAT, skills=skills))["skills"].status == "problem"
+
+
+def test_tasks_that_are_over_before_they_begin_are_found():
+    def sample(rng):
+        task = FLAT.sample_task(rng)
+        space = FLAT.atom_space(task.initial_state)
+        holding = space.decode(space.abstract(task.initial_state))
+        return Task(task.initial_state, frozenset(list(holding)[:1]), task.step_limit)
+
+    found = findings(replace(FLAT, sample_task=sample))["tasks"]
+    assert (found.status, "goal of task 0" in found.found) == ("problem", True)
+
+
+def test_tasks_that_come_from_elsewhere_than_the_seed_are_found():
+    outside = np.random.default_rng(0)
+    found = findings(replace(FLAT, sample_task=lambda _: FLAT.sample_task(outside)))["tasks"]
+    assert (found.status, "sampled again" in found.found) == ("problem", True)
+
+
+def test_a_domain_in_which_nothing_can_be_solved_says_why_and_is_checked_all_the_same():
+    class Lame(TooHigh):
+        def start(self, state, objects):
+            return lambda _: None
+
+    found = findings(replace(FLAT, skills={n: Lame(s) for n, s in FLAT.skills.items()}))
+    assert found["pure planning"].status == "problem"
+    assert found["pure planning"].found.startswith("0 of 3 tasks solved; not so: ")
+    assert found["Markov"].status == "ok"
+
+
+def test_the_command_prints_what_it_found_and_answers_with_a_code():
+    result = CliRunner().invoke(app, ["check", "obstacle2d", "--tasks", "2", "--json"])
+    assert result.exit_code == 0
+    assert {"name", "status", "found", "advice"} == set(json.loads(result.stdout)[0])
