@@ -17,7 +17,7 @@ NODES = tuple(name for name in ABOVE_THE_CORE if name != "ensemble")
 FLOORS = (
     NODES,
     ("ensemble",),
-    ("cli", "doctor"),
+    ("cli", "domain_check", "doctor"),
     ("report", "studies"),
     ("robot", "bags", "evaluation"),
     ("shortcuts",),
