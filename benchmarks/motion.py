@@ -27,7 +27,7 @@ from slap_ros.motion import (
     linear_motion,
     plan_path,
     retime,
-    retime_in_tens,
+    retime_fixed_steps,
     shifted,
 )
 from slap_ros.physics.panda import HOME, JOINT_HIGH, JOINT_LOW, Pose, grasp_pose
@@ -157,7 +157,7 @@ def _plan(
             "ms": (perf_counter() - start) * 1e3,
             "steps": len(motion),
             "straight": math.ceil(control_steps(q, goal) - 1e-9),
-            "in tens": len(retime_in_tens(path)),
+            "in tens": len(retime_fixed_steps(path)),
         }
     )
     return goal
@@ -174,7 +174,7 @@ def _approach(rows: list[dict[str, float]], q: Joints, free: CollisionChecker) -
             "ms": (perf_counter() - start) * 1e3,
             "steps": len(retime(path)),
             "straight": math.ceil(control_steps(path[0], path[-1]) - 1e-9),
-            "in tens": len(retime_in_tens(path[[0, -1]])),
+            "in tens": len(retime_fixed_steps(path[[0, -1]])),
         }
     )
     return np.asarray(path[-1])

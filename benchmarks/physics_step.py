@@ -43,7 +43,7 @@ from slap_ros.physics.panda import (
 )
 from slap_ros.physics.scene import CUBE_EDGE, FRICTION, TABLE, TABLE_TOP, Body, Scene, cube
 from slap_ros.physics.simulation import PANDA, Drive, Simulation, Stepping
-from slap_ros.physics.snapshot import Motion, Reader
+from slap_ros.physics.snapshot import BodyState, SnapshotCodec
 from slap_ros.physics.world import ACTION_SPACE, STEPPING, PandaWorld
 from slap_ros.relational import Object, State, Type
 
@@ -200,14 +200,17 @@ class Fine:
     def blocks(self) -> Array:
         """Position, quaternion, velocity and spin of each block, (4, 13)."""
         return np.array(
-            [[*m.pose.position, *m.pose.quaternion, *m.velocity, *m.spin] for m in self._bodies]
+            [
+                [*m.pose.position, *m.pose.quaternion, *m.velocity, *m.angular_velocity]
+                for m in self._bodies
+            ]
         )
 
 
-def motion_of(state: State, name: str) -> Motion:
+def motion_of(state: State, name: str) -> BodyState:
     """A block that stands upright, at rest."""
     x, y, z = state[state.layout.object(name)][:3].tolist()
-    return Motion(Pose((x, y, z)))
+    return BodyState(Pose((x, y, z)))
 
 
 class Plain:
@@ -229,7 +232,7 @@ class Plain:
         client = self._client
         pybullet.resetSimulation(physicsClientId=client)
         pybullet.setGravity(0.0, 0.0, -9.81, client)
-        scene, reader = self._scene, Reader.of(self._scene, self._start.layout)
+        scene, reader = self._scene, SnapshotCodec.of(self._scene, self._start.layout)
         for body, pose in zip(scene.fixed, reader.fixed_poses(scene, self._start), strict=True):
             self._add(body, pose)
         motions = reader.read(self._start).bodies
@@ -286,8 +289,8 @@ class Plain:
         rows = []
         for body in self._blocks:
             position, quaternion = pybullet.getBasePositionAndOrientation(body, self._client)
-            velocity, spin = pybullet.getBaseVelocity(body, self._client)
-            rows.append([*position, *quaternion, *velocity, *spin])
+            velocity, angular_velocity = pybullet.getBaseVelocity(body, self._client)
+            rows.append([*position, *quaternion, *velocity, *angular_velocity])
         return np.array(rows)
 
 
@@ -421,7 +424,7 @@ def draw(moved: dict[str, Array], figures: dict[str, float], folder: Path) -> No
 class Unprimed(Simulation):
     """What is left of a simulation's purity without its prime."""
 
-    def _prime(self, bodies: Sequence[Motion]) -> None:
+    def _prime(self, bodies: Sequence[BodyState]) -> None:
         pass
 
 

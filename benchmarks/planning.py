@@ -14,14 +14,14 @@ from time import process_time
 
 from benchmarks.printing import show
 from slap_ros.domains import get_domain
-from slap_ros.domains.tabletop.ways import forget
+from slap_ros.domains.tabletop.transit import clear_caches
 from slap_ros.planning.plan import PlanningResult
 from slap_ros.planning.planner import make_planner
 
 
 def plan(preset: str, seed: int, planner: str) -> tuple[PlanningResult, float]:
     """A plan, and the seconds of one core that it took from scratch."""
-    forget()
+    clear_caches()
     domain = get_domain("obstacle_tower", preset)
     task = domain.task(seed)
     start = process_time()

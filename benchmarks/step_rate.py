@@ -84,7 +84,7 @@ def obstacle_tower() -> dict[str, Any]:
 def cleanup_table() -> dict[str, Any]:
     """World and atoms against a plain world without them."""
     from benchmarks.physics_step import Plain, away, steps_per_second
-    from slap_ros.domains.cleanup_table.scenery import scene_of
+    from slap_ros.domains.cleanup_table.scene import scene_of
     from slap_ros.domains.cleanup_table.shapes import shipped
 
     domain = get_domain("cleanup_table")
@@ -102,9 +102,9 @@ def cleanup_table() -> dict[str, Any]:
 def cluttered_drawer() -> dict[str, Any]:
     """Ratios to plain stepping, steps a second, both with atoms."""
     from benchmarks.physics_step import EPISODES, Episode, Plain, steps_per_second, with_joints
-    from slap_ros.domains.cluttered_drawer.scenery import scene_of
+    from slap_ros.domains.cluttered_drawer.scene import scene_of
     from slap_ros.domains.tabletop.grasps import from_above
-    from slap_ros.domains.tabletop.reading import joints_of, pose_of
+    from slap_ros.domains.tabletop.state_access import joints_of, pose_of
     from slap_ros.motion import nearest_configurations
 
     domain = get_domain("cluttered_drawer", "paper")

@@ -18,7 +18,7 @@ _TOUCHING = 1e-9  # m, below which two points are one
 _PROJECTIONS = 3  # from box to box, in search of their nearest points
 
 
-def apart(turn: Array, offset: Array, half_a: Array, half_b: Array, distance: Array) -> Flags:
+def separated(turn: Array, offset: Array, half_a: Array, half_b: Array, distance: Array) -> Flags:
     """Whether boxes A are at least so far from boxes B. Never True wrongly.
 
     Looks for a line on which the boxes' shadows are that far apart: among the 15 lines that decide

@@ -11,7 +11,7 @@ Vector = tuple[float, float, float]  # x y z
 Quaternion = tuple[float, float, float, float]  # x y z w, of length 1
 
 ORIGIN: Vector = (0.0, 0.0, 0.0)
-NO_TURN: Quaternion = (0.0, 0.0, 0.0, 1.0)
+NO_ROTATION: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
 
 def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
@@ -31,11 +31,11 @@ def conjugate(q: Quaternion) -> Quaternion:
     return (-q[0], -q[1], -q[2], q[3])
 
 
-def turn_about(v: Vector) -> Quaternion:
+def from_rotation_vector(v: Vector) -> Quaternion:
     """The rotation about the axis ``v`` by its length in rad."""
     angle = math.hypot(*v)
     if angle == 0.0:
-        return NO_TURN
+        return NO_ROTATION
     part = math.sin(0.5 * angle) / angle
     return (part * v[0], part * v[1], part * v[2], math.cos(0.5 * angle))
 
@@ -56,7 +56,7 @@ class Pose(NamedTuple):
     """Where a frame is, seen from another: position in m and orientation."""
 
     position: Vector = ORIGIN
-    quaternion: Quaternion = NO_TURN
+    quaternion: Quaternion = NO_ROTATION
 
     def compose(self, inner: Pose) -> Pose:
         """The pose, seen from outside, of a frame that is at ``inner`` seen from this one."""

@@ -14,7 +14,7 @@ def cache_folder() -> Path:
     return Path(home) / "slap_ros" / "meshes"
 
 
-def keep(file: Path, content: bytes) -> None:
+def store(file: Path, content: bytes) -> None:
     """Write a file, in one go: two processes may both do so."""
     file.parent.mkdir(parents=True, exist_ok=True)
     part = file.with_name(f".{file.name}.{os.getpid()}")

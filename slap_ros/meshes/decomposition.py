@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 
 from slap_ros.errors import InvalidMeshError, MeshUnavailableError
-from slap_ros.meshes.cache import cache_folder, keep
+from slap_ros.meshes.cache import cache_folder, store
 from slap_ros.meshes.obj import from_obj, to_obj
-from slap_ros.meshes.solid import Array, Piece, Solid
+from slap_ros.meshes.solid import Array, ConvexPiece, Solid
 
 Y_IS_UP = (".glb", ".gltf")  # by their standard; of other files z is taken to be
 TO_Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
@@ -26,7 +26,7 @@ FORMAT = 1  # of what is kept; a new one forgets what was kept before
 
 
 @dataclass(frozen=True)
-class Fineness:
+class DecompositionSettings:
     """How closely convex pieces follow a mesh. Few are fast, and smooth where they rest."""
 
     threshold: float = 0.05  # 1, concavity that is tolerated, of a mesh of size 1
@@ -35,10 +35,12 @@ class Fineness:
     seed: int = 0  # of the search
 
 
-USUAL = Fineness()
+DEFAULT_SETTINGS = DecompositionSettings()
 
 
-def load_mesh(file: Path, size_m: float, fineness: Fineness = USUAL) -> Solid:
+def load_mesh(
+    file: Path, size_m: float, settings: DecompositionSettings = DEFAULT_SETTINGS
+) -> Solid:
     """A mesh, of whatever size in its file, as a solid of a given size that stands upright.
 
     The pieces are kept in the user's cache folder, by the content of the file and all that went
@@ -47,7 +49,7 @@ def load_mesh(file: Path, size_m: float, fineness: Fineness = USUAL) -> Solid:
     Args:
         file: OBJ, GLB, STL, PLY or what else trimesh reads.
         size_m: The longest edge that the box around the solid is to have.
-        fineness: How closely to follow the mesh.
+        settings: How closely to follow the mesh.
 
     Raises:
         MeshUnavailableError: The file cannot be read, or a library for it is not installed.
@@ -59,20 +61,22 @@ def load_mesh(file: Path, size_m: float, fineness: Fineness = USUAL) -> Solid:
         content = file.read_bytes()
     except OSError as error:
         raise MeshUnavailableError(f"{file} cannot be read: {error.strerror}") from error
-    kept = kept_at(content, file.suffix.lower(), size_m, fineness)
-    if not kept.exists():
-        keep(kept, to_obj(_decomposed(file, size_m, fineness)).encode())
-    return Solid.of(from_obj(kept.read_text(encoding="utf-8")))
+    cached = cached_file(content, file.suffix.lower(), size_m, settings)
+    if not cached.exists():
+        store(cached, to_obj(_decomposed(file, size_m, settings)).encode())
+    return Solid.of(from_obj(cached.read_text(encoding="utf-8")))
 
 
-def kept_at(content: bytes, suffix: str, size_m: float, fineness: Fineness = USUAL) -> Path:
+def cached_file(
+    content: bytes, suffix: str, size_m: float, settings: DecompositionSettings = DEFAULT_SETTINGS
+) -> Path:
     """Where the pieces of a mesh are kept, for what its file has in it and how that ends."""
-    settings = repr((FORMAT, suffix, size_m, astuple(fineness))).encode()
-    digest = hashlib.blake2b(content, key=hashlib.blake2b(settings).digest(), digest_size=16)
+    key = repr((FORMAT, suffix, size_m, astuple(settings))).encode()
+    digest = hashlib.blake2b(content, key=hashlib.blake2b(key).digest(), digest_size=16)
     return cache_folder() / f"{digest.hexdigest()}.obj"
 
 
-def _decomposed(file: Path, size_m: float, fineness: Fineness) -> list[Piece]:
+def _decomposed(file: Path, size_m: float, settings: DecompositionSettings) -> list[ConvexPiece]:
     """The convex pieces of a file's mesh."""
     try:
         import coacd
@@ -92,14 +96,14 @@ def _decomposed(file: Path, size_m: float, fineness: Fineness) -> list[Piece]:
     coacd.set_log_level("error")
     found = coacd.run_coacd(
         coacd.Mesh(scaled, np.asarray(mesh.faces, dtype=np.int32)),
-        threshold=fineness.threshold,
-        max_convex_hull=fineness.pieces,
+        threshold=settings.threshold,
+        max_convex_hull=settings.pieces,
         decimate=True,
-        max_ch_vertex=fineness.vertices,
-        seed=fineness.seed,
+        max_ch_vertex=settings.vertices,
+        seed=settings.seed,
     )
     return [
-        Piece(tuple(map(tuple, points.tolist())), tuple(map(tuple, triangles.tolist())))
+        ConvexPiece(tuple(map(tuple, points.tolist())), tuple(map(tuple, triangles.tolist())))
         for points, triangles in found
     ]
 

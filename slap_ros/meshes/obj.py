@@ -8,10 +8,10 @@ from collections.abc import Sequence
 
 from slap_ros.errors import InvalidMeshError
 from slap_ros.geometry.pose import Vector
-from slap_ros.meshes.solid import Piece
+from slap_ros.meshes.solid import ConvexPiece
 
 
-def to_obj(pieces: Sequence[Piece]) -> str:
+def to_obj(pieces: Sequence[ConvexPiece]) -> str:
     """The text of a file; floats are written so that they are read back to the bit."""
     lines, first = [], 1
     for number, (vertices, triangles) in enumerate(pieces):
@@ -22,7 +22,7 @@ def to_obj(pieces: Sequence[Piece]) -> str:
     return "\n".join([*lines, ""])
 
 
-def from_obj(text: str) -> list[Piece]:
+def from_obj(text: str) -> list[ConvexPiece]:
     """The pieces in the text of a file: convex objects, one after the other.
 
     Raises:
@@ -49,7 +49,7 @@ def from_obj(text: str) -> list[Piece]:
                 f"line {number}, {line!r}: want objects (o), each with vertices (v x y z) and "
                 "triangles (f a b c) of its own"
             ) from error
-    return [Piece(tuple(v), tuple(f)) for v, f in zip(vertices, faces, strict=True)]
+    return [ConvexPiece(tuple(v), tuple(f)) for v, f in zip(vertices, faces, strict=True)]
 
 
 def _index(word: str, first: int, count: int) -> int:

@@ -11,14 +11,16 @@ import re
 from pathlib import Path
 
 from slap_ros.errors import InvalidMeshError, MeshUnavailableError
-from slap_ros.meshes.cache import cache_folder, keep
-from slap_ros.meshes.decomposition import USUAL, Fineness, load_mesh
+from slap_ros.meshes.cache import cache_folder, store
+from slap_ros.meshes.decomposition import DEFAULT_SETTINGS, DecompositionSettings, load_mesh
 from slap_ros.meshes.solid import Solid
 
 IDENTIFIER = re.compile(r"[0-9a-f]{32}")
 
 
-def load_objaverse(identifier: str, size_m: float, fineness: Fineness = USUAL) -> Solid:
+def load_objaverse(
+    identifier: str, size_m: float, settings: DecompositionSettings = DEFAULT_SETTINGS
+) -> Solid:
     """An object of Objaverse, downloaded once.
 
     Where there is no network, put it into the cache folder as ``objaverse/IDENTIFIER.glb``.
@@ -26,7 +28,7 @@ def load_objaverse(identifier: str, size_m: float, fineness: Fineness = USUAL) -
     Args:
         identifier: Its uid.
         size_m: See :func:`slap_ros.meshes.decomposition.load_mesh`, also for what else may fail.
-        fineness: How closely to follow it.
+        settings: How closely to follow it.
 
     Raises:
         MeshUnavailableError: It cannot be downloaded.
@@ -36,14 +38,14 @@ def load_objaverse(identifier: str, size_m: float, fineness: Fineness = USUAL) -
         raise InvalidMeshError(
             f"{identifier!r} is no identifier of Objaverse: those are 32 hexadecimal digits"
         )
-    kept = cache_folder() / "objaverse" / f"{identifier}.glb"
-    if not kept.exists():
-        keep(kept, _downloaded(identifier, kept).read_bytes())
-    return load_mesh(kept, size_m, fineness)
+    cached = cache_folder() / "objaverse" / f"{identifier}.glb"
+    if not cached.exists():
+        store(cached, _downloaded(identifier, cached).read_bytes())
+    return load_mesh(cached, size_m, settings)
 
 
-def _downloaded(identifier: str, kept: Path) -> Path:
-    advice = f"or get it elsewhere, and put it at {kept}"
+def _downloaded(identifier: str, cached: Path) -> Path:
+    advice = f"or get it elsewhere, and put it at {cached}"
     try:
         import objaverse
     except ImportError as error:

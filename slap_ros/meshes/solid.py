@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 LEAST_VOLUME = 1e-12  # m³: a cube of a tenth of a millimetre
 
 
-class Piece(NamedTuple):
+class ConvexPiece(NamedTuple):
     """A convex polyhedron."""
 
     vertices: tuple[Vector, ...]  # m
@@ -37,11 +37,11 @@ _FACES = (
 )
 
 
-def cuboid(half: Vector) -> Piece:
+def cuboid(half: Vector) -> ConvexPiece:
     """A box by half its edges, m."""
     x, y, z = half
     corners = product((-x, x), (-y, y), (-z, z))
-    return Piece(tuple(corners), _FACES)
+    return ConvexPiece(tuple(corners), _FACES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,10 +51,10 @@ class Solid:
     Where pieces overlap, what they share counts twice.
     """
 
-    pieces: tuple[Piece, ...]
+    pieces: tuple[ConvexPiece, ...]
 
     @staticmethod
-    def of(pieces: Sequence[Piece]) -> Solid:
+    def of(pieces: Sequence[ConvexPiece]) -> Solid:
         """The solid of pieces that are seen from anywhere.
 
         Raises:
@@ -75,7 +75,7 @@ class Solid:
         cx, cy, cz = (np.sum([m[1] for m in moments], 0) / sum(m[0] for m in moments)).tolist()
         return Solid(
             tuple(
-                Piece(tuple((x - cx, y - cy, z - cz) for x, y, z in vertices), triangles)
+                ConvexPiece(tuple((x - cx, y - cy, z - cz) for x, y, z in vertices), triangles)
                 for vertices, triangles in pieces
             )
         )
@@ -139,13 +139,13 @@ class Solid:
         return hash(self.digest)
 
 
-def _corners(piece: Piece) -> Array:
+def _corners(piece: ConvexPiece) -> Array:
     """The corners of each triangle, shape (triangles, 3, 3)."""
     corners: Array = np.array(piece.vertices)[np.array(piece.triangles, dtype=np.intp)]
     return corners
 
 
-def _moments(piece: Piece) -> tuple[float, Array, Array]:
+def _moments(piece: ConvexPiece) -> tuple[float, Array, Array]:
     """Volume in m³; first moments in m⁴; second moments xx, yy, zz in m⁵: of tetrahedra summed."""
     corners = _corners(piece)
     volumes = np.linalg.det(corners) / 6.0  # of the tetrahedra from the origin
@@ -162,7 +162,7 @@ def _around(points: Array) -> OrientedBox:
     return OrientedBox(Pose((x, y, z)), (u, v, w))
 
 
-def _inside(piece: Piece) -> OrientedBox:
+def _inside(piece: ConvexPiece) -> OrientedBox:
     """The box around a piece, shrunk about the piece's centre until it is inside."""
     corners = _corners(piece)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

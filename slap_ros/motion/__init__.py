@@ -33,7 +33,7 @@ from slap_ros.motion.joints import (
 )
 from slap_ros.motion.linear import linear_motion, shifted
 from slap_ros.motion.planning import plan_path
-from slap_ros.motion.retiming import retime, retime_in_tens
+from slap_ros.motion.retiming import retime, retime_fixed_steps
 
 __all__ = [
     "CollisionChecker",
@@ -52,7 +52,7 @@ __all__ = [
     "path_steps",
     "plan_path",
     "retime",
-    "retime_in_tens",
+    "retime_fixed_steps",
     "shifted",
     "within_limits",
 ]

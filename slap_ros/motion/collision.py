@@ -12,7 +12,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.geometry.box_separation import Flags, apart
+from slap_ros.geometry.box_separation import Flags, separated
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.motion.arm_shapes import ARM_SHAPES, BASE, BEHIND_ELBOW
 from slap_ros.motion.joints import Array, Joints
@@ -103,7 +103,7 @@ class CollisionChecker:
             turn = np.matmul(turns.swapaxes(1, 2), self._turns[obstacle])
             offset = seen[which, shape, obstacle]
             sizes = self._halves[shape], self._sizes[obstacle]
-            free[which[~apart(turn, offset, *sizes, self._clearances[shape])]] = False
+            free[which[~separated(turn, offset, *sizes, self._clearances[shape])]] = False
         return free
 
 

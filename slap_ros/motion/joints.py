@@ -52,7 +52,7 @@ def within_limits(q: Joints) -> NDArray[np.bool_]:
     return cast(NDArray[np.bool_], ((q >= LOW - _ROUNDING) & (q <= HIGH + _ROUNDING)).all(-1))
 
 
-def between(start: Joints, goal: Joints, resolution: float = RESOLUTION) -> Joints:
+def interpolate(start: Joints, goal: Joints, resolution: float = RESOLUTION) -> Joints:
     """Configurations on the straight line, the goal among them and the start not.
 
     Args:
@@ -86,7 +86,7 @@ def free_count(line: Joints, free: Free) -> int:
 
 def path_configurations(path: Path, resolution: float = RESOLUTION) -> Joints:
     """Configurations all along a path, its start first."""
-    lines = [between(a, b, resolution) for a, b in pairwise(path)]
+    lines = [interpolate(a, b, resolution) for a, b in pairwise(path)]
     return np.concatenate([path[:1], *lines])
 
 

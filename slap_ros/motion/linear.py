@@ -20,7 +20,7 @@ from slap_ros.motion.joints import (
     path_configurations,
     within_limits,
 )
-from slap_ros.physics.panda import Reach, grasp_pose
+from slap_ros.physics.panda import GraspKinematics, grasp_pose
 
 INCREMENT = 0.0125  # m, between rows of the path: coming down, less than 1 mm off the line
 TURN_INCREMENT = 0.05  # rad
@@ -133,7 +133,7 @@ def _follow(q: Joints, target: Pose) -> Joints | None:
     """The configuration at a nearby pose, by Newton's method in units of control steps."""
     before = q
     for _ in range(_ITERATIONS):
-        reach = Reach(q.tolist())
+        reach = GraspKinematics(q.tolist())
         offset = (a - b for a, b in zip(target.position, reach.grasp.position, strict=True))
         error = (*offset, *_rotation_vector(reach.grasp, target))
         if max(map(abs, error)) < _CLOSE:

@@ -8,22 +8,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from slap_ros.motion.detour import detour
 from slap_ros.motion.errors import MotionPlanningError
 from slap_ros.motion.joints import (
     RESOLUTION,
     Free,
     Joints,
     Path,
-    between,
     configuration,
     control_steps,
+    interpolate,
     path_configurations,
     path_steps,
     within_limits,
 )
-from slap_ros.motion.rrt import connect
+from slap_ros.motion.rrt import rrt_connect
 from slap_ros.motion.shortcutting import shorten, straighten
+from slap_ros.motion.via_point import via_point_path
 
 ATTEMPTS = 4  # paths, of which the one of fewest control steps is kept
 MAX_SAMPLES = 500  # of the joint space, an attempt
@@ -69,7 +69,7 @@ def plan_path(
     _check_end("goal", goal, free)
     if np.array_equal(start, goal):
         return start[None]
-    if free(between(start, goal, resolution)).all():
+    if free(interpolate(start, goal, resolution)).all():
         return np.stack([start, goal])
 
     rng = np.random.default_rng(seed)
@@ -80,13 +80,13 @@ def plan_path(
         # What is left of a piece is looked at in other places than the whole of it was.
         return shorter if free(path_configurations(shorter, resolution)).all() else path
 
-    bent = detour(start, goal, free, rng, resolution=resolution)
+    bent = via_point_path(start, goal, free, rng, resolution=resolution)
     if bent is not None:
         return shortened(bent)
     enough = GOOD_ENOUGH * float(control_steps(start, goal))
     best: Path | None = None
     for _ in range(attempts):
-        found = connect(start, goal, free, rng, max_samples=max_samples, resolution=resolution)
+        found = rrt_connect(start, goal, free, rng, max_samples=max_samples, resolution=resolution)
         if found is None:
             break
         found = shortened(straighten(found, free, resolution=resolution))

@@ -16,7 +16,7 @@ from slap_ros.motion.joints import (
     Free,
     Joints,
     Path,
-    between,
+    interpolate,
     path_configurations,
 )
 from slap_ros.motion.shortcutting import points_at, without_repeats
@@ -65,7 +65,7 @@ def retime(
     return np.concatenate(motions)
 
 
-def retime_in_tens(path: Path, steps: int = PAPER_STEPS) -> Joints:
+def retime_fixed_steps(path: Path, steps: int = PAPER_STEPS) -> Joints:
     """Joint positions at each control step, the same number for every straight piece.
 
     The timing of the preset ``paper``: the joint limits a step are ignored.
@@ -94,7 +94,7 @@ def _pieces(path: Path, limits: Array, free: Free, resolution: float) -> list[Pa
     step = times[-1] / max(len(motion) - 1, 1)
     for i, (begin, end) in enumerate(pairwise(motion)):
         corners = ((times > i * step) & (times < (i + 1) * step)).nonzero()[0]
-        if len(corners) and not free(between(begin, end, resolution)).all():
+        if len(corners) and not free(interpolate(begin, end, resolution)).all():
             corner = int(corners[0])
             first = _pieces(path[: corner + 1], limits, free, resolution)
             return first + _pieces(path[corner:], limits, free, resolution)

@@ -12,7 +12,16 @@ from typing import cast
 
 import numpy as np
 
-from slap_ros.motion.joints import HIGH, LOW, Free, Joints, Path, between, control_steps, free_count
+from slap_ros.motion.joints import (
+    HIGH,
+    LOW,
+    Free,
+    Joints,
+    Path,
+    control_steps,
+    free_count,
+    interpolate,
+)
 
 REACH = 15.0  # control steps that a tree grows at most towards a sample
 WIDENING = 50  # samples until the sampled box has reached the joint limits
@@ -56,7 +65,7 @@ class _Tree:
             Whether one was added.
         """
         parent = self.nearest(target)
-        line = between(self[parent], target, resolution)
+        line = interpolate(self[parent], target, resolution)
         count = free_count(line, free)
         if count == 0 or (
             count < len(line) and control_steps(self[parent], line[count - 1]) < _LEAST_GROWTH
@@ -66,7 +75,7 @@ class _Tree:
         return True
 
 
-def connect(
+def rrt_connect(
     start: Joints,
     goal: Joints,
     free: Free,

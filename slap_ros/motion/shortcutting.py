@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from slap_ros.motion.joints import Array, Free, Joints, Path, between, control_steps, free_count
+from slap_ros.motion.joints import Array, Free, Joints, Path, control_steps, free_count, interpolate
 
 _GAIN = 1e-6  # control steps; less is not shorter
 
@@ -34,7 +34,7 @@ def shorten(
         a, b = points_at(path, times, np.array((begin, end)))
         if control_steps(a, b) >= end - begin - _GAIN:
             continue
-        line = between(a, b, resolution)
+        line = interpolate(a, b, resolution)
         if free_count(line, free) == len(line):
             path = np.concatenate([path[:first], [a, b], path[last:]])
     return without_repeats(path)
@@ -45,7 +45,7 @@ def straighten(path: Path, free: Free, *, resolution: float) -> Path:
     rows = list(path)
     i = 1
     while i < len(rows) - 1:
-        line = between(rows[i - 1], rows[i + 1], resolution)
+        line = interpolate(rows[i - 1], rows[i + 1], resolution)
         if free_count(line, free) == len(line):
             del rows[i]
             i = max(1, i - 1)  # the row before may now be skipped, too

@@ -16,8 +16,8 @@ import numpy as np
 from slap_ros.core import Domain
 from slap_ros.perception.debounce import Debouncer
 from slap_ros.perception.percept import Percept
+from slap_ros.perception.pose_sensor_model import PoseSensorModel
 from slap_ros.perception.quality import Quality
-from slap_ros.perception.sight import Sight
 from slap_ros.relational import AtomSpace, State
 
 
@@ -29,7 +29,7 @@ class NoisyPerceiver:
     space: AtomSpace
     quality: Quality
     rng: np.random.Generator
-    sight: Sight
+    sensor: PoseSensorModel
     debouncer: Debouncer
 
     @classmethod
@@ -47,14 +47,14 @@ class NoisyPerceiver:
             InvalidParameterError: An object that is to be hidden is none of the task's.
         """
         quality.require_known(initial.layout.by_name.keys())
-        sight = Sight.of(quality, rng, initial)
-        return cls(domain, space, quality, rng, sight, Debouncer(quality.debounce))
+        sensor = PoseSensorModel.of(quality, rng, initial)
+        return cls(domain, space, quality, rng, sensor, Debouncer(quality.debounce))
 
     def perceive(self, state: State) -> Percept:
         """See :class:`~slap_ros.perception.percept.Perceiver`."""
-        seen = self.domain.execution.settle(self.sight.look(state))
+        seen = self.domain.execution.settle(self.sensor.measure(state))
         abstract = self.debouncer.add(self._abstract(seen))
-        return Percept(seen, abstract, self.sight.missing, self.quality.exact)
+        return Percept(seen, abstract, self.sensor.missing, self.quality.exact)
 
     def _abstract(self, seen: State) -> int:
         if self.quality.threshold_noise == 0.0:

@@ -72,6 +72,6 @@ class Quality:
         return not any(noise) and not self.hidden and self.debounce == 1
 
     @property
-    def patience(self) -> int:
+    def debounce_delay_steps(self) -> int:
         """Environment steps by which a true atom may be late on account of debouncing."""
         return self.debounce - 1

@@ -95,7 +95,7 @@ class Obstacle(NamedTuple):
         return cls(box, box.pose.position[2] + height)
 
 
-class Contact(NamedTuple):
+class Penetration(NamedTuple):
     """A point of the arm that is further inside a fixed body than it may be."""
 
     link: int  # index in panda.LINKS
@@ -155,7 +155,7 @@ class Sweep:
                     return True
         return False
 
-    def deepest(self, obstacles: Sequence[Obstacle]) -> Contact | None:
+    def deepest_penetration(self, obstacles: Sequence[Obstacle]) -> Penetration | None:
         """Where the arm would be deepest in an obstacle, seen from above; None if in none."""
         found = None
         for link, way in enumerate(self.ways):
@@ -165,7 +165,7 @@ class Sweep:
                     point = min(self.end.box(link).corners(), key=lambda corner: corner[2])
                     depth = top - _depth(link) - point[2]
                     if depth > 0.0 and (found is None or depth > found.depth):
-                        found = Contact(self._carrier(link), point, depth)
+                        found = Penetration(self._carrier(link), point, depth)
         return found
 
     def _carrier(self, link: int) -> int:

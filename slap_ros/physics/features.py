@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from slap_ros.geometry.pose import IDENTITY, NO_TURN, ORIGIN, Pose, Vector
+from slap_ros.geometry.pose import IDENTITY, NO_ROTATION, ORIGIN, Pose, Vector
 from slap_ros.physics.panda import FINGER_OPEN, JOINTS
 from slap_ros.physics.scene import CUBE_MATERIAL, Material
 from slap_ros.relational import Feature, Type
@@ -56,13 +56,13 @@ def pose_features(pose: Pose) -> Mapping[str, float]:
 
 def body_features(
     position: Vector,
-    quaternion: tuple[float, float, float, float] = NO_TURN,
+    quaternion: tuple[float, float, float, float] = NO_ROTATION,
     velocity: Vector = ORIGIN,
-    spin: Vector = ORIGIN,
+    angular_velocity: Vector = ORIGIN,
     held: bool = False,
 ) -> Mapping[str, float]:
     """A free body's features, for ``State.build``: m, m/s and rad/s in the base's frame."""
-    values = (*position, *quaternion, *velocity, *spin, float(held))
+    values = (*position, *quaternion, *velocity, *angular_velocity, float(held))
     return dict(zip((f.name for f in BODY_FEATURES), values, strict=True))
 
 

@@ -15,7 +15,7 @@ from dataclasses import replace
 from slap_ros.geometry.pose import IDENTITY, Pose, conjugate, rotate
 from slap_ros.physics.panda import FINGER_OPEN, grasp_pose, hand_pose
 from slap_ros.physics.scene import Body, Scene
-from slap_ros.physics.snapshot import Motion, Snapshot
+from slap_ros.physics.snapshot import BodyState, Snapshot
 
 GRASP_REACH = 0.01  # m, between the grasp point and a body's centre
 CLOSE, OPEN = 0.5, -0.5  # gripper commands beyond which it closes or opens
@@ -45,7 +45,7 @@ def _grasp(scene: Scene, snapshot: Snapshot) -> Snapshot:
     grasped = replace(
         snapshot, held=nearest, grasp=grasp, finger=finger_around(scene.free[nearest], grasp)
     )
-    return grasped.moved(nearest, Motion(pose))
+    return grasped.moved(nearest, BodyState(pose))
 
 
 def _release(snapshot: Snapshot) -> Snapshot:

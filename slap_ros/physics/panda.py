@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.geometry.pose import NO_TURN, ORIGIN, Pose, Vector, multiply, rotate
+from slap_ros.geometry.pose import NO_ROTATION, ORIGIN, Pose, Vector, multiply, rotate
 
 __all__ = [
     "CONTROL_PERIOD_S",
@@ -30,12 +30,12 @@ __all__ = [
     "LINKS",
     "MAX_STEP",
     "Pose",
-    "Reach",
+    "GraspKinematics",
     "grasp_pose",
     "hand_pose",
     "jacobian",
     "link_poses",
-    "rise",
+    "vertical_jacobian",
 ]
 
 JOINTS = 7
@@ -74,7 +74,7 @@ _HALF_TURN_Z = (0.0, 0.0, 1.0, 0.0)
 
 def _arm(q: Sequence[float] | NDArray[np.float64]) -> list[Pose]:
     """Poses of link 0 to link 7."""
-    position, turn = ORIGIN, NO_TURN
+    position, turn = ORIGIN, NO_ROTATION
     poses = [Pose(position, turn)]
     for angle, (origin, quarter) in zip(q, _JOINT_FRAMES, strict=True):
         dx, dy, dz = rotate(turn, origin)
@@ -125,10 +125,12 @@ def jacobian(q: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
     Returns:
         Shape (6, 7): rows 0-2 linear in m/rad, rows 3-5 angular in rad/rad.
     """
-    return Reach(q).jacobian()
+    return GraspKinematics(q).jacobian()
 
 
-def rise(q: Sequence[float] | NDArray[np.float64], link: int, point: Vector) -> tuple[float, ...]:
+def vertical_jacobian(
+    q: Sequence[float] | NDArray[np.float64], link: int, point: Vector
+) -> tuple[float, ...]:
     """How fast a point of a link rises with each joint, m/rad.
 
     Args:
@@ -145,7 +147,7 @@ def rise(q: Sequence[float] | NDArray[np.float64], link: int, point: Vector) -> 
     return tuple(rates)
 
 
-class Reach:
+class GraspKinematics:
     """The grasp point in one configuration, and how it would move: kinematics done once."""
 
     __slots__ = ("_links", "grasp")

@@ -12,13 +12,13 @@ import numpy as np
 import pybullet
 
 from slap_ros.geometry.pose import Pose, Vector
-from slap_ros.meshes.solid import Piece, Solid
+from slap_ros.meshes.solid import ConvexPiece, Solid
 from slap_ros.physics.animation import Picture, write_pictures
 from slap_ros.physics.panda import CONTROL_PERIOD_S
 from slap_ros.physics.scene import Body, Box, Scene
 from slap_ros.physics.simulation import PANDA
-from slap_ros.physics.snapshot import Reader
-from slap_ros.physics.viewpoint import View
+from slap_ros.physics.snapshot import SnapshotCodec
+from slap_ros.physics.viewpoint import Viewpoint
 from slap_ros.relational import State
 
 ARM_JOINTS = range(7)  # indices in the URDF
@@ -31,9 +31,9 @@ NEAR, FAR = 0.05, 5.0  # m, what is closer or further is not drawn
 class Camera:
     """Draws states of a scene, in a client of its own; to be closed."""
 
-    def __init__(self, scene: Scene, view: View | None = None) -> None:
+    def __init__(self, scene: Scene, view: Viewpoint | None = None) -> None:
         """Look at ``scene``; by default from the front right, from above the arm."""
-        view = view or View()
+        view = view or Viewpoint()
         self._scene = scene
         self._size = (view.width, view.height)
         self.client: int = pybullet.connect(pybullet.DIRECT)
@@ -80,7 +80,7 @@ class Camera:
         return np.asarray(pixels, dtype=np.uint8).reshape(height, width, 4)[..., :3]
 
     def _place(self, state: State) -> None:
-        reader = Reader.of(self._scene, state.layout)
+        reader = SnapshotCodec.of(self._scene, state.layout)
         snapshot = reader.read(state)
         for joint, q in zip(ARM_JOINTS, snapshot.joints, strict=True):
             pybullet.resetJointState(self._robot, joint, q, 0.0, self.client)
@@ -103,7 +103,7 @@ class Camera:
             for look in looks
         ]
 
-    def _piece(self, piece: Piece, body: Body) -> int:
+    def _piece(self, piece: ConvexPiece, body: Body) -> int:
         """A piece with corners of their own for each triangle, so that faces look flat."""
         corners = np.array(piece.vertices)[np.array(piece.triangles)]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

@@ -20,7 +20,7 @@ FLOATING = 0.015  # m, between a bottom and the top of what it is taken to lie o
 AXES: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-def settled(
+def resting_poses(
     measured: Mapping[int, Pose], bodies: Sequence[Body], fixed: Sequence[OrientedBox]
 ) -> dict[int, Pose]:
     """Poses of bodies at rest, each flat on what it lies on; left alone where that is unclear.

@@ -24,13 +24,13 @@ from typing import NamedTuple
 
 import pybullet
 
-from slap_ros.geometry.pose import NO_TURN, ORIGIN, Pose, Vector, conjugate, multiply
+from slap_ros.geometry.pose import NO_ROTATION, ORIGIN, Pose, Vector, conjugate, multiply
 from slap_ros.meshes.obj import to_obj
 from slap_ros.meshes.solid import Solid, cuboid
 from slap_ros.physics.links import LINK_SHAPES
 from slap_ros.physics.panda import CONTROL_PERIOD_S
 from slap_ros.physics.scene import FRICTION, Body, Material, Scene, Shape
-from slap_ros.physics.snapshot import Motion
+from slap_ros.physics.snapshot import BodyState
 
 GRAVITY = 9.81  # m/s², downwards
 DRIVEN_MASS = 1e4  # kg, against which nothing else weighs
@@ -57,7 +57,7 @@ class Drive(NamedTuple):
 
     start: Pose
     velocity: Vector  # m/s
-    spin: Vector  # rad/s
+    angular_velocity: Vector  # rad/s
 
     @classmethod
     def between(cls, start: Pose, end: Pose) -> Drive:
@@ -111,13 +111,15 @@ class Simulation:
         self._fixed = [self._add_fixed(body) for body in scene.fixed]
         self._free = [self._add_free(body) for body in scene.free]
         self._materials: list[Material | None] = [None] * len(self._free)
-        self.make_of([body.material for body in scene.free])
+        self.set_materials([body.material for body in scene.free])
         self._links = [self._add_link(i) for i in range(len(LINK_SHAPES))]
         # A held body is one more link. Bodies of one shape share it, as one is held at a time.
         shapes = dict.fromkeys(body.shape for body in scene.free)
-        self._ghosts = {shape: self._add_driven(self._shape(shape), FRICTION) for shape in shapes}
-        self._ghost_frictions = dict.fromkeys(shapes, FRICTION)
-        self._driven = [*self._links, *self._ghosts.values()]
+        self._held_proxies = {
+            shape: self._add_driven(self._shape(shape), FRICTION) for shape in shapes
+        }
+        self._held_proxy_frictions = dict.fromkeys(shapes, FRICTION)
+        self._driven = [*self._links, *self._held_proxies.values()]
         self._parking = {body: _parking(i) for i, body in enumerate([*self._free, *self._driven])}
 
     def close(self) -> None:
@@ -133,7 +135,7 @@ class Simulation:
             if body is not None:
                 pybullet.resetBasePositionAndOrientation(body, *pose, self.client)
 
-    def make_of(self, materials: Sequence[Material]) -> None:
+    def set_materials(self, materials: Sequence[Material]) -> None:
         """Give the scene's free bodies these masses and frictions.
 
         It has to be told even what a body was created with: PyBullet derives a body's weight in
@@ -153,10 +155,10 @@ class Simulation:
 
     def run(
         self,
-        bodies: Sequence[Motion],
+        bodies: Sequence[BodyState],
         held: int | None = None,
         drives: Sequence[Drive] = (),
-    ) -> list[Motion]:
+    ) -> list[BodyState]:
         """One control period.
 
         Args:
@@ -172,8 +174,8 @@ class Simulation:
         for i, (body, motion) in enumerate(zip(self._free, bodies, strict=True)):
             if i != held:
                 pybullet.resetBasePositionAndOrientation(body, *motion.pose, client)
-                pybullet.resetBaseVelocity(body, motion.velocity, motion.spin, client)
-        driven = self._links if held is None else [*self._links, self._ghost(held)]
+                pybullet.resetBaseVelocity(body, motion.velocity, motion.angular_velocity, client)
+        driven = self._links if held is None else [*self._links, self._held_proxy(held)]
         for body, drive in zip(driven, drives, strict=False):
             self._drive(body, drive)
         self._advance(self.stepping.substeps)
@@ -187,7 +189,7 @@ class Simulation:
         contacts = pybullet.getContactPoints(physicsClientId=self.client)
         return max((-contact[DISTANCE] for contact in contacts), default=0.0)
 
-    def _prime(self, bodies: Sequence[Motion]) -> None:
+    def _prime(self, bodies: Sequence[BodyState]) -> None:
         """Forget: park everything apart for a moment, free bodies oriented as they will be.
 
         Contacts and their impulses go with the pairs, and the inertia in world axes, which
@@ -200,7 +202,7 @@ class Simulation:
             )
             pybullet.resetBaseVelocity(body, ORIGIN, ORIGIN, client)
         for body in self._driven:
-            pybullet.resetBasePositionAndOrientation(body, self._parking[body], NO_TURN, client)
+            pybullet.resetBasePositionAndOrientation(body, self._parking[body], NO_ROTATION, client)
             pybullet.resetBaseVelocity(body, ORIGIN, ORIGIN, client)
         self._advance(0)
 
@@ -212,30 +214,30 @@ class Simulation:
     def _drive(self, body: int, drive: Drive) -> None:
         client = self.client
         pybullet.resetBasePositionAndOrientation(body, *drive.start, client)
-        pybullet.resetBaseVelocity(body, drive.velocity, drive.spin, client)
+        pybullet.resetBaseVelocity(body, drive.velocity, drive.angular_velocity, client)
         # At the centre of mass; it lasts through all substeps.
         pybullet.applyExternalForce(
             body, -1, LIFT, drive.start.position, pybullet.WORLD_FRAME, client
         )
 
-    def _motion(self, body: int) -> Motion:
+    def _motion(self, body: int) -> BodyState:
         pose = pybullet.getBasePositionAndOrientation(body, self.client)
-        velocity, spin = pybullet.getBaseVelocity(body, self.client)
-        return Motion(Pose(*pose), velocity, spin)
+        velocity, angular_velocity = pybullet.getBaseVelocity(body, self.client)
+        return BodyState(Pose(*pose), velocity, angular_velocity)
 
-    def _ghost(self, held: int) -> int:
+    def _held_proxy(self, held: int) -> int:
         """The driven body that stands for a held one, as rough as that is."""
         shape, material = self.scene.free[held].shape, self._materials[held]
         assert material is not None
-        if material.friction != self._ghost_frictions[shape]:
+        if material.friction != self._held_proxy_frictions[shape]:
             pybullet.changeDynamics(
-                self._ghosts[shape],
+                self._held_proxies[shape],
                 -1,
                 lateralFriction=material.friction,
                 physicsClientId=self.client,
             )
-            self._ghost_frictions[shape] = material.friction
-        return self._ghosts[shape]
+            self._held_proxy_frictions[shape] = material.friction
+        return self._held_proxies[shape]
 
     # -- building -------------------------------------------------------------------------------
 

@@ -25,17 +25,17 @@ from slap_ros.physics.scene import Material, Scene
 from slap_ros.relational import Feature, Layout, Object, State
 
 
-class Motion(NamedTuple):
+class BodyState(NamedTuple):
     """How a free body is and moves, in the base's frame."""
 
     pose: Pose
     velocity: Vector = ORIGIN  # m/s
-    spin: Vector = ORIGIN  # rad/s
+    angular_velocity: Vector = ORIGIN  # rad/s
 
     @property
     def still(self) -> bool:
         """Whether it has no velocity at all."""
-        return self.velocity == ORIGIN and self.spin == ORIGIN
+        return self.velocity == ORIGIN and self.angular_velocity == ORIGIN
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,27 +46,29 @@ class Snapshot:
     finger: float  # m
     grasp: Pose  # the held body in the hand's frame
     held: int | None  # index among the scene's free bodies
-    bodies: tuple[Motion, ...]  # the scene's free bodies
+    bodies: tuple[BodyState, ...]  # the scene's free bodies
 
-    def moved(self, index: int, motion: Motion) -> Snapshot:
+    def moved(self, index: int, motion: BodyState) -> Snapshot:
         """The same with one body elsewhere."""
         bodies = (*self.bodies[:index], motion, *self.bodies[index + 1 :])
         return replace(self, bodies=bodies)
 
 
 @dataclass(frozen=True, eq=False)
-class Reader:
+class SnapshotCodec:
     """Where a scene's features lie in the states of a layout."""
 
     layout: Layout
     robot: NDArray[np.intp]  # (7 + 1 + 7,): joints, finger, grasp
     bodies: NDArray[np.intp]  # (free bodies, 14)
     fixed: tuple[NDArray[np.intp] | None, ...]  # a fixed body's pose, where the state has one
-    made_of: tuple[NDArray[np.intp] | None, ...]  # a free body's material, where it has one
+    material_columns: tuple[
+        NDArray[np.intp] | None, ...
+    ]  # a free body's material, where it has one
 
     @staticmethod
     @lru_cache(maxsize=256)
-    def of(scene: Scene, layout: Layout) -> Reader:
+    def of(scene: Scene, layout: Layout) -> SnapshotCodec:
         """The reader for a scene and a layout.
 
         Raises:
@@ -77,7 +79,7 @@ class Reader:
             raise InvalidStateError(f"a scene has one robot, the state has {len(robots)}")
         columns = (*JOINT_FEATURES, Feature("finger", "m"), *GRASP_FEATURES)
         free = [_embodied(layout, body.name) for body in scene.free]
-        return Reader(
+        return SnapshotCodec(
             layout,
             _columns(layout, robots[0], columns),
             np.array([_columns(layout, obj, BODY_FEATURES) for obj in free], dtype=np.intp).reshape(
@@ -118,8 +120,14 @@ class Reader:
         )
         if snapshot.bodies:
             data[self.bodies] = [
-                (*pose.position, *pose.quaternion, *velocity, *spin, float(i == snapshot.held))
-                for i, (pose, velocity, spin) in enumerate(snapshot.bodies)
+                (
+                    *pose.position,
+                    *pose.quaternion,
+                    *velocity,
+                    *angular_velocity,
+                    float(i == snapshot.held),
+                )
+                for i, (pose, velocity, angular_velocity) in enumerate(snapshot.bodies)
             ]
         return State(state.layout, data)
 
@@ -134,7 +142,7 @@ class Reader:
         """What each free body is made of, in the scene's order."""
         return tuple(
             body.material if columns is None else Material(*state.data[columns].tolist())
-            for body, columns in zip(scene.free, self.made_of, strict=True)
+            for body, columns in zip(scene.free, self.material_columns, strict=True)
         )
 
 
@@ -143,9 +151,9 @@ def _pose(values: list[float]) -> Pose:
     return Pose((x, y, z), (qx, qy, qz, qw))
 
 
-def _motion(row: list[float]) -> Motion:
+def _motion(row: list[float]) -> BodyState:
     x, y, z, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz, _ = row
-    return Motion(Pose((x, y, z), (qx, qy, qz, qw)), (vx, vy, vz), (wx, wy, wz))
+    return BodyState(Pose((x, y, z), (qx, qy, qz, qw)), (vx, vy, vz), (wx, wy, wz))
 
 
 def _columns(layout: Layout, obj: Object, features: tuple[Feature, ...]) -> NDArray[np.intp]:

@@ -10,7 +10,7 @@ from slap_ros.geometry.pose import Vector
 
 
 @dataclass(frozen=True)
-class View:
+class Viewpoint:
     """By default from the front right, from above the arm."""
 
     eye: Vector = (1.45, -1.1, 0.85)  # m

@@ -15,15 +15,22 @@ from types import TracebackType
 
 from slap_ros.core import Action, ActionSpace
 from slap_ros.errors import InvalidStateError
-from slap_ros.physics.arm import Arm, Contact, Obstacle, Sweep
-from slap_ros.physics.clients import borrow, give_back
+from slap_ros.physics.arm import Arm, Obstacle, Penetration, Sweep
 from slap_ros.physics.features import JOINT_FEATURES
 from slap_ros.physics.gripper import grip
-from slap_ros.physics.panda import HAND, JOINT_HIGH, JOINT_LOW, MAX_STEP, grasp_pose, rise
-from slap_ros.physics.possible import require_possible
+from slap_ros.physics.panda import (
+    HAND,
+    JOINT_HIGH,
+    JOINT_LOW,
+    MAX_STEP,
+    grasp_pose,
+    vertical_jacobian,
+)
 from slap_ros.physics.scene import Scene
 from slap_ros.physics.simulation import Drive, Stepping
-from slap_ros.physics.snapshot import Motion, Reader, Snapshot
+from slap_ros.physics.simulation_pool import acquire, release
+from slap_ros.physics.snapshot import BodyState, Snapshot, SnapshotCodec
+from slap_ros.physics.validation import require_valid
 from slap_ros.relational import Feature, State
 
 ACTION_SPACE = ActionSpace(
@@ -41,7 +48,7 @@ PRESSED = 0.006  # m, how far the arm may press bodies into one another; deeper,
 JAMMED = 0.02  # m, where no body moves: between two immovable ones the solver has no answer
 RAISED = 8  # times that the arm is raised at most, lest it enters a fixed body
 CLEAR = 1e-4  # m, over where it just does not
-MOST_REMEMBERED = 256  # arrangements of bodies known to stand or not
+CACHE_SIZE = 256  # arrangements of bodies known to stand or not
 
 
 class PandaWorld:
@@ -67,12 +74,12 @@ class PandaWorld:
         """
         self._scene = scene
         self._actions = actions
-        self._reader = Reader.of(scene, state.layout)
+        self._reader = SnapshotCodec.of(scene, state.layout)
         self._standing: dict[object, bool] = {}
         self._solid = [i for i, body in enumerate(scene.fixed) if body.solid]
         self._adopt(state)
-        self._simulation = borrow(scene, stepping)
-        self._closing = weakref.finalize(self, give_back, self._simulation)
+        self._simulation = acquire(scene, stepping)
+        self._closing = weakref.finalize(self, release, self._simulation)
         self._prepare()
 
     def __enter__(self) -> PandaWorld:
@@ -114,7 +121,7 @@ class PandaWorld:
     def _prepare(self) -> None:
         """Tell the simulation what it remembers between control periods."""
         self._simulation.place_fixed(self._fixed_poses)
-        self._simulation.make_of(self._materials)
+        self._simulation.set_materials(self._materials)
 
     def _adopt(self, state: State) -> None:
         state.require_finite()
@@ -123,7 +130,7 @@ class PandaWorld:
         obstacles = [Obstacle.of(self._scene.fixed[i].at(poses[i])) for i in self._solid]
         materials = self._reader.materials(self._scene, state)
         arm = self._arm(snapshot)
-        require_possible(self._scene, snapshot, materials, arm, obstacles)
+        require_valid(self._scene, snapshot, materials, arm, obstacles)
         self._state, self._snapshot, self._posture = state, snapshot, arm
         self._fixed_poses, self._materials = poses, materials
         self._obstacles: list[Obstacle] = obstacles
@@ -186,7 +193,7 @@ class PandaWorld:
         """The goal with the arm raised until it enters nothing; ``now`` if it cannot be raised."""
         for _ in range(RAISED):
             sweep = Sweep(start, self._arm(goal))
-            contact = sweep.deepest(self._obstacles)
+            contact = sweep.deepest_penetration(self._obstacles)
             if contact is None:
                 return now if sweep.hits(self._obstacles) else goal
             goal = replace(goal, joints=_raised(now.joints, goal.joints, contact))
@@ -196,7 +203,7 @@ class PandaWorld:
         held = None if snapshot.held is None else self._scene.free[snapshot.held]
         return Arm.at(snapshot.joints, snapshot.finger, held, snapshot.grasp)
 
-    def _bodies_after(self, now: Snapshot, sweep: Sweep) -> tuple[tuple[Motion, ...], float]:
+    def _bodies_after(self, now: Snapshot, sweep: Sweep) -> tuple[tuple[BodyState, ...], float]:
         """The free bodies after the arm's sweep, and how far any overlaps another, m."""
         bodies, depth = list(now.bodies), 0.0
         loose = [i for i in range(len(bodies)) if i != now.held]
@@ -207,15 +214,15 @@ class PandaWorld:
             depth = self._simulation.deepest()
             came_to_rest = all(_rests(bodies[i], after[i]) for i in loose)
             for i in loose:
-                bodies[i] = Motion(bodies[i].pose) if came_to_rest else after[i]
+                bodies[i] = BodyState(bodies[i].pose) if came_to_rest else after[i]
         if now.held is not None:
-            bodies[now.held] = Motion(sweep.end.held_pose)
+            bodies[now.held] = BodyState(sweep.end.held_pose)
         return tuple(bodies), depth
 
-    def _frozen(self, now: Snapshot, end: Arm) -> tuple[Motion, ...]:
+    def _frozen(self, now: Snapshot, end: Arm) -> tuple[BodyState, ...]:
         """The free bodies as they were, without velocity; the held one with the hand."""
         return tuple(
-            Motion(end.held_pose if i == now.held else body.pose)
+            BodyState(end.held_pose if i == now.held else body.pose)
             for i, body in enumerate(now.bodies)
         )
 
@@ -239,7 +246,7 @@ class PandaWorld:
         if stands is None:
             after = self._simulation.run(now.bodies, now.held)
             stands = all(_rests(now.bodies[i], after[i]) for i in loose)
-            if len(self._standing) == MOST_REMEMBERED:
+            if len(self._standing) == CACHE_SIZE:
                 self._standing.clear()
             self._standing[key] = stands
         return stands
@@ -269,15 +276,15 @@ def _hand_raised(now: Snapshot, goal: Snapshot, depth: float) -> Snapshot:
     """The goal with the hand higher by ``depth`` m; an arm that was not to move stays."""
     if goal.joints == now.joints:
         return now
-    contact = Contact(HAND, grasp_pose(goal.joints).position, depth)
+    contact = Penetration(HAND, grasp_pose(goal.joints).position, depth)
     return replace(goal, joints=_raised(now.joints, goal.joints, contact))
 
 
 def _raised(
-    start: tuple[float, ...], goal: tuple[float, ...], contact: Contact
+    start: tuple[float, ...], goal: tuple[float, ...], contact: Penetration
 ) -> tuple[float, ...]:
     """The goal with a point raised, fast joints first; within the speed limit from the start."""
-    rates = rise(goal, contact.link, contact.point)
+    rates = vertical_jacobian(goal, contact.link, contact.point)
     weights = [rate * step * step for rate, step in zip(rates, MAX_STEP, strict=True)]
     yielding = sum(rate * weight for rate, weight in zip(rates, weights, strict=True))
     if yielding <= 0.0:
@@ -290,11 +297,11 @@ def _raised(
     return _within_limits(start, displacement)
 
 
-def _rests(before: Motion, after: Motion) -> bool:
+def _rests(before: BodyState, after: BodyState) -> bool:
     """Whether a body hardly moved in a control period and hardly moves now."""
     (position, quaternion), (old_position, old_quaternion) = after.pose, before.pose
     return (
-        all(abs(v) < REST_SPEED for v in (*after.velocity, *after.spin))
+        all(abs(v) < REST_SPEED for v in (*after.velocity, *after.angular_velocity))
         and all(abs(x - y) < REST_SHIFT for x, y in zip(position, old_position, strict=True))
         and all(abs(x - y) < REST_TURN for x, y in zip(quaternion, old_quaternion, strict=True))
     )

@@ -136,7 +136,7 @@ def _check_arguments(name: str, types: tuple[Type, ...], condition: Condition) -
             )
 
 
-def shared(compute: Callable[[State], T]) -> Callable[[State], T]:
+def cache_latest(compute: Callable[[State], T]) -> Callable[[State], T]:
     """Compute once what several predicates ask of the same state one after the other.
 
     The latest state is cached with its answer, and stays in memory until another is asked about.

@@ -30,7 +30,7 @@ from slap_ros.physics.features import (
     VELOCITY_FEATURES,
 )
 from slap_ros.physics.panda import FINGER_OPEN, JOINTS, hand_pose
-from slap_ros.physics.settling import settled
+from slap_ros.physics.settling import resting_poses
 from slap_ros.physics.world import PandaWorld
 from slap_ros.relational import Feature, Object, State
 from slap_ros.robot.limits import STEP_TOLERANCE, Limits, Motion
@@ -236,7 +236,7 @@ class Cell:
         resting = {
             i: known[o].pose for i, o in enumerate(self._bodies) if o in known and known[o].steady
         }
-        flat = settled(resting, self._world.scene.free, fixed)
+        flat = resting_poses(resting, self._world.scene.free, fixed)
         for obj, sighting in known.items():
             pose = sighting.pose
             if obj in self._bodies:

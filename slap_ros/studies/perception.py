@@ -215,7 +215,7 @@ def solve_perceived(
         task.step_limit,
         max_replans,
         NoisyPerceiver.of(chosen, space, initial, quality, rng),
-        quality.patience,
+        quality.debounce_delay_steps,
     ).run()
     holds = space.abstract(world.state) & goal == goal
     reason = episode.error.reason or ("" if holds else "solved, as far as was seen, and is not")

@@ -22,7 +22,7 @@ from slap_ros.domains.cleanup_table.model import (
     TIP,
     WALL,
 )
-from slap_ros.domains.cleanup_table.scenery import BIN, FLOOR_TOP, TABLE, scene_of
+from slap_ros.domains.cleanup_table.scene import BIN, FLOOR_TOP, TABLE, scene_of
 from slap_ros.domains.cleanup_table.shapes import TOYS, WIPER, shipped
 from slap_ros.domains.cleanup_table.tasks import make_task
 from slap_ros.errors import ErrorCode, InvalidParameterError
@@ -76,7 +76,7 @@ def test_static_atoms_tell_things_apart():
 # -- predicates, spelled out one by one -----------------------------------------------------------
 
 
-def scattered(initial, rng, count):
+def random_states(initial, rng, count):
     """A batch in which blocks lie, tumble and fall about table and bin, and the hand is about."""
     layout = initial.layout
     data = np.repeat(initial.data[None], count, axis=0)
@@ -156,7 +156,7 @@ def test_states_are_perceived_as_spelled_out_one_by_one():
         space = FAIR.atom_space(initial)
         names = (*PLACES, "HandReadyPick")
         mask = space.mask(atom for atom in space.atoms if atom.predicate.name in names)
-        batch = scattered(initial, rng, 100)
+        batch = random_states(initial, rng, 100)
         for row, abstract in zip(batch.data, space.abstract_each(batch), strict=True):
             state = State(initial.layout, row)
             found = {str(atom) for atom in space.decode(space.abstract(state) & mask)}
@@ -171,7 +171,7 @@ def test_states_are_perceived_as_spelled_out_one_by_one():
 
 def test_a_margin_is_positive_exactly_where_its_atom_holds():
     initial = FAIR.task(0).initial_state
-    batch = scattered(initial, np.random.default_rng(1), 300)
+    batch = random_states(initial, np.random.default_rng(1), 300)
     space = FAIR.atom_space(initial)
     truth = space.truth(batch)
     for i, atom in enumerate(space.atoms):

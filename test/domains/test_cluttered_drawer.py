@@ -10,12 +10,17 @@ import pytest
 from executed import executed, fluent_atoms
 
 from slap_ros.domains import get_domain
-from slap_ros.domains.cluttered_drawer.model import BLOCK, SIDES, FingerRoom
-from slap_ros.domains.cluttered_drawer.scenery import BOTTOM, FRONT, HALF_WIDTH, MIDDLE
+from slap_ros.domains.cluttered_drawer.model import BLOCK, SIDES, FingerClearance
+from slap_ros.domains.cluttered_drawer.scene import BOTTOM, FRONT, HALF_WIDTH, MIDDLE
 from slap_ros.domains.cluttered_drawer.skills import FRONT_BACK, LEFT_RIGHT, _way_to_grasp
-from slap_ros.domains.cluttered_drawer.tasks import NEIGHBOUR, PaperTasks, RandomTasks, Scenery
+from slap_ros.domains.cluttered_drawer.tasks import (
+    NEIGHBOUR,
+    DrawerArrangement,
+    PaperDrawerTasks,
+    RandomDrawerTasks,
+)
 from slap_ros.domains.tabletop.grasps import from_above
-from slap_ros.domains.tabletop.reading import joints_of, pose_of
+from slap_ros.domains.tabletop.state_access import joints_of, pose_of
 from slap_ros.errors import InvalidParameterError, InvalidStateError, SkillNotApplicableError
 from slap_ros.geometry.pose import multiply, rotate
 from slap_ros.motion import linear_motion, nearest_configurations, retime
@@ -53,7 +58,7 @@ def moved(state, name, **features):
     return state.replace({(obj, feature): value for feature, value in features.items()})
 
 
-def scattered(initial, rng, count):
+def random_states(initial, rng, count):
     """A batch: blocks around the target block, in the air, on their sides, tumbling; hands over."""
     layout = initial.layout
     data = np.repeat(initial.data[None], count, axis=0)
@@ -115,7 +120,7 @@ def test_a_batch_is_perceived_like_its_states_and_margins_tell_the_truth():
     for seed in range(3):
         initial = FAIR.task(seed).initial_state
         space = FAIR.atom_space(initial)
-        batch = scattered(initial, rng, 200)
+        batch = random_states(initial, rng, 200)
         truth = space.truth(batch)
         for row, one in zip(batch.data[:60], truth, strict=False):
             assert (space.truth(State(initial.layout, row)) == one).all()
@@ -151,12 +156,12 @@ def overlap(one, other):
 
 
 def test_what_blocks_is_what_shares_the_room_of_a_finger():
-    rng, room, found = np.random.default_rng(0), FingerRoom(), 0
-    space = FAIR.atom_space(Scenery(TARGET, (LEFT_BLOCKER,)).task().initial_state)
+    rng, room, found = np.random.default_rng(0), FingerClearance(), 0
+    space = FAIR.atom_space(DrawerArrangement(TARGET, (LEFT_BLOCKER,)).task().initial_state)
     for _ in range(400):
         yaw = rng.uniform(-0.78, 0.78)
         other = (MIDDLE + rng.uniform(-0.1, 0.1), rng.uniform(-0.1, 0.1), rng.uniform(-3, 3))
-        state = Scenery((MIDDLE, 0.0, yaw), (other,)).task().initial_state
+        state = DrawerArrangement((MIDDLE, 0.0, yaw), (other,)).task().initial_state
         seen = {str(atom) for atom in space.decode(space.abstract(state))}
         for side, towards in zip(SIDES, (-1, 1, 1j, -1j), strict=True):
             turn = complex(math.cos(yaw), math.sin(yaw))
@@ -171,7 +176,7 @@ def test_what_blocks_is_what_shares_the_room_of_a_finger():
 
 
 def test_margins_say_how_far_a_blocker_is_to_be_moved():
-    state = Scenery(TARGET, (LEFT_BLOCKER,)).task().initial_state
+    state = DrawerArrangement(TARGET, (LEFT_BLOCKER,)).task().initial_state
     predicate = next(p for p in FAIR.predicates if p.name == "LeftClear")
     column = Column((state.layout.object("block1"),))
 
@@ -179,23 +184,23 @@ def test_margins_say_how_far_a_blocker_is_to_be_moved():
         return predicate.margin(moved(state, "block2", y=y), column)[0]
 
     for y in (0.0675, 0.08, 0.09):
-        assert margin(y) == pytest.approx(y - (HALF + FingerRoom().reach + HALF))
+        assert margin(y) == pytest.approx(y - (HALF + FingerClearance().reach + HALF))
     assert margin(0.0675) < 0 < margin(0.1)
 
 
 @pytest.mark.parametrize("factor", [0.5, 1.5, 2.0])
 def test_thresholds_are_a_presets(factor):
-    reach = FingerRoom().reach * factor
+    reach = FingerClearance().reach * factor
     noisy = get_domain("cluttered_drawer", f"fair:reach={reach}")
     edge = 2 * HALF + reach
     for y, blocked in ((edge - 0.001, True), (edge + 0.001, False)):
-        state = Scenery(TARGET, ((MIDDLE, y, 0.0),)).task().initial_state
+        state = DrawerArrangement(TARGET, ((MIDDLE, y, 0.0),)).task().initial_state
         assert ("BlockingLeft(block2, block1)" in sides(state, noisy)) == blocked
     assert noisy.task(3).initial_state == FAIR.task(3).initial_state  # tasks are the same
 
 
 def test_only_a_block_that_stands_in_the_drawer_is_blocked():
-    state = Scenery(TARGET, (LEFT_BLOCKER,)).task().initial_state
+    state = DrawerArrangement(TARGET, (LEFT_BLOCKER,)).task().initial_state
     free = {f"{side}Clear(block1)" for side in SIDES}
     assert "BlockingLeft(block2, block1)" in sides(state)
     assert sides(moved(state, "block1", z=BOTTOM + HALF + 0.02)) == free
@@ -211,7 +216,7 @@ def test_a_hand_fits_where_sides_are_clear_and_not_where_blockers_stand(turns):
     wanted = ("Front", "Back") if turns is FRONT_BACK else ("Left", "Right")
     fits = {True: 0, False: 0}
     for seed in range(12):
-        settings = RandomTasks(obstacles=(seed % 4, seed % 4))
+        settings = RandomDrawerTasks(obstacles=(seed % 4, seed % 4))
         state = settings.sample(np.random.default_rng(seed)).initial_state
         target = state.layout.object("block1")
         clear = {f"{side}Clear(block1)" for side in wanted} <= atoms(state)
@@ -271,7 +276,7 @@ class WatchedModel(Model):
 @pytest.mark.parametrize("preset", ["fair", "paper"])
 def test_the_lazy_search_is_bounded_truly_and_finds_the_cost_of_the_exhaustive(preset):
     domain = {"fair": FAIR, "paper": PAPER}[preset]
-    task = RandomTasks(obstacles=(3, 3)).sample(np.random.default_rng(0))
+    task = RandomDrawerTasks(obstacles=(3, 3)).sample(np.random.default_rng(0))
     costs = []
     for search in (search_lazily, search_exhaustively):
         model = WatchedModel.of(domain, task.initial_state)
@@ -315,7 +320,7 @@ def test_a_hand_that_turns_around_the_block_frees_two_sides_and_holds_nothing():
 
 def test_a_drawer_that_is_too_full_is_refused():
     with pytest.raises(InvalidParameterError, match="no room for 30 obstacles"):
-        RandomTasks(obstacles=(30, 30)).sample(np.random.default_rng(0))
+        RandomDrawerTasks(obstacles=(30, 30)).sample(np.random.default_rng(0))
 
 
 @pytest.mark.parametrize(
@@ -323,6 +328,6 @@ def test_a_drawer_that_is_too_full_is_refused():
     [((MIDDLE + 0.01, 0.0, 0.0), "block"), ((MIDDLE, HALF_WIDTH, 0.0), "block2 is inside a fixed")],
 )
 def test_blocks_inside_one_another_or_in_a_wall_are_refused(place, culprit):
-    task = replace(PaperTasks().scenery, blockers=(place,)).task()
+    task = replace(PaperDrawerTasks().scenery, blockers=(place,)).task()
     with pytest.raises(InvalidStateError, match=culprit):
         FAIR.make_world(task.initial_state)

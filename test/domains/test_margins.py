@@ -4,13 +4,13 @@
 
 import numpy as np
 import pytest
-from scattered import one_by_one, scattered
+from random_states import one_by_one, random_states
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.obstacle2d.model import RESTING_TOLERANCE
 from slap_ros.domains.obstacle2d.tasks import make_task
-from slap_ros.domains.obstacle_tower.lying import TOUCHING
-from slap_ros.domains.obstacle_tower.tasks import Scenery
+from slap_ros.domains.obstacle_tower.support import TOUCHING
+from slap_ros.domains.obstacle_tower.tasks import TowerArrangement
 from slap_ros.physics.scene import CUBE_EDGE
 from slap_ros.relational import Column, State
 
@@ -38,7 +38,7 @@ def test_the_tower_is_perceived_as_spelled_out_one_by_one():
         initial = TOWER.task(seed).initial_state
         space = TOWER.atom_space(initial)
         bodies = [space.bit(a) for a in space.atoms if a.predicate.name in ("On", "NothingOn")]
-        for row in scattered(initial, rng, 60).data:
+        for row in random_states(initial, rng, 60).data:
             state = State(initial.layout, row)
             found = {str(a) for a in space.decode(space.abstract(state) & sum(bodies))}
             assert found == one_by_one(state)
@@ -51,7 +51,7 @@ def test_a_margin_is_positive_exactly_where_its_atom_holds(name):
     domain, rng = DOMAINS[name], np.random.default_rng(1)
     initial = domain.task(0).initial_state
     if domain is TOWER:
-        batch = scattered(initial, rng, 300)
+        batch = random_states(initial, rng, 300)
     else:
         columns = [initial.layout.column(b, "x") for b in initial.objects if "block" in b.name]
         data = np.repeat(initial.data[None], 300, axis=0)
@@ -70,7 +70,9 @@ def test_a_margin_is_positive_exactly_where_its_atom_holds(name):
 
 def sliding(yaw, gap):
     """A block that lies slightly above the table and slides off the target, along x."""
-    state = Scenery((0.5, 0.0, yaw), (0.4, 0.3, 0.0), ((0.5, 0.0, 0.0),)).task().initial_state
+    state = (
+        TowerArrangement((0.5, 0.0, yaw), (0.4, 0.3, 0.0), ((0.5, 0.0, 0.0),)).task().initial_state
+    )
     state = state.replace({(state.layout.object("block2"), "z"): 0.1 + gap})
     return moved(state, "block2", "x", np.linspace(0.5, 0.58, 100))
 
@@ -91,14 +93,16 @@ def test_a_block_that_slides_off_the_target_is_ever_less_in_it(gap):
 
 def test_a_block_that_slides_off_another_lies_ever_less_on_it():
     tower = ((0.5, 0.0, 0.0),) * 2
-    state = Scenery((0.5, 0.0, 0.0), (0.4, 0.3, 0.0), tower).task().initial_state
+    state = TowerArrangement((0.5, 0.0, 0.0), (0.4, 0.3, 0.0), tower).task().initial_state
     slid = moved(state, "block3", "x", np.linspace(0.5, 0.56, 100))
     assert (np.diff(margin(TOWER, slid, "On", "block3", "block2")) < 0).all()
     assert (np.diff(margin(TOWER, slid, "NothingOn", "block2")) > 0).all()
 
 
 def test_a_lifted_block_leaves_without_a_jump():
-    state = Scenery((0.5, 0.0, 0.0), (0.4, 0.3, 0.0), ((0.5, 0.0, 0.0),)).task().initial_state
+    state = (
+        TowerArrangement((0.5, 0.0, 0.0), (0.4, 0.3, 0.0), ((0.5, 0.0, 0.0),)).task().initial_state
+    )
     heights = 0.1 + np.linspace(-0.01, 0.01, 20001)
     for name, objects in (("On", ("block2", "target")), ("NothingOn", ("target",))):
         found = margin(TOWER, moved(state, "block2", "z", heights), name, *objects)

@@ -8,11 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from executed import executed, fluent_atoms
-from scattered import scattered
+from random_states import random_states
 
 from slap_ros.domains import get_domain
-from slap_ros.domains.obstacle_tower.tasks import PaperTasks, RandomTasks, Scenery
-from slap_ros.domains.obstacle_tower.things import BLOCK
+from slap_ros.domains.obstacle_tower.features import BLOCK
+from slap_ros.domains.obstacle_tower.tasks import (
+    PaperTowerTasks,
+    RandomTowerTasks,
+    TowerArrangement,
+)
 from slap_ros.errors import ErrorCode, InvalidStateError, UnsolvableError
 from slap_ros.physics.panda import MAX_STEP
 from slap_ros.physics.scene import Material
@@ -47,7 +51,9 @@ def test_a_tower_is_perceived_as_it_stands():
 
 
 def test_a_block_half_on_the_target_is_on_the_table_and_leaves_no_room():
-    scenery = Scenery(target=(0.5, 0.0, 0.4), target_block=(0.4, 0.2, 0), tower=((0.54, 0.0, 0.9),))
+    scenery = TowerArrangement(
+        target=(0.5, 0.0, 0.4), target_block=(0.4, 0.2, 0), tower=((0.54, 0.0, 0.9),)
+    )
     seen = atoms(scenery.task().initial_state)
     assert "On(block2, table)" in seen
     assert "On(block2, target)" not in seen
@@ -55,7 +61,7 @@ def test_a_block_half_on_the_target_is_on_the_table_and_leaves_no_room():
 
 
 def test_blocks_in_the_air_or_on_edge_lie_on_nothing():
-    state = Scenery((0.5, 0.0, 0.0), (0.4, 0.2, 0.0), ()).task().initial_state
+    state = TowerArrangement((0.5, 0.0, 0.0), (0.4, 0.2, 0.0), ()).task().initial_state
     block = state.layout.object("block1")
     lifted = state.replace({(block, "z"): float(state.get(block, "z")) + 0.006})
     assert "On(block1, table)" not in atoms(lifted)
@@ -69,7 +75,7 @@ def test_a_batch_is_perceived_like_its_states_whether_they_stand_or_tumble():
     for seed in range(5):
         initial = FAIR.task(seed).initial_state
         space = FAIR.atom_space(initial)
-        batch = scattered(initial, rng, 200)
+        batch = random_states(initial, rng, 200)
         truth = space.truth(batch)
         square = State(initial.layout, batch.data.reshape(10, 20, -1))
         assert (space.truth(square).reshape(200, -1) == truth).all()
@@ -132,7 +138,7 @@ def test_the_paper_tower_is_solved_the_same_way_twice():
 
 
 def test_without_obstacles_it_is_pick_and_place():
-    task = Scenery((0.5, 0.0, 0.0), (0.4, 0.2, 0.3), ()).task()
+    task = TowerArrangement((0.5, 0.0, 0.0), (0.4, 0.2, 0.3), ()).task()
     episode = solve(task)
     assert episode.success
     assert episode.plan_length < 40
@@ -140,13 +146,13 @@ def test_without_obstacles_it_is_pick_and_place():
 
 def test_a_single_obstacle_and_six_can_be_sampled():
     for count in (1, 6):
-        settings = RandomTasks(obstacles=(count, count), distractors=(0, 0))
+        settings = RandomTowerTasks(obstacles=(count, count), distractors=(0, 0))
         task = settings.sample(np.random.default_rng(0))
         assert len(task.initial_state.layout.of_type(BLOCK)) == count + 1
 
 
 def test_a_block_out_of_reach_makes_the_task_unsolvable():
-    task = Scenery((0.5, 0.0, 0.0), (0.74, 0.39, 0.0), ()).task()
+    task = TowerArrangement((0.5, 0.0, 0.0), (0.74, 0.39, 0.0), ()).task()
     far = task.initial_state.layout.object("block1")
     state = task.initial_state.replace({(far, "x"): 0.9, (far, "z"): -0.4})  # fell off the table
     episode = solve(replace(task, initial_state=state))
@@ -155,13 +161,13 @@ def test_a_block_out_of_reach_makes_the_task_unsolvable():
 
 
 def test_blocks_inside_one_another_are_refused():
-    task = Scenery((0.5, 0.0, 0.0), (0.4, 0.2, 0.0), ((0.41, 0.21, 0.0),)).task()
+    task = TowerArrangement((0.5, 0.0, 0.0), (0.4, 0.2, 0.0), ((0.41, 0.21, 0.0),)).task()
     with pytest.raises(InvalidStateError, match="block"):
         FAIR.make_world(task.initial_state)
 
 
 def test_masses_and_frictions_are_sampled_last_and_alike_for_all_blocks():
-    wide = RandomTasks(mass=(0.1, 2.0), friction=(0.2, 1.2))
+    wide = RandomTowerTasks(mass=(0.1, 2.0), friction=(0.2, 1.2))
     seen = set()
     for seed in range(10):
         plain = FAIR.task(seed).initial_state
@@ -179,7 +185,7 @@ def test_masses_and_frictions_are_sampled_last_and_alike_for_all_blocks():
 
 @pytest.mark.parametrize("material", [Material(0.05, 0.3), Material(3.0, 1.2)])
 def test_towers_of_other_materials_are_taken_apart_too(material):
-    scenery = replace(PaperTasks().scenery, material=material)
+    scenery = replace(PaperTowerTasks().scenery, material=material)
     episode = solve(scenery.task())
     assert episode.success, episode.error
     blocks = episode.states[-1].layout.of_type(BLOCK)
@@ -202,7 +208,7 @@ class WatchedModel(Model):
 @pytest.mark.parametrize("seed", range(2))
 def test_the_lazy_search_is_bounded_truly_and_finds_the_cost_of_the_exhaustive(preset, seed):
     domain = {"fair": FAIR, "paper": PAPER}[preset]
-    settings = RandomTasks(obstacles=(1 + seed, 1 + seed), distractors=(1 - seed, 1 - seed))
+    settings = RandomTowerTasks(obstacles=(1 + seed, 1 + seed), distractors=(1 - seed, 1 - seed))
     task = settings.sample(np.random.default_rng(seed))
     costs, rolled_out, slack = [], [], []
     for search in (search_lazily, search_exhaustively):
@@ -221,7 +227,7 @@ def test_the_lazy_search_is_bounded_truly_and_finds_the_cost_of_the_exhaustive(p
 @pytest.mark.parametrize("planner", ["lazy", "ff"])
 def test_a_target_off_the_table_makes_the_task_unsolvable(place, planner):
     """Far away, beside the table, and where the arm could reach it in mid-air."""
-    task = Scenery((*place, 0.0), (0.4, 0.2, 0.0), ()).task()
+    task = TowerArrangement((*place, 0.0), (0.4, 0.2, 0.0), ()).task()
     space = FAIR.atom_space(task.initial_state)
     with pytest.raises(UnsolvableError, match=r"no path through|leads to the goal"):
         make_planner(planner, FAIR, task.initial_state).plan(

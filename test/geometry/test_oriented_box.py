@@ -44,11 +44,11 @@ def test_overlap_is_a_distance_below_zero(distance):
     counts = {True: 0, False: 0}
     for _ in range(400):
         a, b = random_box(rng), random_box(rng)
-        apart = distance(a, b)
-        if abs(apart) < UNSURE:
+        separated = distance(a, b)
+        if abs(separated) < UNSURE:
             continue
-        assert a.overlaps(b) == b.overlaps(a) == (apart < 0)
-        counts[apart < 0] += 1
+        assert a.overlaps(b) == b.overlaps(a) == (separated < 0)
+        counts[separated < 0] += 1
     assert min(counts.values()) > 50
 
 

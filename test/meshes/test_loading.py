@@ -10,13 +10,13 @@ import pytest
 
 from slap_ros.domains.cleanup_table.shapes import make
 from slap_ros.errors import InvalidMeshError, MeshUnavailableError
-from slap_ros.meshes.cache import cache_folder, keep
-from slap_ros.meshes.decomposition import Fineness, kept_at, load_mesh
+from slap_ros.meshes.cache import cache_folder, store
+from slap_ros.meshes.decomposition import DecompositionSettings, cached_file, load_mesh
 from slap_ros.meshes.obj import to_obj
 from slap_ros.meshes.objaverse import load_objaverse
 from slap_ros.meshes.solid import Solid
 
-ROUGH = Fineness(threshold=0.3, pieces=6)  # quick
+ROUGH = DecompositionSettings(threshold=0.3, pieces=6)  # quick
 IDENTIFIER = "0123456789abcdef0123456789abcdef"
 PIECES = make.duck()
 DUCK = Solid.of(PIECES)
@@ -52,7 +52,7 @@ def test_a_mesh_that_is_not_convex_comes_apart_and_is_kept(tmp_path, monkeypatch
 
 
 def test_what_is_kept_is_found_by_content_without_any_library(tmp_path, without_libraries):
-    keep(kept_at(b"a duck", ".obj", 0.08), to_obj(PIECES).encode())
+    store(cached_file(b"a duck", ".obj", 0.08), to_obj(PIECES).encode())
     file = tmp_path / "any name.OBJ"
     file.write_bytes(b"a duck")
     assert load_mesh(file, size_m=0.08) == DUCK
@@ -78,8 +78,8 @@ def test_a_damaged_file_is_refused(tmp_path):
 
 
 def test_objaverse_objects_that_are_here_need_no_network(without_libraries):
-    keep(cache_folder() / "objaverse" / f"{IDENTIFIER}.glb", b"downloaded before")
-    keep(kept_at(b"downloaded before", ".glb", 0.07), to_obj(PIECES).encode())
+    store(cache_folder() / "objaverse" / f"{IDENTIFIER}.glb", b"downloaded before")
+    store(cached_file(b"downloaded before", ".glb", 0.07), to_obj(PIECES).encode())
     assert load_objaverse(IDENTIFIER, size_m=0.07) == DUCK
 
 

@@ -11,7 +11,7 @@ from slap_ros.domains.cleanup_table.shapes import make, shipped
 from slap_ros.domains.cleanup_table.shapes.make import Ring, block, stack
 from slap_ros.errors import InvalidMeshError
 from slap_ros.meshes.obj import from_obj, to_obj
-from slap_ros.meshes.solid import Piece, Solid
+from slap_ros.meshes.solid import ConvexPiece, Solid
 
 BRICK = block((1.0, 2.0, 3.0), (1.2, 2.4, 3.6))  # m
 
@@ -69,9 +69,9 @@ def test_pieces_are_read_as_they_were_written():
 
 
 def test_nothing_inside_out_flat_or_endless_is_a_solid():
-    inside_out = Piece(BRICK.vertices, tuple((a, c, b) for a, b, c in BRICK.triangles))
+    inside_out = ConvexPiece(BRICK.vertices, tuple((a, c, b) for a, b, c in BRICK.triangles))
     flat = block((0.0, 0.0, 0.0), (1.0, 1.0, 0.0))
-    endless = Piece(((math.inf, 0.0, 0.0), *BRICK.vertices[1:]), BRICK.triangles)
+    endless = ConvexPiece(((math.inf, 0.0, 0.0), *BRICK.vertices[1:]), BRICK.triangles)
     for pieces in ([], [inside_out], [BRICK, flat], [endless]):
         with pytest.raises(InvalidMeshError):
             Solid.of(pieces)

@@ -16,7 +16,7 @@ from motion_scenes import (
     tower,
 )
 
-from slap_ros.geometry.box_separation import apart
+from slap_ros.geometry.box_separation import separated
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.motion import CollisionChecker, inverse_kinematics
 from slap_ros.motion.kinematics import matrix
@@ -99,19 +99,19 @@ def test_boxes_apart_agree_with_separation_by_sampled_points():
         seen = np.linalg.inv(in_a) @ in_b
         offset = np.linalg.inv(in_b) @ in_a[:, 3]
 
-        def separated(distance, turn=seen[:3, :3], offset=offset[:3], a=a, b=b):
+        def keep(distance, turn=seen[:3, :3], offset=offset[:3], a=a, b=b):
             sizes = np.array([a.half]), np.array([b.half])
-            return bool(apart(turn[None], offset[None], *sizes, np.array([distance]))[0])
+            return bool(separated(turn[None], offset[None], *sizes, np.array([distance]))[0])
 
         # The true distance, from below by nothing and from above by points of both.
         points = grid * b.half @ seen[:3, :3].T + seen[:3, 3]
         distance = np.linalg.norm(np.maximum(np.abs(points) - a.half, 0.0), axis=1).min()
-        assert not separated(distance + 1e-6)
+        assert not keep(distance + 1e-6)
         if distance == 0.0:
             touching += 1
         if distance > 0.05:
             separate += 1
-            assert separated(0.7 * distance - 0.02)
+            assert keep(0.7 * distance - 0.02)
     assert touching > 10
     assert separate > 200
 

@@ -31,9 +31,9 @@ from slap_ros.motion import (
     plan_path,
     within_limits,
 )
-from slap_ros.motion.detour import detour
-from slap_ros.motion.joints import LOW, between, free_count, path_configurations
+from slap_ros.motion.joints import LOW, free_count, interpolate, path_configurations
 from slap_ros.motion.shortcutting import shorten
+from slap_ros.motion.via_point import via_point_path
 
 OVER_TOWER = [TABLE, *tower(0.5, 0.0)]
 
@@ -68,7 +68,7 @@ def test_start_is_goal():
 
 def test_over_the_tower():
     start, goal, free = across_the_tower()
-    assert not free(between(start, goal)).all()
+    assert not free(interpolate(start, goal)).all()
     path = plan_path(start, goal, free, seed=0)
     check(path, start, goal, free)
     assert path_steps(path) < 2.0 * control_steps(start, goal)
@@ -76,7 +76,7 @@ def test_over_the_tower():
 
 def test_a_single_bend_leads_over_the_tower():
     start, goal, free = across_the_tower()
-    found = detour(start, goal, free, np.random.default_rng(0), resolution=0.125)
+    found = via_point_path(start, goal, free, np.random.default_rng(0), resolution=0.125)
     assert found.shape == (3, 7)
     check(found, start, goal, free)
 
@@ -89,7 +89,7 @@ def test_where_one_bend_is_not_enough_a_path_is_found_at_random():
         first, second = (np.abs(q[:, 0] - wall) < 0.05 for wall in (0.5, 1.5))
         return (~first | (q[:, 1] > 0.1)) & (~second | (q[:, 1] < -0.4))
 
-    assert detour(START, goal, slalom, np.random.default_rng(0), resolution=0.125) is None
+    assert via_point_path(START, goal, slalom, np.random.default_rng(0), resolution=0.125) is None
     path = plan_path(START, goal, slalom, seed=0)
     check(path, START, goal, slalom)
     assert len(path) > 3
@@ -114,7 +114,7 @@ def test_free_among_random_boxes(seed):
 
 
 def test_one_step_is_never_between_checked_configurations():
-    line = between(START, START + 1.0)
+    line = interpolate(START, START + 1.0)
     assert control_steps(line[:-1], line[1:]).max() <= 0.125 + 1e-9
     assert np.array_equal(line[-1], START + 1.0)
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from motion_scenes import START
 
-from slap_ros.motion import path_steps, retime, retime_in_tens
+from slap_ros.motion import path_steps, retime, retime_fixed_steps
 from slap_ros.motion.joints import path_configurations
 from slap_ros.physics.panda import MAX_STEP
 
@@ -84,9 +84,9 @@ def test_other_limits():
 
 def test_in_tens():
     path = np.stack([START, START + 2.0, START + 2.1])
-    motion = retime_in_tens(path)
+    motion = retime_fixed_steps(path)
     assert motion.shape == (20, 7)
     np.testing.assert_array_equal(motion[[9, 19]], path[1:])
     np.testing.assert_allclose(motion[:10], START + 0.2 * np.arange(1, 11)[:, None])
-    assert retime_in_tens(START[None]).shape == (0, 7)
-    assert len(retime_in_tens(path, 30)) == 60
+    assert retime_fixed_steps(START[None]).shape == (0, 7)
+    assert len(retime_fixed_steps(path, 30)) == 60

@@ -37,7 +37,7 @@ def solve(quality, seed, max_replans=10, task=TASK):
         task.step_limit,
         max_replans,
         perceiver(quality, task=task, seed=seed),
-        quality.patience,
+        quality.debounce_delay_steps,
     ).run()
     return episode, space.abstract(world.state) & goal == goal
 
@@ -170,8 +170,8 @@ def test_a_skill_about_what_is_missing_ends_with_its_own_code():
     assert not episode.success
     assert episode.error.code is ErrorCode.NO_DETECTION
     assert "block1" in episode.error.reason
-    remembered, holds = solve(Quality(hidden=frozenset({"block1"}), memory_steps=100), 0)
-    assert remembered.success
+    memoized, holds = solve(Quality(hidden=frozenset({"block1"}), memory_steps=100), 0)
+    assert memoized.success
     assert holds
 
 
@@ -198,7 +198,10 @@ def test_what_is_debounced_is_waited_for():
     assert holds
     assert episode.replans == 0
     edges = 4
-    assert episode.plan_length == solve(Quality(), 0)[0].plan_length + edges * quality.patience
+    assert (
+        episode.plan_length
+        == solve(Quality(), 0)[0].plan_length + edges * quality.debounce_delay_steps
+    )
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from slap_ros.relational import State, Type
 MADE_BLOCK = Type("block", (*BODY_FEATURES, *MATERIAL_FEATURES))
 
 
-def made_of(materials: Mapping[str, Material]) -> State:
+def tower_of(materials: Mapping[str, Material]) -> State:
     """The tower, of these materials; the reference's where none is given."""
     state = tower()
     features = {}
@@ -31,6 +31,6 @@ def made_of(materials: Mapping[str, Material]) -> State:
 
 def mixed(rng: np.random.Generator) -> State:
     """The tower, each block from feather to lead and from ice to rubber."""
-    return made_of(
+    return tower_of(
         {n: Material(float(np.exp(rng.uniform(-3, 1))), rng.uniform(0.0, 1.5)) for n in NAMES}
     )

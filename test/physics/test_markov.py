@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pairs import Pairs, record
+from transitions import Transitions, record
 
 from benchmarks.physics_step import BLOCK, NAMES, SCENE, tower
 from slap_ros.geometry.pose import Pose
-from slap_ros.physics.clients import release_idle
 from slap_ros.physics.features import POSE_FEATURES, pose_features
 from slap_ros.physics.scene import TABLE, Box, Scene
+from slap_ros.physics.simulation_pool import close_idle
 from slap_ros.physics.world import PandaWorld
 from slap_ros.relational import State, Type
 
@@ -24,20 +24,20 @@ COUNTS = {"alike": 1000, "mixed": 1000, "toys": 400}  # toys have many pieces
 
 
 @pytest.fixture(scope="module", params=list(COUNTS))
-def pairs(request) -> Pairs:
+def transitions(request) -> Transitions:
     return record(COUNTS[request.param], seed=1, kind=request.param)
 
 
 @pytest.fixture
-def world(pairs):
-    with PandaWorld(pairs.scene, pairs.start) as world:
+def world(transitions):
+    with PandaWorld(transitions.scene, transitions.start) as world:
         yield world
 
 
-def test_the_pairs_are_taken_in_the_thick_of_it(pairs):
-    states = State(pairs.start.layout, pairs.before)
+def test_the_pairs_are_taken_in_the_thick_of_it(transitions):
+    states = State(transitions.start.layout, transitions.before)
     blocks = [states[states.layout.object(name)] for name in NAMES]
-    after = State(pairs.start.layout, pairs.after)
+    after = State(transitions.start.layout, transitions.after)
     moving = np.max([np.abs(block[:, 7:13]).max(1) for block in blocks], axis=0) > 0.02
     shifted = np.max(
         [
@@ -47,41 +47,44 @@ def test_the_pairs_are_taken_in_the_thick_of_it(pairs):
         axis=0,
     )
     held = np.max([block[:, 13] for block in blocks], axis=0) > 0.5
-    assert len(pairs.before) == COUNTS[pairs.kind]
+    assert len(transitions.before) == COUNTS[transitions.kind]
     assert moving.mean() > 0.2
     assert ((shifted > 1e-3) & ~held).mean() > 0.3
     assert held.mean() > 0.1
 
 
-def test_the_same_after_any_other_history(pairs, world):
+def test_the_same_after_any_other_history(transitions, world):
     for seed in range(2):
-        order = np.random.default_rng(seed).permutation(len(pairs.before))
-        assert pairs.differing(world, order) == []
+        order = np.random.default_rng(seed).permutation(len(transitions.before))
+        assert transitions.differing(world, order) == []
 
 
-def test_the_same_in_fresh_worlds(pairs):
-    for i in range(0, len(pairs.before), 50):
-        release_idle()  # a new PyBullet client each time
-        with PandaWorld(pairs.scene, pairs.start) as world:
-            assert pairs.differing(world, [i]) == []
+def test_the_same_in_fresh_worlds(transitions):
+    for i in range(0, len(transitions.before), 50):
+        close_idle()  # a new PyBullet client each time
+        with PandaWorld(transitions.scene, transitions.start) as world:
+            assert transitions.differing(world, [i]) == []
 
 
-def test_the_same_in_another_process(pairs, tmp_path):
-    pairs.save(tmp_path / "pairs.npz")
-    script = Path(__file__).with_name("pairs.py")
+def test_the_same_in_another_process(transitions, tmp_path):
+    transitions.save(tmp_path / "transitions.npz")
+    script = Path(__file__).with_name("transitions.py")
     answer = subprocess.run(
-        [sys.executable, script, tmp_path / "pairs.npz"], capture_output=True, text=True, check=True
+        [sys.executable, script, tmp_path / "transitions.npz"],
+        capture_output=True,
+        text=True,
+        check=True,
     )
-    assert f"0 of {len(pairs.before)} differ" in answer.stdout
+    assert f"0 of {len(transitions.before)} differ" in answer.stdout
 
 
-def test_a_world_goes_on_as_one_that_was_reset_to_its_state(pairs, world):
+def test_a_world_goes_on_as_one_that_was_reset_to_its_state(transitions, world):
     """Nothing is carried from step to step but the state."""
-    with PandaWorld(pairs.scene, pairs.start) as other:
-        for start in range(0, len(pairs.before), 40):
-            state = pairs.state(start)
+    with PandaWorld(transitions.scene, transitions.start) as other:
+        for start in range(0, len(transitions.before), 40):
+            state = transitions.state(start)
             world.reset(state)
-            for action in pairs.actions[start : start + 8]:
+            for action in transitions.actions[start : start + 8]:
                 other.reset(state)
                 state = world.step(action)
                 assert other.step(action) == state

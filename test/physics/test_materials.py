@@ -6,15 +6,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from materials import made_of
-from pairs import GRASP, holding
+from materials import tower_of
+from transitions import GRASP, holding
 
 from benchmarks.physics_step import NAMES, SCENE, reach, tower
 from slap_ros.errors import InvalidStateError
-from slap_ros.physics.clients import release_idle
 from slap_ros.physics.panda import HOME
 from slap_ros.physics.scene import CUBE_MATERIAL, FRICTION, TABLE, Material, Scene, cube
 from slap_ros.physics.simulation import GRAVITY
+from slap_ros.physics.simulation_pool import close_idle
 from slap_ros.physics.world import PandaWorld
 from slap_ros.relational import State
 
@@ -30,14 +30,14 @@ def steps(world: PandaWorld, state: State, count: int) -> State:
 
 def shoved(friction: float, mass: float = 0.5, at: float = 1.0) -> State:
     """Block T slides along the table at so many m/s in y; what it might meet is far away."""
-    state = made_of({"T": Material(mass, friction)})
+    state = tower_of({"T": Material(mass, friction)})
     block = state.layout.object("T")
     return state.replace({(block, "vy"): at, (block, "y"): -0.35})
 
 
 @pytest.fixture
 def world():
-    with PandaWorld(SCENE, made_of({})) as world:
+    with PandaWorld(SCENE, tower_of({})) as world:
         yield world
 
 
@@ -60,7 +60,7 @@ def test_a_block_on_ice_does_not_stop(world):
 def test_a_heavy_block_hits_harder(world):
     def travelled(mass: float) -> float:
         """How far a block of 0.5 kg goes that is hit by one of that mass."""
-        state = made_of({"T": Material(mass, 0.3), "B": Material(0.5, 0.3)})
+        state = tower_of({"T": Material(mass, 0.3), "B": Material(0.5, 0.3)})
         t, b = state.layout.object("T"), state.layout.object("B")
         changes = {(t, "x"): 0.3, (t, "y"): 0.2, (t, "vx"): 0.8}
         changes |= {(b, "x"): 0.4, (b, "y"): 0.2}
@@ -77,7 +77,7 @@ def test_a_held_block_is_as_rough_as_the_state_says(world):
     def dragged(friction: float) -> float:
         """How far a light block goes over which a held one is drawn, slightly pressing it."""
         joints = reach(np.array([0.5, -0.2, 0.148]), 0.0, np.array(HOME))
-        state = made_of({"T": Material(0.5, friction), "B": Material(0.05, 0.1)})
+        state = tower_of({"T": Material(0.5, friction), "B": Material(0.05, 0.1)})
         state = holding(state, "T", tuple(joints.tolist()))
         blocks = {name: state.layout.object(name) for name in NAMES}
         changes = {(blocks["B"], "x"): 0.5, (blocks["B"], "y"): -0.2}
@@ -102,7 +102,7 @@ def test_a_world_takes_on_the_masses_and_frictions_of_each_state(world):
     states = [shoved(0.2, 0.3), shoved(0.7, 3.0), shoved(0.9, 0.5), shoved(0.2, 0.1)]
     fresh = []
     for state in states:
-        release_idle()
+        close_idle()
         with PandaWorld(SCENE, state) as other:
             fresh.append(steps(other, state, 6))
     assert len({state.key for state in fresh}) == len(states)
@@ -122,8 +122,8 @@ def test_the_same_numbers_in_the_scene_and_in_the_state_are_the_same_physics(mat
 
     with PandaWorld(scene, tower()) as said_by_scene:
         one = steps(said_by_scene, thrown(tower()), 6)
-    said = made_of(dict.fromkeys(NAMES, material))
-    with PandaWorld(SCENE, made_of({})) as said_by_state:
+    said = tower_of(dict.fromkeys(NAMES, material))
+    with PandaWorld(SCENE, tower_of({})) as said_by_state:
         other = steps(said_by_state, thrown(said), 6)
     for name in NAMES:
         for feature in features:

@@ -5,8 +5,8 @@
 import numpy as np
 import pybullet
 import pytest
-from pairs import GRASP, holding
 from toys import TOYS, heap
+from transitions import GRASP, holding
 
 from benchmarks.physics_step import BLOCK, NAMES, SCENE, tower
 from slap_ros.domains.cleanup_table.shapes import make, shipped

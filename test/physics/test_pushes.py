@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pybullet
 import pytest
-from pairs import HIGH, holding
+from transitions import HIGH, holding
 
 from benchmarks.physics_step import NAMES, SCENE, pushes, tower, truth, with_joints
 from slap_ros.geometry.oriented_box import OrientedBox
@@ -16,7 +16,7 @@ from slap_ros.physics.arm import Arm
 from slap_ros.physics.panda import FINGER_OPEN, HOME, MAX_STEP
 from slap_ros.physics.scene import CUBE_EDGE, FLOOR_TOP, TABLE, TABLE_TOP, cube
 from slap_ros.physics.simulation import Drive, Simulation, Stepping
-from slap_ros.physics.snapshot import Motion
+from slap_ros.physics.snapshot import BodyState
 from slap_ros.physics.world import PandaWorld
 
 PUSHES = 40  # of the 200 that benchmarks/physics_step.py --pushes 200 compares
@@ -108,7 +108,7 @@ def test_a_tower_stands_while_the_arm_moves_about_elsewhere(world):
 def test_driven_links_arrive_where_they_are_sent():
     """To a hundredth of a millimetre, over the longest way, with nothing to push."""
     simulation = Simulation(SCENE, Stepping())
-    away = [Motion(Pose((-1.0 - i, 0.0, 1.0))) for i in range(len(NAMES))]
+    away = [BodyState(Pose((-1.0 - i, 0.0, 1.0))) for i in range(len(NAMES))]
     start = Arm.at(HOME, FINGER_OPEN)
     end = Arm.at(np.add(HOME, MAX_STEP).tolist(), FINGER_OPEN)
     drives = [Drive.between(a, b) for a, b in zip(start.links, end.links, strict=True)]

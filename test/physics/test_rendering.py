@@ -10,18 +10,18 @@ import cv2
 import numpy as np
 import pybullet
 import pytest
-from pairs import holding
 from PIL import Image, ImageSequence
+from transitions import holding
 
 from benchmarks.physics_step import NAMES, tower
 from slap_ros.physics.animation import WRITERS
-from slap_ros.physics.rendering import Camera, View, write_animation
+from slap_ros.physics.rendering import Camera, Viewpoint, write_animation
 from slap_ros.physics.scene import TABLE, Scene, cube
 from slap_ros.relational import State
 
 RED, BLUE = (0.9, 0.1, 0.1, 1.0), (0.1, 0.1, 0.9, 1.0)
 SCENE = Scene((TABLE, *(cube(n, RED if n == "T" else BLUE) for n in NAMES)))
-VIEW = View(width=160, height=120)
+VIEW = Viewpoint(width=160, height=120)
 
 
 @pytest.fixture

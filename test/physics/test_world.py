@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The world: limits, refused steps, grasping, impossible scenes, clients."""
+"""The world: limits, refused steps, grasping, impossible scenes, simulations used again."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import gc
 import numpy as np
 import pybullet
 import pytest
-from pairs import HIGH, holding
+from transitions import HIGH, holding
 
 from benchmarks.physics_step import BLOCK, NAMES, SCENE, pushes, reach, tower, with_joints
 from slap_ros.errors import InvalidCommandError, InvalidDomainError, InvalidStateError
 from slap_ros.geometry.pose import Pose
-from slap_ros.physics import clients
+from slap_ros.physics import simulation_pool
 from slap_ros.physics.arm import Arm, Obstacle, Sweep
 from slap_ros.physics.features import ROBOT, body_features, robot_features
 from slap_ros.physics.panda import (
@@ -370,7 +370,7 @@ def test_a_scene_without_free_bodies():
         assert joints(world.step(HIGH))[0] == pytest.approx(HOME[0] + MAX_STEP[0])
 
 
-# -- clients ------------------------------------------------------------------------------------
+# -- simulations used again ------------------------------------------------------------------------
 
 
 def connected() -> int:
@@ -378,7 +378,7 @@ def connected() -> int:
 
 
 def test_ten_worlds_made_and_closed_leak_no_clients():
-    clients.release_idle()
+    simulation_pool.close_idle()
     before = connected()
     worlds = [PandaWorld(SCENE, tower()) for _ in range(10)]
     assert connected() == before + 10
@@ -386,19 +386,19 @@ def test_ten_worlds_made_and_closed_leak_no_clients():
     assert states[2] == states[4] != states[3] == states[5]
     for world in worlds:
         world.close()
-    assert connected() == before + clients.MOST_IDLE
-    clients.release_idle()
+    assert connected() == before + simulation_pool.MOST_IDLE
+    simulation_pool.close_idle()
     assert connected() == before
 
 
 def test_a_world_that_nobody_refers_to_gives_its_client_back():
-    clients.release_idle()
+    simulation_pool.close_idle()
     before = connected()
     for _ in range(10):
         PandaWorld(SCENE, tower()).step(STAY)
     gc.collect()
     assert connected() == before + 1  # the same one every time
-    clients.release_idle()
+    simulation_pool.close_idle()
     assert connected() == before
 
 
@@ -411,7 +411,7 @@ def test_a_closed_world_cannot_be_stepped():
 
 
 def test_a_refused_state_takes_no_client():
-    clients.release_idle()
+    simulation_pool.close_idle()
     before = connected()
     with pytest.raises(InvalidStateError):
         PandaWorld(SCENE, changed("T", z=0.0))

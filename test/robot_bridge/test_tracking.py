@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from slap_ros.errors import InvalidMeasurementError
-from slap_ros.geometry.pose import NO_TURN, Pose
+from slap_ros.geometry.pose import NO_ROTATION, Pose
 from slap_ros.geometry.static_transforms import StaticTransforms
 from slap_ros.physics.scene import TABLE, TABLE_TOP, cube
-from slap_ros.physics.settling import settled
+from slap_ros.physics.settling import resting_poses
 from slap_ros.robot.tracking import Detection, Sensing, Track, measured_pose
 
 SENSING = Sensing(position_noise_m=0.002)
@@ -21,7 +21,7 @@ RATE = 30.0  # Hz
 def feed(track, place, start_s, count, rng, velocity=(0.0, 0.0, 0.0)):
     for k in range(count):
         at = np.add(place, np.multiply(velocity, k / RATE)) + 0.002 * rng.standard_normal(3)
-        track.add(Detection(start_s + (k + 1) / RATE, Pose(tuple(at), NO_TURN)))
+        track.add(Detection(start_s + (k + 1) / RATE, Pose(tuple(at), NO_ROTATION)))
 
 
 def test_what_lies_still_is_averaged_and_then_stays_the_same_to_the_bit():
@@ -99,7 +99,7 @@ def test_a_tower_is_put_together_again():
         x, y, z = (0.5, 0.0, TABLE_TOP + 0.05 * (i + 0.5)) + 0.002 * rng.standard_normal(3)
         a, b, c = 0.005 * rng.standard_normal(3)
         measured[i] = measured_pose((x, y, z), np.array([a, b, c, 1.0]) / math.hypot(a, b, c, 1.0))
-    found = settled(measured, cubes, [TABLE.at(TABLE.pose)])
+    found = resting_poses(measured, cubes, [TABLE.at(TABLE.pose)])
     for i, pose in found.items():
         assert pose.position[2] == pytest.approx(TABLE_TOP + 0.05 * (i + 0.5), abs=1e-12)
         assert pose.position[:2] == measured[i].position[:2]
@@ -110,7 +110,7 @@ def test_a_tower_is_put_together_again():
 def test_what_leans_or_floats_is_left_as_it_was_seen():
     leaning = Pose((0.5, 0.0, 0.11), (math.sin(0.2), 0.0, 0.0, math.cos(0.2)))
     floating = Pose((0.4, 0.2, 0.3))
-    found = settled({0: leaning, 1: floating}, [cube("a"), cube("b")], [TABLE.at(TABLE.pose)])
+    found = resting_poses({0: leaning, 1: floating}, [cube("a"), cube("b")], [TABLE.at(TABLE.pose)])
     assert found == {0: leaning, 1: floating}
 
 

@@ -6,8 +6,13 @@ import numpy as np
 import pytest
 
 from slap_ros.domains import get_domain
-from slap_ros.domains.tabletop.reading import JOINT_NAMES
-from slap_ros.domains.tabletop.seeing import SWIFT, along, hand, moving_hand
+from slap_ros.domains.tabletop.observation import (
+    STEP_SCALE,
+    hand_frame,
+    hand_frame_and_velocities,
+    joint_contributions,
+)
+from slap_ros.domains.tabletop.state_access import JOINT_NAMES
 from slap_ros.physics.features import ROBOT
 from slap_ros.physics.panda import JOINT_HIGH, JOINT_LOW, MAX_STEP
 from slap_ros.physics.scene import TABLE_TOP
@@ -63,7 +68,7 @@ def test_a_batch_is_strained_like_its_states(sight):
 def after_the_slap(block_to_hand_m, speed):
     """The target is free. A block of the tower moves, so far below the hand; the rest is away."""
     state = TOWER.task(0).initial_state
-    x, y, z = hand(state.alone())[0, :3, 3]
+    x, y, z = hand_frame(state.alone())[0, :3, 3]
     features = {
         (state.layout.object(f"block{number}"), axis): value
         for number in (2, 3, 4)
@@ -110,10 +115,12 @@ def test_joints_are_seen_to_take_the_hand_as_far_as_they_do():
     (robot,) = state.layout.of_type(ROBOT)
     joints = dict(zip(JOINT_NAMES, rng.uniform(JOINT_LOW, JOINT_HIGH), strict=True))
     here = state.replace({(robot, name): value for name, value in joints.items()})
-    moving, way = moving_hand(here.alone()), rng.normal(size=3)
-    seen = along(moving, way[None, None])[0, 0]
+    moving, way = hand_frame_and_velocities(here.alone()), rng.normal(size=3)
+    seen = joint_contributions(moving, way[None, None])[0, 0]
     part = 1e-5  # of a control step
     for i, (name, value) in enumerate(joints.items()):
         there = here.replace({(robot, name): value + part * MAX_STEP[i]})
-        shift = hand(there.alone())[0, :3, 3] - moving[0, :3, 3]
-        assert seen[i] == pytest.approx(shift @ way / np.linalg.norm(way) / part / SWIFT, abs=1e-4)
+        shift = hand_frame(there.alone())[0, :3, 3] - moving[0, :3, 3]
+        assert seen[i] == pytest.approx(
+            shift @ way / np.linalg.norm(way) / part / STEP_SCALE, abs=1e-4
+        )

@@ -11,7 +11,7 @@ import pytest
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.obstacle_tower import make
-from slap_ros.domains.obstacle_tower.tasks import RandomTasks
+from slap_ros.domains.obstacle_tower.tasks import RandomTowerTasks
 from slap_ros.evaluation.approaches import Approach
 from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.reach import Reach
@@ -21,7 +21,7 @@ from slap_ros.shortcuts.signature import Change, Signature, concerned, context_o
 def tower(obstacles, seed=0, distractors=0):
     """The atoms of a tower task, and the change of knocking the whole tower over."""
     counts = (obstacles, obstacles), (distractors, distractors)
-    state = RandomTasks(*counts).sample(np.random.default_rng(seed)).initial_state
+    state = RandomTowerTasks(*counts).sample(np.random.default_rng(seed)).initial_state
     space = make("fair").atom_space(state)
     blocks = [f"block{i}" for i in range(2, obstacles + 2)]
     add = [space.atom("On", [b, "table"]) for b in blocks] + [space.atom("NothingOn", ["target"])]

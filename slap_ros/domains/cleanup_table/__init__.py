@@ -17,28 +17,30 @@ from types import MappingProxyType
 from slap_ros.core import ActionSpace, Display, Domain, Execution, Learning
 from slap_ros.domains.cleanup_table import model, skills, tasks
 from slap_ros.domains.cleanup_table.learner_interface import LEARNER_INTERFACE
-from slap_ros.domains.cleanup_table.scenery import scene_of
+from slap_ros.domains.cleanup_table.scene import scene_of
 from slap_ros.domains.cleanup_table.shapes import shipped
 from slap_ros.domains.tabletop.settling import settling
-from slap_ros.domains.tabletop.showing import animation, visible_arm, visible_bodies
-from slap_ros.domains.tabletop.timing import AtSpeedLimit, InTens, Timing
+from slap_ros.domains.tabletop.timing import FixedStepTiming, SpeedLimitTiming, Timing
+from slap_ros.domains.tabletop.visualization import animation, visible_arm, visible_bodies
 from slap_ros.domains.variation import varied
 from slap_ros.meshes.solid import Solid
 from slap_ros.physics.panda import CONTROL_PERIOD_S
 from slap_ros.physics.scene import Scene
-from slap_ros.physics.viewpoint import View
+from slap_ros.physics.viewpoint import Viewpoint
 from slap_ros.physics.world import ACTION_SPACE, PandaWorld
 from slap_ros.relational import State
 
-SETTINGS: Mapping[str, tasks.RandomTasks | tasks.PaperTasks] = {
-    "fair": tasks.RandomTasks(),
-    "paper": tasks.PaperTasks(),
+SETTINGS: Mapping[str, tasks.RandomCleanupTasks | tasks.PaperCleanupTasks] = {
+    "fair": tasks.RandomCleanupTasks(),
+    "paper": tasks.PaperCleanupTasks(),
 }
 # The reference has no limit to what its planned motions do in a step, and jumps by 3 rad.
-WHATEVER = replace(ACTION_SPACE, low=(*(-math.pi,) * 7, -1.0), high=(*(math.pi,) * 7, 1.0))
-ACTIONS: Mapping[str, ActionSpace] = {"fair": ACTION_SPACE, "paper": WHATEVER}
-FROM_THE_LEFT = View(eye=(1.7, 1.15, 0.95), target=(0.33, 0.13, 0.13))  # m, into the bin
-TIMINGS: Mapping[str, Timing] = {"fair": AtSpeedLimit(), "paper": InTens()}
+UNLIMITED_ACTION_SPACE = replace(
+    ACTION_SPACE, low=(*(-math.pi,) * 7, -1.0), high=(*(math.pi,) * 7, 1.0)
+)
+ACTIONS: Mapping[str, ActionSpace] = {"fair": ACTION_SPACE, "paper": UNLIMITED_ACTION_SPACE}
+VIEWPOINT = Viewpoint(eye=(1.7, 1.15, 0.95), target=(0.33, 0.13, 0.13))  # m, into the bin
+TIMINGS: Mapping[str, Timing] = {"fair": SpeedLimitTiming(), "paper": FixedStepTiming()}
 
 
 def make(
@@ -79,7 +81,7 @@ def make(
         display=Display(
             bodies=lambda state: visible_bodies(scene(state), state),
             arm=visible_arm,
-            animate=animation(scene, FROM_THE_LEFT),
+            animate=animation(scene, VIEWPOINT),
         ),
         learning=Learning(
             interface=LEARNER_INTERFACE,

@@ -13,9 +13,9 @@ from slap_ros.domains.cleanup_table.model import (
     HALF,
     HOLDING,
     NOT_HOLDING,
-    Things,
+    CleanupObjectIndex,
 )
-from slap_ros.domains.tabletop import seeing
+from slap_ros.domains.tabletop import observation
 from slap_ros.relational import Column, State
 from slap_ros.relational.predicates import Bools
 from slap_ros.relational.state import Array
@@ -28,9 +28,16 @@ def _things(state: State, hand: Array, column: Column) -> Array:
     """Of blocks, where from the hand, along the base's axes; how fast; where from the bin."""
     kind = column.objects[0].type
     if not kind.is_a(BLOCK):
-        return seeing.nothing(state, column)  # the robot is seen already, the rest stands still
-    place, speed = seeing.place(state, hand, column), seeing.speed(state, column)
-    return np.concatenate([place, speed, _from_bin(state, column) / seeing.FAR], axis=-1)
+        return observation.no_features(
+            state, column
+        )  # the robot is seen already, the rest stands still
+    place, speed = (
+        observation.scaled_displacements(state, hand, column),
+        observation.scaled_velocities(state, column),
+    )
+    return np.concatenate(
+        [place, speed, _from_bin(state, column) / observation.DISTANCE_SCALE], axis=-1
+    )
 
 
 def _from_bin(state: State, column: Column) -> Array:
@@ -41,17 +48,17 @@ def _from_bin(state: State, column: Column) -> Array:
 
 def _bin(state: State) -> Column:
     """The bin, alone; it stays one, so that one state of a batch tells."""
-    surfaces = Things.of(state.layout).surfaces
+    surfaces = CleanupObjectIndex.of(state.layout).surfaces
     first = state.data.reshape(-1, state.data.shape[-1])[0]
     labels = first[state.layout.grid(surfaces, ("is_drawer",))[:, 0]]
-    return seeing.alone(surfaces.objects[int(np.argmax(labels))])
+    return observation.single(surfaces.objects[int(np.argmax(labels))])
 
 
 def _distance(state: State, hand: Array, column: Column) -> Array:
     """From the hand to where it pushes blocks towards the bin: across it, any place will do."""
     if not column.objects[0].type.is_a(BLOCK):
-        return seeing.never_near(state, column)
-    way = seeing.from_hand(state, hand, column)
+        return observation.unreachable(state, column)
+    way = observation.displacements(state, hand, column)
     way[..., 1] += BEHIND * np.sign(_from_bin(state, column)[..., 1])
     distance: Array = np.sqrt(np.square(way).sum(axis=-1))
     return distance
@@ -59,7 +66,7 @@ def _distance(state: State, hand: Array, column: Column) -> Array:
 
 def _lost(state: State) -> Bools:
     """Whether a block lies on the floor beside the bin."""
-    things = Things.of(state.layout)
+    things = CleanupObjectIndex.of(state.layout)
     box = state.gather(_bin(state), ("z", *HALF))[..., 0, :]
     low = state.stack(things.blocks, "z") < (box[..., 0] + box[..., 3] - FALLEN)[..., None]
     off: Bools = np.abs(_from_bin(state, things.blocks)) > box[..., None, 1:3]
@@ -68,13 +75,13 @@ def _lost(state: State) -> Bools:
 
 
 LEARNER_INTERFACE = LearnerInterface(
-    hand=seeing.hand,
-    robot=seeing.robot,
+    hand=observation.hand_frame,
+    robot=observation.robot,
     objects=_things,
     distance=_distance,
-    separation=seeing.apart,
-    at_rest=seeing.settled,
+    separation=observation.separations,
+    at_rest=observation.at_rest,
     failed=_lost,
-    joint_limit_penalty=seeing.strain,
+    joint_limit_penalty=observation.joint_limit_penalty,
     grasping=frozenset({HOLDING, NOT_HOLDING, GRIPPER_EMPTY}),
 )

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.domains.tabletop import seeing
-from slap_ros.domains.tabletop.reading import JOINT_NAMES
+from slap_ros.domains.tabletop import observation
+from slap_ros.domains.tabletop.state_access import JOINT_NAMES
 from slap_ros.physics.features import (
     BODY_FEATURES,
     MATERIAL_FEATURES,
@@ -30,7 +30,7 @@ from slap_ros.relational import (
     Type,
     Variable,
 )
-from slap_ros.relational.predicates import Bools, shared
+from slap_ros.relational.predicates import Bools, cache_latest
 from slap_ros.relational.state import Array
 
 LOW = 0.03  # height over the table at which a thing still counts as on it
@@ -86,7 +86,7 @@ SURFACE_READ = ("x", "y", "qw", "qz", "z", *HALF, "is_drawer")  # complex number
 
 
 @dataclass(frozen=True, eq=False)
-class Things:
+class CleanupObjectIndex:
     """The blocks and surfaces of a layout, and where their features are."""
 
     blocks: Column
@@ -96,10 +96,10 @@ class Things:
 
     @staticmethod
     @lru_cache(maxsize=256)
-    def of(layout: Layout) -> Things:
+    def of(layout: Layout) -> CleanupObjectIndex:
         """Those of a layout."""
         blocks, surfaces = layout.column_of(BLOCK), layout.column_of(SURFACE)
-        return Things(
+        return CleanupObjectIndex(
             blocks,
             surfaces,
             (layout.grid(blocks, BLOCK_READ), layout.grid(surfaces, SURFACE_READ)),
@@ -113,7 +113,7 @@ class Things:
         return np.array([among.objects.index(obj) for obj in column.objects], dtype=np.intp)
 
 
-class Scenery(NamedTuple):
+class CleanupRelations(NamedTuple):
     """How everything is in a state, as margins in m."""
 
     on: Array  # of blocks on surfaces, shape (..., blocks, surfaces)
@@ -123,10 +123,10 @@ class Scenery(NamedTuple):
     highest: Array  # height of the highest point of what is not in the hand, shape (...)
 
 
-@shared
-def scenery(state: State) -> Scenery:
+@cache_latest
+def cleanup_relations(state: State) -> CleanupRelations:
     """How everything is: all at once, as predicates share most of it."""
-    things = Things.of(state.layout)
+    things = CleanupObjectIndex.of(state.layout)
     blocks, surfaces = (state.data.take(read, axis=-1) for read in things.read)
     bottom, top = _extents(blocks)
     held = blocks[..., 10] > 0.5
@@ -140,11 +140,13 @@ def scenery(state: State) -> Scenery:
     highest_other = np.maximum(np.maximum.reduce(others, axis=-1), table_top[..., None])
     highest = np.maximum(np.maximum.reduce(tops, axis=-1), table_top)
 
-    hand = seeing.grasp_point(state.gather(state.layout.column_of(ROBOT), JOINT_NAMES)[..., 0, :])
+    hand = observation.grasp_points(
+        state.gather(state.layout.column_of(ROBOT), JOINT_NAMES)[..., 0, :]
+    )
     way = hand[..., None, :] - blocks[..., :3]
     aside = ASIDE - np.hypot(way[..., 0], way[..., 1])
     ready = _all_of(np.stack([aside, BAND - np.abs(way[..., 2] - OVER)]))
-    return Scenery(
+    return CleanupRelations(
         _on(blocks, surfaces, bottom, held),
         bottom - highest_other - CLEAR,
         _idle(ready, full[..., None]),
@@ -214,18 +216,22 @@ def _strictly(margin: Array) -> Array:
 
 
 def _among_blocks(margins: Array, state: State, block: Column) -> Array:
-    return margins.take(Things.numbers(Things.of(state.layout).blocks, block), axis=-1)
+    return margins.take(
+        CleanupObjectIndex.numbers(CleanupObjectIndex.of(state.layout).blocks, block), axis=-1
+    )
 
 
 def _on_margin(state: State, block: Column, surface: Column) -> Array:
-    things = Things.of(state.layout)
-    rows = Things.numbers(things.blocks, block)
-    margins: Array = scenery(state).on[..., rows, Things.numbers(things.surfaces, surface)]
+    things = CleanupObjectIndex.of(state.layout)
+    rows = CleanupObjectIndex.numbers(things.blocks, block)
+    margins: Array = cleanup_relations(state).on[
+        ..., rows, CleanupObjectIndex.numbers(things.surfaces, surface)
+    ]
     return margins
 
 
 def _above_margin(state: State, block: Column) -> Array:
-    return _among_blocks(scenery(state).above, state, block)
+    return _among_blocks(cleanup_relations(state).above, state, block)
 
 
 def _not_above_margin(state: State, block: Column) -> Array:
@@ -233,7 +239,7 @@ def _not_above_margin(state: State, block: Column) -> Array:
 
 
 def _ready_margin(state: State, _: Column, block: Column) -> Array:
-    return _among_blocks(scenery(state).ready, state, block)
+    return _among_blocks(cleanup_relations(state).ready, state, block)
 
 
 def _not_ready_margin(state: State, robot: Column, block: Column) -> Array:
@@ -241,7 +247,7 @@ def _not_ready_margin(state: State, robot: Column, block: Column) -> Array:
 
 
 def _hand_ready_margin(state: State, _: Column) -> Array:
-    return scenery(state).hand_ready[..., None]
+    return cleanup_relations(state).hand_ready[..., None]
 
 
 def _is(state: State, thing: Column, label: str) -> Bools:
@@ -261,7 +267,7 @@ def _not_held(state: State, _: Column, block: Column) -> Bools:
 
 
 def _gripper_empty(state: State, _: Column) -> Bools:
-    held = _is(state, Things.of(state.layout).blocks, "held")
+    held = _is(state, CleanupObjectIndex.of(state.layout).blocks, "held")
     empty: Bools = ~np.logical_or.reduce(held, axis=-1, keepdims=True)
     return empty
 

@@ -21,13 +21,15 @@ from slap_ros.domains.cleanup_table.model import (
     TIP,
     VELOCITY,
     WALL,
-    scenery,
+    cleanup_relations,
 )
-from slap_ros.domains.cleanup_table.scenery import SURROUNDINGS, carried
-from slap_ros.domains.tabletop import seeing
+from slap_ros.domains.cleanup_table.scene import PLANNING_SCENE, carried
+from slap_ros.domains.tabletop import observation
 from slap_ros.domains.tabletop.grasps import from_above
-from slap_ros.domains.tabletop.places import Place, free_places
-from slap_ros.domains.tabletop.reading import (
+from slap_ros.domains.tabletop.placements import Placement, free_placements
+from slap_ros.domains.tabletop.planning_scene import CARRYING
+from slap_ros.domains.tabletop.skills import GRIP, RELEASE, STEP_LIMIT, TrajectoryFollower
+from slap_ros.domains.tabletop.state_access import (
     JOINT_NAMES,
     box_of,
     grasp_of,
@@ -35,10 +37,8 @@ from slap_ros.domains.tabletop.reading import (
     pose_of,
     top_of,
 )
-from slap_ros.domains.tabletop.skills import GRIP, RELEASE, STEP_LIMIT, Follow
-from slap_ros.domains.tabletop.surroundings import CARRYING
 from slap_ros.domains.tabletop.timing import Timing
-from slap_ros.domains.tabletop.ways import CLEARANCE, PLANS, SEED, remembered
+from slap_ros.domains.tabletop.transit import CLEARANCE, PLANS, SEED, memoized
 from slap_ros.errors import SkillNotApplicableError
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, Vector, conjugate, rotate
@@ -74,14 +74,16 @@ GAP = 0.1  # m, between what is dropped and what lies there, where there is room
 # -- motions --------------------------------------------------------------------------------------
 
 
-class Motion(NamedTuple):
+class MotionPlan(NamedTuple):
     """Paths of the arm one after the other, in rad, shape (k, 7)."""
 
     pieces: Sequence[Path]
     free: Free  # where corners may be cut
 
 
-def _across(state: State, ends: Sequence[Pose], accepts: Callable[[Pose, Joints], bool]) -> Motion:
+def _across(
+    state: State, ends: Sequence[Pose], accepts: Callable[[Pose, Joints], bool]
+) -> MotionPlan:
     """To the nearest of some poses of the grasp point that will do, on a planned path.
 
     Args:
@@ -92,7 +94,7 @@ def _across(state: State, ends: Sequence[Pose], accepts: Callable[[Pose, Joints]
     Raises:
         SkillNotApplicableError: None of them can be reached.
     """
-    q, free = joints_of(state), SURROUNDINGS.checker(state, held_margin=CARRYING)
+    q, free = joints_of(state), PLANNING_SCENE.checker(state, held_margin=CARRYING)
     goals = nearest_configurations(ends, q, free=free) if ends else []
     ways = [
         (np.stack([q, goal]), end)
@@ -103,7 +105,9 @@ def _across(state: State, ends: Sequence[Pose], accepts: Callable[[Pose, Joints]
         if not accepts(end, goal):
             continue
         try:
-            return Motion([q[None], PLANS.plan_path(q, goal, free, seed=SEED), goal[None]], free)
+            return MotionPlan(
+                [q[None], PLANS.plan_path(q, goal, free, seed=SEED), goal[None]], free
+            )
         except MotionPlanningError:
             continue
     raise SkillNotApplicableError(f"none of {len(ends)} poses can be reached from here")
@@ -152,14 +156,16 @@ def _drops(state: State, block: Object, drawer: Object) -> Iterator[list[Pose]]:
     """Poses of the grasp point over the bin, hand pointing down; those of some places at a time."""
     x, y, _ = pose_of(state, block).position
     hand, space = grasp_pose(joints_of(state)), box_of(state, drawer)
-    height = max(hand.position[2], float(scenery(state).highest) + HAND_CLEAR + TIP + READY_SLACK)
+    height = max(
+        hand.position[2], float(cleanup_relations(state).highest) + HAND_CLEAR + TIP + READY_SLACK
+    )
     (mx, my, _), (half_x, half_y, _) = space.pose.position, space.half
     others = [other for other in state.layout.of_type(BLOCK) if other != block]
     lying = [pose_of(state, o).position for o in others if ON(o, drawer).holds(state)]
     taken = [((px, py), GAP) for px, py, _ in lying]
     rectangle = (mx, my), (half_x - WALL - INSIDE, half_y - WALL - INSIDE)
-    places = free_places((x, y), *rectangle, taken)
-    places += [place for place in free_places((x, y), *rectangle, []) if place not in places]
+    places = free_placements((x, y), *rectangle, taken)
+    places += [place for place in free_placements((x, y), *rectangle, []) if place not in places]
     found: list[Pose] = []
     for number, place in enumerate(places, start=1):
         found += _over(state, block, space, place, height)
@@ -170,7 +176,7 @@ def _drops(state: State, block: Object, drawer: Object) -> Iterator[list[Pose]]:
 
 
 def _over(
-    state: State, block: Object, space: OrientedBox, place: Place, height: float
+    state: State, block: Object, space: OrientedBox, place: Placement, height: float
 ) -> list[Pose]:
     """Poses from which the held block falls into the bin between its walls."""
     grasp, (frame, half) = grasp_of(state), carried(state, block)
@@ -191,9 +197,9 @@ def _over(
 # -- ways -----------------------------------------------------------------------------------------
 
 
-def _to_over(state: State, block: Object, table: Object) -> Motion:
+def _to_over(state: State, block: Object, table: Object) -> MotionPlan:
     """Over a block, where the hand can go straight down to grasp it."""
-    touching = SURROUNDINGS.checker(state, (block,))
+    touching = PLANNING_SCENE.checker(state, (block,))
     height = pose_of(state, block).position[2] + OVER
     below: dict[Pose, list[Pose]] = {}
     for grasp in grasps(state, block, table):
@@ -205,19 +211,19 @@ def _to_over(state: State, block: Object, table: Object) -> Motion:
     return _across(state, list(below), comes_down)
 
 
-def _down(state: State, block: Object, table: Object) -> Motion:
+def _down(state: State, block: Object, table: Object) -> MotionPlan:
     """Down to the grasp that takes the least turning."""
-    q, touching = joints_of(state), SURROUNDINGS.checker(state, (block,))
+    q, touching = joints_of(state), PLANNING_SCENE.checker(state, (block,))
     for grasp in sorted(grasps(state, block, table), key=grasp_pose(q).angle_to):
         down = linear_motion(q, grasp, free=touching)
         if down is not None:
-            return Motion([q[None], down], touching)
+            return MotionPlan([q[None], down], touching)
     raise SkillNotApplicableError(f"the hand cannot go straight down to {block}")
 
 
-def _up(state: State, block: Object, table: Object) -> Motion:
+def _up(state: State, block: Object, table: Object) -> MotionPlan:
     """Up until what is held is above everything, 5 cm after 5 cm."""
-    touching = SURROUNDINGS.checker(state, (table,))
+    touching = PLANNING_SCENE.checker(state, (table,))
     rise = LIFT_SLACK - _above(state, block)
     stages = max(1, math.ceil(rise / CLEARANCE))
     q, pieces = joints_of(state), []
@@ -227,10 +233,10 @@ def _up(state: State, block: Object, table: Object) -> Motion:
             raise SkillNotApplicableError(f"the arm cannot lift {block}")
         pieces.append(up[[0, -1]])
         q = up[-1]
-    return Motion(pieces, touching)
+    return MotionPlan(pieces, touching)
 
 
-def _to_bin(state: State, block: Object, drawer: Object) -> Motion:
+def _to_bin(state: State, block: Object, drawer: Object) -> MotionPlan:
     """Over one of the nearest places in the bin that can be reached."""
     for ends in _drops(state, block, drawer):
         try:
@@ -242,7 +248,7 @@ def _to_bin(state: State, block: Object, drawer: Object) -> Motion:
 
 def _above(state: State, block: Object) -> float:
     """Margin of a block over everything else, m."""
-    return float(scenery(state).above[state.layout.of_type(BLOCK).index(block)])
+    return float(cleanup_relations(state).above[state.layout.of_type(BLOCK).index(block)])
 
 
 # -- where a skill has done its work --------------------------------------------------------------
@@ -253,7 +259,7 @@ Until = Callable[[State, Object, Joints], Bools]
 
 def _is_over(state: State, block: Object, positions: Joints) -> Bools:
     """Whether the hand is ready to pick a block, and no more above everything."""
-    seen = scenery(_with_joints(state, positions))
+    seen = cleanup_relations(_with_joints(state, positions))
     number = state.layout.of_type(BLOCK).index(block)
     over: Bools = (seen.ready[..., number] >= 0.0) & (seen.hand_ready < 0.0)
     return over
@@ -261,8 +267,8 @@ def _is_over(state: State, block: Object, positions: Joints) -> Bools:
 
 def _is_lifted(state: State, block: Object, positions: Joints) -> Bools:
     """Whether a block that is lifted without being turned is above everything."""
-    before = seeing.grasp_point(joints_of(state))[..., 2]
-    rise = seeing.grasp_point(positions)[:, 2] - before
+    before = observation.grasp_points(joints_of(state))[..., 2]
+    rise = observation.grasp_points(positions)[:, 2] - before
     lifted: Bools = rise + _above(state, block) > ROUNDING
     return lifted
 
@@ -284,7 +290,7 @@ def _landed(state: State, block: Object, drawer: Object) -> bool:
     return bool((np.square(moving).sum(axis=-1) < SLOW**2).all()) and ON(block, drawer).holds(state)
 
 
-class ThenWait:
+class WaitForOutcome:
     """Stay where a policy ended, until something has happened."""
 
     def __init__(self, policy: Policy, happened: Callable[[State], bool]) -> None:
@@ -313,7 +319,7 @@ class MotionSkill:
 
     name: str
     timing: Timing
-    motion: Callable[[State, Object, Object], Motion]
+    motion: Callable[[State, Object, Object], MotionPlan]
     until: Until | None = None
     grip: tuple[float, ...] = ()
     step_limit: int = STEP_LIMIT
@@ -336,10 +342,10 @@ class MotionSkill:
         Raises:
             SkillNotApplicableError: There is no way for the arm.
         """
-        return Follow(_script(self, state, objects), self.timing.step)
+        return TrajectoryFollower(_script(self, state, objects), self.timing.step)
 
 
-@remembered
+@memoized
 def _script(
     skill: MotionSkill, state: State, objects: tuple[Object, ...]
 ) -> Sequence[tuple[Joints, float]]:
@@ -368,7 +374,7 @@ class DropSkill(MotionSkill):
         """See :class:`MotionSkill`."""
         _, block, drawer = objects
         policy = super().start(state, objects)
-        return ThenWait(policy, lambda now: _landed(now, block, drawer))
+        return WaitForOutcome(policy, lambda now: _landed(now, block, drawer))
 
 
 def skills(timing: Timing) -> dict[str, Skill]:

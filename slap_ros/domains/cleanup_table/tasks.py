@@ -13,7 +13,7 @@ import numpy as np
 
 from slap_ros.core import Task
 from slap_ros.domains.cleanup_table.model import BLOCK, HALF, IS_DRAWER, MIDDLE, ON, SURFACE, TOOL
-from slap_ros.domains.cleanup_table.scenery import BIN, MATERIAL, TABLE, TABLE_TOP, kind_of
+from slap_ros.domains.cleanup_table.scene import BIN, MATERIAL, TABLE, TABLE_TOP, kind_of
 from slap_ros.domains.cleanup_table.shapes import WIPER
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.geometry.oriented_box import OrientedBox
@@ -35,12 +35,12 @@ TRIES = 1_000  # places drawn for a toy before all are drawn anew
 ROUNDS = 100  # before there is said to be no room
 
 
-Place = tuple[float, float, float]  # x, y, yaw
+PlanarPose = tuple[float, float, float]  # x, y, yaw
 Range = tuple[float, float]
 
 
 def make_task(
-    places: Mapping[str, Place], shapes: Mapping[str, Solid], material: Material = MATERIAL
+    places: Mapping[str, PlanarPose], shapes: Mapping[str, Solid], material: Material = MATERIAL
 ) -> Task:
     """The task to put everything that stands on the table into the bin.
 
@@ -73,7 +73,7 @@ def everything_in_the_bin(state: State) -> frozenset[GroundAtom]:
 
 
 @dataclass(frozen=True)
-class RandomTasks:
+class RandomCleanupTasks:
     """Toys anywhere beside the bin, turned as they like; the wiper on the other side."""
 
     toys: tuple[int, int] = (3, 3)  # inclusive
@@ -101,10 +101,10 @@ class RandomTasks:
         material = Material(rng.uniform(*self.mass), rng.uniform(*self.friction))
         return make_task({**places, WIPER: (x, y, yaw)}, shapes, material)
 
-    def _apart(self, rng: np.random.Generator, count: int) -> list[Place]:
+    def _apart(self, rng: np.random.Generator, count: int) -> list[PlanarPose]:
         """Places that keep their distance, drawn anew where the last toys find none."""
         for _ in range(ROUNDS):
-            placed: list[Place] = []
+            placed: list[PlanarPose] = []
             for _ in range(TRIES):
                 if len(placed) == count:
                     return placed
@@ -119,11 +119,11 @@ class RandomTasks:
 
 
 @dataclass(frozen=True)
-class PaperTasks:
+class PaperCleanupTasks:
     """One start state, as the reference has; toys in its ranges."""
 
-    toys: tuple[Place, ...] = ((0.40, 0.10, 0.0), (0.50, 0.20, 0.0), (0.60, 0.10, 0.0))
-    wiper: Place = (0.5, -0.12, 0.0)
+    toys: tuple[PlanarPose, ...] = ((0.40, 0.10, 0.0), (0.50, 0.20, 0.0), (0.60, 0.10, 0.0))
+    wiper: PlanarPose = (0.5, -0.12, 0.0)
 
     def sample(self, _: np.random.Generator, shapes: Mapping[str, Solid]) -> Task:
         """That state."""

@@ -17,32 +17,36 @@ from types import MappingProxyType
 from slap_ros.core import ActionSpace, Display, Domain, Execution, Learning
 from slap_ros.domains.cluttered_drawer import model, skills, tasks
 from slap_ros.domains.cluttered_drawer.learner_interface import LEARNER_INTERFACE
-from slap_ros.domains.cluttered_drawer.scenery import scene_of
+from slap_ros.domains.cluttered_drawer.scene import scene_of
 from slap_ros.domains.tabletop.settling import settling
-from slap_ros.domains.tabletop.showing import animation, visible_arm, visible_bodies
-from slap_ros.domains.tabletop.timing import AtSpeedLimit, InTens, Timing
+from slap_ros.domains.tabletop.timing import FixedStepTiming, SpeedLimitTiming, Timing
+from slap_ros.domains.tabletop.visualization import animation, visible_arm, visible_bodies
 from slap_ros.domains.variation import varied
 from slap_ros.physics.features import ROBOT
 from slap_ros.physics.panda import CONTROL_PERIOD_S
-from slap_ros.physics.viewpoint import View
+from slap_ros.physics.viewpoint import Viewpoint
 from slap_ros.physics.world import ACTION_SPACE, PandaWorld
 
-SETTINGS: Mapping[str, tasks.RandomTasks | tasks.PaperTasks] = {
-    "fair": tasks.RandomTasks(),
-    "paper": tasks.PaperTasks(),
+SETTINGS: Mapping[str, tasks.RandomDrawerTasks | tasks.PaperDrawerTasks] = {
+    "fair": tasks.RandomDrawerTasks(),
+    "paper": tasks.PaperDrawerTasks(),
 }
 # The reference has no limit to what its planned motions do in a step, and jumps by 3 rad.
-WHATEVER = replace(ACTION_SPACE, low=(*(-math.pi,) * 7, -1.0), high=(*(math.pi,) * 7, 1.0))
-ACTIONS: Mapping[str, ActionSpace] = {"fair": ACTION_SPACE, "paper": WHATEVER}
-TIMINGS: Mapping[str, Timing] = {"fair": AtSpeedLimit(), "paper": InTens()}
+UNLIMITED_ACTION_SPACE = replace(
+    ACTION_SPACE, low=(*(-math.pi,) * 7, -1.0), high=(*(math.pi,) * 7, 1.0)
+)
+ACTIONS: Mapping[str, ActionSpace] = {"fair": ACTION_SPACE, "paper": UNLIMITED_ACTION_SPACE}
+TIMINGS: Mapping[str, Timing] = {"fair": SpeedLimitTiming(), "paper": FixedStepTiming()}
 
-LOOK = View(eye=(0.9, -1.3, 1.0), target=(0.3, 0.0, 0.28))  # into the drawer, past the hand
+VIEWPOINT = Viewpoint(
+    eye=(0.9, -1.3, 1.0), target=(0.3, 0.0, 0.28)
+)  # into the drawer, past the hand
 
 
 def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Domain:
     """The domain: preset ``fair`` samples different tasks, ``paper`` has the reference's one."""
     settings, actions = varied(SETTINGS[preset], changes), ACTIONS[preset]
-    room = model.FingerRoom(settings.reach, settings.half_width)
+    room = model.FingerClearance(settings.reach, settings.half_width)
     return Domain(
         name="cluttered_drawer",
         preset=preset,
@@ -64,7 +68,7 @@ def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Doma
         display=Display(
             bodies=lambda state: visible_bodies(scene_of(state), state),
             arm=visible_arm,
-            animate=animation(scene_of, LOOK),
+            animate=animation(scene_of, VIEWPOINT),
         ),
         learning=Learning(
             interface=LEARNER_INTERFACE,

@@ -8,8 +8,8 @@ import numpy as np
 
 from slap_ros.core import LearnerInterface
 from slap_ros.domains.cluttered_drawer.model import BLOCK, GRASPING, SIDES, SURFACE, TARGET
-from slap_ros.domains.cluttered_drawer.scenery import BOTTOM
-from slap_ros.domains.tabletop import seeing
+from slap_ros.domains.cluttered_drawer.scene import BOTTOM
+from slap_ros.domains.tabletop import observation
 from slap_ros.relational import Column, GroundAtom, State
 from slap_ros.relational.state import Array
 
@@ -26,14 +26,14 @@ def _things(state: State, hand: Array, column: Column) -> Array:
     """
     kind = column.objects[0].type
     if kind.is_a(SURFACE):
-        return seeing.place(state, hand, column)
+        return observation.scaled_displacements(state, hand, column)
     if not kind.is_a(BLOCK):
-        return seeing.nothing(state, column)
+        return observation.no_features(state, column)
     turn = state.gather(column, ("qz", "qw"))
     yaw = 8.0 * np.arctan2(turn[..., 0], turn[..., 1])  # a square looks the same four times
     parts = [
-        seeing.place(state, hand, column),
-        seeing.speed(state, column),
+        observation.scaled_displacements(state, hand, column),
+        observation.scaled_velocities(state, column),
         np.stack([np.sin(yaw), np.cos(yaw)], axis=-1),
         _beside_target(state, column) / NEAR,
     ]
@@ -49,13 +49,13 @@ def _beside_target(state: State, column: Column) -> Array:
 def _distance(state: State, hand: Array, column: Column) -> Array:
     """From the hand to around the target block: from there its fingers push any of the blocks."""
     if not column.objects[0].type.is_a(BLOCK):
-        return seeing.never_near(state, column)
-    around = seeing.to_over(state, hand, _target(state), AROUND)
+        return observation.unreachable(state, column)
+    around = observation.distances_above(state, hand, _target(state), AROUND)
     return np.repeat(around, len(column.objects), axis=-1)
 
 
 def _target(state: State) -> Column:
-    return seeing.alone(state.layout.of_type(TARGET)[0])
+    return observation.single(state.layout.of_type(TARGET)[0])
 
 
 def _slack(atom: GroundAtom) -> float:
@@ -63,14 +63,14 @@ def _slack(atom: GroundAtom) -> float:
 
 
 LEARNER_INTERFACE = LearnerInterface(
-    hand=seeing.hand,
-    robot=seeing.robot,
+    hand=observation.hand_frame,
+    robot=observation.robot,
     objects=_things,
     distance=_distance,
-    separation=seeing.apart,
-    at_rest=seeing.settled,
-    failed=seeing.lower_than(BOTTOM),
-    joint_limit_penalty=seeing.strain,
+    separation=observation.separations,
+    at_rest=observation.at_rest,
+    failed=observation.fallen_below(BOTTOM),
+    joint_limit_penalty=observation.joint_limit_penalty,
     success_tolerance=_slack,
     grasping=GRASPING,
     length_m=0.05,

@@ -31,7 +31,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from slap_ros.domains.tabletop.lying import (
+from slap_ros.domains.tabletop.footprints import (
     HALVES,
     PARTS,
     TO_EDGES,
@@ -44,8 +44,8 @@ from slap_ros.domains.tabletop.lying import (
     unpinched,
     widths,
 )
-from slap_ros.domains.tabletop.reading import HALF_NAMES, JOINT_NAMES
-from slap_ros.domains.tabletop.seeing import grasp_point
+from slap_ros.domains.tabletop.observation import grasp_points
+from slap_ros.domains.tabletop.state_access import HALF_NAMES, JOINT_NAMES
 from slap_ros.physics.features import BODY_FEATURES, MATERIAL_FEATURES, POSE_FEATURES, ROBOT
 from slap_ros.relational import (
     Column,
@@ -59,14 +59,14 @@ from slap_ros.relational import (
     Type,
     Variable,
 )
-from slap_ros.relational.predicates import Bools, Classifier, Margin, shared
+from slap_ros.relational.predicates import Bools, Classifier, Margin, cache_latest
 from slap_ros.relational.state import Array
 
 TOUCHING = 0.004  # height over a surface at which a block still lies on it
 OVER = 0.05  # height of the grasp point over the middle of a block that it is ready to pick
 OVER_TOLERANCE = 0.02  # up and down
 ASIDE_TOLERANCE = 0.015  # sideways
-MOST_REMEMBERED = 1024  # columns of objects, a layout
+CACHE_SIZE = 1024  # columns of objects, a layout
 
 SIZE_FEATURES = tuple(Feature(name, "m") for name in HALF_NAMES)  # half its edges
 THING = Type("thing")
@@ -84,7 +84,7 @@ AXES = np.array([0, 0, 1, 1])  # along which they lie
 
 
 @dataclass(frozen=True)
-class FingerRoom:
+class FingerClearance:
     """What has to be free at a side of the target block, so that a finger fits there.
 
     Args:
@@ -97,7 +97,7 @@ class FingerRoom:
 
 
 @dataclass(frozen=True, eq=False)
-class Things:
+class DrawerObjectIndex:
     """The blocks and surfaces of a layout, and where their features are."""
 
     blocks: tuple[Object, ...]
@@ -117,7 +117,7 @@ class Things:
 
     @staticmethod
     @lru_cache(maxsize=256)
-    def of(layout: Layout) -> Things:
+    def of(layout: Layout) -> DrawerObjectIndex:
         """Those of a layout."""
         blocks, surfaces = layout.of_type(BLOCK), layout.of_type(SURFACE)
         targets = layout.of_type(TARGET)
@@ -125,7 +125,7 @@ class Things:
         def where(objects: Sequence[Object], *features: str) -> Indices:
             return np.array([layout.columns(objects, name) for name in features]).T
 
-        return Things(
+        return DrawerObjectIndex(
             blocks,
             targets,
             surfaces,
@@ -156,7 +156,7 @@ class Things:
                 among = self.targets if kind.is_a(TARGET) else self.surfaces
                 second = np.array([among.index(obj) for obj in column.objects])
                 numbers = numbers * len(among) + second
-            if len(self._numbers) == MOST_REMEMBERED:
+            if len(self._numbers) == CACHE_SIZE:
                 self._numbers.clear()
             self._numbers[columns] = numbers
         return numbers
@@ -165,16 +165,16 @@ class Things:
 # -- margins --------------------------------------------------------------------------------------
 
 
-class Lie(NamedTuple):
+class BlockingRelations(NamedTuple):
     """How everything lies in a state, as margins in m."""
 
-    things: Things
+    things: DrawerObjectIndex
     on: Array  # of blocks on surfaces, shape (..., blocks * surfaces)
     blocking: Array  # of blocks at sides of target blocks, shape (..., sides, blocks * targets)
     clear: Array  # of these sides, shape (..., sides, targets)
 
 
-class Rooms(NamedTuple):
+class ClearanceBoxes(NamedTuple):
     """The rooms for fingers at all sides, seen along the faces of the block that they are at."""
 
     depth: float  # half the reach
@@ -183,13 +183,13 @@ class Rooms(NamedTuple):
 
     @staticmethod
     @lru_cache(maxsize=64)
-    def of(room: FingerRoom) -> Rooms:
+    def of(room: FingerClearance) -> ClearanceBoxes:
         """Those that have to be so large."""
         depth = room.reach / 2
         ahead, aside = (depth, room.half_width), (room.half_width, depth)
         halves = np.array([aside if side.imag else ahead for side in TOWARDS])
         spans = np.stack([halves, halves[:, ::-1]], axis=-1)
-        return Rooms(depth, halves[:, None, None], spans[:, None])
+        return ClearanceBoxes(depth, halves[:, None, None], spans[:, None])
 
 
 class Blocks(NamedTuple):
@@ -203,7 +203,7 @@ class Blocks(NamedTuple):
     height: Array  # half of it
 
 
-def _blocks(things: Things, data: Array) -> Blocks:
+def _blocks(things: DrawerObjectIndex, data: Array) -> Blocks:
     q = data.take(things.quaternions, axis=-1)
     products = (q[..., None] * q[..., None, :]).reshape(*q.shape[:-1], 16)
     edges = products @ TO_EDGES * data.take(things.halves, axis=-1)
@@ -213,12 +213,12 @@ def _blocks(things: Things, data: Array) -> Blocks:
     return Blocks(q, edges, complex_of(edges[..., :6]), places, z, height)
 
 
-def lie_with(room: FingerRoom, state: State) -> Lie:
+def blocking_relations(room: FingerClearance, state: State) -> BlockingRelations:
     """How everything lies, all at once, with so much room for a finger."""
-    things, data = Things.of(state.layout), state.data
+    things, data = DrawerObjectIndex.of(state.layout), state.data
     blocks = _blocks(things, data)
     on = _lying_on(things, data, blocks)
-    sideways = _sideways(Rooms.of(room), things, blocks)
+    sideways = _sideways(ClearanceBoxes.of(room), things, blocks)
 
     # A block blocks at the height of a target block that stands in the drawer.
     z, height = blocks.z, blocks.height
@@ -229,7 +229,7 @@ def lie_with(room: FingerRoom, state: State) -> Lie:
     applies = np.where(things.same, -1.0, applies)[..., None, :, :]
     blocking = np.minimum(sideways, applies)
     clear = strictly(-np.maximum.reduce(blocking, axis=-2, initial=-1.0))
-    return Lie(
+    return BlockingRelations(
         things,
         on.reshape(*on.shape[:-2], -1),
         blocking.reshape(*blocking.shape[:-2], -1),
@@ -237,7 +237,7 @@ def lie_with(room: FingerRoom, state: State) -> Lie:
     )
 
 
-def _lying_on(things: Things, data: Array, blocks: Blocks) -> Array:
+def _lying_on(things: DrawerObjectIndex, data: Array, blocks: Blocks) -> Array:
     """How well blocks touch surfaces, their middles over them: shape (..., blocks, surfaces)."""
     levels = data.take(things.levels, axis=-1)[..., None, :, :]
     middles = complex_of(data.take(things.middles, axis=-1))[..., 0]
@@ -247,7 +247,7 @@ def _lying_on(things: Things, data: Array, blocks: Blocks) -> Array:
     return np.minimum(touches, np.minimum(within[..., 0], within[..., 1]))
 
 
-def _sideways(rooms: Rooms, things: Things, blocks: Blocks) -> Array:
+def _sideways(rooms: ClearanceBoxes, things: DrawerObjectIndex, blocks: Blocks) -> Array:
     """How far blocks are in the rooms for fingers, (..., sides, blocks, targets).
 
     One is in a room that no line separates it from: neither one along the target block's faces nor
@@ -276,11 +276,11 @@ def _towards_base(back: Complex) -> Complex:
     return np.where(quarter.real < 0.0, -quarter, quarter)
 
 
-@shared
-def over(state: State) -> tuple[Things, Array]:
+@cache_latest
+def over(state: State) -> tuple[DrawerObjectIndex, Array]:
     """How well the hand is over blocks, as margins in m, shape (..., blocks)."""
-    things, data = Things.of(state.layout), state.data
-    point = grasp_point(data.take(things.joints, axis=-1))
+    things, data = DrawerObjectIndex.of(state.layout), state.data
+    point = grasp_points(data.take(things.joints, axis=-1))
     aside = data.take(things.places, axis=-1) - point[..., None, :2]
     above = point[..., None, 2] - data.take(things.z, axis=-1)
     level = OVER_TOLERANCE - np.abs(above - OVER)
@@ -351,13 +351,13 @@ def _clear_margin(lie: Perceive, side: int) -> Margin:
     return margin
 
 
-Perceive = Callable[[State], Lie]
+Perceive = Callable[[State], BlockingRelations]
 
 
 @lru_cache(maxsize=64)
-def predicates(room: FingerRoom) -> tuple[Predicate, ...]:
+def predicates(room: FingerClearance) -> tuple[Predicate, ...]:
     """All of them; blocks block where they leave less than this room."""
-    lie = shared(partial(lie_with, room))
+    lie = cache_latest(partial(blocking_relations, room))
     return (
         Predicate("IsRobot", (ROBOT,), _is_a(ROBOT)),
         Predicate("IsBlock", (THING,), _is_a(BLOCK)),
@@ -385,7 +385,7 @@ def predicates(room: FingerRoom) -> tuple[Predicate, ...]:
     )
 
 
-BY_NAME = {predicate.name: predicate for predicate in predicates(FingerRoom())}
+BY_NAME = {predicate.name: predicate for predicate in predicates(FingerClearance())}
 ON = BY_NAME["On"]
 HAND_PREDICATES = frozenset(
     BY_NAME[name] for name in ("ReadyPick", "NotReadyPick", "HandReadyPick")

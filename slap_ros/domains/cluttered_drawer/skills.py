@@ -11,12 +11,12 @@ from slap_ros.core import Skill
 from slap_ros.domains.cluttered_drawer.model import BLOCK, DRAWER, SIDES, TABLE, TARGET, WALL
 from slap_ros.domains.cluttered_drawer.tasks import APART
 from slap_ros.domains.tabletop.grasps import from_above, grasps_to_stand, quarter_turns
-from slap_ros.domains.tabletop.places import GAP, free_places
-from slap_ros.domains.tabletop.reading import box_of, held_body, pose_of, top_of, yaw_of
-from slap_ros.domains.tabletop.skills import GRIP, RELEASE, ReachSkill, Ways, WaySkill
-from slap_ros.domains.tabletop.surroundings import Surroundings
+from slap_ros.domains.tabletop.placements import GAP, free_placements
+from slap_ros.domains.tabletop.planning_scene import PlanningScene
+from slap_ros.domains.tabletop.skills import GRIP, RELEASE, ReachSkill, Transits, TransitSkill
+from slap_ros.domains.tabletop.state_access import box_of, held_body, pose_of, top_of, yaw_of
 from slap_ros.domains.tabletop.timing import Timing
-from slap_ros.domains.tabletop.ways import Way, remembered
+from slap_ros.domains.tabletop.transit import Transit, memoized
 from slap_ros.errors import SkillNotApplicableError
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import IDENTITY
@@ -40,7 +40,7 @@ def _solid(state: State) -> Iterator[tuple[Object, OrientedBox]]:
             yield thing, box_of(state, thing)
 
 
-SURROUNDINGS = Surroundings(
+PLANNING_SCENE = PlanningScene(
     _solid, lambda state, body: OrientedBox(IDENTITY, box_of(state, body).half)
 )
 
@@ -50,41 +50,41 @@ def _least_turned(yaw: float) -> float:
     return yaw - round(yaw / (math.pi / 2)) * math.pi / 2
 
 
-@remembered
-def _way_to_grasp(state: State, block: Object, turns: Sequence[float]) -> Way:
+@memoized
+def _way_to_grasp(state: State, block: Object, turns: Sequence[float]) -> Transit:
     pose = pose_of(state, block)
     yaw = _least_turned(yaw_of(pose))
     grasps = [from_above(pose.position, yaw + turn) for turn in turns]
-    return Way(SURROUNDINGS, state, grasps, touched=(block,))
+    return Transit(PLANNING_SCENE, state, grasps, touched=(block,))
 
 
-def _to_block(turns: Sequence[float]) -> Ways:
+def _to_block(turns: Sequence[float]) -> Transits:
     """To a grasp of the block, the hand turned so against it."""
 
-    def ways(state: State, objects: tuple[Object, ...]) -> Iterator[Way]:
+    def ways(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:
         yield _way_to_grasp(state, objects[1], turns)
 
     return ways
 
 
-def _over_block(state: State, objects: tuple[Object, ...]) -> Iterator[Way]:
+def _over_block(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:
     """Over a grasp of the block; where it is hemmed in, the fingers over the gaps at its edges."""
     for turns in (ANY, DIAGONALLY):
         yield _way_to_grasp(state, objects[1], turns)
 
 
-@remembered
-def _way_to_place(state: State, place: tuple[float, float], surface: Object) -> Way:
+@memoized
+def _way_to_place(state: State, place: tuple[float, float], surface: Object) -> Transit:
     """The way on which the held block comes to stand on a surface at a place, turned as it is."""
     block = held_body(state)
     if block is None:
         raise SkillNotApplicableError("nothing is held")
     top, yaws = top_of(box_of(state, surface)), quarter_turns(yaw_of(pose_of(state, block)))
     ends = grasps_to_stand(state, box_of(state, block), place, top, yaws)
-    return Way(SURROUNDINGS, state, ends, touched=(surface,))
+    return Transit(PLANNING_SCENE, state, ends, touched=(surface,))
 
 
-def _onto_surface(state: State, block: Object, surface: Object, margin: float) -> Iterator[Way]:
+def _onto_surface(state: State, block: Object, surface: Object, margin: float) -> Iterator[Transit]:
     """To free places away from all sides of the target block, nearest to the held one first."""
     board, near = box_of(state, surface), pose_of(state, block).position[:2]
     taken = [
@@ -94,16 +94,16 @@ def _onto_surface(state: State, block: Object, surface: Object, margin: float) -
     ]
     half_x, half_y, _ = board.half
     halves = (half_x - margin, half_y - margin)
-    for place in free_places(near, board.pose.position[:2], halves, taken, SPACING):
+    for place in free_placements(near, board.pose.position[:2], halves, taken, SPACING):
         yield _way_to_place(state, place, surface)
 
 
-def _into_drawer(state: State, objects: tuple[Object, ...]) -> Iterator[Way]:
+def _into_drawer(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:
     _, block, _, drawer = objects
     return _onto_surface(state, block, drawer, WALL_MARGIN)
 
 
-def _onto_table(state: State, objects: tuple[Object, ...]) -> Iterator[Way]:
+def _onto_table(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:
     _, block, table = objects
     return _onto_surface(state, block, table, TABLE_MARGIN)
 
@@ -112,7 +112,7 @@ def skills(timing: Timing) -> dict[str, Skill]:
     """A skill for each operator."""
 
     def grasp(name: str, turns: Sequence[float]) -> Skill:
-        return WaySkill(name, timing, _to_block(turns), GRIP, LIFT)
+        return TransitSkill(name, timing, _to_block(turns), GRIP, LIFT)
 
     made = [
         ReachSkill("Reach", timing, _over_block),
@@ -120,7 +120,7 @@ def skills(timing: Timing) -> dict[str, Skill]:
         grasp("GraspLeftRight", LEFT_RIGHT),
         grasp("GraspFullClear", ANY),
         grasp("GraspNonTarget", ANY),
-        WaySkill("PlaceTarget", timing, _onto_table, RELEASE),
-        *(WaySkill(f"Place{side}Block", timing, _into_drawer, RELEASE) for side in SIDES),
+        TransitSkill("PlaceTarget", timing, _onto_table, RELEASE),
+        *(TransitSkill(f"Place{side}Block", timing, _into_drawer, RELEASE) for side in SIDES),
     ]
     return {skill.name: skill for skill in made}

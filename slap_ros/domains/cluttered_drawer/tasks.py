@@ -17,11 +17,11 @@ from slap_ros.domains.cluttered_drawer.model import (
     SIDES,
     TABLE,
     TARGET,
-    FingerRoom,
-    lie_with,
+    FingerClearance,
+    blocking_relations,
 )
-from slap_ros.domains.cluttered_drawer.scenery import BOTTOM, FIXED, HALF_WIDTH, MIDDLE, OPENING
-from slap_ros.domains.tabletop.places import GAP
+from slap_ros.domains.cluttered_drawer.scene import BOTTOM, FIXED, HALF_WIDTH, MIDDLE, OPENING
+from slap_ros.domains.tabletop.placements import GAP
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.geometry.pose import Pose
 from slap_ros.physics.features import (
@@ -43,16 +43,16 @@ WALL_GAP = 0.04  # between a wall and a block's middle
 ENDS = 0.06  # along y: of the drawer's two ends, where blocks stand about that hem nothing in
 
 Range = tuple[float, float]
-Placed = tuple[float, float, float]  # x, y, yaw in rad
+PlanarPose = tuple[float, float, float]  # x, y, yaw in rad
 
 
 @dataclass(frozen=True)
-class Scenery:
+class DrawerArrangement:
     """Where the blocks stand, and what all of them are made of."""
 
-    target: Placed
-    blockers: tuple[Placed, ...]
-    others: tuple[Placed, ...] = ()
+    target: PlanarPose
+    blockers: tuple[PlanarPose, ...]
+    others: tuple[PlanarPose, ...] = ()
     material: Material = CUBE_MATERIAL
 
     def task(self) -> Task:
@@ -79,7 +79,9 @@ def target_block_on_table(state: State) -> frozenset[GroundAtom]:
     return frozenset({ON(targets[0], tables[0])})
 
 
-def _neighbour(target: Placed, side: complex, distance: float, aside: float, turn: float) -> Placed:
+def _neighbour(
+    target: PlanarPose, side: complex, distance: float, aside: float, turn: float
+) -> PlanarPose:
     """A block beside another: at a side of it, at a distance, so far aside and so much turned."""
     x, y, yaw = target
     way = side * complex(distance, aside) * complex(math.cos(yaw), math.sin(yaw))
@@ -90,7 +92,7 @@ TOWARDS = (-1.0 + 0j, 1.0 + 0j, 1j, -1j)  # front, back, left, right
 
 
 @dataclass(frozen=True)
-class RandomTasks:
+class RandomDrawerTasks:
     """Everything sampled anew for each task. Lengths in m, angles in rad, masses in kg."""
 
     obstacles: tuple[int, int] = (4, 6)  # inclusive: four hem the target in, others stand about
@@ -104,8 +106,8 @@ class RandomTasks:
     mass: Range = (CUBE_MATERIAL.mass_kg, CUBE_MATERIAL.mass_kg)
     friction: Range = (CUBE_MATERIAL.friction, CUBE_MATERIAL.friction)
     # What blocks: thresholds of the predicates, nothing that the tasks depend on.
-    reach: float = FingerRoom.reach
-    half_width: float = FingerRoom.half_width
+    reach: float = FingerClearance.reach
+    half_width: float = FingerClearance.half_width
 
     def sample(self, rng: np.random.Generator) -> Task:
         """A task."""
@@ -116,7 +118,7 @@ class RandomTasks:
                 return scenery.task()
         raise InvalidParameterError(f"the drawer has no room for {obstacles} obstacles")
 
-    def _draw(self, rng: np.random.Generator, obstacles: int) -> Scenery | None:
+    def _draw(self, rng: np.random.Generator, obstacles: int) -> DrawerArrangement | None:
         """An arrangement; None where a block does not stand as it should."""
         x, y, yaw = (float(rng.uniform(*r)) for r in (self.target_x, self.target_y, self.yaw))
         target = (x, y, yaw)
@@ -132,7 +134,7 @@ class RandomTasks:
             )
             for side in sides
         )
-        others: list[Placed] = []
+        others: list[PlanarPose] = []
         for _ in range(obstacles - hemming):
             other = (
                 MIDDLE + float(rng.uniform(-1, 1)) * (OPENING / 2 - WALL_GAP),
@@ -144,7 +146,7 @@ class RandomTasks:
             others.append(other)
         # Last, so that where things stand does not depend on it.
         material = Material(float(rng.uniform(*self.mass)), float(rng.uniform(*self.friction)))
-        scenery = Scenery(target, blockers, tuple(others), material)
+        scenery = DrawerArrangement(target, blockers, tuple(others), material)
         return scenery if _blocked_sides(scenery) == [[side] for side in sides] else None
 
     def as_configuration(self) -> Mapping[str, str | int | float]:
@@ -153,19 +155,19 @@ class RandomTasks:
 
 
 @dataclass(frozen=True)
-class PaperTasks:
+class PaperDrawerTasks:
     """The single start state of the reference."""
 
-    scenery: Scenery = field(
-        default_factory=lambda: Scenery(
+    scenery: DrawerArrangement = field(
+        default_factory=lambda: DrawerArrangement(
             target=(MIDDLE, 0.0, 0.0),
             blockers=tuple(
                 _neighbour((MIDDLE, 0.0, 0.0), side, NEIGHBOUR, 0.0, 0.0) for side in TOWARDS
             ),
         )
     )
-    reach: float = FingerRoom.reach
-    half_width: float = FingerRoom.half_width
+    reach: float = FingerClearance.reach
+    half_width: float = FingerClearance.half_width
 
     def sample(self, _: np.random.Generator) -> Task:
         """That state."""
@@ -176,18 +178,21 @@ class PaperTasks:
         return {name: str(value) for name, value in asdict(self).items()}
 
 
-def _between(one: Placed, other: Placed) -> float:
+def _between(one: PlanarPose, other: PlanarPose) -> float:
     return math.hypot(one[0] - other[0], one[1] - other[1])
 
 
-def _blocked_sides(scenery: Scenery) -> list[list[int]]:
+def _blocked_sides(scenery: DrawerArrangement) -> list[list[int]]:
     """The sides of the target block that each blocker blocks."""
     state = scenery.task().initial_state
-    blocking = lie_with(FingerRoom(), state).blocking[:, 1 : 1 + len(scenery.blockers)] >= 0.0
+    blocking = (
+        blocking_relations(FingerClearance(), state).blocking[:, 1 : 1 + len(scenery.blockers)]
+        >= 0.0
+    )
     return [np.flatnonzero(sides).tolist() for sides in blocking.T]
 
 
-def _block(material: Material, placed: Placed) -> Mapping[str, float]:
+def _block(material: Material, placed: PlanarPose) -> Mapping[str, float]:
     x, y, yaw = placed
     half = CUBE_EDGE / 2
     return {

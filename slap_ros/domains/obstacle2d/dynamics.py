@@ -151,7 +151,7 @@ def _push(x: Array, pushable: NDArray[np.bool_], pusher: Array) -> Array:
     return x
 
 
-def require_possible(state: State) -> None:
+def require_valid(state: State) -> None:
     """Refuse scenes that cannot be.
 
     Raises:
@@ -208,7 +208,7 @@ class Obstacle2DWorlds:
             InvalidStateError: A scene that cannot be.
         """
         for state in states:
-            require_possible(state)
+            require_valid(state)
         self._layout = states[0].layout
         self._data = np.stack([state.data for state in states])
 
@@ -236,7 +236,7 @@ class Obstacle2DWorld:
         Raises:
             InvalidStateError: A scene that cannot be.
         """
-        require_possible(state)
+        require_valid(state)
         self._state = state
 
     @property

@@ -38,7 +38,7 @@ def target_block_in_target_area(state: State) -> frozenset[GroundAtom]:
 
 
 @dataclass(frozen=True)
-class RandomTasks:
+class RandomObstacle2DTasks:
     """Everything sampled anew for each task. Lengths in m."""
 
     bystanders: tuple[int, int] = (0, 2)  # how many blocks stand about besides, inclusive
@@ -83,7 +83,7 @@ class RandomTasks:
 
 
 @dataclass(frozen=True)
-class PaperTasks:
+class PaperObstacle2DTasks:
     """The reference's start states: one scene, the obstacle at one of three places."""
 
     robot: tuple[float, float] = (0.5, 1.0)  # m
@@ -101,7 +101,10 @@ class PaperTasks:
         return {name: str(value) for name, value in asdict(self).items()}
 
 
-SETTINGS: Mapping[str, RandomTasks | PaperTasks] = {"fair": RandomTasks(), "paper": PaperTasks()}
+SETTINGS: Mapping[str, RandomObstacle2DTasks | PaperObstacle2DTasks] = {
+    "fair": RandomObstacle2DTasks(),
+    "paper": PaperObstacle2DTasks(),
+}
 
 
 def make_task(robot: tuple[float, float], target_x: float, blocks_x: list[float]) -> Task:

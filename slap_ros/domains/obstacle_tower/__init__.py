@@ -17,23 +17,25 @@ from types import MappingProxyType
 from slap_ros.core import ActionSpace, Display, Domain, Execution, Learning
 from slap_ros.domains.obstacle_tower import model, skills, tasks
 from slap_ros.domains.obstacle_tower.learner_interface import LEARNER_INTERFACE
-from slap_ros.domains.obstacle_tower.scenery import scene_of
+from slap_ros.domains.obstacle_tower.scene import scene_of
 from slap_ros.domains.tabletop.settling import settling
-from slap_ros.domains.tabletop.showing import animation, visible_arm, visible_bodies
-from slap_ros.domains.tabletop.timing import AtSpeedLimit, InTens, Timing
+from slap_ros.domains.tabletop.timing import FixedStepTiming, SpeedLimitTiming, Timing
+from slap_ros.domains.tabletop.visualization import animation, visible_arm, visible_bodies
 from slap_ros.domains.variation import varied
 from slap_ros.physics.features import ROBOT
 from slap_ros.physics.panda import CONTROL_PERIOD_S
 from slap_ros.physics.world import ACTION_SPACE, PandaWorld
 
-SETTINGS: Mapping[str, tasks.RandomTasks | tasks.PaperTasks] = {
-    "fair": tasks.RandomTasks(),
-    "paper": tasks.PaperTasks(),
+SETTINGS: Mapping[str, tasks.RandomTowerTasks | tasks.PaperTowerTasks] = {
+    "fair": tasks.RandomTowerTasks(),
+    "paper": tasks.PaperTowerTasks(),
 }
 # The reference has no limit to what its planned motions do in a step, and jumps by 3 rad.
-WHATEVER = replace(ACTION_SPACE, low=(*(-math.pi,) * 7, -1.0), high=(*(math.pi,) * 7, 1.0))
-ACTIONS: Mapping[str, ActionSpace] = {"fair": ACTION_SPACE, "paper": WHATEVER}
-TIMINGS: Mapping[str, Timing] = {"fair": AtSpeedLimit(), "paper": InTens()}
+UNLIMITED_ACTION_SPACE = replace(
+    ACTION_SPACE, low=(*(-math.pi,) * 7, -1.0), high=(*(math.pi,) * 7, 1.0)
+)
+ACTIONS: Mapping[str, ActionSpace] = {"fair": ACTION_SPACE, "paper": UNLIMITED_ACTION_SPACE}
+TIMINGS: Mapping[str, Timing] = {"fair": SpeedLimitTiming(), "paper": FixedStepTiming()}
 
 
 def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Domain:

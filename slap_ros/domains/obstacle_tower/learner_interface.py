@@ -7,9 +7,9 @@ from __future__ import annotations
 import numpy as np
 
 from slap_ros.core import LearnerInterface
+from slap_ros.domains.obstacle_tower.features import BLOCK, SURFACE
 from slap_ros.domains.obstacle_tower.model import GRIPPER_EMPTY, HOLDING, NOT_HOLDING, NOTHING_ON
-from slap_ros.domains.obstacle_tower.things import BLOCK, SURFACE
-from slap_ros.domains.tabletop import seeing
+from slap_ros.domains.tabletop import observation
 from slap_ros.physics.features import ROBOT
 from slap_ros.physics.scene import CUBE_EDGE, TABLE_TOP
 from slap_ros.relational import Column, GroundAtom, State
@@ -28,22 +28,26 @@ def _things(state: State, hand: Array, column: Column) -> Array:
     what is fixed: which way it is turned.
     """
     if column.objects[0].type.is_a(ROBOT):
-        return seeing.nothing(state, column)
-    place = seeing.place(state, hand, column)
+        return observation.no_features(state, column)
+    place = observation.scaled_displacements(state, hand, column)
     if column.objects[0].type.is_a(BLOCK):
         off = _off_target(state, column)
         parts = [
             place,
-            seeing.speed(state, column),
+            observation.scaled_velocities(state, column),
             _over_target(state, off) / NEAR,
-            seeing.along(hand, seeing.ways_over(state, hand, column, BESIDE)),
-            seeing.along(hand, np.pad(off, ((0, 0), (0, 0), (0, 1)))),
+            observation.joint_contributions(
+                hand, observation.displacements_above(state, hand, column, BESIDE)
+            ),
+            observation.joint_contributions(hand, np.pad(off, ((0, 0), (0, 0), (0, 1)))),
         ]
         return np.concatenate(parts, axis=-1)
     turn = state.gather(column, ("qz", "qw"))
     yaw = 8.0 * np.arctan2(turn[..., 0], turn[..., 1])  # a square looks the same four times
     turned = np.stack([np.sin(yaw), np.cos(yaw)], axis=-1)
-    there = seeing.along(hand, seeing.ways_over(state, hand, column, OVER))
+    there = observation.joint_contributions(
+        hand, observation.displacements_above(state, hand, column, OVER)
+    )
     return np.concatenate([place, turned, there], axis=-1)
 
 
@@ -66,7 +70,7 @@ def _target(state: State) -> Column:
     surfaces = state.layout.column_of(SURFACE)
     first = state.data.reshape(-1, state.data.shape[-1])[0]
     labels = first[state.layout.grid(surfaces, ("is_target",))[:, 0]]
-    return seeing.alone(surfaces.objects[int(np.argmax(labels))])
+    return observation.single(surfaces.objects[int(np.argmax(labels))])
 
 
 def _distance(state: State, hand: Array, column: Column) -> Array:
@@ -76,10 +80,10 @@ def _distance(state: State, hand: Array, column: Column) -> Array:
     """
     thing = column.objects[0].type
     if thing.is_a(ROBOT):
-        return seeing.never_near(state, column)
+        return observation.unreachable(state, column)
     if thing.is_a(BLOCK):
-        return seeing.to_over(state, hand, column, BESIDE)
-    distance = seeing.to_over(state, hand, column, OVER)
+        return observation.distances_above(state, hand, column, BESIDE)
+    distance = observation.distances_above(state, hand, column, OVER)
     return np.where(state.stack(column, "is_target") > 0.5, distance, np.inf)
 
 
@@ -90,14 +94,14 @@ def _slack(atom: GroundAtom) -> float:
 
 
 LEARNER_INTERFACE = LearnerInterface(
-    hand=seeing.moving_hand,
-    robot=seeing.robot,
+    hand=observation.hand_frame_and_velocities,
+    robot=observation.robot,
     objects=_things,
     distance=_distance,
-    separation=seeing.apart,
-    at_rest=seeing.settled,
-    failed=seeing.lower_than(FALLEN),
-    joint_limit_penalty=seeing.strain,
+    separation=observation.separations,
+    at_rest=observation.at_rest,
+    failed=observation.fallen_below(FALLEN),
+    joint_limit_penalty=observation.joint_limit_penalty,
     success_tolerance=_slack,
     grasping=frozenset({HOLDING, NOT_HOLDING, GRIPPER_EMPTY}),
 )

@@ -8,8 +8,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from slap_ros.domains.obstacle_tower.lying import lie, rest
-from slap_ros.domains.obstacle_tower.things import BLOCK, SURFACE, THING
+from slap_ros.domains.obstacle_tower.features import BLOCK, SURFACE, THING
+from slap_ros.domains.obstacle_tower.support import support_relations, support_truths
 from slap_ros.physics.features import ROBOT
 from slap_ros.relational import (
     Column,
@@ -32,24 +32,24 @@ TYPES = (ROBOT, THING, BLOCK, SURFACE)
 def _on(state: State, block: Column, thing: Column) -> Bools:
     if state.data.ndim > 1:
         return _on_margin(state, block, thing) >= 0.0
-    known = rest(state)
+    known = support_truths(state)
     return known.on[known.things.pairs(block, thing)]
 
 
 def _on_margin(state: State, block: Column, thing: Column) -> Array:
-    things, on, _ = lie(state)
+    things, on, _ = support_relations(state)
     return on.take(things.pairs(block, thing), axis=-1)
 
 
 def _nothing_on(state: State, thing: Column) -> Bools:
     if state.data.ndim > 1:
         return _nothing_on_margin(state, thing) >= 0.0
-    known = rest(state)
+    known = support_truths(state)
     return known.room[known.things.numbers(thing)]
 
 
 def _nothing_on_margin(state: State, thing: Column) -> Array:
-    things, _, room = lie(state)
+    things, _, room = support_relations(state)
     return room.take(things.numbers(thing), axis=-1)
 
 
@@ -70,7 +70,7 @@ def _always(state: State, column: Column) -> Bools:
 def _held(state: State, _: Column, block: Column) -> Bools:
     if state.data.ndim > 1:
         return _is(state, block, "held")
-    known = rest(state)
+    known = support_truths(state)
     return known.held[known.things.numbers(block)]
 
 
@@ -80,7 +80,7 @@ def _not_held(state: State, robot: Column, block: Column) -> Bools:
 
 def _gripper_empty(state: State, _: Column) -> Bools:
     if state.data.ndim == 1:
-        return rest(state).empty
+        return support_truths(state).empty
     held = _is(state, _all(state.layout, BLOCK), "held")
     empty: Bools = ~np.logical_or.reduce(held, axis=-1, keepdims=True)
     return empty

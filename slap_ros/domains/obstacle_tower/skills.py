@@ -11,14 +11,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from slap_ros.core import Skill
-from slap_ros.domains.obstacle_tower.things import BLOCK, SURFACE
+from slap_ros.domains.obstacle_tower.features import BLOCK, SURFACE
 from slap_ros.domains.tabletop.grasps import grasps_along_faces, grasps_to_stand, quarter_turns
-from slap_ros.domains.tabletop.places import GAP, Place, free_places
-from slap_ros.domains.tabletop.reading import box_of, held_body, pose_of, top_of, yaw_of
-from slap_ros.domains.tabletop.skills import GRIP, RELEASE, WaySkill
-from slap_ros.domains.tabletop.surroundings import Surroundings
+from slap_ros.domains.tabletop.placements import GAP, Placement, free_placements
+from slap_ros.domains.tabletop.planning_scene import PlanningScene
+from slap_ros.domains.tabletop.skills import GRIP, RELEASE, TransitSkill
+from slap_ros.domains.tabletop.state_access import box_of, held_body, pose_of, top_of, yaw_of
 from slap_ros.domains.tabletop.timing import Timing
-from slap_ros.domains.tabletop.ways import Way, remembered
+from slap_ros.domains.tabletop.transit import Transit, memoized
 from slap_ros.errors import SkillNotApplicableError
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import IDENTITY
@@ -35,18 +35,20 @@ def _solid(state: State) -> Iterator[tuple[Object, OrientedBox]]:
             yield thing, box_of(state, thing)
 
 
-SURROUNDINGS = Surroundings(
+PLANNING_SCENE = PlanningScene(
     _solid, lambda state, body: OrientedBox(IDENTITY, box_of(state, body).half)
 )
 
 
-@remembered
-def _way_to_grasp(state: State, block: Object) -> Way:
-    return Way(SURROUNDINGS, state, grasps_along_faces(pose_of(state, block)), touched=(block,))
+@memoized
+def _way_to_grasp(state: State, block: Object) -> Transit:
+    return Transit(
+        PLANNING_SCENE, state, grasps_along_faces(pose_of(state, block)), touched=(block,)
+    )
 
 
-@remembered
-def _way_to_place(state: State, place: Place, yaw: float, thing: Object) -> Way:
+@memoized
+def _way_to_place(state: State, place: Placement, yaw: float, thing: Object) -> Transit:
     """The way on which the held block comes to stand on a thing at a place."""
     block = held_body(state)
     if block is None:
@@ -54,23 +56,23 @@ def _way_to_place(state: State, place: Place, yaw: float, thing: Object) -> Way:
     top = top_of(box_of(state, thing))
     yaws = quarter_turns(yaw)
     ends = grasps_to_stand(state, box_of(state, block), place, top, yaws)
-    return Way(SURROUNDINGS, state, ends, touched=(thing,))
+    return Transit(PLANNING_SCENE, state, ends, touched=(thing,))
 
 
-def _to_block(state: State, objects: tuple[Object, ...]) -> Iterator[Way]:
+def _to_block(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:
     """To a grasp of the block."""
     _, block, _ = objects
     yield _way_to_grasp(state, block)
 
 
-def _onto_middle(state: State, objects: tuple[Object, ...]) -> Iterator[Way]:
+def _onto_middle(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:
     """Onto the middle of the target or of another block."""
     _, _, thing = objects
     x, y, _ = pose_of(state, thing).position
     yield _way_to_place(state, (x, y), yaw_of(pose_of(state, thing)), thing)
 
 
-def _onto_table(state: State, objects: tuple[Object, ...]) -> Iterator[Way]:
+def _onto_table(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:
     """To free places on the table, nearest to the block first."""
     _, block, table = objects
     pose, board = pose_of(state, block), box_of(state, table)
@@ -79,17 +81,17 @@ def _onto_table(state: State, objects: tuple[Object, ...]) -> Iterator[Way]:
     taken = [(pose_of(state, thing).position[:2], GAP) for thing in others]
     half_x, half_y, _ = board.half
     margins = half_x - TABLE_MARGIN, half_y - TABLE_MARGIN
-    for place in free_places(pose.position[:2], board.pose.position[:2], margins, taken):
+    for place in free_placements(pose.position[:2], board.pose.position[:2], margins, taken):
         yield _way_to_place(state, place, yaw_of(pose), table)
 
 
 def skills(timing: Timing) -> dict[str, Skill]:
     """A skill for each operator."""
     return {
-        "Pick": WaySkill("Pick", timing, _to_block, GRIP, LIFT),
-        "PickFromTarget": WaySkill("PickFromTarget", timing, _to_block, GRIP, LIFT),
-        "Unstack": WaySkill("Unstack", timing, _to_block, GRIP, LIFT),
-        "Place": WaySkill("Place", timing, _onto_table, RELEASE),
-        "PlaceInTarget": WaySkill("PlaceInTarget", timing, _onto_middle, RELEASE),
-        "Stack": WaySkill("Stack", timing, _onto_middle, RELEASE),
+        "Pick": TransitSkill("Pick", timing, _to_block, GRIP, LIFT),
+        "PickFromTarget": TransitSkill("PickFromTarget", timing, _to_block, GRIP, LIFT),
+        "Unstack": TransitSkill("Unstack", timing, _to_block, GRIP, LIFT),
+        "Place": TransitSkill("Place", timing, _onto_table, RELEASE),
+        "PlaceInTarget": TransitSkill("PlaceInTarget", timing, _onto_middle, RELEASE),
+        "Stack": TransitSkill("Stack", timing, _onto_middle, RELEASE),
     }

@@ -11,9 +11,9 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from slap_ros.core import Task
+from slap_ros.domains.obstacle_tower.features import BLOCK, SURFACE
 from slap_ros.domains.obstacle_tower.model import NOT_IS_TARGET, ON
-from slap_ros.domains.obstacle_tower.things import BLOCK, SURFACE
-from slap_ros.domains.tabletop.places import GAP
+from slap_ros.domains.tabletop.placements import GAP
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.geometry.pose import Pose
 from slap_ros.physics.features import (
@@ -35,7 +35,7 @@ Range = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Scenery:
+class TowerArrangement:
     """Where everything stands, yaws in rad; and what all blocks are made of."""
 
     target: tuple[float, float, float]  # x, y, yaw
@@ -74,7 +74,7 @@ def target_block_on_target(state: State) -> frozenset[GroundAtom]:
 
 
 @dataclass(frozen=True)
-class RandomTasks:
+class RandomTowerTasks:
     """Everything sampled anew for each task. Lengths in m, angles in rad, masses in kg."""
 
     obstacles: tuple[int, int] = (3, 3)  # blocks of the tower, inclusive
@@ -108,7 +108,7 @@ class RandomTasks:
         standing = tuple(self._stand_apart(rng, placed) for _ in range(1 + distractors))
         # Last, so that where things stand does not depend on it.
         material = Material(rng.uniform(*self.mass), rng.uniform(*self.friction))
-        return Scenery((x, y, yaw), standing[0], tower, standing[1:], material).task()
+        return TowerArrangement((x, y, yaw), standing[0], tower, standing[1:], material).task()
 
     def _stand_apart(
         self, rng: np.random.Generator, placed: list[tuple[float, float]]
@@ -133,10 +133,10 @@ class RandomTasks:
 
 
 @dataclass(frozen=True)
-class PaperTasks:
+class PaperTowerTasks:
     """The single start state of the reference."""
 
-    scenery: Scenery = Scenery(
+    scenery: TowerArrangement = TowerArrangement(
         target=(0.5, 0.0, 0.0),
         target_block=(0.375, -0.2, 0.0),
         tower=((0.5, 0.0, 0.0),) * 3,

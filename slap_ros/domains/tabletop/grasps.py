@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from slap_ros.domains.tabletop.reading import grasp_of, yaw_of
+from slap_ros.domains.tabletop.state_access import grasp_of, yaw_of
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import ORIGIN, Pose, Vector
 from slap_ros.relational import State

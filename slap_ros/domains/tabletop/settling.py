@@ -6,10 +6,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from slap_ros.domains.tabletop.reading import pose_of
-from slap_ros.domains.tabletop.showing import SceneOf
+from slap_ros.domains.tabletop.state_access import pose_of
+from slap_ros.domains.tabletop.visualization import SceneOf
 from slap_ros.physics.features import POSE_FEATURES, VELOCITY_FEATURES
-from slap_ros.physics.settling import settled
+from slap_ros.physics.settling import resting_poses
 from slap_ros.relational import Object, State
 
 
@@ -30,7 +30,7 @@ def settling(scene_of: SceneOf) -> Callable[[State], State]:
         ]
         changes = {
             (objects[scene.free[i].name], feature.name): value
-            for i, pose in settled(resting, scene.free, fixed).items()
+            for i, pose in resting_poses(resting, scene.free, fixed).items()
             for feature, value in zip(
                 POSE_FEATURES, (*pose.position, *pose.quaternion), strict=True
             )

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from slap_ros.core import Action, Policy
-from slap_ros.domains.tabletop.reading import joints_of
+from slap_ros.domains.tabletop.state_access import joints_of
 from slap_ros.domains.tabletop.timing import ROUNDING, Timing
-from slap_ros.domains.tabletop.ways import Way
+from slap_ros.domains.tabletop.transit import Transit
 from slap_ros.errors import SkillNotApplicableError
 from slap_ros.motion import Joints, linear_motion, shifted
 from slap_ros.physics.panda import grasp_pose
@@ -26,10 +26,10 @@ LAG = 0.005  # rad, by which an arm may be late without being waited for
 TRIES = 3  # for a position
 
 # To where it may go from a state, in the order in which it is tried.
-Ways = Callable[[State, tuple[Object, ...]], Iterable[Way]]
+Transits = Callable[[State, tuple[Object, ...]], Iterable[Transit]]
 
 
-class Follow:
+class TrajectoryFollower:
     """Go to positions one after the other, giving a gripper command with each.
 
     Closed loop: each step is what is missing from where the arm is. A real arm lags behind: what is
@@ -67,13 +67,13 @@ class Follow:
 
 
 @dataclass(frozen=True)
-class WaySkill:
+class TransitSkill:
     """Go the first way that can be gone; then grip or let go; then lift.
 
     Args:
         name: The operator's.
         timing: How fast.
-        ways: Where to; see :data:`Ways`.
+        ways: Where to; see :data:`Transits`.
         gripper: The gripper command at the end of the way.
         lift: How far to go up after it, m.
         step_limit: Environment steps.
@@ -81,7 +81,7 @@ class WaySkill:
 
     name: str
     timing: Timing
-    ways: Ways
+    ways: Transits
     gripper: float
     lift: float = 0.0
     step_limit: int = STEP_LIMIT
@@ -109,7 +109,7 @@ class WaySkill:
         """
         for way in self.ways(state, objects):
             try:
-                return Follow(self._script(way), self.timing.step)
+                return TrajectoryFollower(self._script(way), self.timing.step)
             except SkillNotApplicableError:
                 continue
         raise _no_way(self.name, objects)
@@ -118,7 +118,7 @@ class WaySkill:
     def _after(self) -> int:
         return 2 if self.lift > 0.0 else 1
 
-    def _script(self, way: Way) -> list[tuple[Joints, float]]:
+    def _script(self, way: Transit) -> list[tuple[Joints, float]]:
         pieces = way.pieces()
         end = pieces[-1][-1]
         script = [(position, 0.0) for position in self.timing.positions(pieces, way.touching)]
@@ -144,7 +144,7 @@ class ReachSkill:
 
     name: str
     timing: Timing
-    ways: Ways
+    ways: Transits
     step_limit: int = STEP_LIMIT
     least_steps: int = 1
 
@@ -165,7 +165,7 @@ class ReachSkill:
                 positions = self.timing.positions(way.pieces_over(can_end), way.free)
             except SkillNotApplicableError:
                 continue
-            return Follow([(position, 0.0) for position in positions], self.timing.step)
+            return TrajectoryFollower([(position, 0.0) for position in positions], self.timing.step)
         raise _no_way(self.name, objects)
 
 

@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from slap_ros.motion import Free, Joints, Path, path_steps, retime, retime_in_tens
+from slap_ros.motion import Free, Joints, Path, path_steps, retime, retime_fixed_steps
 from slap_ros.physics.panda import JOINTS, MAX_STEP
 
 ROUNDING = 1e-6  # control steps
@@ -33,7 +33,7 @@ class Timing(Protocol):
         ...
 
 
-class AtSpeedLimit:
+class SpeedLimitTiming:
     """As fast as the joints may move, without stopping in between."""
 
     step: Sequence[float] = MAX_STEP
@@ -48,7 +48,7 @@ class AtSpeedLimit:
         return math.ceil(sum(path_steps(piece) for piece in pieces) - ROUNDING)
 
 
-class InTens:
+class FixedStepTiming:
     """The paper's timing: ten steps up, ten down, ten for each straight piece across."""
 
     step: Sequence[float] = (math.pi,) * JOINTS
@@ -57,11 +57,11 @@ class InTens:
         """See :class:`Timing`."""
         del free  # corners are not cut
         up, *across, down = (*pieces, pieces[-1][-1:]) if len(pieces) == 1 else pieces
-        return np.concatenate([retime_in_tens(p) for p in (_ends(up), *across, _ends(down))])
+        return np.concatenate([retime_fixed_steps(p) for p in (_ends(up), *across, _ends(down))])
 
     def least_steps(self, pieces: Sequence[Path]) -> int:
         """See :class:`Timing`."""
-        return sum(len(retime_in_tens(_ends(piece))) for piece in pieces)
+        return sum(len(retime_fixed_steps(_ends(piece))) for piece in pieces)
 
 
 def _ends(path: Path) -> Path:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from slap_ros.geometry.pose import Vector
 from slap_ros.meshes.obj import to_obj
-from slap_ros.meshes.solid import Piece
+from slap_ros.meshes.solid import ConvexPiece
 
 SIDES = 8  # of a ring
 DIGITS = 5  # of a coordinate: hundredths of a millimetre
@@ -30,7 +30,7 @@ class Ring(NamedTuple):
     y: float = 0.0  # of its middle
 
 
-def stack(rings: Sequence[Ring], sides: int = SIDES) -> Piece:
+def stack(rings: Sequence[Ring], sides: int = SIDES) -> ConvexPiece:
     """The hull of rings from the bottom upwards. Convex where their sizes bulge, which is trusted.
 
     With four sides they are rectangles whose half edges are ``along`` and ``across``.
@@ -56,17 +56,17 @@ def stack(rings: Sequence[Ring], sides: int = SIDES) -> Piece:
         for k in range(sides):
             a, b = floor + k, floor + (k + 1) % sides
             triangles += [(a, b, b + sides), (a, b + sides, a + sides)]
-    return Piece(tuple(vertices), tuple(triangles))
+    return ConvexPiece(tuple(vertices), tuple(triangles))
 
 
-def block(low: Vector, high: Vector) -> Piece:
+def block(low: Vector, high: Vector) -> ConvexPiece:
     """A cuboid between two corners."""
     (x0, y0, z0), (x1, y1, z1) = low, high
     middle = ((x0 + x1) / 2, (x1 - x0) / 2, (y1 - y0) / 2, (y0 + y1) / 2)
     return stack([Ring(z0, *middle), Ring(z1, *middle)], sides=4)
 
 
-def duck() -> list[Piece]:
+def duck() -> list[ConvexPiece]:
     """8 cm long, sitting."""
     body = [
         Ring(0.0, 0.0, 0.028, 0.016),
@@ -85,7 +85,7 @@ def duck() -> list[Piece]:
     return [stack(body), stack(head), stack(beak, sides=4), stack(tail, sides=4)]
 
 
-def toy_robot() -> list[Piece]:
+def toy_robot() -> list[ConvexPiece]:
     """6 cm high, arms at its sides."""
     pieces = [
         block((-0.014, -0.018, 0.016), (0.014, 0.018, 0.042)),  # trunk
@@ -99,7 +99,7 @@ def toy_robot() -> list[Piece]:
     return pieces
 
 
-def dinosaur() -> list[Piece]:
+def dinosaur() -> list[ConvexPiece]:
     """9 cm from nose to tail, on two broad feet."""
     body = [
         Ring(0.010, 0.0, 0.020, 0.014),
@@ -118,7 +118,7 @@ def dinosaur() -> list[Piece]:
     return pieces
 
 
-def wiper() -> list[Piece]:
+def wiper() -> list[ConvexPiece]:
     """A blade of 26 cm across, with a handle to take it by."""
     return [
         block((-0.130, -0.008, 0.0), (0.130, 0.008, 0.032)),
@@ -126,7 +126,7 @@ def wiper() -> list[Piece]:
     ]
 
 
-SHAPES: Mapping[str, list[Piece]] = {
+SHAPES: Mapping[str, list[ConvexPiece]] = {
     "duck": duck(),
     "toy_robot": toy_robot(),
     "dinosaur": dinosaur(),

@@ -23,7 +23,7 @@ HELD_TOLERANCE = 1e-3  # m and rad, between a held body and where the hand has i
 LIMIT_TOLERANCE = 1e-9  # rad
 
 
-def require_possible(
+def require_valid(
     scene: Scene,
     snapshot: Snapshot,
     materials: Sequence[Material],

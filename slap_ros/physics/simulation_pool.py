@@ -19,7 +19,7 @@ _idle: deque[Simulation] = deque()  # the one that waited longest first
 _lock = RLock()  # a world may be collected, and give back, while another is being made
 
 
-def borrow(scene: Scene, stepping: Stepping) -> Simulation:
+def acquire(scene: Scene, stepping: Stepping) -> Simulation:
     """A simulation of the scene that nobody else uses."""
     with _lock:
         for _ in range(len(_idle)):
@@ -30,7 +30,7 @@ def borrow(scene: Scene, stepping: Stepping) -> Simulation:
     return Simulation(scene, stepping)
 
 
-def give_back(simulation: Simulation) -> None:
+def release(simulation: Simulation) -> None:
     """Keep it for the next world, and close the one that waited longest if there are many."""
     with _lock:
         _idle.append(simulation)
@@ -38,7 +38,7 @@ def give_back(simulation: Simulation) -> None:
             _idle.popleft().close()
 
 
-def release_idle() -> None:
+def close_idle() -> None:
     """Close all simulations that no world uses."""
     with _lock:
         while _idle:

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from slap_ros.domains.tabletop.lying import HALVES, PARTS, Indices
-from slap_ros.domains.tabletop.reading import HALF_NAMES
+from slap_ros.domains.tabletop.footprints import HALVES, PARTS, Indices
+from slap_ros.domains.tabletop.state_access import HALF_NAMES
 from slap_ros.physics.features import BODY_FEATURES, MATERIAL_FEATURES, POSE_FEATURES
 from slap_ros.relational import Column, Feature, Layout, Object, Type
 
-MOST_REMEMBERED = 1024  # columns of objects, a layout
+CACHE_SIZE = 1024  # columns of objects, a layout
 
 Asked = Column | tuple[Column, Column]
 Read = Callable[[Sequence[float]], tuple[Any, ...]]
@@ -34,7 +34,7 @@ SURFACE = Type("surface", (*POSE_FEATURES, *THING_FEATURES), THING)
 
 
 @dataclass(frozen=True, eq=False)
-class Things:
+class TowerObjectIndex:
     """The blocks, then the surfaces of a layout, and where their features are."""
 
     blocks: int  # how many
@@ -46,12 +46,12 @@ class Things:
     is_movable: Indices
     is_target: Indices
     held: Indices  # (blocks,)
-    boxes: tuple[Read, ...]  # of each, what a FloatBox is made of
+    boxes: tuple[Read, ...]  # of each, what a ScalarBox is made of
     _numbers: dict[Asked, Indices] = field(default_factory=dict)
 
     @staticmethod
     @lru_cache(maxsize=256)
-    def of(layout: Layout) -> Things:
+    def of(layout: Layout) -> TowerObjectIndex:
         """Those of a layout."""
         blocks = layout.of_type(BLOCK)
         objects = (*blocks, *layout.of_type(SURFACE))
@@ -63,7 +63,7 @@ class Things:
             names = ("x", "y", "z", *PARTS, *HALF_NAMES)
             return itemgetter(*(layout.column(obj, name) for name in names))
 
-        return Things(
+        return TowerObjectIndex(
             len(blocks),
             objects,
             quaternions=where(*PARTS).T,
@@ -93,6 +93,6 @@ class Things:
         return pairs
 
     def _remember(self, asked: Asked, numbers: Indices) -> None:
-        if len(self._numbers) == MOST_REMEMBERED:
+        if len(self._numbers) == CACHE_SIZE:
             self._numbers.clear()
         self._numbers[asked] = numbers

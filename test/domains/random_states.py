@@ -8,8 +8,8 @@ import math
 
 import numpy as np
 
-from slap_ros.domains.obstacle_tower.lying import CENTRED, TOUCHING
-from slap_ros.domains.obstacle_tower.things import BLOCK, SURFACE
+from slap_ros.domains.obstacle_tower.features import BLOCK, SURFACE
+from slap_ros.domains.obstacle_tower.support import CENTRED, TOUCHING
 from slap_ros.geometry.pose import Pose, multiply, rotate
 from slap_ros.physics.scene import CUBE_EDGE, TABLE_TOP
 from slap_ros.relational import Object, State
@@ -17,7 +17,7 @@ from slap_ros.relational import Object, State
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-def scattered(initial: State, rng: np.random.Generator, count: int) -> State:
+def random_states(initial: State, rng: np.random.Generator, count: int) -> State:
     """A batch in which blocks lie, tumble, fly, stand on one another, on and beside the target."""
     layout = initial.layout
     data = np.repeat(initial.data[None], count, axis=0)

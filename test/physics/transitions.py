@@ -5,7 +5,7 @@
 All blocks are alike, or each is of a material of its own that differs from push to push, or they
 are no blocks but toys of many pieces.
 
-``python pairs.py FILE`` replays recorded pairs and prints how many come out differently.
+``python transitions.py FILE`` replays recorded pairs and prints how many come out differently.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ KINDS: dict[str, tuple[Scene, Callable[[np.random.Generator], State]]] = {
 
 
 @dataclass(frozen=True)
-class Pairs:
+class Transitions:
     """``after[i]`` is what ``actions[i]`` makes of ``before[i]``."""
 
     kind: str  # of KINDS
@@ -53,7 +53,7 @@ class Pairs:
         np.savez(path, kind=self.kind, before=self.before, actions=self.actions, after=self.after)
 
     @classmethod
-    def load(cls, path: Path) -> Pairs:
+    def load(cls, path: Path) -> Transitions:
         with np.load(path) as file:
             return cls(str(file["kind"]), file["before"], file["actions"], file["after"])
 
@@ -107,7 +107,7 @@ def in_the_air(state: State, rng: np.random.Generator) -> State:
     return state.replace({(block, name): value for name, value in features.items()})
 
 
-def record(count: int, seed: int, kind: str = "alike") -> Pairs:
+def record(count: int, seed: int, kind: str = "alike") -> Transitions:
     """Pairs from pushes with an empty and a full hand, throws, and a gripper that acts."""
     rng = np.random.default_rng(seed)
     scene, make = KINDS[kind]
@@ -129,16 +129,16 @@ def record(count: int, seed: int, kind: str = "alike") -> Pairs:
                 before = world.state
                 rows.append((before.data, noisy, world.step(noisy).data))
     chosen = rng.permutation(len(rows))[:count]
-    return Pairs(kind, *(np.array([rows[i][part] for i in chosen]) for part in range(3)))
+    return Transitions(kind, *(np.array([rows[i][part] for i in chosen]) for part in range(3)))
 
 
 def main() -> None:
-    pairs = Pairs.load(Path(sys.argv[1]))
-    order = np.random.default_rng(77).permutation(len(pairs.before))
-    with PandaWorld(pairs.scene, pairs.start) as world:
+    transitions = Transitions.load(Path(sys.argv[1]))
+    order = np.random.default_rng(77).permutation(len(transitions.before))
+    with PandaWorld(transitions.scene, transitions.start) as world:
         for _ in range(20):
             world.step(HIGH * [1, 1, 1, 1, 1, 1, 1, 0])  # another history first
-        differing = pairs.differing(world, order)
+        differing = transitions.differing(world, order)
     sys.stdout.write(f"{len(differing)} of {len(order)} differ\n")
 
 

@@ -11,16 +11,16 @@ GAP = 0.1  # between the middles of things that stand apart at least, so that fi
 SPACING = 0.05  # of the grid of places
 MOST = 40  # places, tried in order of distance
 
-Place = tuple[float, float]  # x, y
+Placement = tuple[float, float]  # x, y
 
 
-def free_places(
-    near: Place,
-    middle: Place,
-    half: Place,
-    taken: Iterable[tuple[Place, float]],
+def free_placements(
+    near: Placement,
+    middle: Placement,
+    half: Placement,
+    taken: Iterable[tuple[Placement, float]],
     spacing: float = SPACING,
-) -> list[Place]:
+) -> list[Placement]:
     """Places of a grid that are free, the nearest first.
 
     Args:

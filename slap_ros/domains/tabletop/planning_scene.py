@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from slap_ros.domains.tabletop.reading import finger_of, grasp_of, held_body
+from slap_ros.domains.tabletop.state_access import finger_of, grasp_of, held_body
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.motion import CollisionChecker
 from slap_ros.relational import Object, State
@@ -18,7 +18,7 @@ AT_EASE, CARRYING, SETTING_DOWN = 0.02, 0.005, -0.001
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class PlanningScene:
     """What is around the arm.
 
     Args:

@@ -6,10 +6,10 @@ import pytest
 
 from benchmarks.physics_step import with_joints
 from slap_ros.domains import get_domain
-from slap_ros.domains.obstacle_tower.skills import SURROUNDINGS
+from slap_ros.domains.obstacle_tower.skills import PLANNING_SCENE
 from slap_ros.domains.tabletop.grasps import from_above
-from slap_ros.domains.tabletop.reading import joints_of, pose_of
-from slap_ros.domains.tabletop.ways import CLEARANCE, Way
+from slap_ros.domains.tabletop.state_access import joints_of, pose_of
+from slap_ros.domains.tabletop.transit import CLEARANCE, Transit
 from slap_ros.motion import nearest_configurations
 from slap_ros.physics.panda import grasp_pose
 from slap_ros.physics.scene import CUBE_EDGE
@@ -31,7 +31,7 @@ def beside_the_tower(gap, blocks_up):
 
 def rise(state):
     """How far it goes up before it goes elsewhere, m."""
-    (descent,) = Way(SURROUNDINGS, state, [ELSEWHERE], ()).descents
+    (descent,) = Transit(PLANNING_SCENE, state, [ELSEWHERE], ()).descents
     before, after = grasp_pose(joints_of(state)), grasp_pose(descent.up[-1])
     return after.position[2] - before.position[2]
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from slap_ros.domains.cleanup_table.model import BLOCK, HALF, MIDDLE, SURFACE, WALL
-from slap_ros.domains.tabletop.reading import box_of, pose_of
-from slap_ros.domains.tabletop.surroundings import Surroundings
+from slap_ros.domains.tabletop.planning_scene import PlanningScene
+from slap_ros.domains.tabletop.state_access import box_of, pose_of
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, Vector
 from slap_ros.meshes.solid import Solid
@@ -91,4 +91,4 @@ def carried(state: State, block: Object) -> OrientedBox:
     return OrientedBox(Pose((x, y, z)), (u, v, w))
 
 
-SURROUNDINGS = Surroundings(solid, carried)
+PLANNING_SCENE = PlanningScene(solid, carried)

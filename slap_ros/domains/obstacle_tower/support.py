@@ -13,9 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from slap_ros.domains.obstacle_tower.things import Things
-from slap_ros.domains.tabletop.floats import FloatBox
-from slap_ros.domains.tabletop.lying import (
+from slap_ros.domains.obstacle_tower.features import TowerObjectIndex
+from slap_ros.domains.tabletop.footprints import (
     TO_EDGES,
     along_axes,
     complex_of,
@@ -24,29 +23,30 @@ from slap_ros.domains.tabletop.lying import (
     unpinched,
     widths,
 )
+from slap_ros.domains.tabletop.scalar_box import ScalarBox
 from slap_ros.relational import State
-from slap_ros.relational.predicates import Bools, shared
+from slap_ros.relational.predicates import Bools, cache_latest
 from slap_ros.relational.state import Array
 
 TOUCHING = 0.004  # m, height over a thing at which a block still lies on it
 CENTRED = 0.015  # m, distance from the target's middle at which a block still is in it
 
 
-class Lie(NamedTuple):
+class SupportRelations(NamedTuple):
     """How everything lies in a state, as margins in m."""
 
-    things: Things
+    things: TowerObjectIndex
     on: Array  # of blocks on things, shape (..., blocks * things)
     room: Array  # for a block on things, shape (..., things)
 
 
-@shared
-def lie(state: State) -> Lie:
+@cache_latest
+def support_relations(state: State) -> SupportRelations:
     """How everything lies: all at once, as predicates share most of it.
 
     Horizontal vectors are complex numbers: turned by a product, seen along both axes at once.
     """
-    things, data = Things.of(state.layout), state.data
+    things, data = TowerObjectIndex.of(state.layout), state.data
     blocks = slice(things.blocks)
     q = data.take(things.quaternions, axis=-1)
     products = (q[..., None] * q[..., None, :]).reshape(*q.shape[:-1], 16)
@@ -80,24 +80,24 @@ def lie(state: State) -> Lie:
     # On the table there is always room; on targets and blocks for one block only.
     over = np.maximum.reduce(np.minimum(touches, covers), axis=-2, initial=-1.0)
     room = np.where(is_movable | is_target, strictly(-over), 1.0)
-    return Lie(things, on.reshape(*on.shape[:-2], -1), room)
+    return SupportRelations(things, on.reshape(*on.shape[:-2], -1), room)
 
 
-class Rest(NamedTuple):
+class SupportTruths(NamedTuple):
     """The same of a single state, as truths, and what is held."""
 
-    things: Things
+    things: TowerObjectIndex
     on: Bools  # of blocks on things, shape (blocks * things,)
     room: Bools  # for a block on things, shape (things,)
     held: Bools  # shape (blocks,)
     empty: Bools  # whether none is, shape (1,)
 
 
-@shared
-def rest(state: State) -> Rest:
+@cache_latest
+def support_truths(state: State) -> SupportTruths:
     """What lies on what in a single state: what is at the right height is looked at closely."""
-    things, values = Things.of(state.layout), state.data.tolist()
-    boxes = [FloatBox(*read(values)) for read in things.boxes]
+    things, values = TowerObjectIndex.of(state.layout), state.data.tolist()
+    boxes = [ScalarBox(*read(values)) for read in things.boxes]
     is_movable, is_target, held = (
         [values[i] > 0.5 for i in label.tolist()]
         for label in (things.is_movable, things.is_target, things.held)
@@ -118,8 +118,10 @@ def rest(state: State) -> Rest:
                 )
             if covers and (is_movable[i] or is_target[i]):
                 room[i] = False
-    return Rest(things, on.reshape(-1), room, np.array(held, bool), np.array([not any(held)]))
+    return SupportTruths(
+        things, on.reshape(-1), room, np.array(held, bool), np.array([not any(held)])
+    )
 
 
-def _is_centred(block: FloatBox, target: FloatBox) -> bool:
+def _is_centred(block: ScalarBox, target: ScalarBox) -> bool:
     return math.hypot(block.x - target.x, block.y - target.y) <= CENTRED

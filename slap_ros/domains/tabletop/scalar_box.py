@@ -7,7 +7,7 @@ from __future__ import annotations
 Vector2 = tuple[float, float]
 
 
-class FloatBox:
+class ScalarBox:
     """What is asked of a box, computed when it is asked for.
 
     Args:
@@ -39,7 +39,7 @@ class FloatBox:
         self.bottom, self.top = z - height, z + height
         self._frame: tuple[Vector2, Vector2] | None = None
 
-    def covers(self, other: FloatBox) -> bool:
+    def covers(self, other: ScalarBox) -> bool:
         """Whether it is over the other somewhere, both seen from above along the other's axes."""
         x, y = self.x - other.x, self.y - other.y
         # However they are turned, a box reaches as far as its shortest half edge, and never as far

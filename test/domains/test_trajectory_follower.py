@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("pybullet")
 
 from slap_ros.domains import get_domain
-from slap_ros.domains.tabletop.skills import Follow
+from slap_ros.domains.tabletop.skills import TrajectoryFollower
 from slap_ros.physics.features import JOINT_FEATURES
 from slap_ros.physics.panda import HOME, MAX_STEP
 
@@ -36,13 +36,13 @@ def run(follow, arrives):
 
 
 def test_an_arm_that_arrives_is_sent_along_the_script():
-    joints, actions = run(Follow(SCRIPT, MAX_STEP), 1.0)
+    joints, actions = run(TrajectoryFollower(SCRIPT, MAX_STEP), 1.0)
     assert len(actions) == len(SCRIPT)
     assert np.allclose(joints, WAY[-1])
 
 
 def test_an_arm_that_lags_is_never_asked_for_more_than_it_may_do_and_still_arrives():
-    joints, actions = run(Follow(SCRIPT, MAX_STEP), 0.8)
+    joints, actions = run(TrajectoryFollower(SCRIPT, MAX_STEP), 0.8)
     assert len(actions) > len(SCRIPT)
     assert np.abs(joints - WAY[-1]).max() < 0.02
     assert [action[7] for action in actions].count(1.0) == 1
@@ -50,5 +50,5 @@ def test_an_arm_that_lags_is_never_asked_for_more_than_it_may_do_and_still_arriv
 
 
 def test_an_arm_that_is_held_up_does_not_keep_a_skill_for_ever():
-    _, actions = run(Follow(SCRIPT, MAX_STEP), 0.0)
+    _, actions = run(TrajectoryFollower(SCRIPT, MAX_STEP), 0.0)
     assert len(SCRIPT) < len(actions) <= 3 * len(SCRIPT)

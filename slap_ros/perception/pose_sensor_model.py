@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from slap_ros.geometry.pose import multiply, turn_about
+from slap_ros.geometry.pose import from_rotation_vector, multiply
 from slap_ros.perception.quality import Quality
 from slap_ros.relational import Object, State
 
@@ -22,7 +22,7 @@ Features = Mapping[str, float]  # of an object, by name
 
 
 @dataclass
-class Sight:
+class PoseSensorModel:
     """Sees what can be moved. The robot and what stands fixed are where they are known to be.
 
     Args:
@@ -37,12 +37,12 @@ class Sight:
     _unseen: dict[Object, int] = field(default_factory=dict)  # steps, of what is not seen
 
     @classmethod
-    def of(cls, quality: Quality, rng: np.random.Generator, initial: State) -> Sight:
+    def of(cls, quality: Quality, rng: np.random.Generator, initial: State) -> PoseSensorModel:
         """The sight of an episode; a task says where things are before they are seen."""
         movable = [obj for obj in initial.objects if HELD in obj.type.column]
         return cls(quality, rng, {obj: _pose(initial, obj) for obj in movable})
 
-    def look(self, state: State) -> State:
+    def measure(self, state: State) -> State:
         """The state as seen: one look, a step."""
         changes: dict[tuple[Object, str], float] = {}
         for obj in self.known:
@@ -79,7 +79,7 @@ class Sight:
         if TURN[0] in seen and noise[1] > 0.0:
             a, b, c = (noise[1] * self.rng.standard_normal(3)).tolist()
             x, y, z, w = (seen[name] for name in TURN)
-            turned = multiply(turn_about((a, b, c)), (x, y, z, w))
+            turned = multiply(from_rotation_vector((a, b, c)), (x, y, z, w))
             seen |= dict(zip(TURN, turned, strict=True))
         return seen
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from slap_ros.domains.obstacle_tower.things import BLOCK, SURFACE
+from slap_ros.domains.obstacle_tower.features import BLOCK, SURFACE
 from slap_ros.physics.scene import TABLE, Box, Colour, Scene, cube
 from slap_ros.relational import State
 

@@ -24,14 +24,14 @@ from slap_ros.motion.joints import (
 )
 from slap_ros.physics.panda import JOINTS
 
-BENDS = 512  # to choose from
+VIA_POINTS = 512  # to choose from
 SPREAD = 10.0  # control steps, the widest standard deviation of the bends from the straight way
 _MIDDLE = 0.2, 0.8  # where on the straight way
 _BATCH = 32  # bends that are looked at together
 _GLANCES = 1, 3, 6  # configurations each way, up to a bend: most blocked paths show at a few
 
 
-def detour(
+def via_point_path(
     start: Joints, goal: Joints, free: Free, rng: np.random.Generator, *, resolution: float
 ) -> Path | None:
     """The path of fewest control steps that is free, of many with one bend.
@@ -46,31 +46,31 @@ def detour(
     Returns:
         rad, shape (3, 7); None if none of them is free.
     """
-    bends = _bends(start, goal, rng)
-    for i in range(0, len(bends), _BATCH):
-        batch = bends[i : i + _BATCH]
+    via_points = _via_points(start, goal, rng)
+    for i in range(0, len(via_points), _BATCH):
+        batch = via_points[i : i + _BATCH]
         for count in _GLANCES:
             glances = _glances(start, batch, goal, count)
             batch = batch[free(glances.reshape(-1, JOINTS)).reshape(glances.shape[:2]).all(0)]
-        for bend in batch:
-            path: Path = np.stack([start, bend, goal])
+        for via_point in batch:
+            path: Path = np.stack([start, via_point, goal])
             if free(path_configurations(path, resolution)).all():
                 return path
     return None
 
 
-def _bends(start: Joints, goal: Joints, rng: np.random.Generator) -> Joints:
+def _via_points(start: Joints, goal: Joints, rng: np.random.Generator) -> Joints:
     """Configurations around the straight way, those that bend it least first: rad, shape (k, 7)."""
-    along = rng.uniform(*_MIDDLE, (BENDS, 1))
-    aside = rng.uniform(0.0, SPREAD, (BENDS, 1)) * rng.normal(size=(BENDS, JOINTS))
+    along = rng.uniform(*_MIDDLE, (VIA_POINTS, 1))
+    aside = rng.uniform(0.0, SPREAD, (VIA_POINTS, 1)) * rng.normal(size=(VIA_POINTS, JOINTS))
     q = start + along * (goal - start) + aside * STEP
     q = q[within_limits(q)]
     lengths = control_steps(start, q) + control_steps(q, goal)
     return cast(Joints, q[np.argsort(lengths, kind="stable")])
 
 
-def _glances(start: Joints, bends: Joints, goal: Joints, count: int) -> Joints:
+def _glances(start: Joints, via_points: Joints, goal: Joints, count: int) -> Joints:
     """So many configurations each way from some bends: rad, shape (2 count - 1, k, 7)."""
     fractions = np.arange(1, count + 1)[:, None, None] / count
-    there, back = (end + fractions * (bends - end) for end in (start, goal))
+    there, back = (end + fractions * (via_points - end) for end in (start, goal))
     return np.concatenate([there, back[:-1]])  # the bends themselves once

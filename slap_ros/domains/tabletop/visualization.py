@@ -8,13 +8,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from slap_ros.core import Animate, VisibleBody
-from slap_ros.domains.tabletop.reading import finger_of, joints_of, pose_of
+from slap_ros.domains.tabletop.state_access import finger_of, joints_of, pose_of
 from slap_ros.geometry.pose import IDENTITY
 from slap_ros.meshes.solid import Solid
 from slap_ros.motion.arm_shapes import ARM_SHAPES, BASE
 from slap_ros.physics.panda import LINKS, link_poses
 from slap_ros.physics.scene import Body, Scene
-from slap_ros.physics.viewpoint import View
+from slap_ros.physics.viewpoint import Viewpoint
 from slap_ros.relational import State
 
 METAL = (0.88, 0.9, 0.92, 1.0)  # of the arm
@@ -58,7 +58,7 @@ def _visible(body: Body, state: State) -> VisibleBody:
     )
 
 
-def animation(scene_of: SceneOf, view: View | None = None) -> Animate:
+def animation(scene_of: SceneOf, view: Viewpoint | None = None) -> Animate:
     """What writes states, one a control step, as an animation, seen from somewhere."""
 
     def animate(path: Path, states: Sequence[State], progress: Callable[[int], None]) -> None:

@@ -15,8 +15,8 @@ from typing import ParamSpec, TypeVar, cast
 
 import numpy as np
 
-from slap_ros.domains.tabletop.reading import joints_of
-from slap_ros.domains.tabletop.surroundings import AT_EASE, CARRYING, Surroundings
+from slap_ros.domains.tabletop.planning_scene import AT_EASE, CARRYING, PlanningScene
+from slap_ros.domains.tabletop.state_access import joints_of
 from slap_ros.domains.tabletop.timing import Timing
 from slap_ros.errors import SkillNotApplicableError
 from slap_ros.geometry.pose import Pose
@@ -40,32 +40,32 @@ CLEARANCE = 0.05  # m, over a place before coming down to it and after leaving i
 SEED = 0  # of motion plans: a plan is a function of the state alone
 ATTEMPTS = 2  # random paths for a motion that needs them; more shorten it by little
 PLANS = PlanCache(attempts=ATTEMPTS)
-REMEMBERED = 1024  # answers of each function below, and of a domain's that make ways
-_FORGET: list[Callable[[], None]] = [PLANS.clear]
+CACHE_SIZE = 1024  # answers of each function below, and of a domain's that make ways
+_CLEAR_CACHES: list[Callable[[], None]] = [PLANS.clear]
 
 Given = ParamSpec("Given")
 T = TypeVar("T")
 
 
-def remembered(compute: Callable[Given, T]) -> Callable[Given, T]:
+def memoized(compute: Callable[Given, T]) -> Callable[Given, T]:
     """Compute once what is asked for again, until it is forgotten: ways, above all."""
-    cached = lru_cache(maxsize=REMEMBERED)(compute)
-    _FORGET.append(cached.cache_clear)
+    cached = lru_cache(maxsize=CACHE_SIZE)(compute)
+    _CLEAR_CACHES.append(cached.cache_clear)
     return cast(Callable[Given, T], cached)
 
 
 @dataclass(frozen=True, eq=False)
-class Way:
+class Transit:
     """How the grasp point gets to one of several poses: up, across, down.
 
     Args:
-        surroundings: What to keep clear of.
+        scene: What to keep clear of.
         state: Where it begins.
         ends: Poses of the grasp point, any of which will do.
         touched: What the arm or its body may touch when it comes down.
     """
 
-    surroundings: Surroundings
+    scene: PlanningScene
     state: State
     ends: Sequence[Pose]
     touched: tuple[Object, ...]
@@ -119,7 +119,7 @@ class Way:
                 least = min(least, timing.least_steps([*towards, descent.down]))
         return least
 
-    def _across(self, descent: Descent) -> Path:
+    def _across(self, descent: TransitCandidate) -> Path:
         start, above = descent.straight
         return PLANS.plan_path(start, above, self.free, seed=SEED)
 
@@ -134,29 +134,29 @@ class Way:
     @property
     def free(self) -> CollisionChecker:
         """What is free on the way across."""
-        return _free(self.surroundings, self.state)
+        return _free(self.scene, self.state)
 
     @cached_property
     def touching(self) -> CollisionChecker:
         """What is free on the way down, and where corners may be cut."""
-        return self.surroundings.checker(self.state, self.touched)
+        return self.scene.checker(self.state, self.touched)
 
     @cached_property
-    def descents(self) -> list[Descent]:
+    def descents(self) -> list[TransitCandidate]:
         """To the ends that have something over them, the nearest first; none if it cannot begin."""
-        up, found = _departure(self.surroundings, self.state), []
+        up, found = _departure(self.scene, self.state), []
         if up is None:
             return []
         over = [shifted(end, (0.0, 0.0, CLEARANCE)) for end in self.ends]
         nearest = nearest_configurations(over, up[-1], free=self.free)
         for end, above in zip(self.ends, nearest, strict=True):
             if above is not None:
-                found.append(Descent(up, np.stack([up[-1], above]), end, self.touching))
+                found.append(TransitCandidate(up, np.stack([up[-1], above]), end, self.touching))
         return sorted(found, key=lambda descent: path_steps(descent.straight))
 
 
 @dataclass(frozen=True, eq=False)
-class Descent:
+class TransitCandidate:
     """A way to one of the ends, but for what may be between."""
 
     up: Path  # rad, shape (k, 7)
@@ -170,32 +170,32 @@ class Descent:
         return linear_motion(self.straight[-1], self.end, free=self.free)
 
 
-@remembered
-def _departure(surroundings: Surroundings, state: State) -> Path | None:
+@memoized
+def _departure(scene: PlanningScene, state: State) -> Path | None:
     """Straight up, where the fingers or the body in them are still close to something.
 
     Higher, where one cannot go across from there: shortcuts leave a hand deep between things.
     """
     q = joints_of(state)
-    if surroundings.checker(state, held_margin=AT_EASE)(q[None])[0]:
+    if scene.checker(state, held_margin=AT_EASE)(q[None])[0]:
         return q[None]
     low = _up(q, CLEARANCE)
-    if low is None or _free(surroundings, state)(low[-1:])[0]:
+    if low is None or _free(scene, state)(low[-1:])[0]:
         return low
     high = _up(q, 2.0 * CLEARANCE)
-    return high if high is not None and _free(surroundings, state)(high[-1:])[0] else low
+    return high if high is not None and _free(scene, state)(high[-1:])[0] else low
 
 
 def _up(q: Joints, rise: float) -> Path | None:
     return linear_motion(q, shifted(grasp_pose(q), (0.0, 0.0, rise)))
 
 
-@remembered
-def _free(surroundings: Surroundings, state: State) -> CollisionChecker:
-    return surroundings.checker(state, held_margin=CARRYING)
+@memoized
+def _free(scene: PlanningScene, state: State) -> CollisionChecker:
+    return scene.checker(state, held_margin=CARRYING)
 
 
-def forget() -> None:
+def clear_caches() -> None:
     """Forget every motion, for fair measurements; nothing else changes."""
-    for clear in _FORGET:
+    for clear in _CLEAR_CACHES:
         clear()
