@@ -21,8 +21,8 @@ from rclpy.executors import SingleThreadedExecutor
 from slap_msgs.msg import ObjectCentricState, RobotCommand
 
 from benchmarks.printing import show
-from ensemble.hosts import ProcessHost
 from ensemble.interfaces import COMMAND, STATE
+from ensemble.launcher import ProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.run import RunRequest, run
 from slap_ros.bags import read_bag
@@ -66,7 +66,7 @@ def state_command_state(steps: int) -> list[float]:
     executor, stepper = SingleThreadedExecutor(), Stepper()
     executor.add_node(stepper.node)
     settings = RunSettings("obstacle2d", "fair", 0, 0, "lazy", None)
-    with ProcessHost({"sim_node": node_parameters(settings)["sim_node"]}):
+    with ProcessLauncher({"sim_node": node_parameters(settings)["sim_node"]}):
         while not stepper.connected():
             executor.spin_once(timeout_sec=0.1)
         stepper.command(0)

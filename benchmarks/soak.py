@@ -26,10 +26,10 @@ from slap_msgs.srv import ResetTask
 
 from benchmarks.printing import show
 from ensemble.client import RunClient
-from ensemble.hosts import ProcessHost
 from ensemble.interfaces import RESET_TASK
+from ensemble.launcher import ProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
-from ensemble.spinning import Spinner, spinning
+from ensemble.spinner import Spinner, temporary_node
 from slap_ros.cli.console import progress
 from slap_ros.evaluation.metrics import RunLog
 from slap_ros.studies.figures import LINES, picture, require_matplotlib
@@ -180,7 +180,7 @@ class Bench:
         return "" if result.success else f"seed {seed}: {result.error_code}: {result.error_msg}"
 
     def _wait(self, condition: Any) -> None:
-        if not self._spinner.until(condition, PATIENCE):
+        if not self._spinner.spin_until(condition, PATIENCE):
             raise SystemExit(f"no answer within {PATIENCE} s")
 
 
@@ -188,16 +188,16 @@ def soak(tasks: int, every: int) -> Soaked:
     """Solve tasks with seeds from 0 on, reading the processes after every so many."""
     with (
         TemporaryDirectory(prefix="slap-soak-") as folder,
-        spinning(lambda: RunClient(lambda _type, _message: None)) as (client, spinner),
+        temporary_node(lambda: RunClient(lambda _type, _message: None)) as (client, spinner),
         ExitStack() as stack,
     ):
         bag = Path(folder) / "bag"
         settings = RunSettings(DOMAIN, "fair", 0, 0, "lazy", bag)
-        host = stack.enter_context(ProcessHost(node_parameters(settings)))
-        spinner.check = host.check
+        launcher = stack.enter_context(ProcessLauncher(node_parameters(settings)))
+        spinner.check = launcher.check
         bench = Bench(client, spinner)
         bench.ready()
-        processes = {name: psutil.Process(p.pid) for name, p in host.processes.items()}
+        processes = {name: psutil.Process(p.pid) for name, p in launcher.processes.items()}
         processes["slap_run"] = psutil.Process()
         read: dict[str, list[Sample]] = {name: [] for name in processes}
         after, failures, start = [], [], monotonic()

@@ -66,7 +66,7 @@ class RunClient(Node):
 
         self.create_subscription(topic.type, topic.name, callback, topic.qos)
 
-    def others(self) -> list[str]:
+    def other_nodes(self) -> list[str]:
         """Names of the other nodes in this namespace."""
         here = self.get_namespace()
         return [

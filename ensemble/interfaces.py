@@ -47,9 +47,9 @@ LATCHED = _reliable(1, DurabilityPolicy.TRANSIENT_LOCAL)
 # simulator, or starts again, misses nothing.
 EPISODE = _reliable(1000, DurabilityPolicy.TRANSIENT_LOCAL)
 # From now on: for whoever must not act on the past.
-FRESH = _reliable(1000, DurabilityPolicy.VOLATILE)
+VOLATILE = _reliable(1000, DurabilityPolicy.VOLATILE)
 # Whatever a robot's driver offers, reliable or not; what is old is of no use.
-SENSED = QoSProfile(
+SENSOR_DATA = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,
     depth=100,
     reliability=ReliabilityPolicy.BEST_EFFORT,
@@ -80,7 +80,7 @@ COMMAND = Topic("slap/command", RobotCommand, EPISODE)
 PLAN = Topic("slap/plan", Plan, LATCHED)
 PLAN_EVENTS = Topic("slap/plan_events", PlanEvent, EPISODE)
 SKILL_EVENTS = Topic("slap/skill_events", SkillEvent, EPISODE)
-DIAGNOSTICS = Topic("diagnostics", DiagnosticArray, FRESH)
+DIAGNOSTICS = Topic("diagnostics", DiagnosticArray, VOLATILE)
 MARKERS = Topic("slap/markers", MarkerArray, EPISODE)
 TF = Topic("tf", TFMessage, _reliable(100, DurabilityPolicy.VOLATILE))
 TF_STATIC = Topic("tf_static", TFMessage, _reliable(100, DurabilityPolicy.TRANSIENT_LOCAL))

@@ -11,18 +11,19 @@ import rclpy
 
 from slap_ros.errors import InvalidParameterError
 
-REACH = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 
 
-def join(**options: Any) -> None:
+def join_network(**options: Any) -> None:
     """``rclpy.init``, so that a robot takes no commands from elsewhere by accident.
 
-    Left to itself Jazzy looks for others on the whole subnet. Who wants that sets ``REACH``.
+    Left to itself Jazzy looks for others on the whole subnet. Whoever wants that sets the variable
+    ``ROS_AUTOMATIC_DISCOVERY_RANGE``.
 
     Raises:
         InvalidParameterError: An environment variable, such as ROS_DOMAIN_ID, is wrong.
     """
-    os.environ.setdefault(REACH, "LOCALHOST")
+    os.environ.setdefault(DISCOVERY_RANGE, "LOCALHOST")
     try:
         rclpy.init(**options)
     except ValueError as error:

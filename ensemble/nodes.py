@@ -7,24 +7,32 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from pkgutil import resolve_name
+from typing import Any
 
 from slap_ros.robot.worlds import MOCK, SIM
 from slap_ros.shortcuts.shortcut import DEFAULT
 
-# A node is started by the name of its package.
-CLASSES = {
-    "sim_node": "SimNode",
-    "robot_bridge": "RobotBridge",
-    "robot_bridge.mock": "MockRobot",
-    "perception_node": "PerceptionNode",
-    "skill_server": "SkillServer",
-    "planner_node": "PlannerNode",
-    "recorder_node": "RecorderNode",
+# What shares a process with others is reached by name: nodes build on the ensemble, not it on them.
+NODE_CLASSES: Mapping[str, str] = {  # by the name of the module that is run as a process
+    "sim_node": "sim_node.node:SimNode",
+    "robot_bridge": "robot_bridge.node:RobotBridge",
+    "robot_bridge.mock": "robot_bridge.mock.node:MockRobot",
+    "robot_bridge.player": "robot_bridge.player:Player",
+    "perception_node": "perception_node.node:PerceptionNode",
+    "skill_server": "skill_server.node:SkillServer",
+    "planner_node": "planner_node.node:PlannerNode",
+    "recorder_node": "recorder_node.node:RecorderNode",
 }
 
 
 # s without a state after which a skill is given up: a robot takes its time to move and to look.
 ROBOT_STATE_TIMEOUT = 8.0
+
+
+def node_class(name: str) -> Any:
+    """The class of a node, by the name of the module that is run as a process."""
+    return resolve_name(NODE_CLASSES[name])
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,10 @@ from rclpy.executors import Executor
 from rclpy.task import Future
 
 from ensemble.client import OnMessage, RunClient
-from ensemble.hosts import Host, InProcessHost, ProcessHost
 from ensemble.interfaces import Topic
+from ensemble.launcher import InProcessLauncher, NodeLauncher, ProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
-from ensemble.spinning import Spinner, spinning
+from ensemble.spinner import Spinner, temporary_node
 from slap_ros.errors import (
     AlreadyRunningError,
     NodeDiedError,
@@ -66,30 +66,33 @@ def run(request: RunRequest, on_message: OnMessage) -> RunMetrics:
         SlapError: The planner refused the task; the code says why.
         KeyboardInterrupt: After the robot holds and the bag is closed.
     """
-    with spinning(lambda: RunClient(on_message, request.shown)) as (client, spinner):
+    with temporary_node(lambda: RunClient(on_message, request.shown)) as (client, spinner):
         _refuse_company(client, spinner)
-        with _host(request, spinner.executor) as host:
-            return _drive(request, client, spinner, host)
+        with _launcher(request, spinner.executor) as launcher:
+            return _drive(request, client, spinner, launcher)
 
 
-def _host(request: RunRequest, executor: Executor) -> Host:
+def _launcher(request: RunRequest, executor: Executor) -> NodeLauncher:
     nodes = node_parameters(request.settings)
-    return InProcessHost(nodes, executor) if request.in_process else ProcessHost(nodes)
+    return InProcessLauncher(nodes, executor) if request.in_process else ProcessLauncher(nodes)
 
 
 def _refuse_company(client: RunClient, spinner: Spinner) -> None:
-    if spinner.until(lambda: bool(client.others()), DISCOVERY):
+    if spinner.spin_until(lambda: bool(client.other_nodes()), DISCOVERY):
+        found = ", ".join(sorted(client.other_nodes()))
         raise AlreadyRunningError(
-            f"{', '.join(sorted(client.others()))} already run on this network: stop them, or set "
-            "another ROS_DOMAIN_ID for this run"
+            f"{found} already run on this network: stop them, or set another ROS_DOMAIN_ID for "
+            "this run"
         )
 
 
-def _drive(request: RunRequest, client: RunClient, spinner: Spinner, host: Host) -> RunMetrics:
-    spinner.check = host.check
+def _drive(
+    request: RunRequest, client: RunClient, spinner: Spinner, launcher: NodeLauncher
+) -> RunMetrics:
+    spinner.check = launcher.check
     recording = request.settings.record is not None
     patience = min(READY_TIMEOUT, request.timeout_s)
-    if not spinner.until(lambda: client.ready(recording), patience):
+    if not spinner.spin_until(lambda: client.ready(recording), patience):
         raise NotReadyError(f"the ensemble did not come up within {patience} s; try `slap doctor`")
     failure: SlapError | None = None
     try:
@@ -98,7 +101,7 @@ def _drive(request: RunRequest, client: RunClient, spinner: Spinner, host: Host)
         failure = error
     finally:
         if recording:
-            failure = _close_bag(client, spinner, host) or failure
+            failure = _close_bag(client, spinner, launcher) or failure
     runs = client.log.runs()
     if not runs:
         raise failure or NotReadyError("the planner ended the run without an event")
@@ -111,16 +114,16 @@ def _solve(request: RunRequest, client: RunClient, spinner: Spinner) -> None:
     sent = client.send(request.goal, request.step_limit, request.max_replans)
     end = monotonic() + request.timeout_s
     try:
-        if not spinner.until(sent.done, end - monotonic()):
+        if not spinner.spin_until(sent.done, end - monotonic()):
             raise RunTimeoutError(f"the planner did not answer within {request.timeout_s} s")
         result = sent.result().get_result_async()
-        if not spinner.until(result.done, end - monotonic()):
+        if not spinner.spin_until(result.done, end - monotonic()):
             raise RunTimeoutError(f"the task was not done within {request.timeout_s} s")
     except (KeyboardInterrupt, RunTimeoutError):
         _cancel(sent, spinner)
         raise
     outcome = result.result().result
-    complete = spinner.until(lambda: client.log.complete, LOG_TIMEOUT)
+    complete = spinner.spin_until(lambda: client.log.complete, LOG_TIMEOUT)
     if not complete and outcome.error_code:
         raise error_from(outcome.error_code, outcome.error_msg)
 
@@ -129,17 +132,17 @@ def _cancel(sent: Future, spinner: Spinner) -> None:
     """Make the robot hold."""
     if sent.done():
         canceled: Any = sent.result().cancel_goal_async()
-        if spinner.until(canceled.done, CANCEL_TIMEOUT):  # else the planner is away
+        if spinner.spin_until(canceled.done, CANCEL_TIMEOUT):  # else the planner is away
             ended = sent.result().get_result_async()
-            spinner.until(ended.done, CANCEL_TIMEOUT)
+            spinner.spin_until(ended.done, CANCEL_TIMEOUT)
 
 
-def _close_bag(client: RunClient, spinner: Spinner, host: Host) -> SlapError | None:
+def _close_bag(client: RunClient, spinner: Spinner, launcher: NodeLauncher) -> SlapError | None:
     """Have the bag finished; the error where the recorder is gone."""
-    spinner.check = lambda: host.require("recorder_node")  # who else is gone is known by now
+    spinner.check = lambda: launcher.require("recorder_node")  # who else is gone is known by now
     closed = client.close_bag()
     try:
-        if not spinner.until(closed.done, CLOSE_TIMEOUT):
+        if not spinner.spin_until(closed.done, CLOSE_TIMEOUT):
             return RunTimeoutError(f"the recorder did not finish its bag within {CLOSE_TIMEOUT} s")
     except NodeDiedError as error:
         return error

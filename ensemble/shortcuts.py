@@ -26,7 +26,7 @@ class ShortcutParameters:
     samples: int = parameter(DEFAULT.samples, "attempts of a shortcut in the model when planning")
 
 
-class Repertoires:
+class ShortcutProvider:
     """The library of whatever domain the simulator runs, and what it offers in each episode."""
 
     def __init__(self, node: Node, settings: ShortcutParameters, planner: str = "lazy") -> None:

@@ -30,7 +30,6 @@ Subscribers:
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -38,55 +37,16 @@ from rclpy.node import Node
 from slap_msgs.msg import ObjectCentricState
 
 from ensemble import encode
-from ensemble.heartbeat import Heartbeat
+from ensemble.diagnostics import DiagnosticsPublisher
+from ensemble.entry_point import run_node
+from ensemble.episode_tracker import EpisodeTracker, subscribe
 from ensemble.interfaces import ATOMS, STATE
-from ensemble.observation import Episode, EpisodeWatcher, subscribe
-from ensemble.parameters import parameter, read_parameters
-from ensemble.running import run_node
-from slap_ros.errors import InvalidParameterError, InvalidStateError
+from ensemble.observation import Episode
+from ensemble.parameters import read_parameters
+from ensemble.perception_parameters import PerceptionParameters
+from slap_ros.errors import InvalidStateError
 from slap_ros.messages.decode import decode_state
-from slap_ros.perception import ExactPerceiver, NoisyPerceiver, Perceiver, Quality
-from slap_ros.perception.quality import MEMORY
-
-
-@dataclass(frozen=True)
-class Parameters:
-    """See the module's docstring."""
-
-    position_noise: float = parameter(0.0, "m, of positions, along each axis")
-    turn_noise: float = parameter(0.0, "rad, of orientations, about each axis")
-    threshold_noise: float = parameter(0.0, "m or rad, of predicates' thresholds")
-    dropout: float = parameter(0.0, "share of sightings that are lost")
-    hidden: str = parameter("", "objects that are never seen, separated by blanks")
-    memory: int = parameter(MEMORY, "steps for which what is not seen is where it was")
-    debounce: int = parameter(1, "times in a row that an atom is to be perceived as changed")
-    noise_seed: int = parameter(0, "noise is a function of it")
-
-    def __post_init__(self) -> None:
-        """Refuse a seed that is none.
-
-        Raises:
-            InvalidParameterError: It is negative.
-        """
-        if self.noise_seed < 0:
-            raise InvalidParameterError(f"noise_seed is 0 or more, not {self.noise_seed}")
-
-    @property
-    def quality(self) -> Quality:
-        """The same for the core.
-
-        Raises:
-            InvalidParameterError: A value that it cannot have.
-        """
-        return Quality(
-            self.position_noise,
-            self.turn_noise,
-            self.threshold_noise,
-            self.dropout,
-            frozenset(self.hidden.split()),
-            self.memory,
-            self.debounce,
-        )
+from slap_ros.perception import ExactPerceiver, NoisyPerceiver, Perceiver
 
 
 class PerceptionNode(Node):
@@ -94,15 +54,15 @@ class PerceptionNode(Node):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("perception_node", **kwargs)
-        parameters = read_parameters(self, Parameters)
+        parameters = read_parameters(self, PerceptionParameters)
         self._quality, self._seed = parameters.quality, parameters.noise_seed
         self._perceiver: Perceiver
         self._perceived = 0
         self._waiting: deque[ObjectCentricState] = deque()
         self._atoms = self.create_publisher(ATOMS.type, ATOMS.name, ATOMS.qos)
-        self._watcher = EpisodeWatcher(self, self._open)
+        self._watcher = EpisodeTracker(self, self._open)
         subscribe(self, STATE, self._on_state)
-        Heartbeat(self, lambda: {"states": self._perceived})
+        DiagnosticsPublisher(self, lambda: {"states": self._perceived})
 
     def _open(self, episode: Episode) -> None:
         self._perceiver = self._perceiver_of(episode)

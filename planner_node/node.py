@@ -36,16 +36,17 @@ from rclpy.action.server import ServerGoalHandle
 from rclpy.node import Node
 from slap_msgs.action import SolveTask
 
-from ensemble.heartbeat import Heartbeat
+from ensemble.diagnostics import DiagnosticsPublisher
+from ensemble.entry_point import run_node
+from ensemble.futures import node_time_s, run_in_executor
 from ensemble.interfaces import EXECUTE_SKILL, SKILL_EVENTS, SOLVE_TASK
-from ensemble.observation import Observation, Observer
+from ensemble.node_liveness import NodeLiveness
+from ensemble.observation import Observation
 from ensemble.parameters import parameter, read_parameters
-from ensemble.presence import Presence
-from ensemble.running import run_node
-from ensemble.shortcuts import Repertoires, ShortcutParameters
-from ensemble.waiting import run_in, seconds
-from planner_node.reporting import Reporter
-from planner_node.solving import Solving
+from ensemble.shortcuts import ShortcutParameters, ShortcutProvider
+from ensemble.state_synchronizer import StateSynchronizer
+from planner_node.plan_publisher import PlanPublisher
+from planner_node.task_execution import TaskExecution
 from slap_ros.errors import (
     BusyError,
     EpisodeChangedError,
@@ -59,7 +60,7 @@ from slap_ros.planning.planner import PLANNERS, make_planner
 
 
 @dataclass(frozen=True)
-class Parameters(ShortcutParameters):
+class PlannerParameters(ShortcutParameters):
     """See the module's docstring."""
 
     planner: str = parameter("lazy", "lazy, exhaustive or ff")
@@ -72,18 +73,18 @@ class PlannerNode(Node):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("planner_node", **kwargs)
-        self._settings = read_parameters(self, Parameters)
+        self._settings = read_parameters(self, PlannerParameters)
         if self._settings.planner not in PLANNERS:
             raise InvalidParameterError(
                 f"parameter planner must be one of {', '.join(PLANNERS)}, "
                 f"not {self._settings.planner!r}"
             )
-        self._repertoires = Repertoires(self, self._settings, self._settings.planner)
+        self._repertoires = ShortcutProvider(self, self._settings, self._settings.planner)
         self._busy = False
         self._counts = Counter(tried=0, solved=0)
         self._workers = ThreadPoolExecutor(1, thread_name_prefix="planning")
-        self._observer = Observer(self, lambda _: None, self._repertoires.open)
-        self._reporter = Reporter(self)
+        self._observer = StateSynchronizer(self, lambda _: None, self._repertoires.open)
+        self._reporter = PlanPublisher(self)
         self._skills = ActionClient(self, EXECUTE_SKILL.type, EXECUTE_SKILL.name)
         self._actions = ActionServer(
             self,
@@ -92,7 +93,7 @@ class PlannerNode(Node):
             self._execute,
             cancel_callback=lambda _: CancelResponse.ACCEPT,
         )
-        Heartbeat(self, lambda: self._counts)
+        DiagnosticsPublisher(self, lambda: self._counts)
 
     def destroy_node(self) -> None:
         """Stop the planning thread as well."""
@@ -127,10 +128,10 @@ class PlannerNode(Node):
         finally:
             self._busy = False
 
-    async def _prepare(self, goal: ServerGoalHandle, start: Observation) -> Solving:
+    async def _prepare(self, goal: ServerGoalHandle, start: Observation) -> TaskExecution:
         episode = start.episode
         atoms = decode_goal(goal.request.goal, episode.space) or episode.task.goal
-        planner = await run_in(
+        planner = await run_in_executor(
             self._workers,
             lambda: make_planner(
                 self._settings.planner,
@@ -139,7 +140,7 @@ class PlannerNode(Node):
                 self._repertoires.of(episode),
             ),
         )
-        return Solving(
+        return TaskExecution(
             self,
             goal,
             self._observer,
@@ -173,14 +174,14 @@ class PlannerNode(Node):
 
     def _skill_server_watch(self) -> Any:
         """A function that tells whether this skill server has been away for too long."""
-        skill_server = Presence(self, SKILL_EVENTS)
-        last_seen = seconds(self)
+        skill_server = NodeLiveness(self, SKILL_EVENTS)
+        last_seen = node_time_s(self)
 
         def lost() -> bool:
             nonlocal last_seen
-            if skill_server.there() and self._skills.server_is_ready():
-                last_seen = seconds(self)
-            return seconds(self) - last_seen > self._settings.server_timeout
+            if skill_server.is_alive() and self._skills.server_is_ready():
+                last_seen = node_time_s(self)
+            return node_time_s(self) - last_seen > self._settings.server_timeout
 
         return lost
 

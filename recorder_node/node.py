@@ -31,11 +31,11 @@ from rclpy.serialization import deserialize_message
 from slap_msgs.msg import DomainInfo, Task
 from std_srvs.srv import Trigger
 
-from ensemble.heartbeat import Heartbeat
+from ensemble.diagnostics import DiagnosticsPublisher
+from ensemble.entry_point import run_node
+from ensemble.futures import wait_until
 from ensemble.interfaces import CLOSE_BAG, DIAGNOSTICS, DOMAIN, RECORDED, TASK, Topic
 from ensemble.parameters import parameter, read_parameters
-from ensemble.running import run_node
-from ensemble.waiting import until
 from slap_ros.bags.writer import BagWriter, require_new
 from slap_ros.errors import InvalidParameterError
 from slap_ros.versions import versions
@@ -44,7 +44,7 @@ QUIET_NS = 200_000_000  # without a message for so long, nothing more is expecte
 
 
 @dataclass(frozen=True)
-class Parameters:
+class RecorderParameters:
     """See the module's docstring."""
 
     bag: str = parameter("", "the folder to write; must not exist")
@@ -65,7 +65,7 @@ class RecorderNode(Node):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("recorder_node", **kwargs)
-        self._path = _new_folder(read_parameters(self, Parameters).bag)
+        self._path = _new_folder(read_parameters(self, RecorderParameters).bag)
         self._metadata: dict[str, str] = {}
         self._early: list[Record] = []  # before domain and task are known
         self._writer: BagWriter | None = None
@@ -82,7 +82,7 @@ class RecorderNode(Node):
             self._on_close,
             callback_group=MutuallyExclusiveCallbackGroup(),
         )
-        Heartbeat(self, lambda: {"messages": self._written, "closed": self._closed})
+        DiagnosticsPublisher(self, lambda: {"messages": self._written, "closed": self._closed})
 
     def destroy_node(self) -> None:
         """Finish the bag, also on a signal."""
@@ -124,7 +124,9 @@ class RecorderNode(Node):
         self._written += 1
 
     async def _on_close(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        await until(self, lambda: self.get_clock().now().nanoseconds - self._heard_ns > QUIET_NS)
+        await wait_until(
+            self, lambda: self.get_clock().now().nanoseconds - self._heard_ns > QUIET_NS
+        )
         response.success = self._writer is not None
         response.message = str(self._path) if response.success else "nothing was recorded"
         self._close()

@@ -15,22 +15,13 @@ from rclpy.node import Node
 from rclpy.task import Future
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from ensemble.waiting import first_of, seconds
+from ensemble.futures import node_time_s, wait_for_first
 from slap_ros.errors import (
     ControllerAbortedError,
     ControllerRejectedError,
     ControllerTimeoutError,
 )
-from slap_ros.robot.limits import Motion
-
-# As MoveIt's configurations of Franka's arms have them; ``ros2 action list`` tells.
-TRAJECTORY_ACTION = "ARM_arm_controller/follow_joint_trajectory"
-GRIPPER_ACTION = "franka_gripper/gripper_action"
-
-
-def action_name(name: str, arm: str) -> str:
-    """An action's name for an arm."""
-    return name.replace("ARM", arm)
+from slap_ros.robot.limits import JointMotion
 
 
 class Controllers:
@@ -54,7 +45,7 @@ class Controllers:
         """Whether both controllers are there."""
         return bool(self._arm.server_is_ready() and self._gripper.server_is_ready())
 
-    async def move(self, motion: Motion) -> None:
+    async def move(self, motion: JointMotion) -> None:
         """Move the arm; a safe motion is the only kind there is.
 
         Raises:
@@ -71,7 +62,7 @@ class Controllers:
                 f"{result.error_string or 'no reason given'}"
             )
 
-    async def grip(self, position: float, effort: float, limit_s: float) -> None:
+    async def move_gripper(self, position: float, effort: float, limit_s: float) -> None:
         """Move the fingers, or close them around something.
 
         Args:
@@ -99,9 +90,9 @@ class Controllers:
         name = self._names[client]
         if not client.server_is_ready():
             raise ControllerTimeoutError(f"{name} is not there: is the controller running?")
-        end = seconds(self._node) + limit_s
+        end = node_time_s(self._node) + limit_s
         sent = client.send_goal_async(goal)
-        if not await first_of(self._node, sent, lambda: seconds(self._node) > end):
+        if not await wait_for_first(self._node, sent, lambda: node_time_s(self._node) > end):
             sent.add_done_callback(_cancel)  # should it be accepted after all
             raise ControllerTimeoutError(f"{name} did not answer within {limit_s:.2f} s")
         handle = sent.result()
@@ -109,7 +100,7 @@ class Controllers:
             raise ControllerRejectedError(f"{name} rejected a goal")
         self._active = handle
         ended = handle.get_result_async()
-        if not await first_of(self._node, ended, lambda: seconds(self._node) > end):
+        if not await wait_for_first(self._node, ended, lambda: node_time_s(self._node) > end):
             self.hold()
             raise ControllerTimeoutError(f"{name} was not done within {limit_s:.2f} s")
         self._active = None
@@ -121,7 +112,7 @@ def _cancel(sent: Future) -> None:
         sent.result().cancel_goal_async()
 
 
-def trajectory(motion: Motion, joints: list[str]) -> JointTrajectory:
+def trajectory(motion: JointMotion, joints: list[str]) -> JointTrajectory:
     """From wherever the arm stands to the target, at rest there: a quintic to a controller."""
     whole = int(motion.duration_s)
     return JointTrajectory(

@@ -65,13 +65,14 @@ from slap_msgs.msg import RobotCommand
 from slap_msgs.srv import ResetTask
 
 from ensemble import encode
-from ensemble.heartbeat import Heartbeat
-from ensemble.interfaces import COMMAND, DOMAIN, FRESH, MARKERS, RESET_TASK, STATE, TASK
+from ensemble.diagnostics import DiagnosticsPublisher
+from ensemble.entry_point import run_node
+from ensemble.futures import node_time_s
+from ensemble.interfaces import COMMAND, DOMAIN, MARKERS, RESET_TASK, STATE, TASK, VOLATILE
 from ensemble.parameters import parameter, read_parameters
-from ensemble.running import run_node
+from ensemble.robot_parameters import RobotParameters
 from ensemble.visualization import markers
-from ensemble.waiting import seconds
-from robot_bridge.robot import Robot, RobotParameters
+from robot_bridge.robot import Robot
 from slap_ros.core import Task
 from slap_ros.domains import get_domain
 from slap_ros.errors import (
@@ -88,14 +89,14 @@ from slap_ros.errors import (
 )
 from slap_ros.messages.decode import decode_command, decode_goal
 from slap_ros.relational import GroundAtom, State
-from slap_ros.robot.cell import GAP_OPEN, GAP_SHUT, Grip, Step
+from slap_ros.robot.robot_world import GAP_OPEN, GAP_SHUT, GripperAction, SafeCommand
 
 MEASURED = -1  # seed of a task that was not sampled
 LOOK_PERIOD = 0.02  # s, between two looks at what is measured
 
 
 @dataclass(frozen=True)
-class Parameters(RobotParameters):
+class RobotBridgeParameters(RobotParameters):
     """See the module's docstring."""
 
     domain: str = parameter("obstacle_tower", "which domain")
@@ -122,14 +123,14 @@ class RobotBridge(Node):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("robot_bridge", **kwargs)
-        self._settings = settings = read_parameters(self, Parameters)
+        self._settings = settings = read_parameters(self, RobotBridgeParameters)
         self._domain = get_domain(settings.domain, settings.preset)
         self._robot = Robot(self, self._domain, self._sampled, settings)
         self._phase = Phase.STARTING
-        self._since_s = seconds(self)  # when the phase, or the measurement of a state, began
+        self._since_s = node_time_s(self)  # when the phase, or the measurement of a state, began
         self._fault = ErrorCode.NONE
         self._goal: Collection[GroundAtom] = ()
-        self._last: Step | None = None
+        self._last: SafeCommand | None = None
         self._episode = 0
         self._step = 0
         self._counts: Counter[str] = Counter(
@@ -140,10 +141,10 @@ class RobotBridge(Node):
         self._states = self.create_publisher(STATE.type, STATE.name, STATE.qos)
         self._markers = self.create_publisher(MARKERS.type, MARKERS.name, MARKERS.qos)
         # Fresh: commands from before this node started belong to another world's states.
-        self.create_subscription(COMMAND.type, COMMAND.name, self._on_command, FRESH)
+        self.create_subscription(COMMAND.type, COMMAND.name, self._on_command, VOLATILE)
         self.create_service(RESET_TASK.type, RESET_TASK.name, self._on_reset)
         self.create_timer(LOOK_PERIOD, self._look)
-        Heartbeat(self, self._diagnostics)
+        DiagnosticsPublisher(self, self._diagnostics)
         self._domains.publish(encode.domain_info(self._domain, self._now()))
 
     def destroy_node(self) -> None:
@@ -158,11 +159,11 @@ class RobotBridge(Node):
         return self.get_clock().now().to_msg()
 
     def _diagnostics(self) -> dict[str, object]:
-        idle = seconds(self) - self._since_s > self._settings.hold_after
+        idle = node_time_s(self) - self._since_s > self._settings.hold_after
         holding = self._phase is Phase.FAULT or (self._phase is Phase.READY and idle)
         return {
             **self._counts,
-            **self._robot.senses.counts,
+            **self._robot.sensors.counts,
             "episode": self._episode,
             "phase": self._phase.name,
             "fault": self._fault.name,
@@ -175,7 +176,7 @@ class RobotBridge(Node):
         try:
             self._check_moment(message)
             self._require_joints()
-            step = self._robot.cell.plan(decode_command(message))
+            step = self._robot.world.plan_command(decode_command(message))
         except NoJointStateError as error:
             self._fail(error)
         except StaleCommandError as error:
@@ -198,7 +199,7 @@ class RobotBridge(Node):
             )
 
     def _require_joints(self) -> None:
-        silence = seconds(self) - self._robot.cell.heard_s
+        silence = node_time_s(self) - self._robot.world.newest_joints_s
         if silence > self._settings.joint_timeout:
             raise NoJointStateError(f"no joint positions for {silence:.1f} s")
 
@@ -206,9 +207,9 @@ class RobotBridge(Node):
         self._counts[kind] += 1
         self.get_logger().warning(f"{error} ({self._counts[kind]} {kind.replace('_', ' ')})")
 
-    async def _act(self, step: Step) -> None:
+    async def _act(self, step: SafeCommand) -> None:
         try:
-            await self._grip(step.grip)
+            await self._grip(step.gripper)
             if self._phase is Phase.MOVING:  # not failed meanwhile
                 await self._robot.controllers.move(step.motion)
         except SlapError as error:
@@ -219,12 +220,14 @@ class RobotBridge(Node):
                 self._last = step
                 self._enter(Phase.LOOKING)
 
-    async def _grip(self, grip: Grip) -> None:
-        if grip is Grip.CLOSE and self._robot.cell.closed(await self._fingers(GAP_SHUT)):
+    async def _grip(self, gripper: GripperAction) -> None:
+        if gripper is GripperAction.CLOSE and self._robot.world.confirm_grasp(
+            await self._fingers(GAP_SHUT)
+        ):
             return
-        if grip is not Grip.KEEP:  # to be opened, or closed around nothing
+        if gripper is not GripperAction.KEEP:  # to be opened, or closed around nothing
             await self._fingers(GAP_OPEN)
-            self._robot.cell.opened()
+            self._robot.world.confirm_release()
 
     async def _fingers(self, gap: float) -> float:
         """Move the fingers; the gap in m at which they then stand."""
@@ -234,20 +237,23 @@ class RobotBridge(Node):
 
     def _look(self) -> None:
         """Whatever time brings: a state, or a sensor that has become silent."""
-        now_s = seconds(self)
+        now_s = node_time_s(self)
         if self._phase in (Phase.STARTING, Phase.FAULT):
             if self._phase is Phase.STARTING and self._robot.controllers.ready:
                 self._start()
         elif self._phase is Phase.READY:
             pass  # it stands, whatever the sensors say
-        elif now_s - max(self._robot.cell.heard_s, self._since_s) > self._settings.joint_timeout:
+        elif (
+            now_s - max(self._robot.world.newest_joints_s, self._since_s)
+            > self._settings.joint_timeout
+        ):
             self._fail(NoJointStateError(f"no joint positions: {self._phase.value}"))
         elif self._phase is Phase.LOOKING:
             self._measure(now_s)
 
     def _start(self) -> None:
         try:
-            state = self._robot.cell.look(self._since_s)
+            state = self._robot.world.measure(self._since_s)
         except InvalidStateError as error:
             self.get_logger().warning(f"not yet: {error}", throttle_duration_sec=1.0)
             return
@@ -257,7 +263,9 @@ class RobotBridge(Node):
     def _measure(self, now_s: float) -> None:
         waited = now_s - self._since_s
         try:
-            state = self._robot.cell.look(self._since_s, moving=waited > self._settings.settle_time)
+            state = self._robot.world.measure(
+                self._since_s, moving=waited > self._settings.settle_time
+            )
             if state is not None:
                 self._require_arrival()
         except InvalidStateError as error:
@@ -273,14 +281,19 @@ class RobotBridge(Node):
 
     def _blind(self) -> NoDetectionError:
         missing = (
-            ", ".join(self._robot.cell.unseen(self._since_s)) or "none at all, but too few times"
+            ", ".join(self._robot.world.undetected(self._since_s))
+            or "none at all, but too few times"
         )
         return NoDetectionError(
             f"not detected within {self._settings.detection_timeout} s: {missing}"
         )
 
     def _require_arrival(self) -> None:
-        off = 0.0 if self._last is None else self._robot.cell.distance(self._last.motion.target)
+        off = (
+            0.0
+            if self._last is None
+            else self._robot.world.joint_distance(self._last.motion.target)
+        )
         if off > self._settings.arrival_tolerance:
             raise ControllerAbortedError(
                 f"the arm is {off:.3f} rad off where its controller says that it went"
@@ -296,7 +309,7 @@ class RobotBridge(Node):
 
     def _enter(self, phase: Phase) -> None:
         self._phase = phase
-        self._since_s = seconds(self)
+        self._since_s = node_time_s(self)
 
     def _fail(self, error: SlapError) -> None:
         """Hold until reset."""
@@ -349,7 +362,7 @@ class RobotBridge(Node):
             )
         if self._phase is Phase.MOVING:
             raise BusyError("the arm moves: cancel the task first")
-        state = self._robot.cell.look(self._since_s)
+        state = self._robot.world.measure(self._since_s)
         if state is None:
             self._require_joints()
             raise self._blind()

@@ -17,16 +17,14 @@ Action clients:
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from rclpy.node import Node
 from rclpy.task import Future
 
-from ensemble.parameters import parameter
-from ensemble.waiting import first_of, seconds
-from robot_bridge.robot import Robot, RobotParameters
+from ensemble.futures import node_time_s, wait_for_first
+from ensemble.robot_parameters import PlayerParameters
+from robot_bridge.robot import Robot
 from slap_ros.errors import (
     ControllerAbortedError,
     ControllerTimeoutError,
@@ -38,37 +36,28 @@ from slap_ros.errors import (
 )
 from slap_ros.physics.features import POSE_FEATURES
 from slap_ros.relational import State
-from slap_ros.robot.cell import GAP_OPEN, GAP_SHUT, GRASPED, Grip
-from slap_ros.robot.limits import Motion
-from slap_ros.robot.rehearsal import Recorded, Rehearsal, Waypoint
+from slap_ros.robot.dry_run import DryRun
+from slap_ros.robot.limits import JointMotion
+from slap_ros.robot.recorded_motion import RecordedMotion, RecordedWaypoint
+from slap_ros.robot.robot_world import GAP_OPEN, GAP_SHUT, GRASPED, GripperAction
 
 POSITION = tuple(feature.name for feature in POSE_FEATURES[:3])
-ON_STEP = Callable[[int], None]
-
-
-@dataclass(frozen=True)
-class Parameters(RobotParameters):
-    """Those of a robot, and how far from where the recording begins things may be."""
-
-    start_timeout: float = parameter(15.0, "s to wait for the robot and every object")
-    start_tolerance: float = parameter(0.05, "rad that a joint may be off the recording's start")
-    place_tolerance: float = parameter(0.01, "m that an object may be off the recording's start")
 
 
 class Player(Node):
     """Plays one recording."""
 
     def __init__(
-        self, recorded: Recorded, rehearsal: Rehearsal, settings: Parameters, **kwargs: Any
+        self, recorded: RecordedMotion, dry_run: DryRun, settings: PlayerParameters, **kwargs: Any
     ) -> None:
-        """Play what was rehearsed.
+        """Play what was checked.
 
         Raises:
-            UnsafeCommandError: The rehearsal says that it must not be executed.
+            UnsafeCommandError: The dry run says that it must not be executed.
         """
-        rehearsal.require_safe()
+        dry_run.require_safe()
         super().__init__("robot_player", **kwargs)
-        self._recorded, self._motions, self._settings = recorded, rehearsal.motions, settings
+        self._recorded, self._motions, self._settings = recorded, dry_run.motions, settings
         self._robot = Robot(self, recorded.domain, lambda: recorded.states[0], settings)
         self.failure: SlapError | None = None
         self.done = 0  # steps
@@ -105,12 +94,14 @@ class Player(Node):
 
     async def _begin(self) -> None:
         """Wait for the robot; refuse to begin elsewhere than the recording does."""
-        end = seconds(self) + self._settings.start_timeout
-        await first_of(self, Future(), lambda: self._robot.controllers.ready or seconds(self) > end)
+        end = node_time_s(self) + self._settings.start_timeout
+        await wait_for_first(
+            self, Future(), lambda: self._robot.controllers.ready or node_time_s(self) > end
+        )
         if not self._robot.controllers.ready:
             raise ControllerTimeoutError("the controllers are not there: are they running?")
         state = await self._look("at the start")
-        off = self._robot.cell.distance(self._recorded.start)
+        off = self._robot.world.joint_distance(self._recorded.start)
         if off > self._settings.start_tolerance:
             raise StartMismatchError(
                 f"a joint is {off:.3f} rad off where the recording begins, which may be "
@@ -136,40 +127,42 @@ class Player(Node):
 
     async def _look(self, when: str) -> State:
         """The state, measured anew."""
-        since_s = seconds(self)
+        since_s = node_time_s(self)
         end_s = since_s + self._settings.start_timeout
         found: list[State] = []
         reasons: list[InvalidStateError] = []
 
-        def look() -> bool:
+        def measure() -> bool:
             try:
-                state = self._robot.cell.look(since_s)
+                state = self._robot.world.measure(since_s)
             except InvalidStateError as error:
                 reasons.append(error)
             else:
                 found.extend([state] if state is not None else [])
-            return bool(found) or seconds(self) > end_s
+            return bool(found) or node_time_s(self) > end_s
 
-        await first_of(self, Future(), look)
+        await wait_for_first(self, Future(), measure)
         if found:
             return found[-1]
-        if self._robot.cell.heard_s <= since_s:
+        if self._robot.world.newest_joints_s <= since_s:
             raise NoJointStateError(f"no joint positions {when}")
         if reasons:
             raise reasons[-1]
-        missing = ", ".join(self._robot.cell.unseen(since_s)) or "none at all, but too few times"
+        missing = (
+            ", ".join(self._robot.world.undetected(since_s)) or "none at all, but too few times"
+        )
         raise NoDetectionError(f"not detected {when}: {missing}")
 
     # -- motions --------------------------------------------------------------------------------
 
-    async def _step(self, waypoint: Waypoint, motion: Motion) -> None:
+    async def _step(self, waypoint: RecordedWaypoint, motion: JointMotion) -> None:
         await self._require_at(motion.start, f"before step {waypoint.step}")
-        if waypoint.grip is not Grip.KEEP:
+        if waypoint.gripper is not GripperAction.KEEP:
             await self._grip(waypoint)
         await self._robot.controllers.move(motion)
 
-    async def _grip(self, waypoint: Waypoint) -> None:
-        closing = waypoint.grip is Grip.CLOSE
+    async def _grip(self, waypoint: RecordedWaypoint) -> None:
+        closing = waypoint.gripper is GripperAction.CLOSE
         wanted = GAP_SHUT if closing else GAP_OPEN
         gap = await self._robot.move_fingers(wanted)
         if closing and gap < GRASPED * waypoint.gap:
@@ -180,16 +173,18 @@ class Player(Node):
 
     async def _require_at(self, joints: tuple[float, ...], when: str) -> None:
         """Hear anew where the arm is, which must be where the recording had it."""
-        since_s = seconds(self)
+        since_s = node_time_s(self)
         end_s = since_s + self._settings.joint_timeout
-        await first_of(
-            self, Future(), lambda: self._robot.cell.heard_s > since_s or seconds(self) > end_s
+        await wait_for_first(
+            self,
+            Future(),
+            lambda: self._robot.world.newest_joints_s > since_s or node_time_s(self) > end_s,
         )
-        if self._robot.cell.heard_s <= since_s:
+        if self._robot.world.newest_joints_s <= since_s:
             raise NoJointStateError(
                 f"no joint positions for {self._settings.joint_timeout} s {when}"
             )
-        off = self._robot.cell.distance(joints)
+        off = self._robot.world.joint_distance(joints)
         if off > self._settings.arrival_tolerance:
             raise ControllerAbortedError(
                 f"the arm is {off:.3f} rad off the recording {when}: it was held up, or moved"

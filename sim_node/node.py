@@ -39,10 +39,10 @@ from slap_msgs.msg import RobotCommand
 from slap_msgs.srv import ResetTask
 
 from ensemble import encode
-from ensemble.heartbeat import Heartbeat
-from ensemble.interfaces import COMMAND, DOMAIN, FRESH, RESET_TASK, STATE, TASK
+from ensemble.diagnostics import DiagnosticsPublisher
+from ensemble.entry_point import run_node
+from ensemble.interfaces import COMMAND, DOMAIN, RESET_TASK, STATE, TASK, VOLATILE
 from ensemble.parameters import parameter, read_parameters
-from ensemble.running import run_node
 from ensemble.visualization import Visualizer
 from slap_ros.core import Domain, Task, World
 from slap_ros.domains import get_domain
@@ -59,7 +59,7 @@ EXPLICIT = -1  # seed of a task that was not sampled
 
 
 @dataclass(frozen=True)
-class Parameters:
+class SimParameters:
     """See the module's docstring."""
 
     domain: str = parameter("obstacle2d", "which domain")
@@ -75,7 +75,7 @@ class SimNode(Node):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("sim_node", **kwargs)
-        parameters = read_parameters(self, Parameters)
+        parameters = read_parameters(self, SimParameters)
         self._domain: Domain = get_domain(parameters.domain, parameters.preset)
         self._pace = parameters.pace
         self._world: World
@@ -89,9 +89,9 @@ class SimNode(Node):
         self._tasks = self.create_publisher(TASK.type, TASK.name, TASK.qos)
         self._states = self.create_publisher(STATE.type, STATE.name, STATE.qos)
         # Fresh: commands from before this node started belong to another simulator's states.
-        self.create_subscription(COMMAND.type, COMMAND.name, self._on_command, FRESH)
+        self.create_subscription(COMMAND.type, COMMAND.name, self._on_command, VOLATILE)
         self.create_service(RESET_TASK.type, RESET_TASK.name, self._on_reset)
-        Heartbeat(self, lambda: self._counts | {"episode": self._episode})
+        DiagnosticsPublisher(self, lambda: self._counts | {"episode": self._episode})
 
         self._domains.publish(encode.domain_info(self._domain, self._now()))
         task = self._domain.task(parameters.seed, parameters.index)

@@ -41,15 +41,16 @@ from slap_msgs.msg import SkillEvent
 from slap_msgs.srv import ListSkills
 
 from ensemble import encode
-from ensemble.heartbeat import Heartbeat
+from ensemble.diagnostics import DiagnosticsPublisher
+from ensemble.entry_point import run_node
+from ensemble.futures import node_time_s, run_in_executor
 from ensemble.interfaces import COMMAND, EXECUTE_SKILL, LIST_SKILLS, PLAN_EVENTS, SKILL_EVENTS
-from ensemble.observation import Observation, Observer
+from ensemble.node_liveness import NodeLiveness
+from ensemble.observation import Observation
 from ensemble.parameters import parameter, read_parameters
-from ensemble.presence import Presence
-from ensemble.running import run_node
-from ensemble.shortcuts import Repertoires, ShortcutParameters
-from ensemble.waiting import run_in, seconds
-from skill_server.skill_run import SkillRun, requested_option, result
+from ensemble.shortcuts import ShortcutParameters, ShortcutProvider
+from ensemble.state_synchronizer import StateSynchronizer
+from skill_server.skill_execution import SkillExecution, requested_option, result
 from slap_ros.core import Action
 from slap_ros.errors import ErrorCode, NoStateError, SlapError
 from slap_ros.planning.options import OptionExecution, Stopped
@@ -58,7 +59,7 @@ WATCH_PERIOD = 0.1  # s
 
 
 @dataclass(frozen=True)
-class Parameters(ShortcutParameters):
+class SkillServerParameters(ShortcutParameters):
     """See the module's docstring."""
 
     state_timeout: float = parameter(2.0, "s without a new state after which a skill is given up")
@@ -70,13 +71,13 @@ class SkillServer(Node):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("skill_server", **kwargs)
-        self._settings = read_parameters(self, Parameters)
-        self._repertoires = Repertoires(self, self._settings)
-        self._run: SkillRun | None = None
+        self._settings = read_parameters(self, SkillServerParameters)
+        self._repertoires = ShortcutProvider(self, self._settings)
+        self._run: SkillExecution | None = None
         self._busy = False  # from the acceptance of a goal to its end
         self._counts: Counter[int] = Counter()  # of SkillEvent kinds
         self._workers = ThreadPoolExecutor(1, thread_name_prefix="skill_start")
-        self._observer = Observer(self, self._on_observation, self._repertoires.open)
+        self._observer = StateSynchronizer(self, self._on_observation, self._repertoires.open)
         self._commands = self.create_publisher(COMMAND.type, COMMAND.name, COMMAND.qos)
         self._events = self.create_publisher(SKILL_EVENTS.type, SKILL_EVENTS.name, SKILL_EVENTS.qos)
         self.create_service(LIST_SKILLS.type, LIST_SKILLS.name, self._on_list)
@@ -88,7 +89,7 @@ class SkillServer(Node):
             cancel_callback=lambda _: CancelResponse.ACCEPT,
         )
         self.create_timer(WATCH_PERIOD, self._watch)
-        Heartbeat(self, self._diagnostics)
+        DiagnosticsPublisher(self, self._diagnostics)
 
     def destroy_node(self) -> None:
         """Stop the worker thread as well."""
@@ -141,13 +142,13 @@ class SkillServer(Node):
             self._run = None
             self._busy = False
 
-    async def _begin(self, goal: ServerGoalHandle) -> SkillRun:
-        planner = Presence(self, PLAN_EVENTS)
+    async def _begin(self, goal: ServerGoalHandle) -> SkillExecution:
+        planner = NodeLiveness(self, PLAN_EVENTS)
         start = await self._observe(goal.request.episode)
         # Starting a skill may take a while (motion planning, rehearsal), so not here.
-        execution = await run_in(self._workers, lambda: self._start(goal.request, start))
+        execution = await run_in_executor(self._workers, lambda: self._start(goal.request, start))
         budget = goal.request.step_budget or execution.option.skill.step_limit
-        return SkillRun(goal, execution, start, budget, planner, heard_s=seconds(self))
+        return SkillExecution(goal, execution, start, budget, planner, heard_s=node_time_s(self))
 
     def _start(self, request: ExecuteSkill.Goal, start: Observation) -> OptionExecution:
         option, target = requested_option(request, start, self._repertoires)
@@ -164,7 +165,7 @@ class SkillServer(Node):
             )
         return latest
 
-    async def _finish(self, run: SkillRun) -> ExecuteSkill.Result:
+    async def _finish(self, run: SkillExecution) -> ExecuteSkill.Result:
         self._publish_event(run, SkillEvent.STARTED, Stopped(ErrorCode.NONE))
         self._advance(run, self._observer.latest)
         stopped = await run.ended
@@ -187,11 +188,11 @@ class SkillServer(Node):
         if self._run is not None:
             self._advance(self._run, observation)
 
-    def _advance(self, run: SkillRun, observation: Observation) -> None:
+    def _advance(self, run: SkillExecution, observation: Observation) -> None:
         """Answer an observation with a command, or end the run."""
         if run.ended.done():
             return
-        run.heard_s = seconds(self)
+        run.heard_s = node_time_s(self)
         if observation.episode is not run.start.episode:
             run.stop(ErrorCode.EPISODE_CHANGED, "the simulator was reset")
             return
@@ -208,11 +209,11 @@ class SkillServer(Node):
         else:
             self._command(run, action)
 
-    def _command(self, run: SkillRun, action: Action) -> None:
+    def _command(self, run: SkillExecution, action: Action) -> None:
         latest, now = run.latest, self.get_clock().now().to_msg()
         self._commands.publish(encode.command(action, latest.episode.number, latest.step, now))
 
-    def _hold(self, run: SkillRun) -> None:
+    def _hold(self, run: SkillExecution) -> None:
         """Stop the robot where it is, gripper as it is."""
         self._command(run, np.zeros(len(run.start.episode.domain.action_space.axes)))
         run.stop(ErrorCode.SKILL_CANCELED, "canceled")
@@ -221,15 +222,15 @@ class SkillServer(Node):
         run = self._run
         if run is None or run.ended.done():
             return
-        silence = seconds(self) - run.heard_s
+        silence = node_time_s(self) - run.heard_s
         if silence > self._settings.state_timeout:
             run.stop(ErrorCode.NO_STATE, f"no new state for {silence:.1f} s")
-        elif run.planner.gone():
+        elif run.planner.is_lost():
             run.stop(ErrorCode.NODE_DIED, "the planner is gone; the robot holds")
 
     # -- telling --------------------------------------------------------------------------------
 
-    def _publish_feedback(self, run: SkillRun) -> None:
+    def _publish_feedback(self, run: SkillExecution) -> None:
         space = run.start.episode.space
         run.goal.publish_feedback(
             ExecuteSkill.Feedback(
@@ -237,7 +238,7 @@ class SkillServer(Node):
             )
         )
 
-    def _publish_event(self, run: SkillRun, kind: int, stopped: Stopped) -> None:
+    def _publish_event(self, run: SkillExecution, kind: int, stopped: Stopped) -> None:
         self._counts[kind] += 1
         self._events.publish(
             SkillEvent(

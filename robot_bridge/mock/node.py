@@ -37,7 +37,6 @@ from __future__ import annotations
 
 import heapq
 from collections import Counter
-from dataclasses import dataclass
 from itertools import count
 from typing import Any
 
@@ -52,48 +51,21 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
-from ensemble.heartbeat import Heartbeat
+from ensemble.diagnostics import DiagnosticsPublisher
+from ensemble.entry_point import run_node
+from ensemble.futures import node_time_s
 from ensemble.interfaces import JOINT_STATES, TF
-from ensemble.parameters import parameter, read_parameters
-from ensemble.running import run_node
-from ensemble.waiting import seconds
-from robot_bridge.controllers import GRIPPER_ACTION, TRAJECTORY_ACTION, action_name
-from robot_bridge.mock.noise import Disturbance, Noise
+from ensemble.parameters import read_parameters
+from ensemble.robot_parameters import MockRobotParameters, action_name
+from robot_bridge.mock.noise_model import NoiseModel, NoiseSettings
 from robot_bridge.mock.plant import Plant
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.geometry.pose import Pose
-from slap_ros.robot.workplace import DETECTED
+from slap_ros.robot.scene_config import DETECTED
 
 POST_PERIOD = 0.005  # s, between two looks at what is due to be published
 FAULTS = ("", "reject", "abort", "ignore")
-
-
-@dataclass(frozen=True)
-class Parameters:
-    """See the module's docstring."""
-
-    domain: str = parameter("obstacle_tower", "which domain")
-    preset: str = parameter("fair", "as the bridge's")
-    seed: int = parameter(0, "samples the task")
-    index: int = parameter(0, "which of the seed's tasks")
-    arm: str = parameter("panda", "prefix of joints and frames")
-    trajectory_action: str = parameter(TRAJECTORY_ACTION, "the arm's controller")
-    gripper_action: str = parameter(GRIPPER_ACTION, "the gripper's controller")
-    gripper_scale: float = parameter(0.5, "position that is sent for each m between the fingers")
-    latency: float = parameter(0.02, "s, of goals and detections")
-    jitter: float = parameter(0.0, "s, at most, on top of the latency")
-    pose_noise: float = parameter(0.002, "m, of detections along each axis")
-    turn_noise: float = parameter(0.01, "rad, of detections about each axis")
-    joint_noise: float = parameter(0.0, "rad, of joint positions")
-    dropout: float = parameter(0.0, "share of detections that are lost")
-    rate: float = parameter(30.0, "Hz, of detections")
-    joint_rate: float = parameter(100.0, "Hz, of joint positions")
-    hidden: str = parameter("", "an object that is never detected")
-    pace: float = parameter(1.0, "how many times faster than a real one it moves")
-    noise_seed: int = parameter(0, "noise and delays are a function of it")
-    fault: str = parameter("", "reject, abort or ignore: what is done to a motion")
-    fault_after: int = parameter(0, "and after how many good ones")
 
 
 class MockRobot(Node):
@@ -101,7 +73,7 @@ class MockRobot(Node):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("mock_robot", **kwargs)
-        self._settings = settings = read_parameters(self, Parameters)
+        self._settings = settings = read_parameters(self, MockRobotParameters)
         if settings.fault not in FAULTS:
             raise InvalidParameterError(f"parameter fault is one of {', '.join(FAULTS[1:])}")
         if min(settings.rate, settings.joint_rate, settings.pace) <= 0.0:
@@ -109,7 +81,9 @@ class MockRobot(Node):
         domain = get_domain(settings.domain, settings.preset)
         self._period_s = domain.execution.control_period_s / settings.pace
         self._plant = Plant(domain, domain.task(settings.seed, settings.index).initial_state)
-        self._noise = Noise(_disturbance(settings), np.random.default_rng(settings.noise_seed))
+        self._noise = NoiseModel(
+            _noise_settings(settings), np.random.default_rng(settings.noise_seed)
+        )
         self._counts = Counter(motions=0, grips=0, refused=0, aborted=0, canceled=0)
         self._busy = False  # a goal is under way, which makes the time pass
         self._post: list[tuple[float, int, TransformStamped]] = []  # by the time they are due
@@ -134,7 +108,7 @@ class MockRobot(Node):
         self.create_timer(1.0 / settings.rate, self._detect)
         self.create_timer(POST_PERIOD, self._deliver)
         self.create_timer(self._period_s, self._pass_time)
-        Heartbeat(self, lambda: self._counts)
+        DiagnosticsPublisher(self, lambda: self._counts)
 
     def destroy_node(self) -> None:
         """Destroy the action servers as well."""
@@ -198,7 +172,7 @@ class MockRobot(Node):
         try:
             await pause(self, self._noise.delay_s() + self._period_s)
             wanted = goal.request.command.position / self._settings.gripper_scale
-            self._plant.grip(shut=wanted < self._plant.gap)
+            self._plant.move_fingers(shut=wanted < self._plant.gap)
         finally:
             self._busy = False
         self._counts["grips"] += 1
@@ -228,16 +202,16 @@ class MockRobot(Node):
 
     def _detect(self) -> None:
         """See everything now; it will be known a little later, not always in order."""
-        now_s, stamp = seconds(self), self.get_clock().now().to_msg()
+        now_s, stamp = node_time_s(self), self.get_clock().now().to_msg()
         for name, pose in self._plant.poses().items():
-            if self._noise.lost() or name == self._settings.hidden:
+            if self._noise.dropped() or name == self._settings.hidden:
                 continue
             item = transform(self._noise.seen(pose), f"{DETECTED}{name}")
             item.header = Header(stamp=stamp, frame_id=f"{self._settings.arm}_link0")
             heapq.heappush(self._post, (now_s + self._noise.delay_s(), next(self._numbers), item))
 
     def _deliver(self) -> None:
-        now_s, due = seconds(self), []
+        now_s, due = node_time_s(self), []
         while self._post and self._post[0][0] <= now_s:
             due.append(heapq.heappop(self._post)[2])
         if due:
@@ -266,8 +240,8 @@ def transform(pose: Pose, child: str) -> TransformStamped:
     )
 
 
-def _disturbance(settings: Parameters) -> Disturbance:
-    return Disturbance(
+def _noise_settings(settings: MockRobotParameters) -> NoiseSettings:
+    return NoiseSettings(
         settings.latency,
         settings.jitter,
         settings.pose_noise,

@@ -76,7 +76,7 @@ class Plant:
         way = np.subtract(target, self.joints)
         self._step(np.clip(way, np.negative(MAX_STEP), MAX_STEP), 0.0)
 
-    def grip(self, shut: bool) -> None:
+    def move_fingers(self, shut: bool) -> None:
         """Close the fingers, around what is between them, or open them."""
         self._step(np.zeros(JOINTS), SHUT if shut else OPEN)
         self._shut = shut

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""``slap bag replay --to robot``: a recorded motion rehearsed, then executed open loop."""
+"""``slap bag replay --to robot``: a recorded motion checked, then executed open loop."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from rich.table import Table
 
 from slap_ros.cli.console import console, print_json, progress
 from slap_ros.errors import ErrorCode, TaskCanceledError
-from slap_ros.robot.cell import Grip
-from slap_ros.robot.rehearsal import Recorded, Rehearsal, recorded_motion, rehearse
+from slap_ros.robot.dry_run import DryRun
+from slap_ros.robot.recorded_motion import RecordedMotion, read_recorded_motion
+from slap_ros.robot.robot_world import GripperAction
 from slap_ros.robot.worlds import MOCK
 
 REACHED = {
@@ -28,44 +29,43 @@ REACHED = {
 def replay_on_robot(
     bag: Path, to: str, dry_run: bool, robot: str, mock: str, sure: bool, json: bool
 ) -> int:
-    """Rehearse, and unless that is all, execute; the exit code.
+    """Check it, and unless that is all, execute it; the exit code.
 
     Raises:
         SlapError: It must not be executed, or failed; a robot then holds.
     """
     # ROS is needed only here: the rest of `slap bag` works without it.
+    from ensemble import replay
     from ensemble.parameters import parse_parameters
-    from robot_bridge.mock.options import mock_options
-    from robot_bridge.player import Parameters
-    from robot_bridge.playing import play
+    from ensemble.robot_parameters import PlayerParameters, parse_mock_robot
 
-    settings = Parameters(**parse_parameters(robot, Parameters, "robot"))
-    parameters = mock_options(mock) if to == MOCK else None
-    recorded = recorded_motion(bag)
-    rehearsal = rehearse(recorded, settings.limits)
+    settings = PlayerParameters(**parse_parameters(robot, PlayerParameters, "robot"))
+    parameters = parse_mock_robot(mock) if to == MOCK else None
+    recorded = read_recorded_motion(bag)
+    checked = DryRun.of(recorded, settings.limits)
     if json and dry_run:
-        print_json(_as_json(recorded, rehearsal))
+        print_json(_as_json(recorded, checked))
     else:
-        console.print(_table(recorded, rehearsal, settings.arm))
-    for step, reason in rehearsal.violations:
+        console.print(_table(recorded, checked, settings.arm))
+    for step, reason in checked.violations:
         console.print(f"step {step}: {reason}", highlight=False, markup=False)
     if dry_run:
-        return int(ErrorCode.UNSAFE_COMMAND) if rehearsal.violations else 0
-    rehearsal.require_safe()
+        return int(ErrorCode.UNSAFE_COMMAND) if checked.violations else 0
+    checked.require_safe()
     if not sure and not _agreed():
         raise TaskCanceledError("nothing moved: nobody said that it may (--yes)")
     with progress() as bar:
         watched = bar.add_task("replaying", total=len(recorded.waypoints))
-        played = play(
+        played = replay.replay_on_robot(
             recorded,
-            rehearsal,
+            checked,
             settings,
             parameters,
             lambda done: bar.update(watched, completed=done),
         )
     reached = played.reached(recorded)
     if json:
-        print_json(_as_json(recorded, rehearsal) | {"played": played.steps, "reached": reached})
+        print_json(_as_json(recorded, checked) | {"played": played.steps, "reached": reached})
     console.print(f"{played.steps} steps executed; {REACHED[reached]}")
     return int(ErrorCode.REPLAY_MISMATCH) if reached is False else 0
 
@@ -77,13 +77,13 @@ def _agreed() -> bool:
     return typer.confirm("The arm is going to move. Is everybody out of its reach?", err=True)
 
 
-def _table(recorded: Recorded, rehearsal: Rehearsal, arm: str) -> Table:
+def _table(recorded: RecordedMotion, checked: DryRun, arm: str) -> Table:
     steps = len(recorded.waypoints)
-    grips = sum(waypoint.grip is not Grip.KEEP for waypoint in recorded.waypoints)
+    grips = sum(waypoint.gripper is not GripperAction.KEEP for waypoint in recorded.waypoints)
     verdict = (
-        f"{len(rehearsal.violations)} steps beyond its limits"
-        if rehearsal.violations
-        else f"{rehearsal.duration_s:.1f} s of motion"
+        f"{len(checked.violations)} steps beyond its limits"
+        if checked.violations
+        else f"{checked.duration_s:.1f} s of motion"
     )
     period_s = recorded.domain.execution.control_period_s
     table = Table(
@@ -97,7 +97,7 @@ def _table(recorded: Recorded, rehearsal: Rehearsal, arm: str) -> Table:
             f"({steps * period_s:.1f} s as recorded), {grips} grips, {verdict}"
         ),
     )
-    for extreme in rehearsal.extremes:
+    for extreme in checked.extremes:
         style = "bold red" if extreme.share > 1.0 else None
         table.add_row(
             extreme.quantity,
@@ -110,13 +110,13 @@ def _table(recorded: Recorded, rehearsal: Rehearsal, arm: str) -> Table:
     return table
 
 
-def _as_json(recorded: Recorded, rehearsal: Rehearsal) -> dict[str, Any]:
+def _as_json(recorded: RecordedMotion, checked: DryRun) -> dict[str, Any]:
     return {
         "domain": recorded.domain.name,
         "seed": recorded.seed,
         "index": recorded.index,
         "steps": len(recorded.waypoints),
-        "duration_s": rehearsal.duration_s,
-        "extremes": [{**asdict(extreme), "share": extreme.share} for extreme in rehearsal.extremes],
-        "violations": [{"step": step, "reason": reason} for step, reason in rehearsal.violations],
+        "duration_s": checked.duration_s,
+        "extremes": [{**asdict(extreme), "share": extreme.share} for extreme in checked.extremes],
+        "violations": [{"step": step, "reason": reason} for step, reason in checked.violations],
     }

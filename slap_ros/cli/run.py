@@ -44,7 +44,7 @@ from slap_ros.robot.worlds import MOCK, ROBOT, SIM, WORLDS
 from slap_ros.shortcuts.shipped import chosen_library
 
 if TYPE_CHECKING:
-    from ensemble.broadcast import Broadcast
+    from ensemble.foxglove_server import FoxgloveServer
 
 LOOK_S = 0.05  # s, between two looks at whether somebody watches
 
@@ -127,13 +127,13 @@ def run(
         check_output(report)
 
     # ROS is needed only here: every other command works without it.
-    from ensemble.broadcast import SHOWN
+    from ensemble.foxglove_server import SHOWN_TOPICS
     from ensemble.nodes import RunSettings
     from ensemble.parameters import parse_parameters
+    from ensemble.perception_parameters import PerceptionParameters
+    from ensemble.robot_parameters import parse_mock_robot
     from ensemble.run import RunRequest
     from ensemble.run import run as run_ensemble
-    from perception_node.node import Parameters as PerceptionParameters
-    from robot_bridge.mock.options import mock_options
 
     seeing = parse_parameters(perception, PerceptionParameters, "perception")
     quality = PerceptionParameters(**seeing).quality
@@ -152,13 +152,13 @@ def run(
             samples,
             world,
             str(scene or ""),
-            mock_options(mock),
+            parse_mock_robot(mock),
             perception=seeing,
         )
         request = RunRequest(settings, atoms, 0, max_replans, timeout, in_process)
         with _broadcast(live, live_port, watched) as show, _narrator(live) as narrate:
             if show is not None:
-                request = replace(request, shown=SHOWN)
+                request = replace(request, shown=SHOWN_TOPICS)
 
             def follow(type_name: str, message: Any) -> None:
                 narrate(type_name, message)
@@ -203,27 +203,27 @@ def _bag(record: Path | None, report: Path | None, name: str) -> Iterator[Path |
 
 
 @contextmanager
-def _broadcast(live: bool, port: int | None, watched: bool) -> Iterator[Broadcast | None]:
+def _broadcast(live: bool, port: int | None, watched: bool) -> Iterator[FoxgloveServer | None]:
     """What shows the run to Foxglove, if it is to be shown and can be.
 
     Raises:
         InvalidParameterError: It was asked for explicitly, and cannot be.
     """
-    from ensemble.broadcast import Broadcast, available
+    from ensemble.foxglove_server import FoxgloveServer, foxglove_installed
 
     if not live:
         yield None
         return
-    if not (available() or watched or port is not None):
+    if not (foxglove_installed() or watched or port is not None):
         console.print("not shown to Foxglove: pip install 'slap_ros[live]'", markup=False)
         yield None
         return
-    with Broadcast(port) as show:
+    with FoxgloveServer(port) as show:
         console.print(f"open in Foxglove: {show.url}", highlight=False)
-        while watched and not show.watched:
+        while watched and not show.has_viewers:
             sleep(LOOK_S)
         yield show
-        while watched and show.watched:
+        while watched and show.has_viewers:
             sleep(LOOK_S)
 
 

@@ -55,7 +55,7 @@ class Workspace:
 
 
 @dataclass(frozen=True)
-class Motion:
+class JointMotion:
     """A safe motion, from rest to rest. Made by :meth:`Limits.motion` only."""
 
     start: Joints  # rad
@@ -83,7 +83,9 @@ class Limits:
     step: Joints = MAX_STEP
     workspace: Workspace = Workspace()
 
-    def motion(self, start: Sequence[float], target: Sequence[float], least_s: float) -> Motion:
+    def motion(
+        self, start: Sequence[float], target: Sequence[float], least_s: float
+    ) -> JointMotion:
         """The motion to a target.
 
         Args:
@@ -100,7 +102,7 @@ class Limits:
         for k in range(1, LOOKS + 1):
             part = k / LOOKS
             self.workspace.require(tuple(a + part * (b - a) for a, b in zip(at, to, strict=True)))
-        return Motion(at, to, max(least_s, self._least_duration_s(at, to)))
+        return JointMotion(at, to, max(least_s, self._least_duration_s(at, to)))
 
     def _require_joints(self, start: Joints, target: Joints) -> None:
         if len(start) != JOINTS or len(target) != JOINTS:

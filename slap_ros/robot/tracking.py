@@ -31,24 +31,25 @@ class Detection(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Sensing:
+class TrackingSettings:
     """How well detections can be trusted."""
 
     position_noise_m: float = 0.002  # standard deviation along each axis
     turn_noise_rad: float = 0.01  # standard deviation about each axis
-    enough: int = 3  # detections that confirm a place that is known
-    many: int = 10  # detections that make a place known
+    confirmations: int = 3  # detections that confirm a place that is known
+    initial_detections: int = 10  # detections that make a place known
 
     def __post_init__(self) -> None:
         if min(self.position_noise_m, self.turn_noise_rad) <= 0.0:
             raise InvalidParameterError("the noise of detections is above 0")
-        if not 2 <= self.enough <= self.many <= LONGEST:
+        if not 2 <= self.confirmations <= self.initial_detections <= LONGEST:
             raise InvalidParameterError(
-                f"of detections, 2 <= enough <= many <= {LONGEST}, not {self.enough}, {self.many}"
+                f"2 <= confirmations <= initial_detections <= {LONGEST}, not "
+                f"{self.confirmations}, {self.initial_detections}"
             )
 
 
-class Sighting(NamedTuple):
+class PoseEstimate(NamedTuple):
     """What is known of an object's motion."""
 
     pose: Pose
@@ -77,10 +78,10 @@ def measured_pose(position: Sequence[float], quaternion: Sequence[float]) -> Pos
 class Track:
     """The detections of one object."""
 
-    def __init__(self, sensing: Sensing) -> None:
-        self._sensing = sensing
+    def __init__(self, settings: TrackingSettings) -> None:
+        self._settings = settings
         self._detections: deque[Detection] = deque(maxlen=LONGEST)
-        self._known: Sighting | None = None  # where it lies still
+        self._known: PoseEstimate | None = None  # where it lies still
 
     def add(self, detection: Detection) -> None:
         """Take a detection.
@@ -96,28 +97,28 @@ class Track:
         self._detections.append(detection)
 
     @property
-    def seen_s(self) -> float:
+    def newest_s(self) -> float:
         """Stamp of the newest detection; minus infinity without one."""
         return self._detections[-1].stamp_s if self._detections else -math.inf
 
-    def sighting(self, since_s: float) -> Sighting | None:
+    def estimate(self, since_s: float) -> PoseEstimate | None:
         """What the detections since then say; None if they are too few."""
         fresh = [d for d in self._detections if d.stamp_s > since_s]
-        few = fresh[-self._sensing.enough :]
-        if len(few) < self._sensing.enough:
+        few = fresh[-self._settings.confirmations :]
+        if len(few) < self._settings.confirmations:
             return None
         if not self._agree(few):
             return _moving(few)
         if self._known is not None and self._explains(self._known, few):
             return self._merged(self._known, few)
-        many = fresh[-self._sensing.many :]
-        if len(many) < self._sensing.many:
+        many = fresh[-self._settings.initial_detections :]
+        if len(many) < self._settings.initial_detections:
             return None
         return _standing(many) if self._agree(many) else _moving(many)
 
-    def settle(self, sighting: Sighting) -> None:
+    def remember(self, estimate: PoseEstimate) -> None:
         """Remember where the object lies still, if it does."""
-        self._known = sighting if sighting.steady else None
+        self._known = estimate if estimate.steady else None
 
     def forget(self) -> None:
         """It was moved on purpose: where it lay says nothing any more."""
@@ -128,21 +129,21 @@ class Track:
         middle = mean_pose([d.pose for d in detections])
         return all(self._near(d.pose, middle, 1.0) for d in detections)
 
-    def _explains(self, known: Sighting, few: Sequence[Detection]) -> bool:
+    def _explains(self, known: PoseEstimate, few: Sequence[Detection]) -> bool:
         spread = math.sqrt(1.0 / len(few) + 1.0 / known.weight)
         return self._near(mean_pose([d.pose for d in few]), known.pose, spread)
 
     def _near(self, pose: Pose, other: Pose, spread: float) -> bool:
-        far = SURPRISE * spread * self._sensing.position_noise_m
-        turned = SURPRISE * spread * self._sensing.turn_noise_rad * math.sqrt(3.0)
+        far = SURPRISE * spread * self._settings.position_noise_m
+        turned = SURPRISE * spread * self._settings.turn_noise_rad * math.sqrt(3.0)
         return (
             all(abs(a - b) <= far for a, b in zip(pose.position, other.position, strict=True))
             and pose.angle_to(other) <= turned
         )
 
-    def _merged(self, known: Sighting, few: Sequence[Detection]) -> Sighting:
+    def _merged(self, known: PoseEstimate, few: Sequence[Detection]) -> PoseEstimate:
         """A little better known; what is known well enough stays the same to the bit."""
-        if known.weight >= self._sensing.many:
+        if known.weight >= self._settings.initial_detections:
             return known
         weight = known.weight + len(few)
         poses = [known.pose] * known.weight + [d.pose for d in few]
@@ -164,15 +165,15 @@ def mean_pose(poses: Sequence[Pose]) -> Pose:
     return Pose((x, y, z), (qx, qy, qz, qw))
 
 
-def _standing(detections: Sequence[Detection]) -> Sighting:
+def _standing(detections: Sequence[Detection]) -> PoseEstimate:
     return _still(mean_pose([d.pose for d in detections]), len(detections))
 
 
-def _still(pose: Pose, weight: int) -> Sighting:
-    return Sighting(pose, ORIGIN, ORIGIN, steady=True, weight=weight)
+def _still(pose: Pose, weight: int) -> PoseEstimate:
+    return PoseEstimate(pose, ORIGIN, ORIGIN, steady=True, weight=weight)
 
 
-def _moving(detections: Sequence[Detection]) -> Sighting:
+def _moving(detections: Sequence[Detection]) -> PoseEstimate:
     """Velocities from the first to the last of the detections."""
     first, last = detections[0], detections[-1]
     dt = last.stamp_s - first.stamp_s
@@ -182,4 +183,4 @@ def _moving(detections: Sequence[Detection]) -> Sighting:
     x, y, z, w = multiply(last.pose.quaternion, conjugate(first.pose.quaternion))
     sine, sign = math.hypot(x, y, z), math.copysign(1.0, w)
     rate = sign * 2.0 * math.atan2(sine, abs(w)) / (sine * dt) if sine > 0.0 else 0.0
-    return Sighting(last.pose, (vx, vy, vz), (x * rate, y * rate, z * rate), False, 1)
+    return PoseEstimate(last.pose, (vx, vy, vz), (x * rate, y * rate, z * rate), False, 1)

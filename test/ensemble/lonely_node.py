@@ -9,12 +9,12 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from std_msgs.msg import String
 
-from ensemble.network import join
+from ensemble.network import join_network
 
 WHILE = 10.0  # s, in which others, where they can be found at all, are found many times over
 
 name, heard = sys.argv[1], set()
-join()
+join_network()
 node = rclpy.create_node(name)
 node.create_subscription(String, "talk", lambda message: heard.add(message.data), 10)
 publisher = node.create_publisher(String, "talk", 10)

@@ -10,12 +10,12 @@ import pytest
 import yaml
 from rosbags.interfaces import Nodetype
 
-from ensemble.broadcast import SHOWN, channel_name
 from ensemble.client import RunClient
-from ensemble.hosts import InProcessHost
+from ensemble.foxglove_server import SHOWN_TOPICS, channel_name
 from ensemble.interfaces import MARKERS
+from ensemble.launcher import InProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
-from ensemble.spinning import spinning
+from ensemble.spinner import temporary_node
 from slap_ros.messages.interfaces import typestore
 
 CONFIG = Path(__file__).parents[2] / "config"
@@ -54,10 +54,10 @@ def published(network):
     pytest.importorskip("pybullet")
     settings = RunSettings("obstacle_tower", "fair", 1, 0, "lazy", None, shortcuts="none")
     with (
-        spinning(lambda: RunClient(lambda *_: None)) as (client, spinner),
-        InProcessHost(node_parameters(settings), spinner.executor),
+        temporary_node(lambda: RunClient(lambda *_: None)) as (client, spinner),
+        InProcessLauncher(node_parameters(settings), spinner.executor),
     ):
-        assert spinner.until(lambda: client.ready(recording=False), 60.0)
+        assert spinner.spin_until(lambda: client.ready(recording=False), 60.0)
         return {
             name: types
             for name, types in client.get_topic_names_and_types()
@@ -95,7 +95,9 @@ def inner_type(description):
 
 
 def test_a_live_run_sends_what_foxglove_shows():
-    assert {topic for topic, _ in foxglove_paths()} <= {channel_name(topic) for topic in SHOWN}
+    assert {topic for topic, _ in foxglove_paths()} <= {
+        channel_name(topic) for topic in SHOWN_TOPICS
+    }
 
 
 def test_every_panel_has_its_place():

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 import rclpy
 
-from ensemble.network import REACH, join
+from ensemble.network import DISCOVERY_RANGE, join_network
 from slap_ros.errors import InvalidParameterError
 
 HERE = Path(__file__).parent
@@ -28,8 +28,8 @@ def two_hosts_possible():
 @pytest.mark.parametrize(("reach", "open_to_all"), [(None, False), ("SUBNET", True)])
 def test_another_host_is_heard_only_where_that_was_asked_for(network, reach, open_to_all):
     """The other host knows the address and asks for it; nobody has to be discovered."""
-    environment = {key: value for key, value in os.environ.items() if key != REACH}
-    environment |= {REACH: reach} if reach else {}
+    environment = {key: value for key, value in os.environ.items() if key != DISCOVERY_RANGE}
+    environment |= {DISCOVERY_RANGE: reach} if reach else {}
     told = subprocess.run(
         ["unshare", "-rn", "bash", str(HERE / "two_hosts.sh"), sys.executable],
         env=environment,
@@ -48,17 +48,17 @@ def test_another_host_is_heard_only_where_that_was_asked_for(network, reach, ope
 @pytest.mark.parametrize(("given", "taken"), [(None, "LOCALHOST"), ("SUBNET", "SUBNET")])
 def test_jazzys_own_default_is_not_taken(network, monkeypatch, given, taken):
     if given is not None:
-        monkeypatch.setenv(REACH, given)
-    join()
+        monkeypatch.setenv(DISCOVERY_RANGE, given)
+    join_network()
     rclpy.shutdown()
-    assert os.environ[REACH] == taken
+    assert os.environ[DISCOVERY_RANGE] == taken
 
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("ROS_DOMAIN_ID", "abc"), ("ROS_DOMAIN_ID", "1000"), (REACH, "EVERYWHERE")],
+    [("ROS_DOMAIN_ID", "abc"), ("ROS_DOMAIN_ID", "1000"), (DISCOVERY_RANGE, "EVERYWHERE")],
 )
 def test_a_wrong_environment_is_refused(network, monkeypatch, name, value):
     monkeypatch.setenv(name, value)
     with pytest.raises(InvalidParameterError, match=value):
-        join()
+        join_network()

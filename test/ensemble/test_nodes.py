@@ -16,11 +16,11 @@ from slap_msgs.srv import ListSkills, ResetTask
 
 from benchmarks.control_loop import state_command_state
 from ensemble.client import RunClient
-from ensemble.hosts import ProcessHost
 from ensemble.interfaces import COMMAND, LIST_SKILLS, RESET_TASK
+from ensemble.launcher import ProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
-from ensemble.observation import Observer
-from ensemble.spinning import spinning
+from ensemble.spinner import temporary_node
+from ensemble.state_synchronizer import StateSynchronizer
 from slap_ros.bags import evaluate_bag
 from slap_ros.messages.interfaces import STATE
 
@@ -55,9 +55,9 @@ def start(name, *arguments):
 def solve(client, spinner, episode=0, **limits):
     """Ask for the task to be solved; the action's result."""
     sent = client.send((), limits.get("step_limit", 0), limits.get("max_replans", 5), episode)
-    assert spinner.until(sent.done, LIMIT)
+    assert spinner.spin_until(sent.done, LIMIT)
     result = sent.result().get_result_async()
-    assert spinner.until(result.done, LIMIT)
+    assert spinner.spin_until(result.done, LIMIT)
     return result.result().result
 
 
@@ -68,18 +68,18 @@ def states(client):
 @pytest.mark.parametrize("order", [ALL, ALL[::-1]], ids=["sim first", "recorder first"])
 def test_any_order_of_start_gives_the_same_complete_bag(network, tmp_path, order):
     nodes = parameters(tmp_path / "bag")
-    with spinning(Listener) as (client, spinner):
+    with temporary_node(Listener) as (client, spinner):
         running = []
         for name in order:
-            host = ProcessHost({name: nodes[name]})
-            running.append(host.__enter__())
+            launcher = ProcessLauncher({name: nodes[name]})
+            running.append(launcher.__enter__())
             time.sleep(1.0)
-        assert spinner.until(lambda: client.ready(True), LIMIT)
+        assert spinner.spin_until(lambda: client.ready(True), LIMIT)
         assert solve(client, spinner).success
         closed = client.close_bag()
-        assert spinner.until(closed.done, LIMIT)
-        for host in running:
-            host.__exit__(None, None, None)
+        assert spinner.spin_until(closed.done, LIMIT)
+        for launcher in running:
+            launcher.__exit__(None, None, None)
     found = evaluate_bag(tmp_path / "bag")
     assert found.runs[0].success
     assert found.states == found.compared == found.runs[0].plan_length + 1
@@ -90,8 +90,8 @@ def test_any_order_of_start_gives_the_same_complete_bag(network, tmp_path, order
 def test_a_node_stops_cleanly(network, tmp_path, name, stop):
     bag = ["-p", f"bag:={tmp_path / 'bag'}"] if name == "recorder_node" else []
     process = start(name, *bag)
-    with spinning(Listener) as (client, spinner):
-        assert spinner.until(lambda: name in client.others(), LIMIT)
+    with temporary_node(Listener) as (client, spinner):
+        assert spinner.spin_until(lambda: name in client.other_nodes(), LIMIT)
         time.sleep(0.2)
     process.send_signal(stop)
     out, err = process.communicate(timeout=LIMIT)
@@ -103,15 +103,15 @@ def test_a_node_stops_cleanly(network, tmp_path, name, stop):
 def test_a_node_that_comes_back_is_taken_up_again(network, victim):
     nodes = parameters()
     others = {name: p for name, p in nodes.items() if name != victim}
-    with spinning(Listener) as (client, spinner), ProcessHost(others):
-        with ProcessHost({victim: nodes[victim]}) as first:
-            assert spinner.until(lambda: client.ready(False), LIMIT)
+    with temporary_node(Listener) as (client, spinner), ProcessLauncher(others):
+        with ProcessLauncher({victim: nodes[victim]}) as first:
+            assert spinner.spin_until(lambda: client.ready(False), LIMIT)
             assert solve(client, spinner).success
             first.processes[victim].kill()
             first.processes[victim].wait()
-        assert spinner.until(lambda: victim not in client.others(), LIMIT)
-        with ProcessHost({victim: nodes[victim]}):
-            assert spinner.until(lambda: client.ready(False), LIMIT)
+        assert spinner.spin_until(lambda: victim not in client.other_nodes(), LIMIT)
+        with ProcessLauncher({victim: nodes[victim]}):
+            assert spinner.spin_until(lambda: client.ready(False), LIMIT)
             opened = reset(client, spinner, seed=4)
             assert solve(client, spinner, episode=opened.episode).success
 
@@ -119,28 +119,28 @@ def test_a_node_that_comes_back_is_taken_up_again(network, victim):
 def test_a_simulator_that_comes_back_opens_a_new_episode(network):
     nodes = parameters()
     others = {name: p for name, p in nodes.items() if name != "sim_node"}
-    with spinning(Listener) as (client, spinner), ProcessHost(others):
+    with temporary_node(Listener) as (client, spinner), ProcessLauncher(others):
         for _ in range(2):
-            with ProcessHost({"sim_node": nodes["sim_node"]}):
+            with ProcessLauncher({"sim_node": nodes["sim_node"]}):
                 client.heard.clear()
-                assert spinner.until(lambda: client.ready(False) and states(client), LIMIT)
+                assert spinner.spin_until(lambda: client.ready(False) and states(client), LIMIT)
                 # Until the planner has heard: the old task is done already, in no steps.
-                assert spinner.until(lambda: solve(client, spinner).plan_length > 0, LIMIT)
-            assert spinner.until(lambda: "sim_node" not in client.others(), LIMIT)
+                assert spinner.spin_until(lambda: solve(client, spinner).plan_length > 0, LIMIT)
+            assert spinner.spin_until(lambda: "sim_node" not in client.other_nodes(), LIMIT)
 
 
 def reset(client, spinner, **request):
     service = client.create_client(RESET_TASK.type, RESET_TASK.name)
-    assert spinner.until(service.service_is_ready, LIMIT)
+    assert spinner.spin_until(service.service_is_ready, LIMIT)
     answer = service.call_async(ResetTask.Request(**request))
-    assert spinner.until(answer.done, LIMIT)
+    assert spinner.spin_until(answer.done, LIMIT)
     client.destroy_client(service)
     return answer.result()
 
 
 def test_a_task_is_solved_in_the_episode_that_was_asked_for(network):
-    with spinning(Listener) as (client, spinner), ProcessHost(parameters()):
-        assert spinner.until(lambda: client.ready(False), LIMIT)
+    with temporary_node(Listener) as (client, spinner), ProcessLauncher(parameters()):
+        assert spinner.spin_until(lambda: client.ready(False), LIMIT)
         for episode in (2, 3):  # at once: before the planner can have heard of it
             assert reset(client, spinner, seed=episode).episode == episode
             assert solve(client, spinner, episode=episode).success
@@ -151,10 +151,10 @@ def test_a_task_is_solved_in_the_episode_that_was_asked_for(network):
 
 def test_commands_that_are_stale_or_impossible_move_nothing(network):
     only = {"sim_node": parameters()["sim_node"]}
-    with spinning(Listener) as (client, spinner), ProcessHost(only):
-        assert spinner.until(lambda: states(client), LIMIT)
+    with temporary_node(Listener) as (client, spinner), ProcessLauncher(only):
+        assert spinner.spin_until(lambda: states(client), LIMIT)
         publisher = client.create_publisher(COMMAND.type, COMMAND.name, COMMAND.qos)
-        assert spinner.until(lambda: publisher.get_subscription_count() == 1, LIMIT)
+        assert spinner.spin_until(lambda: publisher.get_subscription_count() == 1, LIMIT)
         refused = [
             RobotCommand(episode=1, step=7, deltas=[0.0, 0.01], gripper=0.0),  # not now
             RobotCommand(episode=2, step=0, deltas=[0.0, 0.01], gripper=0.0),  # another episode
@@ -166,8 +166,8 @@ def test_commands_that_are_stale_or_impossible_move_nothing(network):
             publisher.publish(command)
         publisher.publish(RobotCommand(episode=1, step=0, deltas=[0.0, -0.01], gripper=0.0))
         publisher.publish(RobotCommand(episode=1, step=0, deltas=[0.0, -0.01], gripper=0.0))
-        assert spinner.until(lambda: len(states(client)) == 2, LIMIT)
-        spinner.until(lambda: False, 0.5)
+        assert spinner.spin_until(lambda: len(states(client)) == 2, LIMIT)
+        spinner.spin_until(lambda: False, 0.5)
         assert [state.step for state in states(client)] == [0, 1]
         before, after = (state.objects[0].features for state in states(client))
         assert after[1] == before[1] - 0.01
@@ -175,13 +175,13 @@ def test_commands_that_are_stale_or_impossible_move_nothing(network):
 
 def test_resets_are_checked_at_the_door(network):
     only = {"sim_node": parameters()["sim_node"]}
-    with spinning(Listener) as (client, spinner), ProcessHost(only):
-        assert spinner.until(lambda: states(client), LIMIT)
+    with temporary_node(Listener) as (client, spinner), ProcessLauncher(only):
+        assert spinner.spin_until(lambda: states(client), LIMIT)
         explicit = states(client)[0]
         answer = reset(client, spinner, seed=9)
         assert (answer.error_code, answer.episode) == (0, 2)
         assert (reset(client, spinner, initial_state=explicit).episode) == 3
-        assert spinner.until(lambda: len(states(client)) == 3, LIMIT)
+        assert spinner.spin_until(lambda: len(states(client)) == 3, LIMIT)
         assert states(client)[2].objects == explicit.objects
         explicit.objects[0].features[0] = float("nan")
         answer = reset(client, spinner, initial_state=explicit)
@@ -190,35 +190,35 @@ def test_resets_are_checked_at_the_door(network):
 
 
 def test_cancelling_makes_the_robot_hold(network):
-    with spinning(Listener) as (client, spinner), ProcessHost(parameters(pace=5.0)):
-        assert spinner.until(lambda: client.ready(False), LIMIT)
+    with temporary_node(Listener) as (client, spinner), ProcessLauncher(parameters(pace=5.0)):
+        assert spinner.spin_until(lambda: client.ready(False), LIMIT)
         sent = client.send((), 0, 5)
-        assert spinner.until(sent.done, LIMIT)
-        assert spinner.until(lambda: len(states(client)) > 5, LIMIT)
+        assert spinner.spin_until(sent.done, LIMIT)
+        assert spinner.spin_until(lambda: len(states(client)) > 5, LIMIT)
         canceled = sent.result().cancel_goal_async()
-        assert spinner.until(canceled.done, LIMIT)
+        assert spinner.spin_until(canceled.done, LIMIT)
         result = sent.result().get_result_async()
-        assert spinner.until(result.done, LIMIT)
+        assert spinner.spin_until(result.done, LIMIT)
         assert result.result().result.error_code == 34
-        spinner.until(lambda: False, 0.5)
+        spinner.spin_until(lambda: False, 0.5)
         seen = states(client)
         assert len(seen) < 20  # mid-way
         assert seen[-1].objects[0].features == seen[-2].objects[0].features  # it held
-        spinner.until(lambda: False, 0.5)
+        spinner.spin_until(lambda: False, 0.5)
         assert len(states(client)) == len(seen)  # and nothing more was commanded
 
 
 def test_skills_are_listed_with_their_signatures(network):
-    with spinning(Listener) as (client, spinner), ProcessHost(parameters()):
+    with temporary_node(Listener) as (client, spinner), ProcessLauncher(parameters()):
         service = client.create_client(LIST_SKILLS.type, LIST_SKILLS.name)
-        assert spinner.until(service.service_is_ready, LIMIT)
+        assert spinner.spin_until(service.service_is_ready, LIMIT)
 
         def listed():
             answer = service.call_async(ListSkills.Request())
-            assert spinner.until(answer.done, LIMIT)
+            assert spinner.spin_until(answer.done, LIMIT)
             return {s.name: list(s.parameters) for s in answer.result().skills}
 
-        assert spinner.until(listed, LIMIT)  # once the skill server knows the domain
+        assert spinner.spin_until(listed, LIMIT)  # once the skill server knows the domain
         skills = listed()
         assert skills["PlaceInTarget"] == ["robot", "block", "surface"]
         assert len(skills) == 4
@@ -309,11 +309,11 @@ def test_a_wrong_parameter_is_refused_in_one_line(network, arguments, code, word
 
 
 def test_parameters_can_be_read_from_outside(network):
-    with spinning(Listener) as (client, spinner), ProcessHost(parameters()):
+    with temporary_node(Listener) as (client, spinner), ProcessLauncher(parameters()):
         service = client.create_client(GetParameters, "planner_node/get_parameters")
-        assert spinner.until(service.service_is_ready, LIMIT)
+        assert spinner.spin_until(service.service_is_ready, LIMIT)
         answer = service.call_async(GetParameters.Request(names=["planner", "server_timeout"]))
-        assert spinner.until(answer.done, LIMIT)
+        assert spinner.spin_until(answer.done, LIMIT)
         planner, timeout = answer.result().values
         assert (planner.string_value, timeout.double_value) == ("lazy", 5.0)
 
@@ -327,15 +327,15 @@ def test_a_thousand_steps_are_answered_one_by_one(network):
 def test_observer_ignores_states_of_an_episode_that_is_over(network):
     """A message of the old episode that comes late must not look like news."""
     with (
-        spinning(Listener) as (client, spinner),
-        ProcessHost(
+        temporary_node(Listener) as (client, spinner),
+        ProcessLauncher(
             {name: p for name, p in parameters().items() if name in ("sim_node", "perception_node")}
         ),
     ):
         observations = []
-        observer = Observer(client, observations.append)
-        assert spinner.until(lambda: observer.latest is not None, LIMIT)
+        observer = StateSynchronizer(client, observations.append)
+        assert spinner.spin_until(lambda: observer.latest is not None, LIMIT)
         reset(client, spinner, seed=8)
-        assert spinner.until(lambda: observer.latest.episode.number == 2, LIMIT)
+        assert spinner.spin_until(lambda: observer.latest.episode.number == 2, LIMIT)
         assert [o.episode.number for o in observations] == [1, 2]
         assert observer.latest.step == 0

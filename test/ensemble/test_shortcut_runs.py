@@ -14,14 +14,14 @@ from slap_msgs.srv import ListSkills
 
 from ensemble import encode
 from ensemble.client import RunClient
-from ensemble.hosts import InProcessHost
 from ensemble.interfaces import LIST_SKILLS
+from ensemble.launcher import InProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.observation import Episode, Observation
 from ensemble.run import RunRequest, run
-from ensemble.shortcuts import Repertoires, ShortcutParameters
-from ensemble.spinning import spinning
-from skill_server.skill_run import requested_option
+from ensemble.shortcuts import ShortcutParameters, ShortcutProvider
+from ensemble.spinner import temporary_node
+from skill_server.skill_execution import requested_option
 from slap_ros.bags import evaluate_bag, replay_bag
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidLibraryError, SkillNotApplicableError, UnknownSkillError
@@ -109,18 +109,18 @@ def test_learned_shortcuts_are_listed(network):
     nodes = node_parameters(request().settings)
     two = {name: nodes[name] for name in ("sim_node", "skill_server")}
     with (
-        spinning(lambda: RunClient(ignore)) as (client, spinner),
-        InProcessHost(two, spinner.executor),
+        temporary_node(lambda: RunClient(ignore)) as (client, spinner),
+        InProcessLauncher(two, spinner.executor),
     ):
         service = client.create_client(LIST_SKILLS.type, LIST_SKILLS.name)
-        assert spinner.until(service.service_is_ready, LIMIT)
+        assert spinner.spin_until(service.service_is_ready, LIMIT)
 
         def skills():
             answer = service.call_async(ListSkills.Request())
-            assert spinner.until(answer.done, LIMIT)
+            assert spinner.spin_until(answer.done, LIMIT)
             return answer.result().skills
 
-        assert spinner.until(skills, LIMIT)  # once the skill server knows the domain
+        assert spinner.spin_until(skills, LIMIT)  # once the skill server knows the domain
         (learned,) = [skill for skill in skills() if skill.kind == OptionKind.SHORTCUT.value]
     assert learned.name == SHORTCUT
     assert list(learned.parameters) == ["block", "surface", "surface"]
@@ -151,7 +151,7 @@ def observed():
 
 def repertoires(observation, choice=DATA):
     node = SimpleNamespace(get_logger=lambda: None)
-    made = Repertoires(node, ShortcutParameters(shortcuts=str(choice)))
+    made = ShortcutProvider(node, ShortcutParameters(shortcuts=str(choice)))
     made.open(observation.episode)
     return made
 

@@ -4,7 +4,6 @@
 
 from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib import import_module
 from random import Random
 
 import rclpy
@@ -15,8 +14,8 @@ from slap_msgs.srv import ResetTask
 
 from ensemble.client import RunClient
 from ensemble.interfaces import ATOMS, COMMAND, DOMAIN, LATCHED, RESET_TASK, STATE, TASK
-from ensemble.nodes import CLASSES, RunSettings, node_parameters
-from ensemble.run import Spinner
+from ensemble.nodes import RunSettings, node_class, node_parameters
+from ensemble.spinner import Spinner
 
 LIMIT = 30.0  # s, within which every case must have ended
 HEARD = {
@@ -184,21 +183,21 @@ class Laboratory:
     def solve(self, episode=0):
         """The result of asking for the task to be solved."""
         sent = self.client.send((), 0, 2, episode)
-        assert self.spinner.until(sent.done, LIMIT)
+        assert self.spinner.spin_until(sent.done, LIMIT)
         result = sent.result().get_result_async()
-        assert self.spinner.until(result.done, LIMIT), "hung"
+        assert self.spinner.spin_until(result.done, LIMIT), "hung"
         return result.result().result
 
     def close_bag(self):
         closed = self.client.close_bag()
-        assert self.spinner.until(closed.done, LIMIT)
+        assert self.spinner.spin_until(closed.done, LIMIT)
 
     def reset(self, seed):
         """Open a new episode; its number."""
         service = self.client.create_client(RESET_TASK.type, RESET_TASK.name)
-        assert self.spinner.until(service.service_is_ready, LIMIT)
+        assert self.spinner.spin_until(service.service_is_ready, LIMIT)
         answer = service.call_async(ResetTask.Request(seed=seed))
-        assert self.spinner.until(answer.done, LIMIT)
+        assert self.spinner.spin_until(answer.done, LIMIT)
         self.client.destroy_client(service)
         assert answer.result().error_code == 0
         return answer.result().episode
@@ -219,7 +218,7 @@ def laboratory(case, bag):
         for node in nodes:
             executor.add_node(node)
         spinner = Spinner(executor)
-        assert spinner.until(lambda: client.ready(True), LIMIT)
+        assert spinner.spin_until(lambda: client.ready(True), LIMIT)
         yield Laboratory(client, spinner, relay)
     finally:
         for node in reversed(nodes):
@@ -231,7 +230,7 @@ def laboratory(case, bag):
 def _node(name, parameters, relayed):
     remaps = [f"{topic.name}:={faulty_name(name, topic)}" for topic in relayed]
     arguments = [part for remap in remaps for part in ("--remap", remap)]
-    return getattr(import_module(f"{name}.node"), CLASSES[name])(
+    return node_class(name)(
         parameter_overrides=[Parameter(key, value=value) for key, value in parameters.items()],
         cli_args=["--ros-args", *arguments] if arguments else None,
     )

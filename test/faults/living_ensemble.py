@@ -8,11 +8,11 @@ from process_faults import LIMIT
 from slap_msgs.srv import ResetTask
 
 from ensemble.client import RunClient
-from ensemble.hosts import ProcessHost
 from ensemble.interfaces import ATOMS, PLAN_EVENTS, RESET_TASK, SKILL_EVENTS, STATE
+from ensemble.launcher import ProcessLauncher
+from ensemble.node_liveness import NodeLiveness
 from ensemble.nodes import RunSettings, node_parameters
-from ensemble.presence import Presence
-from ensemble.spinning import spinning
+from ensemble.spinner import temporary_node
 
 # By which a node is told from its successor.
 PUBLISHED = {
@@ -28,37 +28,37 @@ class Laboratory:
 
     def __init__(self, nodes, client, spinner, heard):
         self.nodes, self.client, self.spinner, self.heard = nodes, client, spinner, heard
-        self._hosts = {}
+        self._launchers = {}
 
     def start(self, name, **changed):
-        self._hosts[name] = ProcessHost({name: {**self.nodes[name], **changed}})
-        self._hosts[name].__enter__()
+        self._launchers[name] = ProcessLauncher({name: {**self.nodes[name], **changed}})
+        self._launchers[name].__enter__()
 
     def kill(self, name):
-        process = self._hosts[name].processes[name]
+        process = self._launchers[name].processes[name]
         process.kill()
         process.wait()
 
     def restart(self, name, **changed):
         """Kill it, start it again, and wait until nobody takes it for its predecessor."""
-        old = Presence(self.client, PUBLISHED[name]) if name in PUBLISHED else None
+        old = NodeLiveness(self.client, PUBLISHED[name]) if name in PUBLISHED else None
         self.kill(name)
         if old is None:
-            self.until(lambda: name not in self.client.others())
+            self.until(lambda: name not in self.client.other_nodes())
         self.start(name, **changed)
-        self.until(lambda: (old is None or old.gone()) and self.client.ready(True))
+        self.until(lambda: (old is None or old.is_lost()) and self.client.ready(True))
 
     def told(self, type_name):
         """The messages of a type so far."""
         return [message for name, message in self.heard if name == type_name]
 
     def stop(self):
-        for host in self._hosts.values():
-            host.__exit__(None, None, None)
+        for launcher in self._launchers.values():
+            launcher.__exit__(None, None, None)
 
     def until(self, condition):
         """Wait for something that must come."""
-        assert self.spinner.until(condition, LIMIT), "hung"
+        assert self.spinner.spin_until(condition, LIMIT), "hung"
 
     def ask(self, episode=0):
         """Ask for the task to be solved; the future result."""
@@ -85,7 +85,7 @@ def laboratory(seed, bag, pace):
     def client_node():
         return RunClient(lambda type_name, message: heard.append((type_name, message)))
 
-    with spinning(client_node) as (client, spinner):
+    with temporary_node(client_node) as (client, spinner):
         bench = Laboratory(node_parameters(settings), client, spinner, heard)
         try:
             for name in bench.nodes:

@@ -15,7 +15,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from truthful_run import Script, record
 from typer.testing import CliRunner
 
-from ensemble.running import run_node
+from ensemble.entry_point import run_node
 from sim_node.node import SimNode
 from slap_ros.bags import bag_digest, bag_info, evaluate_bag, read_bag, replay_bag
 from slap_ros.cli import app
@@ -28,7 +28,7 @@ from slap_ros.meshes.solid import Solid
 from slap_ros.messages.interfaces import definition, typestore
 from slap_ros.relational.pddl import write_domain, write_problem
 from slap_ros.report import read_report, render
-from slap_ros.robot.workplace import read_workplace
+from slap_ros.robot.scene_config import read_scene_config
 from slap_ros.shortcuts.jobs import Kept, Place
 from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.settings import Exploration, training_settings
@@ -196,11 +196,11 @@ def test_a_damaged_scene_is_refused_or_read(tmp_path, count):
     scene.write_text(SCENE)
     for _ in damaged_files(scene, MANY * count, "scene"):
         try:
-            workplace = read_workplace(scene, TOWER)
+            scene_config = read_scene_config(scene, TOWER)
         except SlapError as error:
             assert refused(error)
         else:
-            assert workplace.template.objects
+            assert scene_config.template.objects
 
 
 def test_damaged_parameters_end_a_node_with_a_code(network, tmp_path, monkeypatch, count):

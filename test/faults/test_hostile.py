@@ -17,7 +17,7 @@ from slap_msgs.msg import DomainInfo, Task
 from truthful_run import Script, record
 
 from ensemble.interfaces import DOMAIN, TASK
-from ensemble.run import Spinner
+from ensemble.spinner import Spinner
 from recorder_node.node import RecorderNode
 from slap_ros.bags import bag_info, evaluate_bag
 from slap_ros.domains import get_domain

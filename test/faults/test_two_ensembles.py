@@ -7,14 +7,13 @@ import subprocess
 import sys
 from collections import Counter
 from contextlib import ExitStack
-from importlib import import_module
 
 from rclpy.parameter import Parameter
 
 from ensemble.client import RunClient
 from ensemble.interfaces import DIAGNOSTICS
-from ensemble.nodes import CLASSES, RunSettings, node_parameters
-from ensemble.spinning import spinning
+from ensemble.nodes import RunSettings, node_class, node_parameters
+from ensemble.spinner import temporary_node
 from slap_ros.bags import evaluate_bag, read_bag
 from slap_ros.domains import get_domain
 from slap_ros.evaluation.experiment import Experiment
@@ -35,7 +34,7 @@ def test_namespaces_keep_two_ensembles_apart(network, tmp_path):
     alive = {side: {f"/{side}/{name}" for name in NODES} for side in SEEDS}
     heard = {side: set() for side in SEEDS}
     with ExitStack() as stack:
-        left, spinner = stack.enter_context(spinning(lambda: client_of("left", heard)))
+        left, spinner = stack.enter_context(temporary_node(lambda: client_of("left", heard)))
         clients = {"left": left, "right": client_of("right", heard)}
         stack.callback(clients["right"].destroy_node)
         spinner.executor.add_node(clients["right"])
@@ -46,10 +45,10 @@ def test_namespaces_keep_two_ensembles_apart(network, tmp_path):
                 stack.callback(node.destroy_node)
                 spinner.executor.add_node(node)
         both = clients.values()
-        assert spinner.until(lambda: all(client.ready(True) for client in both), LIMIT)
+        assert spinner.spin_until(lambda: all(client.ready(True) for client in both), LIMIT)
         handles = answers(spinner, [client.send((), 0, 5) for client in both])
         results = answers(spinner, [handle.get_result_async() for handle in handles])
-        assert spinner.until(lambda: all(heard[side] >= alive[side] for side in SEEDS), LIMIT)
+        assert spinner.spin_until(lambda: all(heard[side] >= alive[side] for side in SEEDS), LIMIT)
         names = [name for name, _ in left.get_topic_names_and_types()]
         names += [name for name, _ in left.get_service_names_and_types()]
         answers(spinner, [client.close_bag() for client in both])
@@ -89,13 +88,13 @@ def speakers(bag):
 
 
 def answers(spinner, futures):
-    assert spinner.until(lambda: all(future.done() for future in futures), LIMIT)
+    assert spinner.spin_until(lambda: all(future.done() for future in futures), LIMIT)
     return [future.result() for future in futures]
 
 
 def ensemble(namespace, settings):
     for name, parameters in node_parameters(settings).items():
-        yield getattr(import_module(f"{name}.node"), CLASSES[name])(
+        yield node_class(name)(
             parameter_overrides=[Parameter(key, value=value) for key, value in parameters.items()],
             namespace=f"/{namespace}",
         )

@@ -16,7 +16,7 @@ SLOWLY = 1.0  # environment steps a second: a skill takes longer than a dead nod
 def holds(bench):
     """Whether the robot stands still."""
     before = len(bench.told(STATE))
-    bench.spinner.until(lambda: False, 3.0 / SLOWLY)
+    bench.spinner.spin_until(lambda: False, 3.0 / SLOWLY)
     return len(bench.told(STATE)) == before
 
 
@@ -31,7 +31,7 @@ def test_a_planner_that_dies_leaves_the_robot_holding(network):
         assert (end.kind, end.error_code) == (SkillEventKind.FAILED, ErrorCode.NODE_DIED)
         assert "the planner is gone" in end.error_msg
         # One command may be under way; after that there are no more.
-        bench.spinner.until(lambda: False, 2.0 / SLOWLY)
+        bench.spinner.spin_until(lambda: False, 2.0 / SLOWLY)
         assert holds(bench)
 
 

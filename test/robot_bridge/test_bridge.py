@@ -15,12 +15,12 @@ from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from ensemble.client import RunClient
-from ensemble.hosts import InProcessHost
-from ensemble.interfaces import COMMAND, JOINT_STATES, RESET_TASK, SENSED, TF
+from ensemble.interfaces import COMMAND, JOINT_STATES, RESET_TASK, SENSOR_DATA, TF
+from ensemble.launcher import InProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
+from ensemble.robot_parameters import parse_mock_robot
 from ensemble.run import RunRequest, run
-from ensemble.spinning import spinning
-from robot_bridge.mock.options import mock_options
+from ensemble.spinner import temporary_node
 from slap_ros.bags import evaluate_bag
 from slap_ros.cli.run import check_world
 from slap_ros.errors import ErrorCode, InvalidParameterError
@@ -49,7 +49,10 @@ class Lab:
         self.joints, self.health = [], {}
         self.commands = client.create_publisher(COMMAND.type, COMMAND.name, COMMAND.qos)
         client.create_subscription(
-            JointState, JOINT_STATES.name, lambda m: self.joints.append(list(m.position)), SENSED
+            JointState,
+            JOINT_STATES.name,
+            lambda m: self.joints.append(list(m.position)),
+            SENSOR_DATA,
         )
         client.create_subscription(DiagnosticArray, "/diagnostics", self.on_health, 10)
 
@@ -63,10 +66,10 @@ class Lab:
         return [m for kind, m in self.heard if kind == STATE]
 
     def until(self, condition):
-        assert self.spinner.until(condition, LIMIT)
+        assert self.spinner.spin_until(condition, LIMIT)
 
     def wait(self, seconds):
-        self.spinner.until(lambda: False, seconds)
+        self.spinner.spin_until(lambda: False, seconds)
 
     def command(self, deltas=STILL, gripper=0.0, **moment):
         now = {"episode": self.states[-1].episode, "step": self.states[-1].step} | moment
@@ -101,8 +104,11 @@ def lab(mock=None, bridge=None, started=True):
     only = {name: nodes[name] for name in ("robot_bridge.mock", "robot_bridge")}
     heard = []
     with (
-        spinning(lambda: RunClient(lambda *message: heard.append(message))) as (client, spinner),
-        InProcessHost(only, spinner.executor),
+        temporary_node(lambda: RunClient(lambda *message: heard.append(message))) as (
+            client,
+            spinner,
+        ),
+        InProcessLauncher(only, spinner.executor),
     ):
         bench = Lab(client, spinner, heard)
         if started:
@@ -252,11 +258,14 @@ def test_a_skill_server_that_dies_leaves_the_robot_holding(network):
     mind = {name: nodes.pop(name) for name in ("skill_server", "planner_node")}
     heard = []
     with (
-        spinning(lambda: RunClient(lambda *message: heard.append(message))) as (client, spinner),
-        InProcessHost(nodes, spinner.executor),
+        temporary_node(lambda: RunClient(lambda *message: heard.append(message))) as (
+            client,
+            spinner,
+        ),
+        InProcessLauncher(nodes, spinner.executor),
     ):
         bench = Lab(client, spinner, heard)
-        with InProcessHost(mind, spinner.executor):
+        with InProcessLauncher(mind, spinner.executor):
             bench.until(lambda: client.ready(False))
             client.send((), 0, 5)
             bench.until(lambda: len(bench.states) > 5)
@@ -269,15 +278,15 @@ def test_a_skill_server_that_dies_leaves_the_robot_holding(network):
 
 
 def test_options_of_the_mock_robot_have_types_and_names():
-    assert mock_options("latency=1,noise_seed=3,fault=abort") == {
+    assert parse_mock_robot("latency=1,noise_seed=3,fault=abort") == {
         "latency": 1.0,
         "noise_seed": 3,
         "fault": "abort",
     }
-    assert isinstance(mock_options("latency=1")["latency"], float)
+    assert isinstance(parse_mock_robot("latency=1")["latency"], float)
     for wrong in ("speed=1", "latency=soon", "domain=obstacle2d"):
         with pytest.raises(InvalidParameterError, match="mock robot"):
-            mock_options(wrong)
+            parse_mock_robot(wrong)
 
 
 @pytest.mark.parametrize(

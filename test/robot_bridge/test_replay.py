@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A recorded plan on a robot that is not there: rehearsed, refused, executed, stopped."""
+"""A recorded plan on a robot that is not there: checked, refused, executed, stopped."""
 
 import json
 import os
@@ -21,9 +21,10 @@ from slap_ros.bags.writer import BagWriter
 from slap_ros.cli import app
 from slap_ros.errors import DamagedBagError, InvalidParameterError, UnsafeCommandError
 from slap_ros.messages.interfaces import typestore
-from slap_ros.robot.cell import Grip
+from slap_ros.robot.dry_run import DryRun
 from slap_ros.robot.limits import FR3, PANDA, Limits, Workspace
-from slap_ros.robot.rehearsal import recorded_motion, rehearse
+from slap_ros.robot.recorded_motion import read_recorded_motion
+from slap_ros.robot.robot_world import GripperAction
 
 QUICK = "pace=20,rate=200,latency=0.01"
 PATIENT = "joint_timeout=60,controller_timeout=60,start_timeout=60"
@@ -66,21 +67,21 @@ def recorded_joints(bag):
 
 
 def test_waypoints_are_where_the_arm_was_and_what_the_gripper_did(bag):
-    recorded = recorded_motion(bag)
+    recorded = read_recorded_motion(bag)
     arm = recorded_joints(bag)
     np.testing.assert_array_equal(arm, [recorded.start, *(w.joints for w in recorded.waypoints)])
     assert [w.step for w in recorded.waypoints] == list(range(1, len(arm)))
-    grips = [w.grip for w in recorded.waypoints if w.grip is not Grip.KEEP]
-    assert grips == [Grip.CLOSE, Grip.OPEN]
+    grips = [w.gripper for w in recorded.waypoints if w.gripper is not GripperAction.KEEP]
+    assert grips == [GripperAction.CLOSE, GripperAction.OPEN]
     gaps = [w.gap for w in recorded.waypoints if w.gap]
     assert gaps
     assert gaps == pytest.approx([0.05] * len(gaps), abs=1e-3)
 
 
-def test_every_motion_of_a_rehearsal_keeps_the_limits(bag):
+def test_every_motion_of_a_dry_run_keeps_the_limits(bag):
     """Velocity and acceleration by finite differences of the quintic that a controller runs."""
-    recorded = recorded_motion(bag)
-    found = rehearse(recorded, HALF)
+    recorded = read_recorded_motion(bag)
+    found = DryRun.of(recorded, HALF)
     assert len(found.motions) == len(recorded.waypoints)
     assert not found.violations
     s = np.linspace(0.0, 1.0, 401)
@@ -109,7 +110,7 @@ def test_every_motion_of_a_rehearsal_keeps_the_limits(bag):
     ],
 )
 def test_what_goes_too_far_is_named_with_its_step(bag, limits: Limits, words):
-    found = rehearse(recorded_motion(bag), limits)
+    found = DryRun.of(read_recorded_motion(bag), limits)
     assert found.violations
     assert any(extreme.share > 1.0 for extreme in found.extremes)
     assert all(re.search(words, reason) for _, reason in found.violations)
@@ -118,8 +119,8 @@ def test_what_goes_too_far_is_named_with_its_step(bag, limits: Limits, words):
 
 
 def test_a_slower_arm_takes_longer_and_has_its_own_limits(bag):
-    recorded = recorded_motion(bag)
-    slow, fast = (rehearse(recorded, FR3.scaled(f, Workspace())) for f in (0.1, 1.0))
+    recorded = read_recorded_motion(bag)
+    slow, fast = (DryRun.of(recorded, FR3.scaled(f, Workspace())) for f in (0.1, 1.0))
     assert not slow.violations
     assert slow.duration_s > 2.0 * fast.duration_s
 
@@ -193,21 +194,23 @@ def test_half_a_recording_is_not_executed(bag, tmp_path):
     holed = tmp_path / "holed"
     cut(bag, holed, without=5)
     with pytest.raises(DamagedBagError, match="state of step 5 is not in the bag"):
-        recorded_motion(holed)
+        read_recorded_motion(holed)
 
 
 def test_a_recording_that_begins_with_something_in_the_hand_is_refused(bag, tmp_path):
-    grasped = next(w.step for w in recorded_motion(bag).waypoints if w.grip is Grip.CLOSE)
+    grasped = next(
+        w.step for w in read_recorded_motion(bag).waypoints if w.gripper is GripperAction.CLOSE
+    )
     cut(bag, tmp_path / "held", first=grasped)
     with pytest.raises(InvalidParameterError, match="in the hand"):
-        recorded_motion(tmp_path / "held")
+        read_recorded_motion(tmp_path / "held")
 
 
 def test_a_domain_without_an_arm_is_refused(network, tmp_path):
     settings = RunSettings("obstacle2d", "fair", 3, 0, "lazy", tmp_path / "bag", shortcuts="none")
     run(RunRequest(settings, timeout_s=60, in_process=True), lambda *_: None)
     with pytest.raises(InvalidParameterError, match="no Panda"):
-        recorded_motion(tmp_path / "bag")
+        read_recorded_motion(tmp_path / "bag")
 
 
 def test_options_for_a_robot_are_refused_elsewhere(bag):

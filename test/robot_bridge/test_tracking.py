@@ -12,9 +12,9 @@ from slap_ros.geometry.pose import NO_ROTATION, Pose
 from slap_ros.geometry.static_transforms import StaticTransforms
 from slap_ros.physics.scene import TABLE, TABLE_TOP, cube
 from slap_ros.physics.settling import resting_poses
-from slap_ros.robot.tracking import Detection, Sensing, Track, measured_pose
+from slap_ros.robot.tracking import Detection, Track, TrackingSettings, measured_pose
 
-SENSING = Sensing(position_noise_m=0.002)
+SENSING = TrackingSettings(position_noise_m=0.002)
 RATE = 30.0  # Hz
 
 
@@ -27,15 +27,15 @@ def feed(track, place, start_s, count, rng, velocity=(0.0, 0.0, 0.0)):
 def test_what_lies_still_is_averaged_and_then_stays_the_same_to_the_bit():
     rng, track = np.random.default_rng(0), Track(SENSING)
     feed(track, (0.5, 0.1, 0.1), 0.0, 10, rng)
-    first = track.sighting(0.0)
+    first = track.estimate(0.0)
     assert first.steady
     assert first.velocity == (0.0, 0.0, 0.0)
     assert math.dist(first.pose.position, (0.5, 0.1, 0.1)) < 0.003
-    track.settle(first)
+    track.remember(first)
     changed = 0
     for k in range(1, 200):
         feed(track, (0.5, 0.1, 0.1), float(k), 3, rng)
-        again = track.sighting(float(k))
+        again = track.estimate(float(k))
         changed += again is None or again.pose != first.pose
     assert changed <= 1
 
@@ -43,27 +43,27 @@ def test_what_lies_still_is_averaged_and_then_stays_the_same_to_the_bit():
 def test_what_was_pushed_is_averaged_anew():
     rng, track = np.random.default_rng(1), Track(SENSING)
     feed(track, (0.5, 0.1, 0.1), 0.0, 10, rng)
-    track.settle(track.sighting(0.0))
+    track.remember(track.estimate(0.0))
     feed(track, (0.52, 0.1, 0.1), 1.0, 3, rng)
-    assert track.sighting(1.0) is None  # moved, but not yet known where to
+    assert track.estimate(1.0) is None  # moved, but not yet known where to
     feed(track, (0.52, 0.1, 0.1), 1.2, 10, rng)
-    sighting = track.sighting(1.0)
-    assert sighting.steady
-    assert abs(sighting.pose.position[0] - 0.52) < 0.003
+    estimate = track.estimate(1.0)
+    assert estimate.steady
+    assert abs(estimate.pose.position[0] - 0.52) < 0.003
 
 
 def test_what_moves_has_a_velocity():
     rng, track = np.random.default_rng(2), Track(SENSING)
     feed(track, (0.5, 0.1, 0.1), 0.0, 10, rng, velocity=(0.0, 0.4, 0.0))
-    sighting = track.sighting(0.0)
-    assert not sighting.steady
-    assert sighting.velocity[1] == pytest.approx(0.4, abs=0.15)
+    estimate = track.estimate(0.0)
+    assert not estimate.steady
+    assert estimate.velocity[1] == pytest.approx(0.4, abs=0.15)
 
 
 def test_detections_from_before_say_nothing_about_now():
     rng, track = np.random.default_rng(3), Track(SENSING)
     feed(track, (0.5, 0.1, 0.1), 0.0, 30, rng)
-    assert track.sighting(10.0) is None
+    assert track.estimate(10.0) is None
 
 
 def test_late_and_repeated_detections_are_refused():
@@ -72,7 +72,7 @@ def test_late_and_repeated_detections_are_refused():
     for stamp in (1.0, 0.9):
         with pytest.raises(InvalidMeasurementError, match="older"):
             track.add(Detection(stamp, Pose((9.0, 9.0, 9.0))))
-    assert track.seen_s == 1.0
+    assert track.newest_s == 1.0
 
 
 @pytest.mark.parametrize(

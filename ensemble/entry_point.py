@@ -12,7 +12,7 @@ from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
-from ensemble.network import join
+from ensemble.network import join_network
 from slap_ros.errors import ErrorCode, SlapError
 
 
@@ -23,7 +23,7 @@ def run_node(name: str, make: Callable[[], Node]) -> int:
         Exit code: 0 after a signal, else the error's code, whose message went to stderr.
     """
     try:
-        join()
+        join_network()
     except SlapError as error:
         return _refuse(name, error, error.code)
     try:

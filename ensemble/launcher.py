@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 from collections.abc import Mapping
-from importlib import import_module
 from types import TracebackType
 from typing import Protocol, Self
 
@@ -17,7 +16,7 @@ from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from ensemble.nodes import CLASSES
+from ensemble.nodes import node_class
 from slap_ros.errors import ErrorCode, NodeDiedError
 
 STOP_TIMEOUT = 5.0  # s, after which a node that was asked to stop is killed
@@ -29,7 +28,7 @@ KNOWN_CODES = frozenset(int(code) for code in ErrorCode if code > ErrorCode.UNKN
 NodeParameters = Mapping[str, Mapping[str, str | int | float]]
 
 
-class Host(Protocol):
+class NodeLauncher(Protocol):
     """Runs an ensemble from entering to leaving the context."""
 
     def check(self) -> None:
@@ -58,7 +57,7 @@ class Host(Protocol):
     ) -> None: ...
 
 
-class ProcessHost:
+class ProcessLauncher:
     """Each node a process. None outlives this one, however it ends."""
 
     def __init__(self, nodes: NodeParameters) -> None:
@@ -72,12 +71,12 @@ class ProcessHost:
         return self
 
     def check(self) -> None:
-        """See :class:`Host`."""
+        """See :class:`NodeLauncher`."""
         for name in self.processes:
             self.require(name)
 
     def require(self, name: str) -> None:
-        """See :class:`Host`. The error's code is the one that the node ended with, if it is one."""
+        """See :class:`NodeLauncher`. The error's code is the node's own exit code, if it is one."""
         code = self.processes[name].poll()
         if code is not None:
             raise _died(name, code)
@@ -124,7 +123,7 @@ def _died(name: str, code: int) -> NodeDiedError:
     return NodeDiedError(f"{name} ended with exit code {code}, see its messages above")
 
 
-class InProcessHost:
+class InProcessLauncher:
     """Every node in this process, on one executor."""
 
     def __init__(self, nodes: NodeParameters, executor: Executor) -> None:
@@ -166,6 +165,5 @@ class InProcessHost:
 
 def _make(name: str, parameters: Mapping[str, str | int | float]) -> Node:
     overrides = [Parameter(key, value=value) for key, value in parameters.items()]
-    module = import_module(f"{name}.node")
-    node: Node = getattr(module, CLASSES[name])(parameter_overrides=overrides)
+    node: Node = node_class(name)(parameter_overrides=overrides)
     return node

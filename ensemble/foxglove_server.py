@@ -23,19 +23,19 @@ from slap_ros.messages.interfaces import definition
 if TYPE_CHECKING:
     from foxglove.websocket import ChannelView, Client
 
-SHOWN = tuple(topic for topic in RECORDED if topic is not DIAGNOSTICS)
+SHOWN_TOPICS = tuple(topic for topic in RECORDED if topic is not DIAGNOSTICS)
 EVENTS = (PLAN_EVENTS.type_name, SKILL_EVENTS.type_name)
 HOST = "127.0.0.1"  # nobody else's business
 PORT = 8765  # where Foxglove looks
 BACKLOG = 4096  # messages kept for a viewer that is slow
 
 
-def available() -> bool:
+def foxglove_installed() -> bool:
     """Whether what it takes is installed."""
     return find_spec("foxglove") is not None
 
 
-class Broadcast:
+class FoxgloveServer:
     """Sends what it is given to whoever watches; latecomers get the newest of each topic at once.
 
     Raises:
@@ -44,7 +44,7 @@ class Broadcast:
 
     def __init__(self, port: int | None = None) -> None:
         """``port``: None for the usual one, or any other that is free."""
-        if not available():
+        if not foxglove_installed():
             raise InvalidParameterError(
                 "Foxglove is served with foxglove-sdk, which is not installed: "
                 "pip install 'slap_ros[live]'"
@@ -63,7 +63,7 @@ class Broadcast:
                 message_encoding="cdr",
                 context=self._context,
             )
-            for topic in SHOWN
+            for topic in SHOWN_TOPICS
         }
         self._by_id = {channel.id(): channel for channel in self._channels.values()}
         self._newest: dict[int, bytes] = {}  # by channel
@@ -94,7 +94,7 @@ class Broadcast:
         return f"ws://{HOST}:{self._server.port}"
 
     @property
-    def watched(self) -> bool:
+    def has_viewers(self) -> bool:
         """Whether somebody watches anything."""
         return self._subscriptions > 0
 

@@ -33,9 +33,9 @@ from slap_ros.physics.panda import FINGER_OPEN, JOINTS, hand_pose
 from slap_ros.physics.settling import resting_poses
 from slap_ros.physics.world import PandaWorld
 from slap_ros.relational import Feature, Object, State
-from slap_ros.robot.limits import STEP_TOLERANCE, Limits, Motion
-from slap_ros.robot.tracking import Detection, Sensing, Sighting, Track, measured_pose
-from slap_ros.robot.workplace import Workplace
+from slap_ros.robot.limits import STEP_TOLERANCE, JointMotion, Limits
+from slap_ros.robot.scene_config import SceneConfig
+from slap_ros.robot.tracking import Detection, PoseEstimate, Track, TrackingSettings, measured_pose
 
 GAP_OPEN = 2.0 * FINGER_OPEN  # m, between the fingers
 GAP_SHUT = 0.0  # m
@@ -45,7 +45,7 @@ DRIFT = 0.02  # rad, of a joint of an arm that is taken to stand
 STANDS = 0.05  # rad/s, of each joint of an arm at rest
 
 
-class Grip(Enum):
+class GripperAction(Enum):
     """What the gripper is to do before the arm moves."""
 
     KEEP = "keep"
@@ -54,15 +54,15 @@ class Grip(Enum):
 
 
 @dataclass(frozen=True)
-class Step:
+class SafeCommand:
     """One command, checked."""
 
-    grip: Grip
-    motion: Motion
+    gripper: GripperAction
+    motion: JointMotion
 
 
 @dataclass(frozen=True)
-class Reading:
+class JointReading:
     """What the robot says of its joints."""
 
     stamp_s: float
@@ -96,7 +96,7 @@ class Grasp:
 
 
 @dataclass
-class Cell:
+class RobotWorld:
     """What is known of the robot and what stands around it.
 
     Args:
@@ -111,22 +111,22 @@ class Cell:
     """
 
     domain: Domain
-    workplace: Workplace
+    scene_config: SceneConfig
     limits: Limits
-    sensing: Sensing = field(default_factory=Sensing)
+    tracking: TrackingSettings = field(default_factory=TrackingSettings)
 
     def __post_init__(self) -> None:
         _require_panda(self.domain, self.limits)
-        template = self.workplace.template
+        template = self.scene_config.template
         (self._robot,) = template.layout.of_type(ROBOT)
         world = self.domain.make_world(template)
         if not isinstance(world, PandaWorld):
             raise InvalidParameterError(f"the world of {self.domain.name} has no Panda")
         self._world = world
         self._bodies = [template.layout.object(body.name) for body in world.scene.free]
-        self._tracks = {obj: Track(self.sensing) for obj in self.workplace.seen}
-        self._frames = {how.frame: (obj, how) for obj, how in self.workplace.seen.items()}
-        self._reading: Reading | None = None
+        self._tracks = {obj: Track(self.tracking) for obj in self.scene_config.seen}
+        self._frames = {how.frame: (obj, how) for obj, how in self.scene_config.seen.items()}
+        self._reading: JointReading | None = None
         self._grasp: Grasp | None = None
         self._candidate: Grasp | None = None  # what the gripper is to close around
         self._lost = False  # what was held: the gripper is to be opened
@@ -134,7 +134,7 @@ class Cell:
 
     # -- measurements ---------------------------------------------------------------------------
 
-    def see(self, frame: str, stamp_s: float, base: Pose, seen: Pose) -> None:
+    def add_detection(self, frame: str, stamp_s: float, base: Pose, seen: Pose) -> None:
         """Take a detection; frames that are no object's are none of ours.
 
         Args:
@@ -152,7 +152,7 @@ class Cell:
         pose = base.compose(measured_pose(*seen)).compose(how.offset)
         self._tracks[obj].add(Detection(stamp_s, pose))
 
-    def feel(self, reading: Reading) -> None:
+    def add_joint_reading(self, reading: JointReading) -> None:
         """Take what the robot says of its joints; what is older than the last is left aside.
 
         Raises:
@@ -163,24 +163,24 @@ class Cell:
         self._reading = reading
 
     @property
-    def heard_s(self) -> float:
+    def newest_joints_s(self) -> float:
         """Stamp of the newest joint positions; minus infinity without any."""
         return -math.inf if self._reading is None else self._reading.stamp_s
 
-    def distance(self, joints: Sequence[float]) -> float:
+    def joint_distance(self, joints: Sequence[float]) -> float:
         """How far the joint that is furthest off is from where it should be, rad."""
         if self._reading is None:
             return math.inf
         return max(abs(a - b) for a, b in zip(self._reading.joints, joints, strict=True))
 
-    def unseen(self, since_s: float) -> list[str]:
+    def undetected(self, since_s: float) -> list[str]:
         """Names of the objects that were not detected since then, held ones left out."""
         held = self._grasp.obj if self._grasp is not None else None
-        return [o.name for o, t in self._tracks.items() if o != held and t.seen_s <= since_s]
+        return [o.name for o, t in self._tracks.items() if o != held and t.newest_s <= since_s]
 
     # -- the state ------------------------------------------------------------------------------
 
-    def look(self, since_s: float, moving: bool = False) -> State | None:
+    def measure(self, since_s: float, moving: bool = False) -> State | None:
         """The state since the arm came to rest, once measured.
 
         Args:
@@ -197,34 +197,36 @@ class Cell:
         reading = self._reading
         if reading is None or reading.stamp_s <= since_s or not reading.still:
             return None
-        sightings = {obj: track.sighting(since_s) for obj, track in self._tracks.items()}
-        self._notice_loss(reading, sightings)
+        estimates = {obj: track.estimate(since_s) for obj, track in self._tracks.items()}
+        self._detect_grasp_loss(reading, estimates)
         held = self._grasp.obj if self._grasp is not None else None
-        known = {o: s for o, s in sightings.items() if s is not None and o != held}
+        known = {o: s for o, s in estimates.items() if s is not None and o != held}
         if len(known) < len(self._tracks) - (held is not None):
             return None
         if not moving and not all(s.steady for s in known.values()):
             return None
         state = self._assemble(reading, known)
         self._world.reset(state)
-        for obj, sighting in known.items():
-            self._tracks[obj].settle(sighting)
+        for obj, estimate in known.items():
+            self._tracks[obj].remember(estimate)
         self._state = state
         return state
 
-    def _notice_loss(self, reading: Reading, sightings: Mapping[Object, Sighting | None]) -> None:
+    def _detect_grasp_loss(
+        self, reading: JointReading, estimates: Mapping[Object, PoseEstimate | None]
+    ) -> None:
         """Whether what the hand holds does not follow it any more, or the fingers are shut."""
         grasp = self._grasp
         if grasp is None:
             return
         expected = hand_pose(reading.joints).compose(grasp.pose).position
-        seen = sightings.get(grasp.obj)
+        seen = estimates.get(grasp.obj)
         strayed = seen is not None and math.dist(seen.pose.position, expected) > FOLLOWS
         shut = reading.gap is not None and reading.gap < GRASPED * 2.0 * grasp.finger
         if strayed or shut:
             self._grasp, self._lost = None, True
 
-    def _assemble(self, reading: Reading, known: Mapping[Object, Sighting]) -> State:
+    def _assemble(self, reading: JointReading, known: Mapping[Object, PoseEstimate]) -> State:
         """The state, objects put where physics would have them."""
         grasp = self._grasp
         changes = _robot_changes(self._robot, reading, grasp)
@@ -237,11 +239,11 @@ class Cell:
             i: known[o].pose for i, o in enumerate(self._bodies) if o in known and known[o].steady
         }
         flat = resting_poses(resting, self._world.scene.free, fixed)
-        for obj, sighting in known.items():
-            pose = sighting.pose
+        for obj, estimate in known.items():
+            pose = estimate.pose
             if obj in self._bodies:
                 pose = flat.get(self._bodies.index(obj), pose)
-                motion = (*sighting.velocity, *sighting.spin)
+                motion = (*estimate.velocity, *estimate.spin)
                 changes |= _named(obj, VELOCITY_FEATURES, motion) | {(obj, "held"): 0.0}
             changes |= _named(obj, POSE_FEATURES, (*pose.position, *pose.quaternion))
         if grasp is not None:
@@ -249,19 +251,19 @@ class Cell:
             changes |= _named(grasp.obj, POSE_FEATURES, (*pose.position, *pose.quaternion))
             changes |= _named(grasp.obj, VELOCITY_FEATURES, (*ORIGIN, *ORIGIN))
             changes |= {(grasp.obj, "held"): 1.0}
-        return self.workplace.template.replace(changes)
+        return self.scene_config.template.replace(changes)
 
-    def _fixed_pose(self, name: str, otherwise: Pose, known: Mapping[Object, Sighting]) -> Pose:
-        obj = self.workplace.template.layout.by_name.get(name)
+    def _fixed_pose(self, name: str, otherwise: Pose, known: Mapping[Object, PoseEstimate]) -> Pose:
+        obj = self.scene_config.template.layout.by_name.get(name)
         if obj is None:
             return otherwise
         if obj in known:
             return known[obj].pose
-        return _pose(self.workplace.template, obj)
+        return _pose(self.scene_config.template, obj)
 
     # -- commands -------------------------------------------------------------------------------
 
-    def plan(self, action: Action) -> Step:
+    def plan_command(self, action: Action) -> SafeCommand:
         """What a command from the last state comes to.
 
         Raises:
@@ -275,27 +277,27 @@ class Cell:
         self._world.reset(self._state)
         after = self._world.step(action)
         start, target = (_values(s, self._robot, JOINT_FEATURES) for s in (self._state, after))
-        moved = self.distance(start)
+        moved = self.joint_distance(start)
         if moved > DRIFT:
             raise UnsafeCommandError(
                 f"the arm was moved by {moved:.3f} rad since it was measured: call reset_task"
             )
         motion = self.limits.motion(start, target, self.domain.execution.control_period_s)
-        return Step(self._grip(after), motion)
+        return SafeCommand(self._grip(after), motion)
 
-    def _grip(self, after: State) -> Grip:
+    def _grip(self, after: State) -> GripperAction:
         held = [obj for obj in self._bodies if after.get(obj, "held") > 0.5]
         if self._grasp is None and held:
             x, y, z, *turn = _values(after, self._robot, GRASP_FEATURES)
             qx, qy, qz, qw = turn
             finger = float(after.get(self._robot, "finger"))
             self._candidate = Grasp(held[0], Pose((x, y, z), (qx, qy, qz, qw)), finger)
-            return Grip.CLOSE
+            return GripperAction.CLOSE
         if self._lost or (self._grasp is not None and not held):
-            return Grip.OPEN
-        return Grip.KEEP
+            return GripperAction.OPEN
+        return GripperAction.KEEP
 
-    def closed(self, gap: float) -> bool:
+    def confirm_grasp(self, gap: float) -> bool:
         """Whether something is in the hand now that the fingers stand ``gap`` m apart."""
         candidate, self._candidate = self._candidate, None
         if candidate is None or not gap > GRASPED * 2.0 * candidate.finger:
@@ -304,7 +306,7 @@ class Cell:
         self._tracks[candidate.obj].forget()
         return True
 
-    def opened(self) -> None:
+    def confirm_release(self) -> None:
         """The hand is empty now."""
         if self._grasp is not None:
             self._tracks[self._grasp.obj].forget()
@@ -327,7 +329,7 @@ def _require_panda(domain: Domain, limits: Limits) -> None:
 
 
 def _robot_changes(
-    robot: Object, reading: Reading, grasp: Grasp | None
+    robot: Object, reading: JointReading, grasp: Grasp | None
 ) -> dict[tuple[Object, str], float]:
     pose = IDENTITY if grasp is None else grasp.pose
     finger = FINGER_OPEN if grasp is None else grasp.finger

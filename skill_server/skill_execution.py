@@ -12,9 +12,9 @@ from rclpy.task import Future
 from slap_msgs.action import ExecuteSkill
 from slap_msgs.msg import PlanEdge
 
+from ensemble.node_liveness import NodeLiveness
 from ensemble.observation import Observation
-from ensemble.presence import Presence
-from ensemble.shortcuts import Repertoires
+from ensemble.shortcuts import ShortcutProvider
 from slap_ros.errors import EpisodeChangedError, ErrorCode, UnknownSkillError
 from slap_ros.messages.decode import decode_atoms
 from slap_ros.planning.options import (
@@ -30,14 +30,14 @@ from slap_ros.relational import Object
 
 
 @dataclass
-class SkillRun:
+class SkillExecution:
     """A skill under way."""
 
     goal: ServerGoalHandle
     execution: OptionExecution
     start: Observation
     step_budget: int  # environment steps
-    planner: Presence  # nobody watches the plan when it is gone
+    planner: NodeLiveness  # nobody watches the plan when it is gone
     heard_s: float  # node time of the newest observation
     latest: Observation = field(init=False)
     ended: Future = field(default_factory=Future)  # of Stopped
@@ -56,7 +56,7 @@ class SkillRun:
 
 
 def requested_option(
-    request: ExecuteSkill.Goal, start: Observation, repertoires: Repertoires
+    request: ExecuteSkill.Goal, start: Observation, repertoires: ShortcutProvider
 ) -> tuple[Option, int]:
     """The option that a goal asks for and the abstract state in which it shall end.
 
@@ -84,7 +84,7 @@ def _shortcut(
     objects: Sequence[Object],
     start: Observation,
     target: int,
-    repertoires: Repertoires,
+    repertoires: ShortcutProvider,
 ) -> Option:
     """A shortcut from where the robot is."""
     episode, name = start.episode, edge.name

@@ -15,7 +15,7 @@ from ensemble.interfaces import DIAGNOSTICS
 PERIOD = 1.0  # s
 
 
-class Heartbeat:
+class DiagnosticsPublisher:
     """Publishes what a node counts."""
 
     def __init__(self, node: Node, counts: Callable[[], Mapping[str, object]]) -> None:

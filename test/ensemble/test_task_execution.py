@@ -6,7 +6,7 @@ import asyncio
 from types import SimpleNamespace
 
 from ensemble.observation import Episode, Observation
-from planner_node.solving import Solving
+from planner_node.task_execution import TaskExecution
 from slap_ros.domains import get_domain
 from slap_ros.errors import EpisodeChangedError, ErrorCode
 
@@ -23,7 +23,7 @@ def seen(episode, step):
 def test_a_run_whose_episode_is_over_ends_with_that_and_with_no_steps_fewer_than_none():
     """It began late in the old episode; the new one counts from 0, and lengths are unsigned."""
     observer = SimpleNamespace(latest=seen(1, 28))
-    run = Solving(
+    run = TaskExecution(
         node=None,
         goal=SimpleNamespace(request=SimpleNamespace(max_replans=0)),
         observer=observer,

@@ -46,7 +46,7 @@ MALFORMED = (AttributeError, KeyError, TypeError, ValueError, InvalidMeasurement
 
 
 @dataclass(frozen=True)
-class Seen:
+class DetectedFrame:
     """How an object is detected."""
 
     frame: str  # child frame in TF
@@ -54,7 +54,7 @@ class Seen:
 
 
 @dataclass(frozen=True)
-class Workplace:
+class SceneConfig:
     """The objects, what is known of them beforehand, and how the others are detected.
 
     Args:
@@ -63,16 +63,16 @@ class Workplace:
     """
 
     template: State
-    seen: Mapping[Object, Seen]
+    seen: Mapping[Object, DetectedFrame]
 
 
-def sampled_workplace(initial: State) -> Workplace:
+def sampled_scene_config(initial: State) -> SceneConfig:
     """That of a sampled task: what can move is detected, the rest stands where the task says."""
     movable = [o for o in initial.objects if "held" in {f.name for f in o.type.features}]
-    return Workplace(initial, {o: Seen(f"{DETECTED}{o.name}") for o in movable})
+    return SceneConfig(initial, {o: DetectedFrame(f"{DETECTED}{o.name}") for o in movable})
 
 
-def read_workplace(path: Path, domain: Domain) -> Workplace:
+def read_scene_config(path: Path, domain: Domain) -> SceneConfig:
     """The workplace that a scene file describes.
 
     Raises:
@@ -85,7 +85,7 @@ def read_workplace(path: Path, domain: Domain) -> Workplace:
     if not isinstance(content, dict) or not isinstance(content.get("objects"), dict):
         raise InvalidSceneError(f"scene file {path} has no mapping `objects`")
     features: dict[Object, Mapping[str, float]] = {ROBOT("robot"): robot_features(HOME)}
-    seen: dict[Object, Seen] = {}
+    seen: dict[Object, DetectedFrame] = {}
     for name, entry in content["objects"].items():
         parked = Pose((PARKED + len(features), 0.0, 0.0))
         try:
@@ -96,14 +96,14 @@ def read_workplace(path: Path, domain: Domain) -> Workplace:
         if how is not None:
             seen[obj] = how
     try:
-        return Workplace(State.build(features), seen)
+        return SceneConfig(State.build(features), seen)
     except InvalidStateError as error:
         raise InvalidSceneError(f"scene file {path}: {error}") from error
 
 
 def _object(
     name: str, entry: Mapping[str, Any], domain: Domain, parked: Pose
-) -> tuple[Object, Mapping[str, float], Seen | None]:
+) -> tuple[Object, Mapping[str, float], DetectedFrame | None]:
     if unknown := set(entry) - KEYS:
         raise ValueError(f"unknown keys {sorted(unknown)}; there are {sorted(KEYS)}")
     kinds = domain.types_by_name
@@ -117,7 +117,7 @@ def _object(
     if "frame" in entry:
         x, y, z = map(float, entry.get("offset", ORIGIN))
         start = body_features(parked.position) if moves else pose_features(parked)
-        return obj, {**start, **given}, Seen(str(entry["frame"]), Pose((x, y, z)))
+        return obj, {**start, **given}, DetectedFrame(str(entry["frame"]), Pose((x, y, z)))
     if moves:
         raise ValueError("what can move needs a frame, in which it is detected")
     numbers = [float(v) for v in entry["pose"]]

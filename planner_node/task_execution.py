@@ -19,9 +19,11 @@ from slap_msgs.action import ExecuteSkill, SolveTask
 from slap_msgs.msg import PlanEvent
 
 from ensemble import encode
-from ensemble.observation import Observation, Observer
-from ensemble.waiting import first_of, seconds, submit
-from planner_node.reporting import Reporter, Tally
+from ensemble.futures import node_time_s, submit, wait_for_first
+from ensemble.observation import Observation
+from ensemble.state_synchronizer import StateSynchronizer
+from planner_node.plan_publisher import PlanPublisher
+from planner_node.run_statistics import RunStatistics
 from slap_ros.errors import (
     EpisodeChangedError,
     ErrorCode,
@@ -52,7 +54,7 @@ UNPLANNED = frozenset({ErrorCode.UNSOLVABLE, ErrorCode.PLANNING_LIMIT, ErrorCode
 
 
 @dataclass
-class Solving:
+class TaskExecution:
     """A SolveTask goal under way.
 
     Args:
@@ -71,8 +73,8 @@ class Solving:
 
     node: Node
     goal: ServerGoalHandle
-    observer: Observer
-    reporter: Reporter
+    observer: StateSynchronizer
+    reporter: PlanPublisher
     skills: ActionClient
     skill_server_lost: Callable[[], bool]
     workers: Executor
@@ -83,7 +85,7 @@ class Solving:
 
     def __post_init__(self) -> None:
         self._start = self._latest
-        self._tally = Tally(self._start.step)
+        self._tally = RunStatistics(self._start.step)
 
     @property
     def _latest(self) -> Observation:
@@ -206,9 +208,9 @@ class Solving:
 
     async def _holds(self, ended: Future) -> None:
         """Wait for a canceled skill to end, unless the skill server is gone."""
-        deadline = seconds(self.node) + ANSWER_TIMEOUT
-        await first_of(
-            self.node, ended, lambda: self.skill_server_lost() or seconds(self.node) > deadline
+        deadline = node_time_s(self.node) + ANSWER_TIMEOUT
+        await wait_for_first(
+            self.node, ended, lambda: self.skill_server_lost() or node_time_s(self.node) > deadline
         )
 
     async def _observe(self, step: int) -> None:
@@ -238,11 +240,11 @@ class Solving:
             NodeDiedError: The skill server is gone.
             EpisodeChangedError: The simulator was reset.
         """
-        deadline = seconds(self.node) + timeout_s
-        await first_of(
+        deadline = node_time_s(self.node) + timeout_s
+        await wait_for_first(
             self.node,
             future,
-            lambda: condition() or self._over() or seconds(self.node) > deadline,
+            lambda: condition() or self._over() or node_time_s(self.node) > deadline,
         )
         if self.goal.is_cancel_requested:
             raise TaskCanceledError("canceled")

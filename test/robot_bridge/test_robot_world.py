@@ -18,9 +18,9 @@ from slap_ros.errors import (
 )
 from slap_ros.geometry.pose import IDENTITY, Pose
 from slap_ros.physics.features import JOINT_FEATURES, POSE_FEATURES
-from slap_ros.robot.cell import Cell, Grip, Reading
 from slap_ros.robot.limits import PANDA, Workspace
-from slap_ros.robot.workplace import read_workplace, sampled_workplace
+from slap_ros.robot.robot_world import GripperAction, JointReading, RobotWorld
+from slap_ros.robot.scene_config import read_scene_config, sampled_scene_config
 
 DOMAIN = get_domain("obstacle_tower", "fair")
 TASK = DOMAIN.task(1)
@@ -33,7 +33,7 @@ class Bench:
 
     def __init__(self, noise=0.002, limits=LIMITS):
         self.world = DOMAIN.make_world(TASK.initial_state)
-        self.cell = Cell(DOMAIN, sampled_workplace(TASK.initial_state), limits)
+        self.robot_world = RobotWorld(DOMAIN, sampled_scene_config(TASK.initial_state), limits)
         self.rng, self.noise, self.now = np.random.default_rng(0), noise, 0.0
 
     def pose(self, obj):
@@ -52,8 +52,10 @@ class Bench:
                 pose = self.pose(obj)
                 at = np.array(pose.position) + self.noise * self.rng.standard_normal(3)
                 seen = Pose(tuple(at.tolist()), pose.quaternion)
-                self.cell.see(f"detected_{obj.name}", self.now, IDENTITY, seen)
-            self.cell.feel(Reading(self.now, self.joints(), gap=self.gap()))
+                self.robot_world.add_detection(f"detected_{obj.name}", self.now, IDENTITY, seen)
+            self.robot_world.add_joint_reading(
+                JointReading(self.now, self.joints(), gap=self.gap())
+            )
 
     def joints(self):
         (robot,) = [o for o in self.world.state.objects if o.type.name == "robot"]
@@ -69,28 +71,28 @@ def lifted():
     """A bench on which a block was picked, by the given skill, through the cell."""
     bench = Bench()
     bench.measure()
-    state = bench.cell.look(0.0)
+    state = bench.robot_world.measure(0.0)
     space = DOMAIN.atom_space(state)
     robot, block, table = (space.layout.object(name) for name in ("robot", "block1", "table"))
     policy = DOMAIN.skills["Pick"].start(state, (robot, block, table))
     grips = []
     while (action := policy(state)) is not None:
-        step = bench.cell.plan(action)
-        grips.append(step.grip)
+        step = bench.robot_world.plan_command(action)
+        grips.append(step.gripper)
         bench.world.step(action)
-        if step.grip is Grip.CLOSE:
-            assert bench.cell.closed(bench.gap())
+        if step.gripper is GripperAction.CLOSE:
+            assert bench.robot_world.confirm_grasp(bench.gap())
         since = bench.now
         bench.measure()
-        state = bench.cell.look(since)
+        state = bench.robot_world.measure(since)
     return bench, state, grips
 
 
 def test_what_is_measured_is_the_task_to_the_predicates():
     bench = Bench()
-    assert bench.cell.look(0.0) is None
+    assert bench.robot_world.measure(0.0) is None
     bench.measure()
-    state = bench.cell.look(0.0)
+    state = bench.robot_world.measure(0.0)
     space = DOMAIN.atom_space(TASK.initial_state)
     assert space.abstract(state) == space.abstract(TASK.initial_state)
     assert np.abs(state.data - TASK.initial_state.data).max() < 0.005
@@ -102,17 +104,17 @@ def test_what_is_measured_is_the_task_to_the_predicates():
 def test_a_state_measured_again_is_the_same_state():
     bench = Bench()
     bench.measure()
-    first = bench.cell.look(0.0)
+    first = bench.robot_world.measure(0.0)
     since = bench.now
     bench.measure(times=3)
-    assert bench.cell.look(since) == first
+    assert bench.robot_world.measure(since) == first
 
 
 def test_a_block_is_picked_closed_loop_from_noisy_states(lifted):
     bench, state, grips = lifted
     block = state.layout.object("block1")
-    assert grips.count(Grip.CLOSE) == 1
-    assert Grip.OPEN not in grips
+    assert grips.count(GripperAction.CLOSE) == 1
+    assert GripperAction.OPEN not in grips
     assert state.get(block, "held") == 1.0
     assert math.dist(bench.pose(block).position, state[block][:3]) < 0.005
 
@@ -121,49 +123,53 @@ def test_a_block_that_does_not_follow_the_hand_was_lost(lifted):
     bench, _, _ = lifted
     block = bench.world.state.layout.object("block1")
     held = bench.world.state
-    grasp = bench.cell._grasp
+    grasp = bench.robot_world._grasp
     slipped = {(block, f"{axis}"): v for axis, v in zip("xyz", (0.35, 0.3, 0.1), strict=True)}
     try:
         bench.world._state = held.replace(slipped | {(block, "held"): 0.0})
         since = bench.now
         bench.measure()
-        state = bench.cell.look(since)
+        state = bench.robot_world.measure(since)
         assert state.get(block, "held") == 0.0
         assert state.get(block, "x") == pytest.approx(0.35, abs=0.003)
-        assert bench.cell.plan(STEPS).grip is Grip.OPEN
+        assert bench.robot_world.plan_command(STEPS).gripper is GripperAction.OPEN
     finally:
         bench.world._state = held
-        bench.cell._grasp, bench.cell._lost = grasp, False
+        bench.robot_world._grasp, bench.robot_world._lost = grasp, False
 
 
 def test_fingers_that_close_on_nothing_hold_nothing():
     bench = Bench()
     bench.measure()
-    bench.cell.look(0.0)
-    assert not bench.cell.closed(0.0)  # not asked to
+    bench.robot_world.measure(0.0)
+    assert not bench.robot_world.confirm_grasp(0.0)  # not asked to
     close = np.array([*[0.0] * 7, 1.0])
-    assert bench.cell.plan(close).grip is Grip.KEEP  # there is nothing to close around
+    assert (
+        bench.robot_world.plan_command(close).gripper is GripperAction.KEEP
+    )  # there is nothing to close around
 
 
 def test_a_missing_frame_is_missed_by_name():
     bench = Bench()
     bench.measure(without=("block2",))
-    assert bench.cell.look(0.0) is None
-    assert bench.cell.unseen(0.0) == ["block2"]
+    assert bench.robot_world.measure(0.0) is None
+    assert bench.robot_world.undetected(0.0) == ["block2"]
 
 
 def test_a_nan_pose_moves_nothing():
     bench = Bench()
     bench.measure()
-    state = bench.cell.look(0.0)
+    state = bench.robot_world.measure(0.0)
     with pytest.raises(InvalidMeasurementError):
-        bench.cell.see("detected_block1", 99.0, IDENTITY, Pose((math.nan, 0.0, 0.0)))
+        bench.robot_world.add_detection(
+            "detected_block1", 99.0, IDENTITY, Pose((math.nan, 0.0, 0.0))
+        )
     with pytest.raises(InvalidMeasurementError):
-        bench.cell.feel(Reading(99.0, (math.nan,) * 7))
+        bench.robot_world.add_joint_reading(JointReading(99.0, (math.nan,) * 7))
     with pytest.raises(InvalidMeasurementError, match="not 7 numbers"):
-        Reading(99.0, (0.0,) * 6)
-    assert bench.cell.look(0.0) == state
-    bench.cell.see("somebody_else", 99.0, IDENTITY, Pose((math.nan, 0.0, 0.0)))
+        JointReading(99.0, (0.0,) * 6)
+    assert bench.robot_world.measure(0.0) == state
+    bench.robot_world.add_detection("somebody_else", 99.0, IDENTITY, Pose((math.nan, 0.0, 0.0)))
 
 
 def test_blocks_seen_inside_one_another_are_no_state():
@@ -173,38 +179,38 @@ def test_blocks_seen_inside_one_another_are_no_state():
     bench.world._state = bench.world.state.replace({(two, k): v for k, v in features.items()})
     bench.measure()
     with pytest.raises(InvalidStateError, match="inside one another"):
-        bench.cell.look(0.0)
+        bench.robot_world.measure(0.0)
 
 
 def test_commands_are_checked_twice():
     bench = Bench()
     with pytest.raises(InvalidStateError, match="nothing is measured"):
-        bench.cell.plan(STEPS)
+        bench.robot_world.plan_command(STEPS)
     bench.measure()
-    bench.cell.look(0.0)
+    bench.robot_world.measure(0.0)
     for bad in (math.nan, math.inf, 0.2):
         action = np.array([bad, *[0.0] * 7])
         with pytest.raises(InvalidCommandError):
-            bench.cell.plan(action)
+            bench.robot_world.plan_command(action)
     with pytest.raises(InvalidCommandError):
-        bench.cell.plan(np.zeros(3))
+        bench.robot_world.plan_command(np.zeros(3))
     tight = Bench(limits=PANDA.scaled(0.5, Workspace((0.2, -0.5, 0.499), (0.8, 0.5, 0.9))))
     tight.measure()
-    tight.cell.look(0.0)
+    tight.robot_world.measure(0.0)
     with pytest.raises(UnsafeCommandError, match="outside the workspace"):
-        tight.cell.plan(np.array([0.0, 0.05, *[0.0] * 6]))
-    assert tight.cell.plan(STEPS).motion.target == pytest.approx(tight.joints())
+        tight.robot_world.plan_command(np.array([0.0, 0.05, *[0.0] * 6]))
+    assert tight.robot_world.plan_command(STEPS).motion.target == pytest.approx(tight.joints())
 
 
 def test_an_arm_that_was_moved_by_hand_is_not_sent_on():
     """The motion was timed for the way from where it was measured."""
     bench = Bench()
     bench.measure()
-    bench.cell.look(0.0)
+    bench.robot_world.measure(0.0)
     elsewhere = tuple(q + 0.3 for q in bench.joints())
-    bench.cell.feel(Reading(bench.now + 0.1, elsewhere))
+    bench.robot_world.add_joint_reading(JointReading(bench.now + 0.1, elsewhere))
     with pytest.raises(UnsafeCommandError, match=r"was moved by 0\.300 rad"):
-        bench.cell.plan(STEPS)
+        bench.robot_world.plan_command(STEPS)
 
 
 def test_an_arm_never_enters_the_table_whatever_is_commanded():
@@ -215,8 +221,8 @@ def test_an_arm_never_enters_the_table_whatever_is_commanded():
     for _ in range(25):
         since = bench.now
         bench.measure()
-        assert bench.cell.look(since) is not None
-        motion = bench.cell.plan(down).motion
+        assert bench.robot_world.measure(since) is not None
+        motion = bench.robot_world.plan_command(down).motion
         way = np.subtract(motion.target, motion.start)
         yielded += not np.allclose(way, down[:7])
         bench.world.step(np.array([*way, 0.0]))
@@ -226,10 +232,10 @@ def test_an_arm_never_enters_the_table_whatever_is_commanded():
 def test_domains_without_a_panda_and_presets_that_jump_are_refused():
     other = get_domain("obstacle2d", "fair")
     with pytest.raises(InvalidParameterError, match="has no Panda"):
-        Cell(other, sampled_workplace(other.task(0).initial_state), LIMITS)
+        RobotWorld(other, sampled_scene_config(other.task(0).initial_state), LIMITS)
     jumps = get_domain("obstacle_tower", "paper")
     with pytest.raises(InvalidParameterError, match="which a real arm must not"):
-        Cell(jumps, sampled_workplace(jumps.task(0).initial_state), LIMITS)
+        RobotWorld(jumps, sampled_scene_config(jumps.task(0).initial_state), LIMITS)
 
 
 SCENE = """
@@ -254,12 +260,14 @@ objects:
 def test_a_scene_file_says_what_there_is(tmp_path):
     path = tmp_path / "scene.yaml"
     path.write_text(SCENE)
-    workplace = read_workplace(path, DOMAIN)
-    cell = Cell(DOMAIN, workplace, LIMITS)
+    scene_config = read_scene_config(path, DOMAIN)
+    robot_world = RobotWorld(DOMAIN, scene_config, LIMITS)
     for k in range(1, 12):  # a tag on top of the block, seen by a camera at the base
-        cell.see("tag36h11:1", k * 0.03, IDENTITY, Pose((0.5, 0.2, 0.125)))
-        cell.feel(Reading(k * 0.03, (0.0, -0.186, 0.0, -1.837, 0.0, 1.651, math.pi / 4)))
-    state = cell.look(0.0)
+        robot_world.add_detection("tag36h11:1", k * 0.03, IDENTITY, Pose((0.5, 0.2, 0.125)))
+        robot_world.add_joint_reading(
+            JointReading(k * 0.03, (0.0, -0.186, 0.0, -1.837, 0.0, 1.651, math.pi / 4))
+        )
+    state = robot_world.measure(0.0)
     block = state.layout.object("block1")
     assert state[block][:3] == pytest.approx((0.5, 0.2, 0.1))
     assert [atom.predicate.name for atom in DOMAIN.default_goal(state)] == ["On"]
@@ -282,9 +290,9 @@ def test_a_scene_file_with_a_mistake_is_refused(tmp_path, before, after, words):
     path = tmp_path / "scene.yaml"
     path.write_text(SCENE.replace(before, after))
     with pytest.raises(InvalidSceneError, match=words):
-        read_workplace(path, DOMAIN)
+        read_scene_config(path, DOMAIN)
 
 
 def test_a_scene_file_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(InvalidSceneError, match="cannot be read"):
-        read_workplace(tmp_path / "none.yaml", DOMAIN)
+        read_scene_config(tmp_path / "none.yaml", DOMAIN)

@@ -12,33 +12,33 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
-from ensemble.interfaces import JOINT_STATES, SENSED, TF, TF_STATIC
-from ensemble.waiting import seconds
+from ensemble.futures import node_time_s
+from ensemble.interfaces import JOINT_STATES, SENSOR_DATA, TF, TF_STATIC
 from slap_ros.errors import InvalidMeasurementError
 from slap_ros.geometry.pose import Pose
 from slap_ros.geometry.static_transforms import StaticTransforms
 from slap_ros.messages.decode import NANOSECONDS, stamp_ns
-from slap_ros.robot.cell import Cell, Reading
+from slap_ros.robot.robot_world import JointReading, RobotWorld
 from slap_ros.robot.tracking import measured_pose
 
 FINGERS = 2
 AHEAD = 0.05  # s, by which clocks of machines may differ
 
 
-class Senses:
+class Sensors:
     """Hands joint positions and detections to a cell; counts what it refuses."""
 
-    def __init__(self, node: Node, cell: Cell, prefix: str, base: str) -> None:
+    def __init__(self, node: Node, world: RobotWorld, prefix: str, base: str) -> None:
         """Joints are named ``PREFIX_joint1`` and so on, the base's frame ``base``."""
-        self._node, self._cell = node, cell
+        self._node, self._world = node, world
         self._arm = [f"{prefix}_joint{i + 1}" for i in range(7)]
         self._fingers = [f"{prefix}_finger_joint{i + 1}" for i in range(FINGERS)]
         self._frames = StaticTransforms(base)
         self.counts: Counter[str] = Counter(readings=0, detections=0, refused_measurements=0)
         self.gap: float | None = None  # m, between the fingers
         self.gap_s = 0.0  # stamp of the gap
-        node.create_subscription(JOINT_STATES.type, JOINT_STATES.name, self._on_joints, SENSED)
-        node.create_subscription(TF.type, TF.name, self._on_frames, SENSED)
+        node.create_subscription(JOINT_STATES.type, JOINT_STATES.name, self._on_joints, SENSOR_DATA)
+        node.create_subscription(TF.type, TF.name, self._on_frames, SENSOR_DATA)
         node.create_subscription(TF_STATIC.type, TF_STATIC.name, self._on_static, TF_STATIC.qos)
 
     @property
@@ -59,8 +59,8 @@ class Senses:
             return
         velocities = tuple(speed[name] for name in self._arm if name in speed)
         try:
-            self._cell.feel(
-                Reading(stamp_s, tuple(at[name] for name in self._arm), velocities, self.gap)
+            self._world.add_joint_reading(
+                JointReading(stamp_s, tuple(at[name] for name in self._arm), velocities, self.gap)
             )
         except InvalidMeasurementError as error:
             self._refuse(error)
@@ -86,7 +86,9 @@ class Senses:
                 continue
             position, quaternion = _parts(item)
             try:
-                self._cell.see(item.child_frame_id, stamp_s, base, Pose(position, quaternion))
+                self._world.add_detection(
+                    item.child_frame_id, stamp_s, base, Pose(position, quaternion)
+                )
             except InvalidMeasurementError as error:
                 self._refuse(error)
             else:
@@ -98,7 +100,7 @@ class Senses:
         From a clock that is ahead, what is older than the last motion would look newer.
         """
         stamp_s = stamp_ns(header) / NANOSECONDS
-        ahead_s = stamp_s - seconds(self._node)
+        ahead_s = stamp_s - node_time_s(self._node)
         if ahead_s <= AHEAD:
             return stamp_s
         self._refuse(

@@ -14,7 +14,7 @@ from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
-from ensemble.network import join
+from ensemble.network import join_network
 
 SPIN = 0.05  # s, the longest time between two looks at the nodes
 
@@ -28,7 +28,7 @@ class Spinner:
         self.check: Callable[[], None] = lambda: None
         self.executor = executor
 
-    def until(self, condition: Callable[[], bool], timeout_s: float) -> bool:
+    def spin_until(self, condition: Callable[[], bool], timeout_s: float) -> bool:
         """Whether the condition came to hold in time.
 
         Raises:
@@ -44,7 +44,7 @@ class Spinner:
 
 
 @contextmanager
-def spinning(make: Callable[[], N]) -> Iterator[tuple[N, Spinner]]:
+def temporary_node(make: Callable[[], N]) -> Iterator[tuple[N, Spinner]]:
     """Join the network with a node, and leave it in the end.
 
     No signal handlers: after Ctrl-C there still is something to be canceled and closed.
@@ -53,7 +53,7 @@ def spinning(make: Callable[[], N]) -> Iterator[tuple[N, Spinner]]:
         InvalidParameterError: An environment variable, such as ROS_DOMAIN_ID, is wrong.
     """
     with ExitStack() as stack:
-        join(
+        join_network(
             args=["--ros-args", "--log-level", "warn"],
             signal_handler_options=SignalHandlerOptions.NO,
         )

@@ -14,7 +14,7 @@ from slap_ros.geometry.pose import Pose, multiply
 
 
 @dataclass(frozen=True)
-class Disturbance:
+class NoiseSettings:
     """How bad it is; standard deviations along or about each axis."""
 
     latency_s: float = 0.0
@@ -37,17 +37,17 @@ class Disturbance:
             raise InvalidParameterError(f"dropout is a share in [0, 1), not {self.dropout}")
 
 
-class Noise:
+class NoiseModel:
     """Draws disturbances."""
 
-    def __init__(self, disturbance: Disturbance, rng: np.random.Generator) -> None:
+    def __init__(self, disturbance: NoiseSettings, rng: np.random.Generator) -> None:
         self._by, self._rng = disturbance, rng
 
     def delay_s(self) -> float:
         """How late something is."""
         return self._by.latency_s + self._by.jitter_s * float(self._rng.random())
 
-    def lost(self) -> bool:
+    def dropped(self) -> bool:
         """Whether a detection is lost."""
         return bool(self._rng.random() < self._by.dropout)
 

@@ -16,7 +16,7 @@ T = TypeVar("T")
 LOOK_PERIOD = 0.02  # s, how often a condition is looked at
 
 
-def seconds(node: Node) -> float:
+def node_time_s(node: Node) -> float:
     """The node's time in s."""
     return float(node.get_clock().now().nanoseconds) * 1e-9
 
@@ -28,13 +28,13 @@ def submit(workers: Executor, function: Callable[[], T]) -> Future:
     return done
 
 
-async def run_in(workers: Executor, function: Callable[[], T]) -> T:
+async def run_in_executor(workers: Executor, function: Callable[[], T]) -> T:
     """Run something long in a worker thread; what it raises is raised here."""
     job: Job[T] = await submit(workers, function)
     return job.result()
 
 
-async def first_of(node: Node, future: Future, condition: Callable[[], bool]) -> bool:
+async def wait_for_first(node: Node, future: Future, condition: Callable[[], bool]) -> bool:
     """Wait for a future or for a condition, looked at every ``LOOK_PERIOD``.
 
     Returns:
@@ -59,7 +59,7 @@ async def first_of(node: Node, future: Future, condition: Callable[[], bool]) ->
     return bool(future.done())
 
 
-async def until(node: Node, condition: Callable[[], bool]) -> None:
+async def wait_until(node: Node, condition: Callable[[], bool]) -> None:
     """Wait until a condition holds."""
     if not condition():
-        await first_of(node, Future(), condition)
+        await wait_for_first(node, Future(), condition)

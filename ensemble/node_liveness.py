@@ -6,13 +6,13 @@ from __future__ import annotations
 
 from rclpy.node import Node
 
+from ensemble.futures import node_time_s
 from ensemble.interfaces import Topic
-from ensemble.waiting import seconds
 
 PERIOD = 0.5  # s between two looks at the graph, which cost time; DDS takes longer to miss a node
 
 
-class Presence:
+class NodeLiveness:
     """The nodes that were found to publish a topic.
 
     A node that died and was started again has the same name, and servers that are ready, but it
@@ -24,19 +24,19 @@ class Presence:
         self._node = node
         self._topic = node.resolve_topic_name(topic.name)
         self._known = self._now = self._publishers()
-        self._looked_s = seconds(node)
+        self._looked_s = node_time_s(node)
 
-    def there(self) -> bool:
+    def is_alive(self) -> bool:
         """Whether one of them is there."""
-        if seconds(self._node) - self._looked_s > PERIOD:
+        if node_time_s(self._node) - self._looked_s > PERIOD:
             self._now = self._publishers()
             self._known = self._known or self._now
-            self._looked_s = seconds(self._node)
+            self._looked_s = node_time_s(self._node)
         return not self._known.isdisjoint(self._now)
 
-    def gone(self) -> bool:
+    def is_lost(self) -> bool:
         """Whether they were there and are no more; False as long as none was found."""
-        return not self.there() and bool(self._known)
+        return not self.is_alive() and bool(self._known)
 
     def _publishers(self) -> frozenset[tuple[int, ...]]:
         found = self._node.get_publishers_info_by_topic(self._topic)

@@ -1,0 +1,110 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The ROS parameters of a robot, real or mock, which the command line sets as well."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ensemble.parameters import parameter, parse_parameters
+from slap_ros.errors import InvalidParameterError
+from slap_ros.robot.limits import Limits, Workspace, arm_limits
+from slap_ros.robot.tracking import TrackingSettings
+
+# As MoveIt's configurations of Franka's arms have them; ``ros2 action list`` shows them.
+TRAJECTORY_ACTION = "ARM_arm_controller/follow_joint_trajectory"
+GRIPPER_ACTION = "franka_gripper/gripper_action"
+WORKSPACE = (*Workspace().low, *Workspace().high)
+GIVEN_WITH_THE_RUN = frozenset({"domain", "preset", "seed", "index"})
+
+
+def action_name(name: str, arm: str) -> str:
+    """An action's name for an arm: ``ARM`` in it is replaced."""
+    return name.replace("ARM", arm)
+
+
+@dataclass(frozen=True)
+class RobotParameters:
+    """What a robot is: see the docstring of ``robot_bridge.node``."""
+
+    scene: str = parameter("", "a scene file; empty: the sampled task's objects")
+    arm: str = parameter("panda", "panda or fr3")
+    speed: float = parameter(0.5, "fraction of the velocity and acceleration limits")
+    workspace: tuple[float, ...] = parameter(WORKSPACE, "m, fingertips, lowest x y z, highest")
+    trajectory_action: str = parameter(TRAJECTORY_ACTION, "the arm's controller")
+    gripper_action: str = parameter(GRIPPER_ACTION, "the gripper's controller")
+    gripper_scale: float = parameter(0.5, "position to be sent for each m between the fingers")
+    gripper_effort: float = parameter(20.0, "N")
+    position_noise: float = parameter(0.002, "m, of detections, along each axis")
+    turn_noise: float = parameter(0.01, "rad, of detections, about each axis")
+    joint_timeout: float = parameter(0.5, "s without joint positions until the robot holds")
+    controller_timeout: float = parameter(0.5, "s that a controller may take longer than it should")
+    gripper_timeout: float = parameter(5.0, "s that the gripper may take")
+    arrival_tolerance: float = parameter(0.1, "rad that a joint may be off after a motion")
+
+    @property
+    def limits(self) -> Limits:
+        """What the arm may do.
+
+        Raises:
+            InvalidParameterError: An unknown arm, or a speed or workspace that there is not.
+        """
+        if len(self.workspace) != len(WORKSPACE):
+            raise InvalidParameterError(
+                "parameter workspace is x y z at its lowest and at its highest"
+            )
+        x, y, z, to_x, to_y, to_z = self.workspace
+        return arm_limits(self.arm).scaled(self.speed, Workspace((x, y, z), (to_x, to_y, to_z)))
+
+    @property
+    def tracking(self) -> TrackingSettings:
+        """How well detections can be trusted."""
+        return TrackingSettings(self.position_noise, self.turn_noise)
+
+
+@dataclass(frozen=True)
+class PlayerParameters(RobotParameters):
+    """Those of a robot, and how far from where the recording begins things may be."""
+
+    start_timeout: float = parameter(15.0, "s to wait for the robot and every object")
+    start_tolerance: float = parameter(0.05, "rad that a joint may be off the recording's start")
+    place_tolerance: float = parameter(0.01, "m that an object may be off the recording's start")
+
+
+@dataclass(frozen=True)
+class MockRobotParameters:
+    """What a mock robot is: see the docstring of ``robot_bridge.mock.node``."""
+
+    domain: str = parameter("obstacle_tower", "which domain")
+    preset: str = parameter("fair", "as the bridge's")
+    seed: int = parameter(0, "samples the task")
+    index: int = parameter(0, "which of the seed's tasks")
+    arm: str = parameter("panda", "prefix of joints and frames")
+    trajectory_action: str = parameter(TRAJECTORY_ACTION, "the arm's controller")
+    gripper_action: str = parameter(GRIPPER_ACTION, "the gripper's controller")
+    gripper_scale: float = parameter(0.5, "position that is sent for each m between the fingers")
+    latency: float = parameter(0.02, "s, of goals and detections")
+    jitter: float = parameter(0.0, "s, at most, on top of the latency")
+    pose_noise: float = parameter(0.002, "m, of detections along each axis")
+    turn_noise: float = parameter(0.01, "rad, of detections about each axis")
+    joint_noise: float = parameter(0.0, "rad, of joint positions")
+    dropout: float = parameter(0.0, "share of detections that are lost")
+    rate: float = parameter(30.0, "Hz, of detections")
+    joint_rate: float = parameter(100.0, "Hz, of joint positions")
+    hidden: str = parameter("", "an object that is never detected")
+    pace: float = parameter(1.0, "how many times faster than a real one it moves")
+    noise_seed: int = parameter(0, "noise and delays are a function of it")
+    fault: str = parameter("", "reject, abort or ignore: what is done to a motion")
+    fault_after: int = parameter(0, "and after how many good ones")
+
+
+def parse_mock_robot(text: str) -> dict[str, str | int | float]:
+    """The mock robot's parameters as a command line has them: ``latency=0.05,dropout=0.1``.
+
+    Returns:
+        Parameters by name, of the types that they have.
+
+    Raises:
+        InvalidParameterError: One that there is not, or a value that it cannot have.
+    """
+    return parse_parameters(text, MockRobotParameters, "mock robot", GIVEN_WITH_THE_RUN)

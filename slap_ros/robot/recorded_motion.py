@@ -1,0 +1,118 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A recorded plan as a motion of the arm, for a robot to execute without looking.
+
+Open loop, as LG-SAIL executes on its robot what was planned in simulation: joint positions of the
+recorded states one after the other, each from rest to rest, and what the gripper did between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from slap_ros.bags.reader import read_bag
+from slap_ros.bags.recording import RecordedEpisode, Recording
+from slap_ros.core import Domain
+from slap_ros.errors import DamagedBagError, InvalidParameterError
+from slap_ros.messages.decode import decode_goal, decode_state
+from slap_ros.physics.features import JOINT_FEATURES, ROBOT
+from slap_ros.relational import State
+from slap_ros.robot.limits import Joints
+from slap_ros.robot.robot_world import GripperAction
+
+
+@dataclass(frozen=True)
+class RecordedWaypoint:
+    """Where the arm goes in a step, after the gripper acted."""
+
+    step: int  # at whose end it is there
+    joints: Joints  # rad
+    gripper: GripperAction
+    gap: float  # m, between the fingers around what is held; 0 where nothing is
+
+
+@dataclass(frozen=True)
+class RecordedMotion:
+    """The motion of a recorded episode."""
+
+    domain: Domain
+    seed: int  # of the task, as the recording has it
+    index: int
+    states: tuple[State, ...]  # from the first on
+    waypoints: tuple[RecordedWaypoint, ...]  # one for each state but the first
+    goal: int  # mask, in the atom space of the first state
+
+    @property
+    def start(self) -> Joints:
+        """Where the arm was at the beginning, rad."""
+        return _joints(self.states[0])
+
+
+def read_recorded_motion(path: Path) -> RecordedMotion:
+    """The motion of the newest episode in a bag.
+
+    Raises:
+        DamagedBagError: It breaks off, or lacks a state: half a plan is none for a robot.
+        InvalidParameterError: Its domain has no Panda, or it begins with something in the hand.
+        ForeignBagError, UnknownDomainError, InvalidStateError: As for any replay.
+    """
+    bag = read_bag(path)
+    recording = Recording.of(bag)
+    domain = recording.domain()
+    if bag.damage is not None or domain is None:
+        reason = bag.damage or "it does not name its domain"
+        raise DamagedBagError(f"{path} is not to be executed: {reason}")
+    if ROBOT not in domain.types:
+        raise InvalidParameterError(f"{domain.name} has no Panda, which a real robot is here")
+    moved = [episode for _, episode in sorted(recording.episodes.items()) if episode.states]
+    if not moved or moved[-1].task is None:
+        raise DamagedBagError(f"{path} has no task with states, so there is nothing to execute")
+    episode, task = moved[-1], moved[-1].task
+    states = tuple(_states(episode, domain))
+    if _holds(states[0]):
+        raise InvalidParameterError(
+            f"{path} begins with something in the hand, and nobody could put it there just so"
+        )
+    space = domain.atom_space(states[0])
+    return RecordedMotion(
+        domain,
+        task.seed,
+        task.index,
+        states,
+        tuple(_waypoints(states)),
+        space.mask(decode_goal(task.goal, space)),
+    )
+
+
+def _states(episode: RecordedEpisode, domain: Domain) -> Iterator[State]:
+    for number, step in enumerate(sorted(episode.states)):
+        if step != number:
+            raise DamagedBagError(f"the state of step {number} is not in the bag")
+        yield decode_state(episode.states[step], domain.types_by_name)
+
+
+def _waypoints(states: Sequence[State]) -> Iterator[RecordedWaypoint]:
+    holding = _holds(states[0])
+    for step, state in enumerate(states[1:], start=1):
+        held, holding = holding, _holds(state)
+        gripper = (
+            GripperAction.KEEP
+            if held == holding
+            else GripperAction.CLOSE
+            if holding
+            else GripperAction.OPEN
+        )
+        (robot,) = state.layout.of_type(ROBOT)
+        gap = 2.0 * float(state.get(robot, "finger")) if holding else 0.0
+        yield RecordedWaypoint(step, _joints(state), gripper, gap)
+
+
+def _holds(state: State) -> bool:
+    return any(state.get(o, "held") > 0.5 for o in state.objects if "held" in o.type.column)
+
+
+def _joints(state: State) -> Joints:
+    (robot,) = state.layout.of_type(ROBOT)
+    return tuple(float(state.get(robot, feature.name)) for feature in JOINT_FEATURES)
