@@ -23,13 +23,13 @@ from time import process_time
 from typing import Protocol
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
 from slap_ros.geometry.pose import Pose, conjugate, multiply
 from slap_ros.meshes.obj import to_obj
 from slap_ros.meshes.solid import Solid
 from slap_ros.physics.arm import Arm
+from slap_ros.physics.bullet import pybullet
 from slap_ros.physics.features import BODY_FEATURES, ROBOT, body_features, robot_features
 from slap_ros.physics.panda import (
     FINGER_OPEN,

@@ -9,11 +9,11 @@ from pathlib import Path
 from types import TracebackType
 
 import numpy as np
-import pybullet
 
 from slap_ros.geometry.pose import Pose, Vector
 from slap_ros.meshes.solid import ConvexPiece, Solid
 from slap_ros.physics.animation import Picture, write_pictures
+from slap_ros.physics.bullet import pybullet
 from slap_ros.physics.panda import CONTROL_PERIOD_S
 from slap_ros.physics.scene import Body, Box, Scene
 from slap_ros.physics.simulation import PANDA

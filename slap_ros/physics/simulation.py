@@ -22,11 +22,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
-import pybullet
-
 from slap_ros.geometry.pose import NO_ROTATION, ORIGIN, Pose, Vector, conjugate, multiply
 from slap_ros.meshes.obj import to_obj
 from slap_ros.meshes.solid import Solid, cuboid
+from slap_ros.physics.bullet import pybullet
 from slap_ros.physics.links import LINK_SHAPES
 from slap_ros.physics.panda import CONTROL_PERIOD_S
 from slap_ros.physics.scene import FRICTION, Body, Material, Scene, Shape

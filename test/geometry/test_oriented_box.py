@@ -5,11 +5,11 @@
 from __future__ import annotations
 
 import numpy as np
-import pybullet
 import pytest
 
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose
+from slap_ros.physics.bullet import pybullet
 
 UNSURE = 2e-3  # m, distance within which either answer will do: PyBullet keeps margins
 

@@ -3,7 +3,6 @@
 """Bodies of many pieces: they weigh, stand, fall, are held and pushed as they should."""
 
 import numpy as np
-import pybullet
 import pytest
 from toys import TOYS, heap
 from transitions import GRASP, holding
@@ -13,6 +12,7 @@ from slap_ros.domains.cleanup_table.shapes import make, shipped
 from slap_ros.errors import InvalidStateError
 from slap_ros.geometry.pose import Pose
 from slap_ros.meshes.solid import Solid
+from slap_ros.physics.bullet import pybullet
 from slap_ros.physics.gripper import finger_around
 from slap_ros.physics.panda import HOME
 from slap_ros.physics.rendering import Camera

@@ -7,10 +7,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import pybullet
 import pytest
 
 from slap_ros.geometry.pose import Pose, multiply
+from slap_ros.physics.bullet import pybullet
 from slap_ros.physics.links import LINK_SHAPES
 from slap_ros.physics.panda import (
     FINGER_OPEN,

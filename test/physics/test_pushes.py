@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pybullet
 import pytest
 from transitions import HIGH, holding
 
@@ -13,6 +12,7 @@ from benchmarks.physics_step import NAMES, SCENE, pushes, tower, truth, with_joi
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose
 from slap_ros.physics.arm import Arm
+from slap_ros.physics.bullet import pybullet
 from slap_ros.physics.panda import FINGER_OPEN, HOME, MAX_STEP
 from slap_ros.physics.scene import CUBE_EDGE, FLOOR_TOP, TABLE, TABLE_TOP, cube
 from slap_ros.physics.simulation import Drive, Simulation, Stepping

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import pybullet
 import pytest
 from PIL import Image, ImageSequence
 from transitions import holding
 
 from benchmarks.physics_step import NAMES, tower
 from slap_ros.physics.animation import WRITERS
+from slap_ros.physics.bullet import pybullet
 from slap_ros.physics.rendering import Camera, Viewpoint, write_animation
 from slap_ros.physics.scene import TABLE, Scene, cube
 from slap_ros.relational import State

@@ -7,7 +7,6 @@ from __future__ import annotations
 import gc
 
 import numpy as np
-import pybullet
 import pytest
 from transitions import HIGH, holding
 
@@ -16,6 +15,7 @@ from slap_ros.errors import InvalidCommandError, InvalidDomainError, InvalidStat
 from slap_ros.geometry.pose import Pose
 from slap_ros.physics import simulation_pool
 from slap_ros.physics.arm import Arm, Obstacle, Sweep
+from slap_ros.physics.bullet import pybullet
 from slap_ros.physics.features import ROBOT, body_features, robot_features
 from slap_ros.physics.panda import (
     FINGER_OPEN,
