@@ -73,7 +73,7 @@ class Storage:
         except (OSError, ValueError) as error:
             raise DamagedBagError(
                 f"{self.path / FILE_NAME} cannot be read: {error}; "
-                "the messages can, and `ros2 bag reindex` writes it anew"
+                "the messages can, and `ros2 bag reindex` writes it again"
             ) from error
 
 

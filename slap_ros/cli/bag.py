@@ -13,7 +13,8 @@ from rich.table import Table
 
 from slap_ros.bags import BagEvaluation, bag_info, evaluate_bag, read_bag, replay_bag
 from slap_ros.bags.recording import Recording
-from slap_ros.cli.console import Json, console, exits, print_json
+from slap_ros.cli.console import console, exits, print_json
+from slap_ros.cli.options import Json
 from slap_ros.cli.render import check_renderable
 from slap_ros.cli.render import render as write_animation
 from slap_ros.errors import DamagedBagError, ErrorCode, InvalidParameterError

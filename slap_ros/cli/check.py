@@ -10,15 +10,16 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from slap_ros.cli.console import Json, Preset, Seed, console, print_json
+from slap_ros.cli.console import console, print_json
 from slap_ros.cli.doctor import STYLE
+from slap_ros.cli.options import DomainName, Json, Preset, Seed
 from slap_ros.domain_check import check_domain
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode
 
 
 def check(
-    domain: Annotated[str, typer.Argument(help="One of `slap domains`.")],
+    domain: DomainName,
     preset: Preset = "fair",
     seed: Seed = 0,
     tasks: Annotated[int, typer.Option(min=1, help="Tasks that are planned and executed.")] = 50,

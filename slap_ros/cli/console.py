@@ -8,7 +8,7 @@ import json
 import sys
 from collections.abc import Callable
 from functools import wraps
-from typing import Annotated, Any, ParamSpec
+from typing import Any, ParamSpec
 
 import typer
 from rich.console import Console
@@ -28,20 +28,6 @@ INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 FILE_WIDTH = 120  # columns, where stderr is no terminal: tables must not be cut there
 
 console = Console(stderr=True, soft_wrap=True, width=None if sys.stderr.isatty() else FILE_WIDTH)
-
-Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
-Preset = Annotated[
-    str, typer.Option(help="fair: random tasks; paper: the start states of the paper's code.")
-]
-Planner = Annotated[
-    str, typer.Option(help="lazy, exhaustive (the paper's) or ff (greedy best-first, SLAP D.2).")
-]
-Seed = Annotated[int, typer.Option(min=0, help="Samples the task.")]
-Index = Annotated[int, typer.Option(min=0, help="Which of the seed's tasks.")]
-Goal = Annotated[
-    str | None,
-    typer.Option(help="Another goal, e.g. '(and (On block2 target) (GripperEmpty robot))'."),
-]
 
 
 def exits(command: Callable[P, int | None]) -> Callable[P, None]:

@@ -9,7 +9,8 @@ from dataclasses import asdict
 from rich.markup import escape
 from rich.table import Table
 
-from slap_ros.cli.console import Json, console, print_json
+from slap_ros.cli.console import console, print_json
+from slap_ros.cli.options import Json
 from slap_ros.doctor import diagnose
 from slap_ros.errors import ErrorCode
 

@@ -8,7 +8,8 @@ from collections.abc import Iterator
 
 from rich.table import Table
 
-from slap_ros.cli.console import Json, console, print_json
+from slap_ros.cli.console import console, print_json
+from slap_ros.cli.options import Json
 from slap_ros.core import Domain
 from slap_ros.domains import PRESETS, domain_names, get_domain
 from slap_ros.errors import InvalidDomainError

@@ -10,7 +10,8 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from slap_ros.cli.console import Json, Planner, Preset, console, print_json, progress
+from slap_ros.cli.console import console, print_json, progress
+from slap_ros.cli.options import DomainName, Jobs, Json, Planner, Preset
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose, sampling
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode
@@ -21,8 +22,8 @@ from slap_ros.planning.planner import make_planner
 
 
 def evaluate(
-    domain: Annotated[str, typer.Argument(help="One of `slap domains`.")],
-    tasks: Annotated[int, typer.Option(min=1, help="Tasks a seed.")] = 10,
+    domain: DomainName,
+    tasks: Annotated[int, typer.Option(min=1, help="Tasks per seed.")] = 10,
     seeds: Annotated[int, typer.Option(min=1, help="How many seeds.")] = 5,
     first_seed: Annotated[
         int,
@@ -35,7 +36,7 @@ def evaluate(
     shortcuts: Shortcuts = None,
     samples: Samples = SAMPLES,
     planner: Planner = "lazy",
-    jobs: Annotated[int, typer.Option(min=1, help="Processes; the results are the same.")] = 1,
+    jobs: Jobs = 1,
     json: Json = False,
 ) -> int:
     """Plan and execute many tasks in the world and sum up: success, plan length, planning time.

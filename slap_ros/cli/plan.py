@@ -9,7 +9,8 @@ from typing import Annotated
 
 import typer
 
-from slap_ros.cli.console import Goal, Index, Json, Planner, Preset, Seed, console, print_json
+from slap_ros.cli.console import console, print_json
+from slap_ros.cli.options import Goal, Index, Json, Planner, Preset, Seed
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose, sampling
 from slap_ros.core import Domain, Task
 from slap_ros.domains import get_domain

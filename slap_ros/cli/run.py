@@ -15,17 +15,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from slap_ros.bags.writer import require_new
-from slap_ros.cli.console import (
-    Goal,
-    Index,
-    Json,
-    Planner,
-    Preset,
-    Seed,
-    console,
-    print_json,
-)
+from slap_ros.cli.console import console, print_json
 from slap_ros.cli.live import Dashboard
+from slap_ros.cli.options import Goal, Index, Json, Planner, Preset, Seed
 from slap_ros.cli.render import check_renderable
 from slap_ros.cli.render import render as write_animation
 from slap_ros.cli.report import write_report

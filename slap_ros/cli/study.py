@@ -6,19 +6,20 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.progress import TaskID
 
-from slap_ros.cli.console import Preset, console, exits, progress
+from slap_ros.cli.console import console, exits, progress
+from slap_ros.cli.options import DomainName, Jobs, Preset, flat_options
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose, sampling
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
-from slap_ros.evaluation.approaches import Approach, approaches
-from slap_ros.shortcuts.settings import training_settings
+from slap_ros.evaluation.approaches import approaches
+from slap_ros.shortcuts.settings import Exploration, training_settings
 from slap_ros.shortcuts.shipped import shipped_library
 from slap_ros.studies import dynamics, generalisation, perception, planning_time, pruning
 from slap_ros.studies import goals as sampled
@@ -35,10 +36,8 @@ app = typer.Typer(
     no_args_is_help=True,
 )
 
-Domain = Annotated[str, typer.Argument(help="One of `slap domains`.")]
-Tasks = Annotated[int, typer.Option(min=1, help="Tasks a seed.")]
+Tasks = Annotated[int, typer.Option(min=1, help="Tasks per seed.")]
 Seeds = Annotated[int, typer.Option(min=1, help="How many seeds, from 0 on.")]
-Jobs = Annotated[int, typer.Option(min=1, help="Processes; the results are the same.")]
 Output = Annotated[Path, typer.Option(help="Folder for NAME_DOMAIN.json, .svg and .md.")]
 Vary = Annotated[
     list[str] | None,
@@ -46,13 +45,39 @@ Vary = Annotated[
 ]
 Work = Annotated[
     list[Path],
-    typer.Option(help="Work folder of a `slap train`; may be repeated, a folder a seed."),
+    typer.Option(help="Work folder of a `slap train`; may be repeated, one folder per seed."),
 ]
+
+
+@dataclass(frozen=True)
+class TaskOptions:
+    """Which tasks a study samples, and where it writes."""
+
+    tasks: Tasks = 4
+    seeds: Seeds = 5
+    preset: Preset = "fair"
+    jobs: Jobs = 1
+    output: Output = RESULTS
+
+
+@dataclass(frozen=True)
+class ComparisonOptions(TaskOptions):
+    """How a study compares pure planning with SLAP."""
+
+    shortcuts: Shortcuts = None
+    samples: Samples = SAMPLES
+
+
+@dataclass(frozen=True)
+class GoalOptions(ComparisonOptions):
+    """The same with one task per seed, as each task has many goals."""
+
+    tasks: Tasks = 1
 
 
 @app.command("dynamics")
 @exits
-def dynamics_(domain: Domain, work: Work, output: Output = RESULTS) -> None:
+def dynamics_(domain: DomainName, work: Work, output: Output = RESULTS) -> None:
     """SLAP Fig. 4: success and length while shortcuts are learned, from trainings' work folders."""
     require_matplotlib()
     get_domain(domain)
@@ -64,169 +89,154 @@ def dynamics_(domain: Domain, work: Work, output: Output = RESULTS) -> None:
 
 @app.command("generalisation")
 @exits
-def generalisation_(
-    domain: Domain,
-    vary: Vary = None,
-    tasks: Tasks = 4,
-    seeds: Seeds = 5,
-    preset: Preset = "fair",
-    shortcuts: Shortcuts = None,
-    samples: Samples = SAMPLES,
-    jobs: Jobs = 1,
-    output: Output = RESULTS,
-) -> None:
+@flat_options
+def generalisation_(domain: DomainName, vary: Vary = None, *, options: ComparisonOptions) -> None:
     """SLAP Fig. 5: pure planning and SLAP as obstacles, distractors, mass or friction vary."""
-    comparison, settings = _compare(domain, preset, shortcuts, samples, tasks, seeds, jobs)
+    comparison, settings = _compare(domain, options)
     chosen = [parse_variation(text) for text in vary or ()] or offered(comparison.domain)
-    ends = replace(comparison, approaches=_first_and_last(comparison.approaches))
-    with _StudyBars() as show:
-        report = generalisation.study(ends, chosen, show)
-    command = _command("generalisation", domain, vary=vary, shortcuts=shortcuts, **settings)
-    _write(output, report, Provenance(domain, command, settings))
+    with _StudyBars() as bars:
+        report = generalisation.study(_ends(comparison), chosen, bars)
+    command = _command("generalisation", domain, vary=vary, **_given(options, settings))
+    _write(options.output, report, Provenance(domain, command, settings))
 
 
 @app.command("goals")
 @exits
+@flat_options
 def goals_(
-    domain: Domain,
-    goals: Annotated[int, typer.Option(min=1, help="Goals a task, fewer if it has fewer.")] = 15,
-    tasks: Tasks = 1,
-    seeds: Seeds = 5,
-    preset: Preset = "fair",
-    shortcuts: Shortcuts = None,
-    samples: Samples = SAMPLES,
-    jobs: Jobs = 1,
-    output: Output = RESULTS,
+    domain: DomainName,
+    goals: Annotated[int, typer.Option(min=1, help="Goals per task, fewer if it has fewer.")] = 15,
+    *,
+    options: GoalOptions,
 ) -> None:
     """SLAP Fig. 9: pure planning and SLAP for goals that the library was not trained for."""
-    comparison, settings = _compare(domain, preset, shortcuts, samples, tasks, seeds, jobs)
-    ends = replace(comparison, approaches=_first_and_last(comparison.approaches))
-    with _StudyBars() as show:
-        report = sampled.study(ends, goals, show)
-    command = _command("goals", domain, goals=goals, shortcuts=shortcuts, **settings)
-    _write(output, report, Provenance(domain, command, {"goals": goals, **settings}))
+    comparison, settings = _compare(domain, options)
+    with _StudyBars() as bars:
+        report = sampled.study(_ends(comparison), goals, bars)
+    command = _command("goals", domain, goals=goals, **_given(options, settings))
+    _write(options.output, report, Provenance(domain, command, {"goals": goals, **settings}))
 
 
 @app.command("pruning")
 @exits
+@flat_options
 def pruning_(
-    domain: Domain,
+    domain: DomainName,
     work: Annotated[
         list[Path] | None,
         typer.Option(help="Work folder of a `slap train` that has explored; may be repeated."),
     ] = None,
-    tasks: Tasks = 4,
-    seeds: Seeds = 5,
-    preset: Preset = "fair",
     settings: Annotated[
         str, typer.Option(help="ours, or paper: how to explore, without --work.")
     ] = "ours",
-    jobs: Jobs = 1,
-    output: Output = RESULTS,
+    *,
+    options: TaskOptions,
 ) -> None:
     """SLAP Table 2: how many candidates random rollouts leave over."""
     require_matplotlib()
-    get_domain(domain, preset)
+    get_domain(domain, options.preset)
     if work:
         folders = [TrainingFolder(folder) for folder in work]
         explored, how = pruning.explored_in(folders, domain)
         origin = Provenance(domain, _command("pruning", domain, work=work), _trainings(folders))
     else:
         how = training_settings(settings, domain).exploration
-        with _StudyBars() as show:
-            explored = pruning.explore(domain, preset, seeds, tasks, how, jobs, show)
-        options = {"preset": preset, "tasks": tasks, "seeds": seeds, "settings": settings}
-        origin = Provenance(domain, _command("pruning", domain, **options), options)
-    _write(output, pruning.study(domain, explored, how), origin)
+        explored = _explore(domain, options, how)
+        sampled_from = {
+            "preset": options.preset,
+            "tasks": options.tasks,
+            "seeds": options.seeds,
+            "settings": settings,
+        }
+        command = _command("pruning", domain, **sampled_from)
+        origin = Provenance(domain, command, sampled_from)
+    _write(options.output, pruning.study(domain, explored, how), origin)
 
 
 @app.command("perception")
 @exits
+@flat_options
 def perception_(
-    domain: Domain,
+    domain: DomainName,
     max_replans: Annotated[int, typer.Option(min=0, help="Plans after the first.")] = 10,
-    tasks: Tasks = 4,
-    seeds: Seeds = 5,
-    preset: Preset = "fair",
-    shortcuts: Shortcuts = None,
-    samples: Samples = SAMPLES,
-    jobs: Jobs = 1,
-    output: Output = RESULTS,
+    *,
+    options: ComparisonOptions,
 ) -> None:
     """SLAP D.3, D.4: success, length and replans while perception errs in several ways."""
-    comparison, settings = _compare(domain, preset, shortcuts, samples, tasks, seeds, jobs)
-    ends = replace(comparison, approaches=_first_and_last(comparison.approaches))
-    with _StudyBars() as show:
-        report = perception.study(ends, max_replans, show)
+    comparison, settings = _compare(domain, options)
+    with _StudyBars() as bars:
+        report = perception.study(_ends(comparison), max_replans, bars)
     settings = {"max_replans": max_replans, **settings}
-    options = {name.replace("_", "-"): value for name, value in settings.items()}
-    command = _command("perception", domain, shortcuts=shortcuts, **options)
-    _write(output, report, Provenance(domain, command, settings))
+    command = _command("perception", domain, **_given(options, settings))
+    _write(options.output, report, Provenance(domain, command, settings))
 
 
 @app.command("planning_time")
 @exits
+@flat_options
 def planning_time_(
-    domain: Domain,
+    domain: DomainName,
     vary: Annotated[
         str | None,
         typer.Option(help="setting=value,value,...; default: the number of obstacles."),
     ] = None,
-    tasks: Tasks = 4,
-    seeds: Seeds = 5,
-    preset: Preset = "fair",
-    shortcuts: Shortcuts = None,
-    samples: Samples = SAMPLES,
-    jobs: Jobs = 1,
-    output: Output = RESULTS,
+    *,
+    options: ComparisonOptions,
 ) -> None:
     """SLAP Table 4: seconds of planning, edges rolled out, size of the graph."""
-    comparison, settings = _compare(domain, preset, shortcuts, samples, tasks, seeds, jobs)
+    comparison, settings = _compare(domain, options)
     chosen = parse_variation(vary) if vary else offered(comparison.domain, NUMBERS)[0]
-    with _StudyBars() as show:
-        report = planning_time.study(comparison, chosen, show)
-    command = _command("planning_time", domain, vary=vary, shortcuts=shortcuts, **settings)
-    _write(output, report, Provenance(domain, command, settings))
+    with _StudyBars() as bars:
+        report = planning_time.study(comparison, chosen, bars)
+    command = _command("planning_time", domain, vary=vary, **_given(options, settings))
+    _write(options.output, report, Provenance(domain, command, settings))
 
 
-def _compare(
-    domain: str,
-    preset: str,
-    shortcuts: str | None,
-    samples: int,
-    tasks: int,
-    seeds: int,
-    jobs: int,
-) -> tuple[Comparison, Data]:
-    """What to compare, and the settings to tell of."""
+def _compare(domain: str, options: ComparisonOptions) -> tuple[Comparison, Data]:
+    """What to compare, and the settings that a report names."""
     require_matplotlib()
-    chosen = get_domain(domain, preset)
-    library = choose(shortcuts, chosen, "lazy")
-    folder = Path(shortcuts) if shortcuts else shipped_library(domain)
+    chosen = get_domain(domain, options.preset)
+    library = choose(options.shortcuts, chosen, "lazy")
+    folder = Path(options.shortcuts) if options.shortcuts else shipped_library(domain)
     if library is None or folder is None:
         raise InvalidParameterError(
             f"there is nothing to compare with pure planning in {domain}: give a shortcut library "
             "with --shortcuts"
         )
-    compared = approaches(library, sampling(samples))
+    compared = approaches(library, sampling(options.samples))
     settings = {
-        "preset": preset,
-        "tasks": tasks,
-        "seeds": seeds,
-        "samples": samples,
+        "preset": options.preset,
+        "tasks": options.tasks,
+        "seeds": options.seeds,
+        "samples": options.samples,
         "library": describe_library(folder, library),
     }
-    return Comparison(chosen, compared, tasks, seeds, jobs), settings
+    comparison = Comparison(chosen, compared, options.tasks, options.seeds, options.jobs)
+    return comparison, settings
+
+
+def _ends(comparison: Comparison) -> Comparison:
+    """The same for pure planning and SLAP alone, without the approaches between them."""
+    return replace(comparison, approaches=(comparison.approaches[0], comparison.approaches[-1]))
+
+
+def _given(options: ComparisonOptions, settings: Data) -> Data:
+    """The options that make a report again, with the library as it was given."""
+    return {"shortcuts": options.shortcuts, **settings}
+
+
+def _explore(
+    domain: str, options: TaskOptions, how: Exploration
+) -> tuple[pruning.PrunedCandidates, ...]:
+    with _StudyBars() as bars:
+        return pruning.explore(
+            domain, options.preset, options.seeds, options.tasks, how, options.jobs, bars
+        )
 
 
 def _trainings(folders: Sequence[TrainingFolder]) -> Data:
     """Whose work folders they are."""
     return {"trainings": [folder.place() for folder in folders]}
-
-
-def _first_and_last(compared: tuple[Approach, ...]) -> tuple[Approach, ...]:
-    """Pure planning and SLAP, without what lies between."""
-    return compared[0], compared[-1]
 
 
 def _command(study: str, domain: str, **options: Any) -> str:
@@ -235,7 +245,8 @@ def _command(study: str, domain: str, **options: Any) -> str:
     for name, value in options.items():
         values = value if isinstance(value, list) else [value]
         if not isinstance(value, Mapping) and value is not None:
-            parts += [part for one in values for part in (f"--{name}", str(one))]
+            flag = f"--{name.replace('_', '-')}"
+            parts += [part for one in values for part in (flag, str(one))]
     return shlex.join(parts)
 
 
@@ -245,7 +256,7 @@ def _write(output: Path, report: StudyReport, origin: Provenance) -> None:
 
 
 class _StudyBars:
-    """Progress on the terminal, a bar a kind of jobs."""
+    """Progress on the terminal, one bar per kind of jobs."""
 
     def __init__(self) -> None:
         self._bars = progress()

@@ -16,7 +16,8 @@ from typing import Annotated, Any
 import typer
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
-from slap_ros.cli.console import Json, Preset, console, print_json
+from slap_ros.cli.console import console, print_json
+from slap_ros.cli.options import DomainName, Json, Preset
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.shortcuts.jobs import Kept, Place
@@ -29,7 +30,7 @@ REFRESH_S = 1.0
 
 
 def train(
-    domain: Annotated[str, typer.Argument(help="One of `slap domains`.")],
+    domain: DomainName,
     output: Annotated[
         Path | None, typer.Option(help="The library's folder. Default: runs/models/DOMAIN.")
     ] = None,
@@ -39,7 +40,7 @@ def train(
         str, typer.Option(help="ours, or paper: the paper's hyper-parameters.")
     ] = "ours",
     steps: Annotated[
-        int | None, typer.Option(min=1, help="Environment steps a shortcut; default: settings'.")
+        int | None, typer.Option(min=1, help="Environment steps per shortcut; default: settings'.")
     ] = None,
     jobs: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
     ray: Annotated[

@@ -60,7 +60,7 @@ def _imported(name: str, modules: list[str], distributions: list[str], advice: s
     versions = ", ".join(_versions(distributions))
     if outcome.code != 0:
         found = f"{versions or name} is installed but fails: {outcome.last_error}"
-        return Check(name, "problem", found, f"Install it anew: {advice}")
+        return Check(name, "problem", found, f"Install it again: {advice}")
     return Check(name, "ok", versions or "installed")
 
 

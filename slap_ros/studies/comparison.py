@@ -13,6 +13,8 @@ from slap_ros.domains import get_domain
 from slap_ros.evaluation.approaches import Approach
 from slap_ros.evaluation.experiment import Experiment, Trial, run_all
 from slap_ros.evaluation.summary import Spread, Summary
+from slap_ros.planning.planner import Planner
+from slap_ros.relational import State
 from slap_ros.shortcuts.workers import local_workers
 
 Result = TypeVar("Result")
@@ -35,6 +37,33 @@ class StudyProgress(Protocol):
 
 
 @dataclass(frozen=True)
+class PlanningSetup:
+    """What a process needs to make domain and planner again."""
+
+    domain: str
+    preset: str
+    planner: str
+    approach: Approach
+
+    def make_domain(self) -> Domain:
+        """The domain under its preset.
+
+        Raises:
+            UnknownDomainError: It is not registered.
+            InvalidParameterError: It has no such preset or setting.
+        """
+        return get_domain(self.domain, self.preset)
+
+    def make_planner(self, domain: Domain, state: State) -> Planner:
+        """A planner for tasks with the objects of a state.
+
+        Raises:
+            InvalidParameterError: There is no such planner, or it cannot use shortcuts.
+        """
+        return self.approach.planner(self.planner, domain, state)
+
+
+@dataclass(frozen=True)
 class ApproachResult:
     """One approach on all tasks of an experiment."""
 
@@ -42,7 +71,7 @@ class ApproachResult:
     trials: tuple[Trial, ...]  # by seed and index
 
     def as_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """The summary and every trial, for a report's JSON."""
         return {**self.summary.as_row(), "trials": [asdict(trial) for trial in self.trials]}
 
 
@@ -53,10 +82,10 @@ class Comparison:
     Args:
         domain: Whose tasks.
         approaches: Ways to plan, pure planning first.
-        tasks: How many of each seed.
-        seeds: How many, from 0 on.
-        jobs: Processes.
-        planner: By name.
+        tasks: Number of tasks per seed.
+        seeds: Number of seeds, from 0 on.
+        jobs: Number of processes.
+        planner: Name of the planner: lazy, exhaustive or ff.
     """
 
     domain: Domain
@@ -76,11 +105,11 @@ class Comparison:
 
     @property
     def experiment(self) -> Experiment:
-        """Which tasks."""
+        """The tasks to be solved, and how."""
         return Experiment(self.domain, self.tasks, self.seeds, planner=self.planner)
 
     def measure(self, progress: StudyProgress) -> tuple[ApproachResult, ...]:
-        """Solve every task in every way; one that is not solved counts as failed."""
+        """Solve every task with every approach; one that is not solved counts as failed."""
         experiment = self.experiment
         measured: list[ApproachResult] = []
         progress.begin(self.domain.preset, len(experiment) * len(self.approaches))
@@ -102,26 +131,38 @@ class Comparison:
     def map_jobs(
         self, function: Callable[..., Result], approach: Approach, jobs: Sequence[tuple[Any, ...]]
     ) -> Iterator[tuple[int, Result]]:
-        """Number and outcome of each job, as they end.
+        """Run jobs in processes; every approach has processes of its own, as in :func:`run_all`.
 
-        Every job is given what makes domain and planner anew, then its own arguments. Every
-        approach has processes of its own, as in :func:`run_all`.
+        Args:
+            function: Does a job; called with a :class:`PlanningSetup`, then the job's arguments.
+            approach: How its planner plans.
+            jobs: Arguments of each job.
+
+        Yields:
+            Number and result of each job, in the order in which they end.
         """
-        common = (self.domain.name, self.domain.preset, self.planner, approach)
+        setup = PlanningSetup(self.domain.name, self.domain.preset, self.planner, approach)
         with local_workers(self.jobs) as workers:
-            yield from workers.run(function, [(*common, *job) for job in jobs])
+            yield from workers.run(function, [(setup, *job) for job in jobs])
 
 
 def complaint(approach: Approach, seed: int, index: int, reason: str) -> str:
-    """A task that was not solved, in words."""
+    """A line about a task that was not solved.
+
+    Args:
+        approach: Which did not solve it.
+        seed: Of the task.
+        index: Number of the task among its seed's.
+        reason: Why not.
+    """
     return f"{approach.name}: seed {seed}, task {index} not solved: {reason}"
 
 
 def spread_of(values: Sequence[float]) -> Spread | None:
-    """The spread of values, if there are any."""
+    """The spread of values; None where there are none."""
     return Spread.of(values) if values else None
 
 
 def format_spread(spread: Spread | None, digits: int) -> str:
-    """Mean ± sample standard deviation, for a table."""
+    """Mean ± sample standard deviation with so many digits, for a table; a dash for None."""
     return "-" if spread is None else f"{spread.mean:.{digits}f} ± {spread.sd:.{digits}f}"

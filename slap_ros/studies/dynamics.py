@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-ROWS = 6  # of the table, a shortcut: the first time, the last, and some between
+ROWS = 6  # of the table, per shortcut: the first time, the last, and some between
 THOUSAND = 1000.0
 MEASURED = """\
 What training writes down while it learns a shortcut: the part of recent episodes that ended in
@@ -32,14 +32,14 @@ standard deviation."""
 
 @dataclass(frozen=True)
 class AveragedPoint:
-    """How trainings of the same shortcut stood after as many environment steps."""
+    """Success and length in trainings of one shortcut after so many environment steps."""
 
     steps: int
     success: Spread
     length: Spread | None  # None where no episode succeeded
 
     def as_json(self) -> dict[str, Any]:
-        """Plain data, flat."""
+        """Steps, and mean and deviation of success and length, without nesting."""
         length = asdict(self.length) if self.length else {"mean": None, "sd": None}
         return {
             "steps": self.steps,
@@ -58,7 +58,7 @@ class LearningDynamics:
     stages: tuple[int, ...]  # where each but the first begins, in environment steps
 
     def as_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """The averaged curve, for the report's JSON."""
         return {
             "shortcut": self.shortcut,
             "trainings": self.trainings,
@@ -127,7 +127,7 @@ def _together(curves: Sequence[LearningCurve]) -> LearningDynamics:
 
 
 def draw(figure: Figure, learned: Sequence[LearningDynamics]) -> None:
-    """Success above, length below, a line a shortcut."""
+    """Draw success above, length below, one line per shortcut."""
     above, below = figure.subplots(2, 1, sharex=True)
     for number, one in enumerate(learned):
         colour, dashes = LINES[number % len(LINES)], ("-", "--")[number // len(LINES) % 2]

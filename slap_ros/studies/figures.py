@@ -46,7 +46,7 @@ LINES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 
 @dataclass(frozen=True)
 class ApproachStyle:
-    """How an approach is drawn: told apart by colour and by shape."""
+    """How an approach is drawn: approaches differ in colour and in shape."""
 
     label: str
     colour: str
@@ -96,7 +96,14 @@ def picture(draw: Callable[[Figure], None], size: Size) -> str:
 def plot_spreads(
     axes: Axes, places: Sequence[float], spreads: Sequence[Spread | None], approach: str
 ) -> None:
-    """Means joined by a line, with a bar of one standard deviation each; where there is one."""
+    """Draw means joined by a line, each with a bar of one standard deviation.
+
+    Args:
+        axes: To draw into.
+        places: Horizontal coordinates.
+        spreads: One per place; None where there is nothing to draw.
+        approach: Name of the approach, which gives colour and marker.
+    """
     known = [(x, spread) for x, spread in zip(places, spreads, strict=True) if spread is not None]
     axes.errorbar(
         [x for x, _ in known],
@@ -111,7 +118,14 @@ def plot_spreads(
 def plot_values(
     axes: Axes, places: Sequence[float], values: Sequence[float], approach: str
 ) -> None:
-    """Values joined by a line."""
+    """Draw values joined by a line.
+
+    Args:
+        axes: To draw into.
+        places: Horizontal coordinates.
+        values: One per place.
+        approach: Name of the approach, which gives colour and marker.
+    """
     axes.plot(places, values, **_pen(approach))
 
 
@@ -136,5 +150,12 @@ def legend_above(figure: Figure, axes: Axes) -> None:
 
 
 def dodged(places: Sequence[float], number: int, count: int, apart: float = 0.1) -> list[float]:
-    """Places of the ``number``-th of ``count`` series, beside each other where they would meet."""
+    """Places of one of several series, moved so that their markers do not cover each other.
+
+    Args:
+        places: Horizontal coordinates that the series share.
+        number: Which of the series, from 0.
+        count: How many series there are.
+        apart: Between neighbouring series, in the unit of ``places``.
+    """
     return [place + (number - (count - 1) / 2) * apart for place in places]

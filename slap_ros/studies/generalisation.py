@@ -24,7 +24,7 @@ UNCHANGED = "unchanged"
 MEASURED = """\
 Pure planning and SLAP solve the same tasks, planned and executed in the world, while one setting
 varies and all others stay as in the preset; under *unchanged*, all do. The library is always the
-same one and nothing is trained anew. Length is the number of environment steps executed, mean ±
+same one and nothing is trained again. Length is the number of environment steps executed, mean ±
 sample standard deviation over the solved tasks; relative length is the mean over that of pure
 planning, on tasks that both solved. A task for which no plan is found counts as failed."""
 
@@ -36,10 +36,10 @@ class StudyCondition:
     setting: str | None
     value: str | None
     preset: str
-    measured: tuple[ApproachResult, ...]  # an approach each
+    measured: tuple[ApproachResult, ...]  # one per approach
 
     def as_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """The setting, its value and every trial, for the report's JSON."""
         return {
             "setting": self.setting,
             "value": self.value,
@@ -48,7 +48,7 @@ class StudyCondition:
         }
 
     def as_rows(self) -> Iterator[list[str]]:
-        """Rows of a table, one an approach."""
+        """Rows of a table, one per approach."""
         where = UNCHANGED if self.setting is None else f"{self.setting} {self.value}"
         for one in self.measured:
             summary = one.summary
@@ -66,6 +66,14 @@ def study(
     comparison: Comparison, variations: Sequence[Variation], progress: StudyProgress
 ) -> StudyReport:
     """Measure under every value of every setting.
+
+    Args:
+        comparison: Approaches, and the tasks that they solve.
+        variations: Settings and their values.
+        progress: Is called as tasks end.
+
+    Returns:
+        The report.
 
     Raises:
         InvalidParameterError: The domain has no such setting, or it cannot have that value.
@@ -98,7 +106,13 @@ def study(
 def draw(
     figure: Figure, conditions: Sequence[StudyCondition], variations: Sequence[Variation]
 ) -> None:
-    """A column a setting: success above, length below; first, apart, the unchanged preset."""
+    """Draw one column per setting: success above, length below.
+
+    Args:
+        figure: To draw into.
+        conditions: The unchanged preset, which is at the left of every column, then the others.
+        variations: The settings, in the order of columns.
+    """
     unchanged, *others = conditions
     grid = figure.subplots(
         2, len(variations), squeeze=False, sharex="col", sharey="row", height_ratios=(1, 2.4)

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from slap_ros.core import Domain, Task
-from slap_ros.domains import get_domain
 from slap_ros.drawing.palette import MUTED
 from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.evaluation.approaches import Approach
@@ -27,7 +26,13 @@ from slap_ros.planning.abstract_graph import build_abstract_graph
 from slap_ros.planning.planner import Problem
 from slap_ros.relational import AtomSpace, GroundAtom
 from slap_ros.shortcuts.workers import in_order
-from slap_ros.studies.comparison import Comparison, StudyProgress, complaint, format_spread
+from slap_ros.studies.comparison import (
+    Comparison,
+    PlanningSetup,
+    StudyProgress,
+    complaint,
+    format_spread,
+)
 from slap_ros.studies.figures import APPROACH_STYLES, label
 from slap_ros.studies.results import MarkdownTable, StudyReport
 
@@ -56,6 +61,12 @@ def sample_goals(domain: Domain, task: Task, count: int, rng: np.random.Generato
     Nodes of the abstract graph, which ends where the task's own goal first holds, are taken in
     random order, each giving a goal that is not there yet, and again until there are ``count`` or
     no node has another.
+
+    Args:
+        domain: The task's.
+        task: Its initial state is where goals are reached from.
+        count: How many goals at most.
+        rng: Chooses nodes and atoms.
 
     Raises:
         UnsolvableError: Operators cannot reach the task's own goal.
@@ -102,7 +113,15 @@ class GoalTrials:
 
 
 def study(comparison: Comparison, count: int, progress: StudyProgress) -> StudyReport:
-    """Sample ``count`` goals for each task and solve them all in every way.
+    """Sample goals for each task and solve them all with every approach.
+
+    Args:
+        comparison: Approaches, and the tasks whose goals are replaced.
+        count: Goals per task, fewer where a task has fewer.
+        progress: Is called as goals are solved.
+
+    Returns:
+        The report.
 
     Raises:
         UnsolvableError: No task has any goal that operators can reach.
@@ -175,21 +194,15 @@ def _solve_all(
     return in_order(ended)
 
 
-def _solve(
-    domain: str,
-    preset: str,
-    planner: str,
-    approach: Approach,
-    seed: int,
-    index: int,
-    goal: NamedGoal,
-) -> Trial:
-    """One task with another goal; the domain is made anew where this runs."""
-    chosen = get_domain(domain, preset)
+def _solve(setup: PlanningSetup, seed: int, index: int, goal: NamedGoal) -> Trial:
+    """One task with another goal; the domain is made where this runs."""
+    chosen = setup.make_domain()
     task = chosen.task(seed, index)
     space = chosen.atom_space(task.initial_state)
     atoms = frozenset(space.atom(predicate, objects) for predicate, objects in goal)
-    return Trial.of(seed, index, solve(chosen, replace(task, goal=atoms), approach, planner))
+    return Trial.of(
+        seed, index, solve(chosen, replace(task, goal=atoms), setup.approach, setup.planner)
+    )
 
 
 def _as_json(outcome: GoalTrials, names: Sequence[str]) -> dict[str, Any]:

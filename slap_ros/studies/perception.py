@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What noise in perception does to success, length and replanning (SLAP D.3, D.4).
 
-Poses, thresholds and sightings are disturbed anew in each step. Plans begin from what is seen and
-are watched by it; whether a task is solved is asked of the world.
+Poses, thresholds and sightings are disturbed in each step independently. Plans begin from what is
+perceived and are monitored by it; whether a task is solved is decided in the world.
 """
 
 from __future__ import annotations
@@ -15,13 +15,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from slap_ros.domains import get_domain
-from slap_ros.evaluation.approaches import Approach
 from slap_ros.evaluation.summary import Spread
 from slap_ros.perception import NoisyPerceiver, Quality
 from slap_ros.planning.execution import Executor
 from slap_ros.studies.comparison import (
     Comparison,
+    PlanningSetup,
     StudyProgress,
     complaint,
     format_spread,
@@ -80,7 +79,7 @@ NOISE_KINDS = (
 
 @dataclass(frozen=True)
 class NoisyTrial:
-    """What came of one task."""
+    """What came of one task under noisy perception."""
 
     seed: int
     index: int
@@ -109,16 +108,16 @@ class NoiseLevel:
 
     @property
     def length(self) -> Spread | None:
-        """Environment steps of solved tasks."""
+        """The number of environment steps, over solved tasks."""
         return spread_of([float(one.plan_length) for one in self.trials if one.success])
 
     @property
     def replans(self) -> Spread:
-        """Of all tasks."""
+        """The number of replans, over all tasks."""
         return Spread.of([float(one.replans) for one in self.trials])
 
     def as_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """The noise, the summary and every trial, for the report's JSON."""
         return {
             "kind": self.kind,
             "value": self.value,
@@ -143,7 +142,16 @@ class NoiseLevel:
 
 
 def study(comparison: Comparison, max_replans: int, progress: StudyProgress) -> StudyReport:
-    """Measure at every level of every kind of noise."""
+    """Measure at every level of every kind of noise.
+
+    Args:
+        comparison: Approaches, and the tasks that they solve.
+        max_replans: Plans that a task may take after the first.
+        progress: Is called as tasks end.
+
+    Returns:
+        The report.
+    """
     planned = [(EXACT, EXACT, Quality())]
     planned += [
         (kind.name, value, quality) for kind in NOISE_KINDS for value, quality in kind.levels
@@ -190,17 +198,21 @@ def _measure(
 
 
 def solve_perceived(
-    domain: str,
-    preset: str,
-    planner: str,
-    approach: Approach,
-    quality: Quality,
-    max_replans: int,
-    seed: int,
-    index: int,
+    setup: PlanningSetup, quality: Quality, max_replans: int, seed: int, index: int
 ) -> NoisyTrial:
-    """Solve one task as it is perceived; the domain is made anew where this runs."""
-    chosen = get_domain(domain, preset)
+    """Solve one task as it is perceived.
+
+    Args:
+        setup: Makes domain and planner, in the process where this runs.
+        quality: How well is perceived.
+        max_replans: Plans after the first.
+        seed: Of the task, and with ``index`` of the noise.
+        index: Number of the task among its seed's.
+
+    Returns:
+        What came of it, in the world and in the planner's belief.
+    """
+    chosen = setup.make_domain()
     task = chosen.task(seed, index)
     initial = task.initial_state
     space, world = chosen.atom_space(initial), chosen.make_world(initial)
@@ -208,7 +220,7 @@ def solve_perceived(
     rng = np.random.default_rng([seed, index])
     episode = Executor(
         chosen,
-        approach.planner(planner, chosen, initial),
+        setup.make_planner(chosen, initial),
         world,
         space,
         goal,
@@ -232,7 +244,7 @@ def solve_perceived(
 
 
 def draw(figure: Figure, levels: Sequence[NoiseLevel]) -> None:
-    """A column a kind of noise: success, length, replans; first, apart, exact perception."""
+    """Draw one column per kind of noise: success, length, replans; at its left exact perception."""
     exact = [one for one in levels if one.kind == EXACT]
     grid = figure.subplots(
         3, len(NOISE_KINDS), squeeze=False, sharex="col", sharey="row", height_ratios=(1, 1.6, 1.2)

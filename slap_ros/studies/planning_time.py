@@ -13,12 +13,11 @@ from statistics import fmean
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from slap_ros.domains import get_domain
 from slap_ros.errors import PlanningLimitError, UnsolvableError
-from slap_ros.evaluation.approaches import Approach
 from slap_ros.evaluation.summary import Spread
 from slap_ros.studies.comparison import (
     Comparison,
+    PlanningSetup,
     StudyProgress,
     complaint,
     format_spread,
@@ -74,15 +73,15 @@ class PlanningCost:
 
     @property
     def seconds(self) -> Spread:
-        """Of planning."""
+        """Seconds of planning, over all tasks."""
         return Spread.of([one.seconds for one in self.planned])
 
     def spread(self, quantity: str) -> Spread | None:
-        """Of one of the fields of :class:`PlanningTrial`, over plans found."""
+        """The spread of a field of :class:`PlanningTrial`, over plans found; None without any."""
         return spread_of([float(getattr(one, quantity)) for one in self.planned if one.success])
 
     def as_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """The summary and every trial, for the report's JSON."""
         quantities = {name: self.spread(name) for name in QUANTITIES}
         return {
             "value": self.value,
@@ -99,6 +98,14 @@ QUANTITIES = ("edges_rolled_out", "graph_nodes", "graph_edges", "predicted_steps
 
 def study(comparison: Comparison, variation: Variation, progress: StudyProgress) -> StudyReport:
     """Plan under every value of a setting.
+
+    Args:
+        comparison: Approaches, and the tasks that they plan for.
+        variation: The setting and its values.
+        progress: Is called as tasks end.
+
+    Returns:
+        The report.
 
     Raises:
         InvalidParameterError: The domain has no such setting, or it cannot have that value.
@@ -135,15 +142,22 @@ def _measure(value: str, comparison: Comparison, progress: StudyProgress) -> Ite
         yield PlanningCost(value, approach.name, tuple(planned))
 
 
-def plan_once(
-    domain: str, preset: str, planner: str, approach: Approach, seed: int, index: int
-) -> PlanningTrial:
-    """Plan for one task; the domain is made anew where this runs."""
-    chosen = get_domain(domain, preset)
+def plan_once(setup: PlanningSetup, seed: int, index: int) -> PlanningTrial:
+    """Plan for one task.
+
+    Args:
+        setup: Makes domain and planner, in the process where this runs.
+        seed: Of the task.
+        index: Number of the task among its seed's.
+
+    Returns:
+        What planning took, whether or not it found a plan.
+    """
+    chosen = setup.make_domain()
     task = chosen.task(seed, index)
     state = task.initial_state
     goal = chosen.atom_space(state).mask(task.goal)
-    planning = approach.planner(planner, chosen, state)
+    planning = setup.make_planner(chosen, state)
     began = perf_counter()
     try:
         result = planning.plan(state, goal)
@@ -187,7 +201,13 @@ def _table(variation: Variation, costs: Sequence[PlanningCost]) -> MarkdownTable
 
 
 def draw(figure: Figure, variation: Variation, costs: Sequence[PlanningCost]) -> None:
-    """Seconds, edges rolled out and the graph's edges beside each other, by the setting's value."""
+    """Draw seconds, edges rolled out and edges of the graph beside each other.
+
+    Args:
+        figure: To draw into.
+        variation: The setting on the horizontal axes.
+        costs: One per value of the setting and approach.
+    """
     panels = figure.subplots(1, 3)
     places = range(len(variation.values))
     names = list(dict.fromkeys(cost.approach for cost in costs))

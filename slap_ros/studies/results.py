@@ -17,12 +17,12 @@ from slap_ros.versions import versions
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Data = Mapping[str, Any]  # plain: what JSON can say
+Data = Mapping[str, Any]  # numbers, text, lists and mappings of these, as JSON has them
 
 
 @dataclass(frozen=True)
 class MarkdownTable:
-    """A table of a page; every row has an entry a column."""
+    """A table of a page; every row has one entry per column."""
 
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
@@ -43,7 +43,7 @@ class StudyReport:
         title: Of the page.
         measured: What the numbers are, and whatever must be known to read them; Markdown.
         table: The numbers.
-        found: The numbers in full, plain data.
+        found: The numbers in full, as JSON has them.
         draw: Draws the picture.
         size: Of the picture.
     """
@@ -65,7 +65,7 @@ class Provenance:
     Args:
         domain: Name of the domain.
         command: That makes it again.
-        settings: What else it depends on, plain data.
+        settings: What else it depends on, as JSON has it.
     """
 
     domain: str
@@ -73,7 +73,7 @@ class Provenance:
     settings: Data
 
     def as_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Domain, settings, command and versions, for the report's JSON."""
         return {
             "domain": self.domain,
             **self.settings,
@@ -83,7 +83,16 @@ class Provenance:
 
 
 def write(folder: Path, report: StudyReport, origin: Provenance) -> list[Path]:
-    """Write a report's files, in place of those of an earlier one. Returns where they are."""
+    """Write a report's files, in place of those of an earlier one.
+
+    Args:
+        folder: Where to; it is made if need be.
+        report: What to write.
+        origin: From what it was made.
+
+    Returns:
+        The files: JSON, SVG and Markdown.
+    """
     name = f"{report.study}_{origin.domain}"
     data = {
         "study": report.study,

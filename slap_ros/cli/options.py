@@ -1,0 +1,82 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Options that several commands have, and commands that take a dataclass of options."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import MISSING, fields, is_dataclass
+from functools import wraps
+from inspect import Parameter, signature
+from typing import Annotated, Any, TypeVar, get_type_hints
+
+import typer
+
+R = TypeVar("R")
+
+DomainName = Annotated[str, typer.Argument(help="One of `slap domains`.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
+Preset = Annotated[
+    str, typer.Option(help="fair: random tasks; paper: the start states of the paper's code.")
+]
+Planner = Annotated[
+    str, typer.Option(help="lazy, exhaustive (the paper's) or ff (greedy best-first, SLAP D.2).")
+]
+Seed = Annotated[int, typer.Option(min=0, help="Samples the task.")]
+Index = Annotated[int, typer.Option(min=0, help="Which of the seed's tasks.")]
+Goal = Annotated[
+    str | None,
+    typer.Option(help="Another goal, e.g. '(and (On block2 target) (GripperEmpty robot))'."),
+]
+Jobs = Annotated[int, typer.Option(min=1, help="Processes; the results are the same.")]
+
+
+def flat_options(command: Callable[..., R]) -> Callable[..., R]:
+    """Let a command take dataclasses: each of their fields is an option of the command line.
+
+    Typer reads the options of a command from its signature. So a dataclass states options once
+    for several commands, with their defaults, and refuses in its ``__post_init__`` what cannot be.
+
+    Args:
+        command: Some of its parameters are annotated with a dataclass whose fields are annotated
+            as Typer has it.
+
+    Returns:
+        The command with the fields of its dataclasses as keyword arguments.
+    """
+    groups: dict[str, Any] = {}
+    parameters = []
+    hints = get_type_hints(command, include_extras=True)
+    for name, parameter in signature(command).parameters.items():
+        if is_dataclass(hints[name]):
+            groups[name] = hints[name]
+            parameters += _parameters_of(hints[name])
+        else:
+            parameters.append(
+                parameter.replace(annotation=hints[name], kind=Parameter.KEYWORD_ONLY)
+            )
+
+    @wraps(command)
+    def run(**given: Any) -> R:
+        for name, kind in groups.items():
+            given[name] = kind(**{field.name: given.pop(field.name) for field in fields(kind)})
+        return command(**given)
+
+    # Typer looks at both; what `wraps` has copied are those of the command.
+    flat = signature(command).replace(parameters=parameters, return_annotation=hints["return"])
+    run.__signature__ = flat  # type: ignore[attr-defined]
+    run.__annotations__ = {one.name: one.annotation for one in parameters}
+    return run
+
+
+def _parameters_of(kind: Any) -> list[Parameter]:
+    hints = get_type_hints(kind, include_extras=True)
+    return [
+        Parameter(
+            field.name,
+            Parameter.KEYWORD_ONLY,
+            default=Parameter.empty if field.default is MISSING else field.default,
+            annotation=hints[field.name],
+        )
+        for field in fields(kind)
+    ]
