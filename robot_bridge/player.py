@@ -29,7 +29,6 @@ from slap_ros.errors import (
     ControllerAbortedError,
     ControllerTimeoutError,
     InvalidStateError,
-    NoDetectionError,
     NoJointStateError,
     SlapError,
     StartMismatchError,
@@ -148,10 +147,7 @@ class Player(Node):
             raise NoJointStateError(f"no joint positions {when}")
         if reasons:
             raise reasons[-1]
-        missing = (
-            ", ".join(self._robot.world.undetected(since_s)) or "none at all, but too few times"
-        )
-        raise NoDetectionError(f"not detected {when}: {missing}")
+        raise self._robot.no_detection(since_s, when)
 
     # -- motions --------------------------------------------------------------------------------
 

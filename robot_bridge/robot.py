@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A robot as a node moves it: the cell it stands in, its senses and its controllers."""
+"""A robot as a node moves it: the world it stands in, its sensors and its controllers."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,12 +16,12 @@ from ensemble.robot_parameters import RobotParameters, action_name
 from robot_bridge.controllers import Controllers
 from robot_bridge.sensors import Sensors
 from slap_ros.core import Domain
-from slap_ros.errors import NoJointStateError
+from slap_ros.errors import NoDetectionError, NoJointStateError
 from slap_ros.relational import State
-from slap_ros.robot.robot_world import RobotWorld
+from slap_ros.robot.robot_world import GAP_OPEN, GAP_SHUT, GripperAction, RobotWorld
 from slap_ros.robot.scene_config import read_scene_config, sampled_scene_config
 
-GAP_AGE = 0.1  # s, by which told finger positions may be older than their stamp: drivers merge them
+GAP_AGE = 0.1  # s, by which finger positions may be older than their stamp: drivers merge them
 
 
 class Robot:
@@ -62,6 +63,38 @@ class Robot:
         self.controllers.hold()
         self.controllers.destroy()
         self.world.close()
+
+    def require_joints(self, since_s: float = -math.inf) -> None:
+        """Refuse to go on without news of where the joints are.
+
+        Args:
+            since_s: When news were asked for; s, the node's time.
+
+        Raises:
+            NoJointStateError: There were none for ``joint_timeout``.
+        """
+        silence = node_time_s(self._node) - max(self.world.newest_joints_s, since_s)
+        if silence > self._settings.joint_timeout:
+            raise NoJointStateError(f"no joint positions for {silence:.1f} s")
+
+    def no_detection(self, since_s: float, when: str) -> NoDetectionError:
+        """The error that names what was not detected since then."""
+        missing = ", ".join(self.world.undetected(since_s)) or "none at all, but too few times"
+        return NoDetectionError(f"not detected {when}: {missing}")
+
+    async def actuate_gripper(self, action: GripperAction) -> None:
+        """Close the fingers around what the world expects there, or open them.
+
+        Raises:
+            SlapError: As :meth:`move_fingers`.
+        """
+        if action is GripperAction.CLOSE:
+            gap = await self.move_fingers(GAP_SHUT)
+            if self.world.confirm_grasp(gap):
+                return
+        if action is not GripperAction.KEEP:  # to be opened, or closed around nothing
+            await self.move_fingers(GAP_OPEN)
+            self.world.confirm_release()
 
     async def move_fingers(self, gap: float) -> float:
         """Move the fingers to ``gap`` m, or until they stall; the gap in m at which they stand.

@@ -1,0 +1,192 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What every node in the world's place does: one step per command, episodes, refusals.
+
+The simulator and the robot bridge are such nodes. Each decides how a command becomes a state; when
+it has one, it publishes it with :meth:`LockstepWorld._publish_step`, and only then is the next
+command accepted.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections import Counter
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+from builtin_interfaces.msg import Time
+from rclpy.node import Node
+from slap_msgs.msg import RobotCommand
+from slap_msgs.srv import ResetTask
+
+from ensemble import encode
+from ensemble.diagnostics import DiagnosticsPublisher
+from ensemble.interfaces import COMMAND, DOMAIN, RESET_TASK, STATE, TASK, VOLATILE
+from ensemble.parameters import parameter, read_parameters
+from slap_ros.core import Action, Task
+from slap_ros.domains import get_domain
+from slap_ros.errors import (
+    ErrorCode,
+    InvalidCommandError,
+    SlapError,
+    StaleCommandError,
+    UnsafeCommandError,
+)
+from slap_ros.messages.decode import decode_command
+from slap_ros.relational import State
+
+UNSAMPLED = -1  # seed of a task that was given or measured, not sampled
+REFUSALS = {  # what is counted, by the error that refuses a command
+    StaleCommandError: "stale_commands",
+    InvalidCommandError: "invalid_commands",
+    UnsafeCommandError: "unsafe_commands",
+}
+
+
+@dataclass(frozen=True)
+class WorldParameters:
+    """Which domain runs, and its first task."""
+
+    domain: str = parameter("obstacle2d", "which domain")
+    preset: str = parameter("fair", "fair: random tasks; paper: the paper's start states")
+    seed: int = parameter(0, "samples the first task")
+    index: int = parameter(0, "which of the seed's tasks")
+
+
+P = TypeVar("P", bound=WorldParameters)
+
+
+class LockstepWorld(Node, ABC, Generic[P]):
+    """A node that takes one step per command.
+
+    A subclass calls :meth:`_publish_domain` when it is ready, and :meth:`_open_episode` when it has
+    a first state.
+    """
+
+    def __init__(self, name: str, parameters: type[P], counted: tuple[str, ...], **kwargs: Any):
+        """Read the parameters and open the topics.
+
+        Args:
+            name: The node's.
+            parameters: The dataclass of its parameters.
+            counted: What its diagnostics count besides steps, stale and invalid commands.
+            kwargs: The node's.
+
+        Raises:
+            UnknownDomainError: There is no such domain.
+            InvalidParameterError: The domain has no such preset.
+        """
+        super().__init__(name, **kwargs)
+        self._settings = read_parameters(self, parameters)
+        self._domain = get_domain(self._settings.domain, self._settings.preset)
+        self._episode = 0
+        self._step = 0
+        kinds = ("steps", "stale_commands", "invalid_commands", *counted)
+        self._counts: Counter[str] = Counter(dict.fromkeys(kinds, 0))
+        self._domains = self.create_publisher(DOMAIN.type, DOMAIN.name, DOMAIN.qos)
+        self._tasks = self.create_publisher(TASK.type, TASK.name, TASK.qos)
+        self._states = self.create_publisher(STATE.type, STATE.name, STATE.qos)
+        # Volatile: commands from before this node started answer another world's states.
+        self.create_subscription(COMMAND.type, COMMAND.name, self._on_command, VOLATILE)
+        self.create_service(RESET_TASK.type, RESET_TASK.name, self._on_reset)
+        DiagnosticsPublisher(self, self._diagnostics)
+
+    # -- what each world does its own way -------------------------------------------------------
+
+    @abstractmethod
+    def _apply(self, action: Action) -> None:
+        """Begin a step.
+
+        Raises:
+            InvalidCommandError: The action is not in the domain's action space.
+            UnsafeCommandError: A real arm must not execute it.
+        """
+
+    @abstractmethod
+    def _reset(self, request: ResetTask.Request) -> None:
+        """Open the episode that is asked for.
+
+        Raises:
+            SlapError: It cannot be opened; the current one goes on.
+        """
+
+    @abstractmethod
+    def _occupation(self) -> str:
+        """What the world waits for, for messages; empty when that is a command."""
+
+    @abstractmethod
+    def _show(self, state: State, stamp: Time) -> None:
+        """Publish a state for people to look at."""
+
+    def _diagnostics(self) -> dict[str, object]:
+        return {**self._counts, "episode": self._episode}
+
+    # -- commands and steps ---------------------------------------------------------------------
+
+    def _on_command(self, message: RobotCommand) -> None:
+        try:
+            self._require_current(message)
+            self._apply(decode_command(message))
+        except tuple(REFUSALS) as error:
+            self._refuse(error)
+
+    def _require_current(self, message: RobotCommand) -> None:
+        """Refuse a command that does not answer the current state, or not as the first one."""
+        occupation = self._occupation()
+        if occupation or (message.episode, message.step) != (self._episode, self._step):
+            raise StaleCommandError(
+                f"command for episode {message.episode}, step {message.step} refused: "
+                f"the world is at episode {self._episode}, step {self._step}"
+                f"{occupation and ', '}{occupation}"
+            )
+
+    def _refuse(self, error: SlapError) -> None:
+        kind = REFUSALS[type(error)]
+        self._counts[kind] += 1
+        self.get_logger().warning(f"{error} ({self._counts[kind]} {kind.replace('_', ' ')})")
+
+    def _publish_step(self, state: State) -> None:
+        """Publish the state after a step; from now on a command that answers it is accepted."""
+        self._step += 1
+        self._counts["steps"] += 1
+        now = self._now()
+        self._states.publish(encode.state(state, self._episode, self._step, now))
+        self._show(state, now)  # after the state: the other nodes are at work meanwhile
+
+    # -- episodes -------------------------------------------------------------------------------
+
+    def _publish_domain(self) -> None:
+        self._domains.publish(encode.domain_info(self._domain, self._now()))
+
+    def _open_episode(self, task: Task, seed: int, index: int) -> None:
+        """Publish a task and its initial state, as step 0 of a new episode.
+
+        Args:
+            task: What is to be solved.
+            seed: What sampled it, or ``UNSAMPLED``.
+            index: Which of the seed's tasks it is.
+        """
+        self._episode += 1
+        self._step = 0
+        now = self._now()
+        message = encode.task(task, self._domain, self._episode, seed, index, now)
+        self._tasks.publish(message)
+        self._states.publish(message.initial_state)
+        self._show(task.initial_state, now)
+        origin = "not sampled" if seed == UNSAMPLED else f"seed {seed}"
+        self.get_logger().info(f"episode {self._episode}: {self._domain.name}, {origin}")
+
+    def _on_reset(
+        self, request: ResetTask.Request, response: ResetTask.Response
+    ) -> ResetTask.Response:
+        try:
+            self._reset(request)
+        except SlapError as error:
+            response.error_code, response.error_msg = int(error.code), str(error)
+        else:
+            response.error_code = int(ErrorCode.NONE)
+        response.episode = self._episode
+        return response
+
+    def _now(self) -> Time:
+        return self.get_clock().now().to_msg()
