@@ -151,11 +151,11 @@ def plan(
     episode: int,
     number: int,
     stamp: Time,
-    origin: Mapping[str, str | int],
+    provenance: Mapping[str, str | int],
 ) -> msgs.Plan:
-    """The ``number``-th plan of a run; ``origin``: what made it, as the message has it."""
+    """The ``number``-th plan of a run; ``provenance``: what made it, as the message has it."""
     return msgs.Plan(
-        **origin,
+        **provenance,
         header=header(stamp),
         episode=episode,
         number=number,

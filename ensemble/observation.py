@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from slap_ros.core import Domain, Task
+from slap_ros.errors import EpisodeChangedError
 from slap_ros.messages.decode import stamp_ns
 from slap_ros.messages.protocols import StateMessage
 from slap_ros.relational import AtomSpace, State
@@ -66,3 +67,14 @@ class Observation:
     abstract: int
     missing: frozenset[str] = frozenset()
     exact: bool = True
+
+    def require_episode(self, number: int) -> None:
+        """Refuse a goal that is for another episode.
+
+        Raises:
+            EpisodeChangedError: It is.
+        """
+        if number != self.episode.number:
+            raise EpisodeChangedError(
+                f"goal for episode {number}, but episode {self.episode.number} is under way"
+            )

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The shortcuts that a node may use: parameters, loading, one repertoire an episode."""
+"""The shortcuts that a node may use: parameters, loading, those grounded in an episode."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class ShortcutProvider:
         self._libraries: dict[str, Library | None] = {}  # by domain
         self._made: tuple[Episode, Repertoire] | None = None
 
-    def open(self, episode: Episode) -> None:
+    def load(self, episode: Episode) -> None:
         """Load the library of an episode's domain, once.
 
         Raises:
@@ -65,13 +65,13 @@ class ShortcutProvider:
         library = self._libraries.get(domain.name)
         return library.shortcuts if library is not None else ()
 
-    def origin(self, domain: Domain) -> dict[str, str | int]:
+    def provenance(self, domain: Domain) -> dict[str, str | int]:
         """Which library is used and how, as a plan's message has it."""
         library = self._libraries.get(domain.name)
         digest = library.digest if library is not None else ""
         return {"library": digest, "samples": self.sampling.samples}
 
-    def of(self, episode: Episode) -> Repertoire | None:
+    def grounded(self, episode: Episode) -> Repertoire | None:
         """What there is in an episode; None without shortcuts.
 
         It has a world of its own, so make it in the worker thread that uses it.

@@ -13,6 +13,7 @@ from ensemble.episode_tracker import EpisodeTracker, subscribe
 from ensemble.futures import node_time_s, wait_until
 from ensemble.interfaces import ATOMS, STATE
 from ensemble.observation import Episode, Observation
+from slap_ros.errors import SlapError
 from slap_ros.messages.decode import decode_atoms, decode_seen, decode_state, stamp_ns
 
 
@@ -41,10 +42,20 @@ class StateSynchronizer:
         """The current episode, once known."""
         return self._episodes.current
 
-    async def wait(self, episode: int, timeout_s: float) -> Observation | None:
+    async def observe(
+        self, episode: int, timeout_s: float, missing: type[SlapError]
+    ) -> Observation:
         """The newest observation, waited for until there is one of this episode or a later one.
 
-        After ``timeout_s`` of the node's time, whatever there is.
+        Whoever has just reset the world may know of the new episode before this node does.
+
+        Args:
+            episode: The number of the episode; 0: any.
+            timeout_s: How long to wait, s of the node's time.
+            missing: The error to raise where no such observation comes in time.
+
+        Raises:
+            SlapError: ``missing``.
         """
         deadline = node_time_s(self._node) + timeout_s
 
@@ -52,6 +63,11 @@ class StateSynchronizer:
             return self.latest is not None and self.latest.episode.number >= episode
 
         await wait_until(self._node, lambda: seen() or node_time_s(self._node) > deadline)
+        if self.latest is None or not seen():
+            raise missing(
+                f"no perceived state{f' of episode {episode}' if episode else ''} within "
+                f"{timeout_s} s: are sim_node (or robot_bridge) and perception_node running?"
+            )
         return self.latest
 
     def _open(self, episode: Episode) -> None:

@@ -21,7 +21,7 @@ Action servers:
     slap/solve_task (slap_msgs/SolveTask): solve an episode's task.
 
 Action clients:
-    slap/execute_skill (slap_msgs/ExecuteSkill): one goal for each edge of the plan.
+    slap/execute_skill (slap_msgs/ExecuteSkill): one goal per edge of the plan.
 """
 
 from __future__ import annotations
@@ -38,18 +38,17 @@ from slap_msgs.action import SolveTask
 
 from ensemble.diagnostics import DiagnosticsPublisher
 from ensemble.entry_point import run_node
-from ensemble.futures import node_time_s, run_in_executor
-from ensemble.interfaces import EXECUTE_SKILL, SKILL_EVENTS, SOLVE_TASK
-from ensemble.node_liveness import NodeLiveness
+from ensemble.futures import run_in_executor
+from ensemble.interfaces import EXECUTE_SKILL, SOLVE_TASK
 from ensemble.observation import Observation
 from ensemble.parameters import parameter, read_parameters
 from ensemble.shortcuts import ShortcutParameters, ShortcutProvider
 from ensemble.state_synchronizer import StateSynchronizer
 from planner_node.plan_publisher import PlanPublisher
+from planner_node.skill_server_watch import SkillServerWatch
 from planner_node.task_execution import TaskExecution
 from slap_ros.errors import (
     BusyError,
-    EpisodeChangedError,
     InvalidParameterError,
     NoTaskError,
     SlapError,
@@ -79,12 +78,12 @@ class PlannerNode(Node):
                 f"parameter planner must be one of {', '.join(PLANNERS)}, "
                 f"not {self._settings.planner!r}"
             )
-        self._repertoires = ShortcutProvider(self, self._settings, self._settings.planner)
+        self._shortcuts = ShortcutProvider(self, self._settings, self._settings.planner)
         self._busy = False
         self._counts = Counter(tried=0, solved=0)
         self._workers = ThreadPoolExecutor(1, thread_name_prefix="planning")
-        self._observer = StateSynchronizer(self, lambda _: None, self._repertoires.open)
-        self._reporter = PlanPublisher(self)
+        self._synchronizer = StateSynchronizer(self, lambda _: None, self._shortcuts.load)
+        self._publisher = PlanPublisher(self)
         self._skills = ActionClient(self, EXECUTE_SKILL.type, EXECUTE_SKILL.name)
         self._actions = ActionServer(
             self,
@@ -122,68 +121,38 @@ class PlannerNode(Node):
             raise BusyError("another task is being solved; cancel it first")
         self._busy = True
         try:
-            start = await self._observe(goal.request.episode)
-            solving = await self._prepare(goal, start)
-            return await solving.run()
+            episode, timeout_s = goal.request.episode, self._settings.observation_timeout
+            start = await self._synchronizer.observe(episode, timeout_s, NoTaskError)
+            if episode:
+                start.require_episode(episode)
+            execution = await self._prepare(goal, start)
+            return await execution.run()
         finally:
             self._busy = False
 
     async def _prepare(self, goal: ServerGoalHandle, start: Observation) -> TaskExecution:
-        episode = start.episode
+        episode, name = start.episode, self._settings.planner
         atoms = decode_goal(goal.request.goal, episode.space) or episode.task.goal
         planner = await run_in_executor(
             self._workers,
             lambda: make_planner(
-                self._settings.planner,
-                episode.domain,
-                start.state,
-                self._repertoires.of(episode),
+                name, episode.domain, start.state, self._shortcuts.grounded(episode)
             ),
         )
+        timeout_s = self._settings.server_timeout
         return TaskExecution(
-            self,
-            goal,
-            self._observer,
-            self._reporter,
-            self._skills,
-            self._skill_server_watch(),
-            self._workers,
-            planner,
-            {"planner": self._settings.planner, **self._repertoires.origin(episode.domain)},
-            episode.space.mask(atoms),
-            goal.request.step_limit or episode.task.step_limit,
+            node=self,
+            goal=goal,
+            synchronizer=self._synchronizer,
+            publisher=self._publisher,
+            skills=self._skills,
+            skill_server=SkillServerWatch(self, self._skills, timeout_s),
+            workers=self._workers,
+            planner=planner,
+            provenance={"planner": name, **self._shortcuts.provenance(episode.domain)},
+            goal_mask=episode.space.mask(atoms),
+            step_limit=goal.request.step_limit or episode.task.step_limit,
         )
-
-    async def _observe(self, episode: int) -> Observation:
-        """The newest observation, waited for until there is one of the episode.
-
-        Who has just reset the simulator may know of the new episode before this node does.
-        """
-        latest = await self._observer.wait(episode, self._settings.observation_timeout)
-        if latest is None or latest.episode.number < episode:
-            raise NoTaskError(
-                f"no perceived state{f' of episode {episode}' if episode else ''} within "
-                f"{self._settings.observation_timeout} s: "
-                "are sim_node (or robot_bridge) and perception_node running?"
-            )
-        if episode and latest.episode.number != episode:
-            raise EpisodeChangedError(
-                f"goal for episode {episode}, but episode {latest.episode.number} is under way"
-            )
-        return latest
-
-    def _skill_server_watch(self) -> Any:
-        """A function that tells whether this skill server has been away for too long."""
-        skill_server = NodeLiveness(self, SKILL_EVENTS)
-        last_seen = node_time_s(self)
-
-        def lost() -> bool:
-            nonlocal last_seen
-            if skill_server.is_alive() and self._skills.server_is_ready():
-                last_seen = node_time_s(self)
-            return node_time_s(self) - last_seen > self._settings.server_timeout
-
-        return lost
 
 
 def main() -> int:

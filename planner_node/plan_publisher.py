@@ -32,11 +32,13 @@ class PlanPublisher:
         goal: int,
         number: int,
         at: Observation,
-        origin: Mapping[str, str | int],
+        provenance: Mapping[str, str | int],
     ) -> None:
         """Publish the ``number``-th plan of a run, to reach the mask ``goal``."""
         space, episode = at.episode.space, at.episode.number
-        self._plans.publish(encode.plan(plan, goal, space, episode, number, self._now(), origin))
+        self._plans.publish(
+            encode.plan(plan, goal, space, episode, number, self._now(), provenance)
+        )
 
     def event(self, kind: int, at: Observation, **details: Any) -> int:
         """Publish a PlanEvent; its stamp in ns."""

@@ -24,11 +24,13 @@ from ensemble.observation import Observation
 from ensemble.state_synchronizer import StateSynchronizer
 from planner_node.plan_publisher import PlanPublisher
 from planner_node.run_statistics import RunStatistics
+from planner_node.skill_server_watch import SkillServerWatch
 from slap_ros.errors import (
     EpisodeChangedError,
     ErrorCode,
     NodeDiedError,
     NoStateError,
+    SkillRejectedError,
     SlapError,
     TaskCanceledError,
 )
@@ -60,37 +62,37 @@ class TaskExecution:
     Args:
         node: Makes the timers.
         goal: The goal.
-        observer: What is known of the world.
-        reporter: Tells what happens.
+        synchronizer: What is known of the world.
+        publisher: Of plans and events.
         skills: Client of the skill server.
-        skill_server_lost: Whether the skill server has been away for too long.
+        skill_server: Tells when the skill server has been away for too long.
         workers: Where planning runs.
         planner: Plans for the episode's objects.
-        origin: What makes the plans, as their messages have it.
+        provenance: What makes the plans, as their messages have it.
         goal_mask: What to reach.
         step_limit: Environment steps.
     """
 
     node: Node
     goal: ServerGoalHandle
-    observer: StateSynchronizer
-    reporter: PlanPublisher
+    synchronizer: StateSynchronizer
+    publisher: PlanPublisher
     skills: ActionClient
-    skill_server_lost: Callable[[], bool]
+    skill_server: SkillServerWatch
     workers: Executor
     planner: Planner
-    origin: Mapping[str, str | int]
+    provenance: Mapping[str, str | int]
     goal_mask: int
     step_limit: int
 
     def __post_init__(self) -> None:
         self._start = self._latest
-        self._tally = RunStatistics(self._start.step)
+        self._statistics = RunStatistics(self._start.step)
 
     @property
     def _latest(self) -> Observation:
-        assert self.observer.latest is not None  # a run begins with an observation
-        return self.observer.latest
+        assert self.synchronizer.latest is not None  # a run begins with an observation
+        return self.synchronizer.latest
 
     @property
     def _last_step(self) -> int:
@@ -108,7 +110,7 @@ class TaskExecution:
             blind = stopped.code in UNPLANNED and not self._latest.exact
             if not blind and stopped.code not in DIVERGENCES:
                 break
-            if self._tally.plans > self.goal.request.max_replans:
+            if self._statistics.plans > self.goal.request.max_replans:
                 limit = f"diverged again after {self.goal.request.max_replans} replans"
                 stopped = Stopped(ErrorCode.REPLANS_EXHAUSTED, f"{limit}: {stopped.reason}")
                 break
@@ -121,7 +123,7 @@ class TaskExecution:
             self._event(PlanEvent.SOLVED)
         else:
             self._event(PlanEvent.FAILED, error_code=int(stopped.code), error_msg=stopped.reason)
-        return self._tally.result(self._last_step, stopped)
+        return self._statistics.result(self._last_step, stopped)
 
     async def _attempt(self) -> Stopped:
         """One plan, as far as it goes."""
@@ -148,8 +150,8 @@ class TaskExecution:
     # -- planning -------------------------------------------------------------------------------
 
     async def _plan(self) -> Plan:
-        state, number = self._latest.state, self._tally.plans
-        self._tally.plans += 1
+        state, number = self._latest.state, self._statistics.plans
+        self._statistics.plans += 1
         self._feedback(SolveTask.Feedback.PLANNING)
         started = self._event(PlanEvent.PLANNING_STARTED)
         job = submit(self.workers, lambda: self.planner.plan(state, self.goal_mask))
@@ -157,9 +159,9 @@ class TaskExecution:
         result: PlanningResult = job.result().result()
         rolled_out = result.edges_rolled_out
         done = self._event(PlanEvent.PLANNED, edges_rolled_out=rolled_out)
-        self._tally.planning_ns += done - started
-        self._tally.edges_rolled_out += rolled_out
-        self.reporter.plan(result.plan, self.goal_mask, number, self._latest, self.origin)
+        self._statistics.planning_ns += done - started
+        self._statistics.edges_rolled_out += rolled_out
+        self.publisher.plan(result.plan, self.goal_mask, number, self._latest, self.provenance)
         self._feedback(
             SolveTask.Feedback.EXECUTING,
             graph_nodes=result.graph_nodes,
@@ -184,7 +186,12 @@ class TaskExecution:
         sent = self.skills.send_goal_async(request)
         if not await self._done(sent, ANSWER_TIMEOUT):
             raise NodeDiedError(f"skill_server did not accept {edge} within {ANSWER_TIMEOUT} s")
-        result = await self._result(sent.result())
+        handle = sent.result()
+        if not handle.accepted:
+            raise SkillRejectedError(
+                f"skill_server rejected {edge}: is it another version, or set up otherwise?"
+            )
+        result = await self._result(handle)
         await self._observe(start.step + result.steps)
         return Stopped(ErrorCode(result.error_code), result.error_msg)
 
@@ -210,7 +217,9 @@ class TaskExecution:
         """Wait for a canceled skill to end, unless the skill server is gone."""
         deadline = node_time_s(self.node) + ANSWER_TIMEOUT
         await wait_for_first(
-            self.node, ended, lambda: self.skill_server_lost() or node_time_s(self.node) > deadline
+            self.node,
+            ended,
+            lambda: self.skill_server.is_lost() or node_time_s(self.node) > deadline,
         )
 
     async def _observe(self, step: int) -> None:
@@ -251,7 +260,7 @@ class TaskExecution:
         if self._latest.episode is not self._start.episode:
             raise EpisodeChangedError("the simulator was reset during the run")
         done = future.done() or condition()
-        if not done and self.skill_server_lost():
+        if not done and self.skill_server.is_lost():
             raise NodeDiedError("skill_server does not answer: it was stopped or died")
         return done
 
@@ -259,14 +268,14 @@ class TaskExecution:
         return (
             self.goal.is_cancel_requested
             or self._latest.episode is not self._start.episode
-            or self.skill_server_lost()
+            or self.skill_server.is_lost()
         )
 
     # -- telling --------------------------------------------------------------------------------
 
     def _event(self, kind: int, **details: object) -> int:
-        number = max(self._tally.plans - 1, 0)
-        return self.reporter.event(kind, self._latest, plan_number=number, **details)
+        number = max(self._statistics.plans - 1, 0)
+        return self.publisher.event(kind, self._latest, plan_number=number, **details)
 
     def _feedback(self, phase: int, **details: int) -> None:
         self.goal.publish_feedback(

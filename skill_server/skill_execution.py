@@ -1,112 +1,131 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""One run of the skill server: what was asked for, how far it is, how it ended."""
+"""One goal of the skill server: each perceived state is answered with a command until it ends."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
+import numpy as np
 from rclpy.action.server import ServerGoalHandle
+from rclpy.node import Node
 from rclpy.task import Future
 from slap_msgs.action import ExecuteSkill
-from slap_msgs.msg import PlanEdge
+from slap_msgs.msg import SkillEvent
 
+from ensemble import encode
+from ensemble.futures import node_time_s
 from ensemble.node_liveness import NodeLiveness
 from ensemble.observation import Observation
-from ensemble.shortcuts import ShortcutProvider
-from slap_ros.errors import EpisodeChangedError, ErrorCode, UnknownSkillError
-from slap_ros.messages.decode import decode_atoms
-from slap_ros.planning.options import (
-    HOLD,
-    Option,
-    OptionExecution,
-    OptionKind,
-    Stopped,
-    given_option,
-    hold_option,
-)
-from slap_ros.relational import Object
+from skill_server.skill_publisher import SkillPublisher
+from slap_ros.errors import ErrorCode
+from slap_ros.planning.options import Option, OptionExecution, Stopped
 
 
 @dataclass
 class SkillExecution:
-    """A skill under way."""
+    """A skill under way.
 
+    Args:
+        node: Whose time counts.
+        goal: What was asked for.
+        execution: The option on its way to the expected atoms.
+        start: Where it starts.
+        step_budget: Environment steps that it may take.
+        planner: Nobody watches the plan when it is gone.
+        publisher: Of commands and events.
+    """
+
+    node: Node
     goal: ServerGoalHandle
     execution: OptionExecution
     start: Observation
-    step_budget: int  # environment steps
-    planner: NodeLiveness  # nobody watches the plan when it is gone
-    heard_s: float  # node time of the newest observation
-    latest: Observation = field(init=False)
-    ended: Future = field(default_factory=Future)  # of Stopped
+    step_budget: int
+    planner: NodeLiveness
+    publisher: SkillPublisher
 
     def __post_init__(self) -> None:
         self.latest = self.start
+        self._ended = Future()  # of Stopped
+        self._newest_s = node_time_s(self.node)  # when the latest observation came
 
     @property
-    def steps(self) -> int:
+    def option(self) -> Option:
+        """What is executed."""
+        return self.execution.option
+
+    async def run(self, latest: Observation) -> ExecuteSkill.Result:
+        """Execute from the newest observation to the end, and conclude the goal."""
+        self._publish_event(SkillEvent.STARTED, Stopped(ErrorCode.NONE))
+        self.advance(latest)
+        outcome: Stopped = await self._ended
+        if outcome.reached:
+            kind, conclude = SkillEvent.REACHED, self.goal.succeed
+        elif outcome.code is ErrorCode.SKILL_CANCELED:
+            kind, conclude = SkillEvent.CANCELED, self.goal.canceled
+        else:
+            kind, conclude = SkillEvent.FAILED, self.goal.abort
+        self._publish_event(kind, outcome)
+        conclude()
+        answer = result(outcome, self._steps)
+        answer.atoms = self._atoms()
+        return answer
+
+    def advance(self, observation: Observation) -> None:
+        """Answer an observation with a command, or end."""
+        if self._ended.done():
+            return
+        self._newest_s = node_time_s(self.node)
+        if observation.episode is not self.start.episode:
+            self._stop(ErrorCode.EPISODE_CHANGED, "the simulator was reset")
+            return
+        self.latest = observation
+        if self.goal.is_cancel_requested:
+            self._hold()
+            return
+        self.goal.publish_feedback(ExecuteSkill.Feedback(step=self._steps, atoms=self._atoms()))
+        action = self.execution.advance(
+            observation.state, observation.abstract, observation.missing
+        )
+        if isinstance(action, Stopped):
+            self._ended.set_result(action)
+        elif self._steps >= self.step_budget:
+            self._stop(ErrorCode.STEP_LIMIT, f"not done within {self.step_budget} steps")
+        else:
+            self.publisher.command(action, self.latest)
+
+    def check(self, state_timeout_s: float) -> None:
+        """End if no state has come for so long, or nobody watches the plan any more."""
+        if self._ended.done():
+            return
+        silence_s = node_time_s(self.node) - self._newest_s
+        if silence_s > state_timeout_s:
+            self._stop(ErrorCode.NO_STATE, f"no new state for {silence_s:.1f} s")
+        elif self.planner.is_lost():
+            self._stop(ErrorCode.NODE_DIED, "the planner is gone; the robot holds")
+
+    @property
+    def _steps(self) -> int:
         """Environment steps taken so far."""
         return self.latest.step - self.start.step
 
-    def stop(self, code: ErrorCode, reason: str) -> None:
-        """End with an error."""
-        self.ended.set_result(Stopped(code, f"{self.execution.option}: {reason}"))
+    def _atoms(self) -> list[object]:
+        """The atoms that hold, as messages."""
+        return encode.atoms(self.start.episode.space.decode(self.latest.abstract))
+
+    def _hold(self) -> None:
+        """Stop the robot where it is, gripper as it is."""
+        axes = self.start.episode.domain.action_space.axes
+        self.publisher.command(np.zeros(len(axes)), self.latest)
+        self._stop(ErrorCode.SKILL_CANCELED, "canceled")
+
+    def _stop(self, code: ErrorCode, reason: str) -> None:
+        self._ended.set_result(Stopped(code, f"{self.option}: {reason}"))
+
+    def _publish_event(self, kind: int, outcome: Stopped) -> None:
+        self.publisher.event(kind, self.option, self.latest, outcome)
 
 
-def requested_option(
-    request: ExecuteSkill.Goal, start: Observation, repertoires: ShortcutProvider
-) -> tuple[Option, int]:
-    """The option that a goal asks for and the abstract state in which it shall end.
-
-    Raises:
-        EpisodeChangedError: The goal is for another episode.
-        UnknownSkillError: There is no such option, or it does not lead there from here.
-        UnknownObjectError: The task has no such object.
-    """
-    episode, edge = start.episode, request.edge
-    if request.episode != episode.number:
-        raise EpisodeChangedError(
-            f"goal for episode {request.episode}, but episode {episode.number} is under way"
-        )
-    if edge.name == HOLD:
-        return hold_option(episode.domain.action_space), 0
-    objects = [episode.space.layout.object(name) for name in edge.objects]
-    target = decode_atoms(edge.expected_atoms, episode.space)
-    if edge.kind == OptionKind.SHORTCUT.value:
-        return _shortcut(edge, objects, start, target, repertoires), target
-    return given_option(episode.domain, edge.name, objects), target
-
-
-def _shortcut(
-    edge: PlanEdge,
-    objects: Sequence[Object],
-    start: Observation,
-    target: int,
-    repertoires: ShortcutProvider,
-) -> Option:
-    """A shortcut from where the robot is."""
-    episode, name = start.episode, edge.name
-    known = [shortcut.name for shortcut in repertoires.shortcuts(episode.domain)]
-    repertoire = repertoires.of(episode)
-    if repertoire is None or name not in known:
-        loaded = f"there are {', '.join(known)}" if known else "no shortcut library is loaded"
-        raise UnknownSkillError(f"unknown shortcut {name!r}: {loaded}")
-    option = repertoire.option(name, start.abstract, target, edge.attempt)
-    if option is None:
-        raise UnknownSkillError(
-            f"{name} does not lead from here to the expected atoms: what they change is not what "
-            "it was learned for"
-        )
-    if tuple(objects) != option.objects:
-        about, got = (", ".join(map(str, names)) for names in (option.objects, objects))
-        raise UnknownSkillError(
-            f"{name} from here to the expected atoms is about ({about}), not ({got})"
-        )
-    return option
-
-
-def result(stopped: Stopped, steps: int) -> ExecuteSkill.Result:
-    """The action's result."""
-    return ExecuteSkill.Result(steps=steps, error_code=int(stopped.code), error_msg=stopped.reason)
+def result(outcome: Stopped, steps: int) -> ExecuteSkill.Result:
+    """The action's result, without atoms; ``steps`` are environment steps."""
+    return ExecuteSkill.Result(steps=steps, error_code=int(outcome.code), error_msg=outcome.reason)

@@ -47,6 +47,7 @@ class ErrorCode(IntEnum):
     SKILL_STOPPED_SHORT = 53
     SKILL_CANCELED = 54
     NO_STATE = 55
+    SKILL_REJECTED = 56
 
     # 70-89: simulator and robot bridge
     INVALID_COMMAND = 70
@@ -206,6 +207,12 @@ class UnknownSkillError(SlapError):
     """An option that the domain does not have."""
 
     code = ErrorCode.UNKNOWN_SKILL
+
+
+class SkillRejectedError(SlapError):
+    """The skill server did not accept a goal."""
+
+    code = ErrorCode.SKILL_REJECTED
 
 
 class InvalidCommandError(SlapError):

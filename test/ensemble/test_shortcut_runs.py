@@ -21,7 +21,7 @@ from ensemble.observation import Episode, Observation
 from ensemble.run import RunRequest, run
 from ensemble.shortcuts import ShortcutParameters, ShortcutProvider
 from ensemble.spinner import temporary_node
-from skill_server.skill_execution import requested_option
+from skill_server.requested_option import requested_option
 from slap_ros.bags import evaluate_bag, replay_bag
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidLibraryError, SkillNotApplicableError, UnknownSkillError
@@ -152,7 +152,7 @@ def observed():
 def repertoires(observation, choice=DATA):
     node = SimpleNamespace(get_logger=lambda: None)
     made = ShortcutProvider(node, ShortcutParameters(shortcuts=str(choice)))
-    made.open(observation.episode)
+    made.load(observation.episode)
     return made
 
 

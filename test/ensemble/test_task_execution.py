@@ -22,23 +22,23 @@ def seen(episode, step):
 
 def test_a_run_whose_episode_is_over_ends_with_that_and_with_no_steps_fewer_than_none():
     """It began late in the old episode; the new one counts from 0, and lengths are unsigned."""
-    observer = SimpleNamespace(latest=seen(1, 28))
+    synchronizer = SimpleNamespace(latest=seen(1, 28))
     run = TaskExecution(
         node=None,
         goal=SimpleNamespace(request=SimpleNamespace(max_replans=0)),
-        observer=observer,
-        reporter=SimpleNamespace(event=lambda *_, **__: 0),
+        synchronizer=synchronizer,
+        publisher=SimpleNamespace(event=lambda *_, **__: 0),
         skills=None,
-        skill_server_lost=None,
+        skill_server=None,
         workers=None,
         planner=None,
-        origin={},
+        provenance={},
         goal_mask=0,
         step_limit=50,
     )
 
     async def overtaken():
-        observer.latest = seen(2, 0)
+        synchronizer.latest = seen(2, 0)
         raise EpisodeChangedError("the simulator was reset during the run")
 
     run._attempt = overtaken

@@ -1,0 +1,34 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Whether the skill server that a run began with is still there."""
+
+from __future__ import annotations
+
+from rclpy.action import ActionClient
+from rclpy.node import Node
+
+from ensemble.futures import node_time_s
+from ensemble.interfaces import SKILL_EVENTS
+from ensemble.node_liveness import NodeLiveness
+
+
+class SkillServerWatch:
+    """Watches the skill server from now on."""
+
+    def __init__(self, node: Node, skills: ActionClient, timeout_s: float) -> None:
+        """Begin to watch.
+
+        Args:
+            node: Who watches.
+            skills: Its client of the skill server.
+            timeout_s: How long the server may be away; s, the node's time.
+        """
+        self._node, self._skills, self._timeout_s = node, skills, timeout_s
+        self._liveness = NodeLiveness(node, SKILL_EVENTS)
+        self._alive_s = node_time_s(node)  # when it was last there
+
+    def is_lost(self) -> bool:
+        """Whether it has been away for longer than it may."""
+        if self._liveness.is_alive() and self._skills.server_is_ready():
+            self._alive_s = node_time_s(self._node)
+        return node_time_s(self._node) - self._alive_s > self._timeout_s

@@ -1,0 +1,74 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Which option a goal of the skill server asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from slap_msgs.action import ExecuteSkill
+from slap_msgs.msg import PlanEdge
+
+from ensemble.observation import Observation
+from ensemble.shortcuts import ShortcutProvider
+from slap_ros.errors import UnknownSkillError
+from slap_ros.messages.decode import decode_atoms
+from slap_ros.planning.options import HOLD, Option, OptionKind, given_option, hold_option
+from slap_ros.relational import Object
+
+
+def requested_option(
+    request: ExecuteSkill.Goal, start: Observation, provider: ShortcutProvider
+) -> tuple[Option, int]:
+    """The option that a goal asks for and the abstract state in which it shall end.
+
+    Args:
+        request: The goal.
+        start: Where the robot is.
+        provider: The shortcuts that there are.
+
+    Returns:
+        The option, and its target as a mask over the episode's atom space.
+
+    Raises:
+        EpisodeChangedError: The goal is for another episode.
+        UnknownSkillError: There is no such option, or it does not lead there from here.
+        UnknownObjectError: The task has no such object.
+    """
+    episode, edge = start.episode, request.edge
+    start.require_episode(request.episode)
+    if edge.name == HOLD:
+        return hold_option(episode.domain.action_space), 0
+    objects = [episode.space.layout.object(name) for name in edge.objects]
+    target = decode_atoms(edge.expected_atoms, episode.space)
+    if edge.kind == OptionKind.SHORTCUT.value:
+        return _shortcut(edge, objects, start, target, provider), target
+    return given_option(episode.domain, edge.name, objects), target
+
+
+def _shortcut(
+    edge: PlanEdge,
+    objects: Sequence[Object],
+    start: Observation,
+    target: int,
+    provider: ShortcutProvider,
+) -> Option:
+    """The shortcut that an edge names, from where the robot is."""
+    episode, name = start.episode, edge.name
+    known = [shortcut.name for shortcut in provider.shortcuts(episode.domain)]
+    grounded = provider.grounded(episode)
+    if grounded is None or name not in known:
+        loaded = f"there are {', '.join(known)}" if known else "no shortcut library is loaded"
+        raise UnknownSkillError(f"unknown shortcut {name!r}: {loaded}")
+    option = grounded.option(name, start.abstract, target, edge.attempt)
+    if option is None:
+        raise UnknownSkillError(
+            f"{name} does not lead from here to the expected atoms: what they change is not what "
+            "it was learned for"
+        )
+    if tuple(objects) != option.objects:
+        about, got = (", ".join(map(str, names)) for names in (option.objects, objects))
+        raise UnknownSkillError(
+            f"{name} from here to the expected atoms is about ({about}), not ({got})"
+        )
+    return option
