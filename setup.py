@@ -153,7 +153,7 @@ setup(
     },
     entry_points={
         "console_scripts": [
-            "slap = slap_ros.cli:main",
+            "slap = ensemble.cli:main",
             *(f"{node} = {node}.node:main" for node in NODES),
             "mock_robot = robot_bridge.mock.node:main",
         ],

@@ -48,7 +48,6 @@ def test_every_package_has_a_floor(imports):
     assert packages - {"py"} == set(ORDER) - set(ABOVE_THE_CORE) - {"slap_ros"}
 
 
-@pytest.mark.xfail(reason="being parted")
 def test_imports_run_down(imports):
     up = [
         f"{i.where}: {i.importer} imports {i.imported}"

@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The command line: ``slap``."""
+"""The command line ``slap``: every command but those that bring nodes up (``ensemble.cli``)."""
 
 from __future__ import annotations
 
 import typer
 
 from slap_ros import __version__
-from slap_ros.cli import bag, check, domains, evaluate, plan, report, run, study, train
+from slap_ros.cli import bag, check, domains, evaluate, plan, report, study, train
 from slap_ros.cli import doctor as doctor_command
 from slap_ros.cli.console import exits
 
@@ -22,7 +22,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("run")(exits(run.run))
 app.command("plan")(exits(plan.plan))
 app.command("evaluate")(exits(evaluate.evaluate))
 app.command("report")(exits(report.report))
@@ -47,8 +46,3 @@ def _root(
     ),
 ) -> None:
     del version
-
-
-def main() -> None:
-    """Run a command."""
-    app()

@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""``slap bag``: look into bags, without ROS 2 and without the ensemble."""
+"""``slap bag``: look into bags, without ROS 2 and without the ensemble.
+
+The ensemble adds ``slap bag replay``, which may also move a robot.
+"""
 
 from __future__ import annotations
 
@@ -17,12 +20,9 @@ from slap_ros.cli.console import console, exits, print_json
 from slap_ros.cli.options import Json
 from slap_ros.cli.render import check_renderable
 from slap_ros.cli.render import render as write_animation
-from slap_ros.errors import DamagedBagError, ErrorCode, InvalidParameterError
+from slap_ros.errors import DamagedBagError, ErrorCode
 from slap_ros.evaluation.metrics import RunMetrics
 from slap_ros.messages.decode import decode_state
-from slap_ros.robot.worlds import MOCK, ROBOT
-
-SIM_WORLD = "world"
 
 app = typer.Typer(
     help="Look into recorded runs: info, evaluate, replay, render.", no_args_is_help=True
@@ -117,44 +117,8 @@ def render(
     return _warn(found.damage)
 
 
-@app.command("replay")
-@exits
-def replay(
-    bag: BagPath,
-    to: Annotated[
-        str, typer.Option(help="world: a fresh one; robot (see docs/real-robot.md), or mock.")
-    ] = SIM_WORLD,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Check the motion against the robot's limits only.")
-    ] = False,
-    robot: Annotated[
-        str, typer.Option(help="The robot's parameters, as arm=fr3,speed=0.1: robot_bridge's.")
-    ] = "",
-    mock: Annotated[
-        str, typer.Option(help="The mock robot's parameters, as latency=0.05,pace=5.")
-    ] = "",
-    yes: Annotated[bool, typer.Option("--yes", help="Move the robot without asking.")] = False,
-    json: Json = False,
-) -> int:
-    """Feed the recorded commands to a fresh world and compare every state, bit for bit.
-
-    Or, with --to robot, execute the recorded motion on a robot, open loop: begin with --dry-run.
-    """
-    if to not in (SIM_WORLD, ROBOT, MOCK):
-        raise InvalidParameterError(f"--to must be world, robot or mock, not {to!r}")
-    if to == SIM_WORLD:
-        if dry_run or robot or mock:
-            raise InvalidParameterError("--dry-run, --robot and --mock are for --to robot or mock")
-        return _replay_in_a_world(bag, json)
-    if mock and to != MOCK:
-        raise InvalidParameterError("--mock is for --to mock")
-    # Bullet is needed only here: the rest of `slap bag` works without it.
-    from slap_ros.cli.replay import replay_on_robot
-
-    return replay_on_robot(bag, to, dry_run, robot, mock, yes or to == MOCK, json)
-
-
-def _replay_in_a_world(bag: Path, json: bool) -> int:
+def replay_in_world(bag: Path, json: bool) -> int:
+    """Replay a bag in a fresh world and print how it compares; the exit code."""
     result = replay_bag(bag)
     if json:
         print_json(asdict(result) | {"identical": result.identical})

@@ -28,8 +28,19 @@ UNSOLVABLE = "(define (problem p) (:domain d) (:objects a - thing) (:init) (:goa
 
 
 def slap(*arguments, **options):
-    command = [sys.executable, "-m", "slap_ros.cli", *map(str, arguments)]
+    command = [sys.executable, "-m", "ensemble.cli", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=90, **options)
+
+
+@pytest.mark.parametrize(
+    "arguments", [["domains"], ["plan", "obstacle2d"], ["bag", "--help"], ["run", "--help"]]
+)
+def test_what_brings_no_node_up_needs_no_ros(arguments):
+    hide = "import sys; sys.modules |= dict.fromkeys(['rclpy', 'slap_msgs', 'embedded_ros'])"
+    command = f"{hide}; from ensemble.cli import main; main()"
+    arguments = [sys.executable, "-c", command, *arguments]
+    ran = subprocess.run(arguments, capture_output=True, text=True, timeout=90)
+    assert ran.returncode == 0, ran.stderr
 
 
 def test_evaluate_prints_the_agreed_json_and_nothing_else():

@@ -78,7 +78,7 @@ class Viewer:
 
 @contextmanager
 def live_run(*options: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    command = [sys.executable, "-m", "slap_ros.cli", *RUN, *options]
+    command = [sys.executable, "-m", "ensemble.cli", *RUN, *options]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         try:
             assert process.stderr is not None
@@ -150,7 +150,7 @@ def test_what_is_missing_is_said_with_how_to_get_it(network: int) -> None:
 
 def slap(*options: str, without: str = "") -> tuple[int, str]:
     hide = f"import sys; sys.modules[{without!r}] = None; " if without else ""
-    command = f"{hide}from slap_ros.cli import main; main()"
+    command = f"{hide}from ensemble.cli import main; main()"
     ran = subprocess.run(
         [sys.executable, "-c", command, *RUN, *options],
         capture_output=True,

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from slap_ros.cli.live import RunView
+from ensemble.cli.live import RunView
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "bags"))  # for the scripted run
 
@@ -76,7 +76,7 @@ def test_the_order_of_topics_does_not_matter(script: Script) -> None:
 
 def test_on_a_terminal_it_is_drawn_in_place(network: int) -> None:
     ours, theirs = pty.openpty()
-    command = [sys.executable, "-m", "slap_ros.cli", *RUN]
+    command = [sys.executable, "-m", "ensemble.cli", *RUN]
     environment = os.environ | {"TERM": "xterm-256color", "COLUMNS": "100"}
     with subprocess.Popen(command, stdout=theirs, stderr=theirs, env=environment) as process:
         os.close(theirs)
@@ -95,7 +95,7 @@ def test_on_a_terminal_it_is_drawn_in_place(network: int) -> None:
 
 
 def test_without_a_terminal_there_are_plain_lines(network: int) -> None:
-    command = [sys.executable, "-m", "slap_ros.cli", *RUN]
+    command = [sys.executable, "-m", "ensemble.cli", *RUN]
     ran = subprocess.run(command, capture_output=True, text=True, timeout=90)
     assert ran.returncode == 0, ran.stderr
     assert "\x1b" not in ran.stderr

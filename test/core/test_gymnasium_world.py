@@ -132,7 +132,7 @@ def test_once_installed_the_example_is_a_domain_like_others(tmp_path):
     command += ["--no-deps", "--no-build-isolation", "--target", str(tmp_path), str(EXAMPLE)]
     subprocess.run(command, check=True, timeout=200)
     environment = os.environ | {"PYTHONPATH": str(tmp_path)}
-    command = [sys.executable, "-m", "slap_ros.cli", "evaluate", "marbles", "--tasks", "2"]
+    command = [sys.executable, "-m", "ensemble.cli", "evaluate", "marbles", "--tasks", "2"]
     command += ["--seeds", "1", "--jobs", "1", "--shortcuts", "none", "--json"]
     told = subprocess.run(
         command, check=True, timeout=200, capture_output=True, text=True, env=environment

@@ -228,7 +228,7 @@ def test_skills_are_listed_with_their_signatures(network):
 def test_a_killed_node_ends_the_run_with_a_code_and_a_readable_bag(network, tmp_path, victim):
     bag = tmp_path / "bag"
     runner = subprocess.Popen(
-        [sys.executable, "-m", "slap_ros.cli", "run", "obstacle2d", "--seed", "3",
+        [sys.executable, "-m", "ensemble.cli", "run", "obstacle2d", "--seed", "3",
          "--pace", "10", "--record", str(bag)],
         stderr=subprocess.PIPE,
         text=True,
@@ -265,7 +265,7 @@ def test_a_full_disk_ends_the_run_and_keeps_what_was_recorded(network, tmp_path)
         [
             sys.executable,
             "-m",
-            "slap_ros.cli",
+            "ensemble.cli",
             "run",
             "obstacle2d",
             "--pace",

@@ -13,11 +13,11 @@ import psutil
 import pytest
 from typer.testing import CliRunner
 
+from ensemble.cli import app
+from ensemble.cli.event_printer import EventPrinter
 from ensemble.nodes import RunSettings
 from ensemble.run import RunRequest, run
 from slap_ros.bags import bag_digest, bag_info, evaluate_bag, read_bag, replay_bag
-from slap_ros.cli import app
-from slap_ros.cli.run import EventPrinter
 from slap_ros.domains import get_domain
 from slap_ros.evaluation.experiment import Experiment
 from slap_ros.messages.decode import stamp_ns
@@ -41,7 +41,7 @@ def request(record=None, seed=3, in_process=True, **options):
 
 
 def slap(*arguments, **options):
-    command = [sys.executable, "-m", "slap_ros.cli", *arguments]
+    command = [sys.executable, "-m", "ensemble.cli", *arguments]
     return subprocess.run(command, capture_output=True, text=True, timeout=90, **options)
 
 

@@ -74,7 +74,7 @@ def test_a_shortcut_is_executed_attributed_and_replayed(network, tmp_path):
 
 def test_processes_tell_the_same_live_and_from_the_bag(network, tmp_path):
     def slap(*arguments):
-        command = [sys.executable, "-m", "slap_ros.cli", *map(str, arguments)]
+        command = [sys.executable, "-m", "ensemble.cli", *map(str, arguments)]
         done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT)
         assert done.returncode == 0, done.stderr
         return done.stdout

@@ -61,7 +61,7 @@ class Run:
         self.case, self.bag = case, bag
         self._seen = set()  # every process that there was
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "slap_ros.cli", "run", "obstacle2d", "--shortcuts", "none",
+            [sys.executable, "-m", "ensemble.cli", "run", "obstacle2d", "--shortcuts", "none",
              "--seed", str(case.seed % 50), "--pace", "20", "--timeout", str(GIVE_UP),
              "--record", str(bag)],
             stderr=subprocess.PIPE,

@@ -15,10 +15,10 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from truthful_run import Script, record
 from typer.testing import CliRunner
 
+from ensemble.cli import app
 from ensemble.entry_point import run_node
 from sim_node.node import SimNode
 from slap_ros.bags import bag_digest, bag_info, evaluate_bag, read_bag, replay_bag
-from slap_ros.cli import app
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode, SlapError
 from slap_ros.evaluation.approaches import Approach

@@ -103,7 +103,7 @@ def ensemble(namespace, settings):
 def test_domain_ids_keep_two_ensembles_apart(network, other_network, tmp_path):
     runs = {
         side: subprocess.Popen(
-            [sys.executable, "-m", "slap_ros.cli", "run", "obstacle2d", "--shortcuts", "none",
+            [sys.executable, "-m", "ensemble.cli", "run", "obstacle2d", "--shortcuts", "none",
              "--seed", str(seed), "--record", str(tmp_path / side)],
             env=os.environ | {"ROS_DOMAIN_ID": str(number)},
             stderr=subprocess.PIPE,

@@ -17,8 +17,8 @@ from staged_runs import HOSTILE, with_markers
 from truthful_run import Script, record
 from typer.testing import CliRunner
 
+from ensemble.cli import app
 from slap_ros.bags import evaluate_bag
-from slap_ros.cli import app
 from slap_ros.errors import InvalidParameterError, StorageFullError
 from slap_ros.messages.interfaces import ATOMS, DOMAIN_INFO, MARKERS
 from slap_ros.report import check_output, read_report, render, write_page
@@ -260,7 +260,7 @@ def test_a_tower_is_told_without_pybullet(bags: Bags, tmp_path: Path) -> None:
 def test_a_run_can_be_told_without_keeping_its_bag(network: int, tmp_path: Path) -> None:
     scratch, output = tmp_path / "scratch", tmp_path / "page.html"
     scratch.mkdir()
-    command = [sys.executable, "-m", "slap_ros.cli", "run", "obstacle2d", "--in-process", "--json"]
+    command = [sys.executable, "-m", "ensemble.cli", "run", "obstacle2d", "--in-process", "--json"]
     ran = subprocess.run(
         [*command, "--seed", "3", "--shortcuts", "none", "--report", output],
         capture_output=True,

@@ -14,6 +14,7 @@ from slap_msgs.srv import ResetTask
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
+from ensemble.cli.run_options import RunOptions
 from ensemble.client import RunClient
 from ensemble.interfaces import COMMAND, JOINT_STATES, RESET_TASK, SENSOR_DATA, TF
 from ensemble.launcher import InProcessLauncher
@@ -22,7 +23,6 @@ from ensemble.robot_parameters import parse_mock_robot
 from ensemble.run import RunRequest, run
 from ensemble.spinner import temporary_node
 from slap_ros.bags import evaluate_bag
-from slap_ros.cli.run import check_world
 from slap_ros.errors import ErrorCode, InvalidParameterError
 from slap_ros.messages.interfaces import STATE
 
@@ -290,13 +290,15 @@ def test_options_of_the_mock_robot_have_types_and_names():
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("options", "words"),
     [
-        (("moon", None, ""), "--world must be one of sim, robot, mock"),
-        (("sim", Path("x.yaml"), ""), "not for --world sim"),
-        (("robot", None, "latency=0.1"), "for --world mock"),
+        ({"world": "moon"}, "--world must be one of sim, robot, mock"),
+        ({"world": "sim", "scene": Path("x.yaml")}, "not for --world sim"),
+        ({"world": "robot", "mock": "latency=0.1"}, "for --world mock"),
+        ({"watched": True}, "for --live"),
+        ({"live_port": 8765}, "for --live"),
     ],
 )
-def test_the_command_line_refuses_what_does_not_fit(arguments, words):
+def test_the_command_line_refuses_what_does_not_fit(options, words):
     with pytest.raises(InvalidParameterError, match=words):
-        check_world(*arguments)
+        RunOptions("obstacle_tower", **options)

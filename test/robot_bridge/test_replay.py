@@ -14,11 +14,11 @@ import pytest
 import rclpy
 from typer.testing import CliRunner
 
+from ensemble.cli import app
 from ensemble.nodes import RunSettings
 from ensemble.run import RunRequest, run
 from slap_ros.bags import read_bag
 from slap_ros.bags.writer import BagWriter
-from slap_ros.cli import app
 from slap_ros.errors import DamagedBagError, InvalidParameterError, UnsafeCommandError
 from slap_ros.messages.interfaces import typestore
 from slap_ros.robot.dry_run import DryRun
@@ -52,7 +52,7 @@ def slap(*arguments):
 
 def slap_alone(*arguments):
     """The same, in a process of its own: a mock robot writes to a real stderr."""
-    command = [sys.executable, "-m", "slap_ros.cli", "bag", "replay", *map(str, arguments)]
+    command = [sys.executable, "-m", "ensemble.cli", "bag", "replay", *map(str, arguments)]
     ran = subprocess.run(command, capture_output=True, text=True, timeout=200)
     return ran.returncode, ran.stdout, " ".join(ran.stderr.split())
 

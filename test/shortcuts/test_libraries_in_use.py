@@ -203,7 +203,7 @@ from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.repertoire import Repertoire
 from slap_ros.shortcuts.shipped import chosen_library
 from slap_ros.evaluation.approaches import approaches
-import ensemble.nodes, slap_ros.cli
+import ensemble.cli, ensemble.nodes
 assert "torch" not in sys.modules, "torch was imported"
 domain = get_domain("obstacle2d")
 digest = sha256()

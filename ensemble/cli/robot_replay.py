@@ -6,12 +6,15 @@ from __future__ import annotations
 
 import sys
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import typer
 from rich.table import Table
 
+from ensemble import replay as ensemble_replay
+from ensemble.cli.replay_options import ReplayOptions
+from ensemble.parameters import parse_parameters
+from ensemble.robot_parameters import PlayerParameters, parse_mock_robot
 from slap_ros.cli.console import console, print_json, progress
 from slap_ros.errors import ErrorCode, TaskCanceledError
 from slap_ros.robot.dry_run import DryRun
@@ -26,45 +29,41 @@ REACHED = {
 }
 
 
-def replay_on_robot(
-    bag: Path, to: str, dry_run: bool, robot: str, mock: str, sure: bool, json: bool
-) -> int:
-    """Check it, and unless that is all, execute it; the exit code.
+def replay_on_robot(options: ReplayOptions) -> int:
+    """Check the motion, and unless that is all, execute it; the exit code.
 
     Raises:
         SlapError: It must not be executed, or failed; a robot then holds.
     """
-    # ROS is needed only here: the rest of `slap bag` works without it.
-    from ensemble import replay
-    from ensemble.parameters import parse_parameters
-    from ensemble.robot_parameters import PlayerParameters, parse_mock_robot
-
-    settings = PlayerParameters(**parse_parameters(robot, PlayerParameters, "robot"))
-    parameters = parse_mock_robot(mock) if to == MOCK else None
-    recorded = read_recorded_motion(bag)
-    checked = DryRun.of(recorded, settings.limits)
-    if json and dry_run:
+    parameters = PlayerParameters(**parse_parameters(options.robot, PlayerParameters, "robot"))
+    recorded = read_recorded_motion(options.bag)
+    checked = DryRun.of(recorded, parameters.limits)
+    if options.json and options.dry_run:
         print_json(_as_json(recorded, checked))
     else:
-        console.print(_table(recorded, checked, settings.arm))
+        console.print(_table(recorded, checked, parameters.arm))
     for step, reason in checked.violations:
         console.print(f"step {step}: {reason}", highlight=False, markup=False)
-    if dry_run:
+    if options.dry_run:
         return int(ErrorCode.UNSAFE_COMMAND) if checked.violations else 0
     checked.require_safe()
-    if not sure and not _agreed():
+    if not (options.yes or options.to == MOCK or _agreed()):
         raise TaskCanceledError("nothing moved: nobody said that it may (--yes)")
+    return _execute(options, recorded, checked, parameters)
+
+
+def _execute(
+    options: ReplayOptions, recorded: RecordedMotion, checked: DryRun, parameters: PlayerParameters
+) -> int:
+    """Execute the motion; the exit code."""
+    mock = parse_mock_robot(options.mock) if options.to == MOCK else None
     with progress() as bar:
         watched = bar.add_task("replaying", total=len(recorded.waypoints))
-        played = replay.replay_on_robot(
-            recorded,
-            checked,
-            settings,
-            parameters,
-            lambda done: bar.update(watched, completed=done),
+        played = ensemble_replay.replay_on_robot(
+            recorded, checked, parameters, mock, lambda done: bar.update(watched, completed=done)
         )
     reached = played.reached(recorded)
-    if json:
+    if options.json:
         print_json(_as_json(recorded, checked) | {"played": played.steps, "reached": reached})
     console.print(f"{played.steps} steps executed; {REACHED[reached]}")
     return int(ErrorCode.REPLAY_MISMATCH) if reached is False else 0

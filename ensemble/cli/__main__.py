@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""``python -m slap_ros.cli``."""
+"""``python -m ensemble.cli``."""
 
-from slap_ros.cli import main
+from ensemble.cli import main
 
 main()

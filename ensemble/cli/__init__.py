@@ -1,0 +1,20 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``slap``: the commands of the core, and those that bring nodes up."""
+
+from __future__ import annotations
+
+from ensemble.cli.commands import replay, run
+from slap_ros.cli import app
+from slap_ros.cli.bag import app as bag_app
+from slap_ros.cli.console import exits
+from slap_ros.cli.options import flat_options
+
+app.command("run")(exits(flat_options(run)))
+app.registered_commands.sort(key=lambda command: command.name != "run")  # the first in --help
+bag_app.command("replay")(exits(flat_options(replay)))
+
+
+def main() -> None:
+    """Run a command of ``slap``."""
+    app()

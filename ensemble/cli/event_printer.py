@@ -1,0 +1,41 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A run in lines of text, as it goes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from slap_ros.cli.console import console
+from slap_ros.messages.events import PlanEventKind, SkillEventKind
+from slap_ros.messages.interfaces import PLAN, PLAN_EVENT, SKILL_EVENT
+
+
+class EventPrinter:
+    """Prints one line per event of a run, on stderr."""
+
+    def __init__(self) -> None:
+        self._started = 0
+
+    def __call__(self, type_name: str, message: Any) -> None:
+        """Print a message of the run, if it is an event."""
+        if type_name == PLAN:
+            steps = [f"{edge.name} {edge.predicted_steps}" for edge in message.edges]
+            console.print(
+                f"plan {message.number}: {message.predicted_steps} steps ({', '.join(steps)})"
+            )
+        elif type_name == SKILL_EVENT:
+            self._skill(message)
+        elif type_name == PLAN_EVENT and message.kind == PlanEventKind.DIVERGED:
+            console.print(f"[yellow]diverged[/]: {message.error_msg}", highlight=False)
+        elif type_name == PLAN_EVENT and message.kind == PlanEventKind.FAILED:
+            console.print(f"[red]failed[/]: {message.error_msg}", highlight=False)
+
+    def _skill(self, message: Any) -> None:
+        if message.kind == SkillEventKind.STARTED:
+            self._started = message.step
+            return
+        name = f"{message.skill}({', '.join(message.objects)})"
+        outcome = SkillEventKind(message.kind).name.lower()
+        steps = message.step - self._started
+        console.print(f"{message.step:5d}  {name}: {outcome} after {steps} steps", highlight=False)

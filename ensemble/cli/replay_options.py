@@ -1,0 +1,51 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The options of ``slap bag replay``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import typer
+
+from slap_ros.cli.bag import BagPath
+from slap_ros.cli.options import Json
+from slap_ros.errors import InvalidParameterError
+from slap_ros.robot.worlds import MOCK, ROBOT
+
+WORLD = "world"  # a fresh one, rather than a robot
+
+
+@dataclass(frozen=True)
+class ReplayOptions:
+    """Where to replay a bag, and how.
+
+    Raises:
+        InvalidParameterError: Options do not fit together.
+    """
+
+    bag: BagPath
+    to: Annotated[
+        str, typer.Option(help="world: a fresh one; robot (see docs/real-robot.md), or mock.")
+    ] = WORLD
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Check the motion against the robot's limits only.")
+    ] = False
+    robot: Annotated[
+        str, typer.Option(help="The robot's parameters, as arm=fr3,speed=0.1: robot_bridge's.")
+    ] = ""
+    mock: Annotated[
+        str, typer.Option(help="The mock robot's parameters, as latency=0.05,pace=5.")
+    ] = ""
+    yes: Annotated[bool, typer.Option("--yes", help="Move the robot without asking.")] = False
+    json: Json = False
+
+    def __post_init__(self) -> None:
+        """Refuse what does not fit; see the class."""
+        if self.to not in (WORLD, ROBOT, MOCK):
+            raise InvalidParameterError(f"--to must be world, robot or mock, not {self.to!r}")
+        if self.to == WORLD and (self.dry_run or self.robot or self.mock):
+            raise InvalidParameterError("--dry-run, --robot and --mock are for --to robot or mock")
+        if self.mock and self.to != MOCK:
+            raise InvalidParameterError("--mock is for --to mock")

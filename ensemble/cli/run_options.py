@@ -1,0 +1,115 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The options of ``slap run``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from slap_ros.bags.writer import require_new
+from slap_ros.cli.options import DomainName, Goal, Index, Json, Planner, Preset, Seed
+from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts
+from slap_ros.errors import InvalidParameterError
+from slap_ros.planning.execution import MAX_REPLANS
+from slap_ros.report import check_output
+from slap_ros.robot.worlds import MOCK, ROBOT, SIM, WORLDS
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """What to run, in which world, and what to keep and show of it.
+
+    Raises:
+        InvalidParameterError: Options do not fit together, or the report is no place for one.
+        BagExistsError: There is something where a bag is to be recorded.
+    """
+
+    domain: DomainName
+    seed: Seed = 0
+    index: Index = 0
+    preset: Preset = "fair"
+    goal: Goal = None
+    shortcuts: Shortcuts = None
+    samples: Samples = SAMPLES
+    planner: Planner = "lazy"
+    max_replans: Annotated[int, typer.Option(min=0, help="Plans after the first.")] = MAX_REPLANS
+    record: Annotated[
+        Path | None, typer.Option(help="Record a bag as a new folder with this name.")
+    ] = None
+    in_process: Annotated[bool, typer.Option("--in-process", help="All nodes in this process.")] = (
+        False
+    )
+    pace: Annotated[
+        float, typer.Option(min=0.0, help="Steps per second, for watching; 0: at full speed.")
+    ] = 0.0
+    timeout: Annotated[float, typer.Option(min=0.1, help="Give up after so many seconds.")] = 600.0
+    render: Annotated[
+        Path | None, typer.Option(help="Write an animation of the run: a .gif or .mp4.")
+    ] = None
+    report: Annotated[
+        Path | None, typer.Option(help="Report the run on a page, as `slap report` does: a .html.")
+    ] = None
+    live: Annotated[
+        bool,
+        typer.Option(
+            "--live",
+            help="Show plan and progress in place on a terminal, and everything to Foxglove.",
+        ),
+    ] = False
+    live_port: Annotated[
+        int | None,
+        typer.Option(
+            min=0, max=65535, help="Of the WebSocket for Foxglove. Default: 8765, or a free one."
+        ),
+    ] = None
+    watched: Annotated[
+        bool,
+        typer.Option("--watched", help="With --live: begin once somebody watches; end with them."),
+    ] = False
+    world: Annotated[
+        str,
+        typer.Option(
+            help="sim, robot (see docs/real-robot.md), or mock: a robot that is not there."
+        ),
+    ] = SIM
+    scene: Annotated[
+        Path | None, typer.Option(help="What stands around the robot: a scene file.")
+    ] = None
+    mock: Annotated[
+        str, typer.Option(help="The mock robot's parameters, as latency=0.05,pose_noise=0.003.")
+    ] = ""
+    perception: Annotated[
+        str, typer.Option(help="Noise of perception, as position_noise=0.002,debounce=3.")
+    ] = ""
+    json: Json = False
+
+    def __post_init__(self) -> None:
+        """Refuse what can be refused without the domain; see the class."""
+        self._check_world()
+        if not self.live and (self.watched or self.live_port is not None):
+            raise InvalidParameterError("--watched and --live-port are for --live")
+        if self.record is not None:
+            require_new(self.record)
+        if self.report is not None:
+            check_output(self.report)
+
+    def _check_world(self) -> None:
+        world = self.world
+        if world not in WORLDS:
+            known = ", ".join(WORLDS)
+            raise InvalidParameterError(f"--world must be one of {known}, not {world!r}")
+        if self.scene is not None and world != ROBOT:
+            raise InvalidParameterError(
+                f"--scene is what is around a robot, not for --world {world}"
+            )
+        if self.mock and world != MOCK:
+            raise InvalidParameterError(f"--mock is for --world mock, not for --world {world}")
+
+    @property
+    def foxglove_is_optional(self) -> bool:
+        """Whether the run may go on without Foxglove, as nothing but ``--live`` asks for it."""
+        return not self.watched and self.live_port is None

@@ -1,0 +1,189 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What ``slap run`` does: one task, from its options to its exit code."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import sleep
+from typing import Any
+
+from ensemble.cli.event_printer import EventPrinter
+from ensemble.cli.live import Dashboard
+from ensemble.cli.run_options import RunOptions
+from ensemble.client import OnMessage
+from ensemble.foxglove_server import SHOWN_TOPICS, FoxgloveServer, foxglove_installed
+from ensemble.nodes import RunSettings
+from ensemble.parameters import parse_parameters
+from ensemble.perception_parameters import PerceptionParameters
+from ensemble.robot_parameters import parse_mock_robot
+from ensemble.run import RunRequest
+from ensemble.run import run as run_ensemble
+from slap_ros.cli.console import console, print_json
+from slap_ros.cli.render import check_renderable
+from slap_ros.cli.render import render as write_animation
+from slap_ros.cli.report import write_report
+from slap_ros.core import Domain, Task
+from slap_ros.domains import get_domain
+from slap_ros.evaluation.metrics import RunMetrics
+from slap_ros.messages.decode import decode_state
+from slap_ros.messages.interfaces import STATE
+from slap_ros.messages.protocols import StateMessage
+from slap_ros.planning.planner import make_planner
+from slap_ros.relational import GroundAtom
+from slap_ros.relational.pddl import parse_goal
+from slap_ros.shortcuts.shipped import chosen_library
+
+LOOK_S = 0.05  # s, between two looks at whether somebody watches
+
+
+def run_task(options: RunOptions) -> int:
+    """Run the ensemble, show what happens, write what is asked for; the exit code.
+
+    Raises:
+        SlapError: Nothing was run, or what was run cannot be written; the code says why.
+    """
+    # Everything that can be refused is refused before a node is started.
+    domain = get_domain(options.domain, options.preset)
+    task = domain.task(options.seed, options.index)
+    request = _request(options, domain, task)
+    states: list[StateMessage] = []
+
+    def keep_states(type_name: str, message: Any) -> None:
+        if type_name == STATE and options.render is not None:
+            states.append(message)
+
+    with _bag(options) as bag:
+        settings = replace(request.settings, record=bag)
+        metrics = _run(replace(request, settings=settings), options, keep_states)
+        if options.json:
+            print_json(metrics.as_json())
+        _conclude(metrics, options.record)
+        code = 0
+        if bag is not None and options.report is not None:
+            code = write_report([bag], options.report)
+    if options.render is not None:
+        decoded = [decode_state(message, domain.types_by_name) for message in states]
+        write_animation(domain, decoded, options.render)
+    return int(metrics.error_code) or code
+
+
+def _request(options: RunOptions, domain: Domain, task: Task) -> RunRequest:
+    """What to ask of an ensemble, with no bag yet.
+
+    Raises:
+        SlapError: The domain, or what perceives it, cannot do what is asked for.
+    """
+    goal = _check_planning(options, domain, task)
+    perception = parse_parameters(options.perception, PerceptionParameters, "perception")
+    quality = PerceptionParameters(**perception).quality
+    quality.require_known(task.initial_state.layout.by_name.keys())
+    settings = RunSettings(
+        options.domain,
+        options.preset,
+        options.seed,
+        options.index,
+        options.planner,
+        record=None,
+        pace=options.pace,
+        shortcuts=options.shortcuts or "",
+        samples=options.samples,
+        world=options.world,
+        scene=str(options.scene or ""),
+        mock=parse_mock_robot(options.mock),
+        perception=perception,
+    )
+    return RunRequest(
+        settings,
+        goal,
+        max_replans=options.max_replans,
+        timeout_s=options.timeout,
+        in_process=options.in_process,
+    )
+
+
+def _check_planning(options: RunOptions, domain: Domain, task: Task) -> frozenset[GroundAtom]:
+    """The goal; empty for the task's own.
+
+    Raises:
+        SlapError: It is no goal of the task; or planner, library or pictures are not there.
+    """
+    space = domain.atom_space(task.initial_state)
+    goal = parse_goal(options.goal, space) if options.goal else frozenset()
+    make_planner(options.planner, domain, task.initial_state)
+    chosen_library(options.shortcuts, domain, options.planner)
+    if options.render is not None:
+        check_renderable(domain, options.render)
+    return goal
+
+
+@contextmanager
+def _bag(options: RunOptions) -> Iterator[Path | None]:
+    """Where to record: where the user wants it, or for the time that a report needs it."""
+    if options.record is not None or options.report is None:
+        yield options.record
+        return
+    with TemporaryDirectory(prefix="slap-") as folder:
+        yield Path(folder) / f"{options.domain}-{options.seed}"
+
+
+def _run(request: RunRequest, options: RunOptions, keep_states: OnMessage) -> RunMetrics:
+    """Run the ensemble and show what happens."""
+    with _foxglove(options) as server, _event_view(options.live) as view:
+        listeners: list[OnMessage] = [view, keep_states]
+        if server is not None:
+            request = replace(request, shown=SHOWN_TOPICS)
+            listeners.append(server)
+
+        def on_message(type_name: str, message: Any) -> None:
+            for listener in listeners:
+                listener(type_name, message)
+
+        return run_ensemble(request, on_message)
+
+
+@contextmanager
+def _foxglove(options: RunOptions) -> Iterator[FoxgloveServer | None]:
+    """What shows the run to Foxglove, if it is to be shown and can be.
+
+    Raises:
+        InvalidParameterError: It was asked for explicitly, and cannot be.
+    """
+    if not options.live:
+        yield None
+        return
+    if options.foxglove_is_optional and not foxglove_installed():
+        console.print("not shown to Foxglove: pip install 'slap_ros[live]'", markup=False)
+        yield None
+        return
+    with FoxgloveServer(options.live_port) as server:
+        console.print(f"open in Foxglove: {server.url}", highlight=False)
+        while options.watched and not server.has_viewers:
+            sleep(LOOK_S)
+        yield server
+        while options.watched and server.has_viewers:
+            sleep(LOOK_S)
+
+
+def _event_view(live: bool) -> AbstractContextManager[OnMessage]:
+    """What shows the run: a view in place on a terminal, lines elsewhere."""
+    return Dashboard(console) if live and console.is_terminal else nullcontext(EventPrinter())
+
+
+def _conclude(metrics: RunMetrics, record: Path | None) -> None:
+    if metrics.success:
+        console.print(
+            f"[bold green]solved[/] in {metrics.plan_length} steps, {metrics.shortcut_steps} of "
+            f"them in shortcuts, {metrics.replans} replans, "
+            f"{metrics.planning_seconds:.3f} s of planning, "
+            f"{metrics.edges_rolled_out} edges rolled out",
+            highlight=False,
+        )
+    else:
+        console.print(f"[bold red]not solved[/]: {metrics.error_msg}", highlight=False)
+    if record is not None:
+        console.print(f"bag: {record}", highlight=False)
