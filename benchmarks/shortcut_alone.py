@@ -15,14 +15,13 @@ from benchmarks.printing import show
 from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.shortcuts import jobs
-from slap_ros.shortcuts.explore import Explored
-from slap_ros.shortcuts.jobs import Place
-from slap_ros.shortcuts.practice import Start
+from slap_ros.shortcuts.explore import ExplorationResult
+from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.settings import training_settings
 from slap_ros.shortcuts.shipped import chosen_library
 from slap_ros.shortcuts.shortcut import DEFAULT, PAPER, Shortcut
-from slap_ros.shortcuts.sight import Sight
-from slap_ros.shortcuts.starts import find_start, recall
+from slap_ros.shortcuts.starts import Start, find_start, restore_starts
+from slap_ros.shortcuts.task_distribution import TaskDistribution
 from slap_ros.shortcuts.training import mean_steps, rank
 
 FRESH = 3_000_000  # the first seed of its tasks
@@ -30,31 +29,31 @@ HORIZON, SOON = PAPER.horizon, DEFAULT.horizon  # environment steps of an attemp
 
 
 def starts_of(
-    shortcut: Shortcut, domain: Domain, explored: list[Explored], seed: int, count: int
+    shortcut: Shortcut, domain: Domain, explored: list[ExplorationResult], seed: int, count: int
 ) -> list[Start]:
     """Where it would begin in ``count`` tasks of a seed, as training looks for it."""
     patterns = shortcut.signature.patterns
-    candidate = next(c for c in rank(explored) if c.signature.patterns == patterns)
+    group = next(group for group in rank(explored) if group.signature.patterns == patterns)
     steps = mean_steps(explored)
     found = (
-        find_start(domain, FRESH + seed, index, shortcut.signature, candidate.origin, steps)
+        find_start(domain, FRESH + seed, index, shortcut.signature, group.operator_path, steps)
         for index in range(count)
     )
-    return recall(domain, [record for record in found if record is not None])
+    return restore_starts(domain, [record for record in found if record is not None])
 
 
 def attempt(shortcut: Shortcut, domain: Domain, start: Start) -> int | None:
-    """Steps until it is done; None where it is lost, or not done by the horizon."""
-    sight = Sight(domain, start.space, shortcut.signature, start.change)
+    """Steps until it succeeds; None where it fails, or does not succeed by the horizon."""
+    encoder = ObservationEncoder(domain, start.space, shortcut.signature, start.change)
     worlds = domain.make_vector_world([start.state])
-    look = sight.look(worlds.states)
+    encoding = encoder.encode(worlds.states)
     for step in range(1, HORIZON + 1):
-        choice = shortcut.policy.mean(look.observations)
-        state = worlds.step(sight.actions(choice.astype(float)))
-        look = sight.look(state)
-        if sight.done(state, look, [start.target])[0]:
+        action = shortcut.policy.mean(encoding.observations)
+        state = worlds.step(encoder.action_map(action.astype(float)))
+        encoding = encoder.encode(state)
+        if encoder.success(state, encoding, [start.target])[0]:
             return step
-        if look.lost[0]:
+        if encoding.failure[0]:
             return None
     return None
 
@@ -72,12 +71,12 @@ def measure(shortcut: Shortcut, domain: Domain, starts: list[Start]) -> dict[str
     }
 
 
-def explore(name: str) -> list[Explored]:
+def explore(name: str) -> list[ExplorationResult]:
     """What training found, from which it is known where a shortcut begins."""
     settings = training_settings("ours", name).exploration
-    place = Place(name, "fair", 0)
-    found = (jobs.explore(place, index, settings) for index in range(settings.tasks))
-    return [Explored.from_json(data) for data in found]
+    distribution = TaskDistribution(name, "fair", 0)
+    found = (jobs.explore(distribution, index, settings) for index in range(settings.tasks))
+    return [ExplorationResult.from_json(data) for data in found]
 
 
 def main() -> None:

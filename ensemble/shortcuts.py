@@ -12,8 +12,8 @@ from ensemble.observation import Episode
 from ensemble.parameters import parameter
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError
+from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
 from slap_ros.shortcuts.library import Library
-from slap_ros.shortcuts.repertoire import Repertoire
 from slap_ros.shortcuts.shipped import chosen_library, require_usable
 from slap_ros.shortcuts.shortcut import DEFAULT, Shortcut
 
@@ -45,7 +45,7 @@ class ShortcutProvider:
         self.sampling = replace(DEFAULT, samples=settings.samples)
         self._node, self._choice, self._planner = node, settings.shortcuts, planner
         self._libraries: dict[str, Library | None] = {}  # by domain
-        self._made: tuple[Episode, Repertoire] | None = None
+        self._made: tuple[Episode, GroundedShortcuts] | None = None
 
     def load(self, episode: Episode) -> None:
         """Load the library of an episode's domain, once.
@@ -71,7 +71,7 @@ class ShortcutProvider:
         digest = library.digest if library is not None else ""
         return {"library": digest, "samples": self.sampling.samples}
 
-    def grounded(self, episode: Episode) -> Repertoire | None:
+    def grounded(self, episode: Episode) -> GroundedShortcuts | None:
         """What there is in an episode; None without shortcuts.
 
         It has a world of its own, so make it in the worker thread that uses it.
@@ -81,6 +81,6 @@ class ShortcutProvider:
             return None
         if self._made is None or self._made[0] is not episode:
             initial = episode.task.initial_state
-            repertoire = Repertoire(episode.domain, shortcuts, initial, self.sampling)
-            self._made = (episode, repertoire)
+            grounded = GroundedShortcuts(episode.domain, shortcuts, initial, self.sampling)
+            self._made = (episode, grounded)
         return self._made[1]

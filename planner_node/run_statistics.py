@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from slap_msgs.action import SolveTask
 
-from slap_ros.planning.options import Stopped
+from slap_ros.planning.options import OptionResult
 
 
 @dataclass
@@ -20,7 +20,7 @@ class RunStatistics:
     planning_ns: int = 0
     edges_rolled_out: int = 0
 
-    def result(self, last_step: int, stopped: Stopped) -> SolveTask.Result:
+    def result(self, last_step: int, stopped: OptionResult) -> SolveTask.Result:
         """The action's result."""
         return SolveTask.Result(
             success=stopped.reached,

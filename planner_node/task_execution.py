@@ -34,7 +34,7 @@ from slap_ros.errors import (
     SlapError,
     TaskCanceledError,
 )
-from slap_ros.planning.options import Stopped, hold_option
+from slap_ros.planning.options import OptionResult, hold_option
 from slap_ros.planning.plan import Plan, PlanEdge, PlanningResult
 from slap_ros.planning.planner import Planner
 
@@ -106,13 +106,13 @@ class TaskExecution:
             try:
                 stopped = await self._attempt()
             except SlapError as error:
-                stopped = Stopped(error.code, str(error))
+                stopped = OptionResult(error.code, str(error))
             blind = stopped.code in UNPLANNED and not self._latest.exact
             if not blind and stopped.code not in DIVERGENCES:
                 break
             if self._statistics.plans > self.goal.request.max_replans:
                 limit = f"diverged again after {self.goal.request.max_replans} replans"
-                stopped = Stopped(ErrorCode.REPLANS_EXHAUSTED, f"{limit}: {stopped.reason}")
+                stopped = OptionResult(ErrorCode.REPLANS_EXHAUSTED, f"{limit}: {stopped.reason}")
                 break
             if blind:
                 looked = await self._look_again()
@@ -125,7 +125,7 @@ class TaskExecution:
             self._event(PlanEvent.FAILED, error_code=int(stopped.code), error_msg=stopped.reason)
         return self._statistics.result(self._last_step, stopped)
 
-    async def _attempt(self) -> Stopped:
+    async def _attempt(self) -> OptionResult:
         """One plan, as far as it goes."""
         plan = await self._plan()
         for number, edge in enumerate(plan.edges):
@@ -137,15 +137,15 @@ class TaskExecution:
                     self._event(PlanEvent.DIVERGED, edge=number, error_code=code, error_msg=reason)
                 return stopped
             self._event(PlanEvent.EDGE_REACHED, edge=number)
-        return Stopped(ErrorCode.NONE)
+        return OptionResult(ErrorCode.NONE)
 
-    async def _look_again(self) -> Stopped:
+    async def _look_again(self) -> OptionResult:
         """Hold for a step, to see the same anew."""
         hold = hold_option(self._latest.episode.domain.action_space)
         try:
             return await self._execute(PlanEdge(hold, 0, hold.skill.step_limit))
         except SlapError as error:
-            return Stopped(error.code, str(error))
+            return OptionResult(error.code, str(error))
 
     # -- planning -------------------------------------------------------------------------------
 
@@ -171,11 +171,11 @@ class TaskExecution:
 
     # -- execution ------------------------------------------------------------------------------
 
-    async def _execute(self, edge: PlanEdge) -> Stopped:
+    async def _execute(self, edge: PlanEdge) -> OptionResult:
         start = self._latest
         budget = self.step_limit - (start.step - self._start.step)
         if budget <= 0:
-            return Stopped(
+            return OptionResult(
                 ErrorCode.STEP_LIMIT, f"the goal was not reached in {self.step_limit} steps"
             )
         request = ExecuteSkill.Goal(
@@ -193,7 +193,7 @@ class TaskExecution:
             )
         result = await self._result(handle)
         await self._observe(start.step + result.steps)
-        return Stopped(ErrorCode(result.error_code), result.error_msg)
+        return OptionResult(ErrorCode(result.error_code), result.error_msg)
 
     async def _result(self, goal: ClientGoalHandle) -> ExecuteSkill.Result:
         """How a skill ended.

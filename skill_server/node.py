@@ -51,7 +51,7 @@ from skill_server.requested_option import requested_option
 from skill_server.skill_execution import SkillExecution, result
 from skill_server.skill_publisher import SkillPublisher
 from slap_ros.errors import ErrorCode, NoStateError, SlapError
-from slap_ros.planning.options import OptionExecution, Stopped
+from slap_ros.planning.options import OptionExecution, OptionResult
 
 CHECK_PERIOD = 0.1  # s, between two looks at whether a skill is to be given up
 
@@ -115,13 +115,13 @@ class SkillServer(Node):
     async def _execute(self, goal: ServerGoalHandle) -> ExecuteSkill.Result:
         if self._busy:
             goal.abort()
-            return result(Stopped(ErrorCode.BUSY, "another skill is under way"), 0)
+            return result(OptionResult(ErrorCode.BUSY, "another skill is under way"), 0)
         self._busy = True
         try:
             self._execution = await self._begin(goal)
         except SlapError as error:
             goal.abort()
-            return result(Stopped(error.code, str(error)), 0)
+            return result(OptionResult(error.code, str(error)), 0)
         else:
             return await self._execution.run(self._synchronizer.latest)
         finally:

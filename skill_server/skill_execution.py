@@ -19,7 +19,7 @@ from ensemble.node_liveness import NodeLiveness
 from ensemble.observation import Observation
 from skill_server.skill_publisher import SkillPublisher
 from slap_ros.errors import ErrorCode
-from slap_ros.planning.options import Option, OptionExecution, Stopped
+from slap_ros.planning.options import Option, OptionExecution, OptionResult
 
 
 @dataclass
@@ -46,7 +46,7 @@ class SkillExecution:
 
     def __post_init__(self) -> None:
         self.latest = self.start
-        self._ended = Future()  # of Stopped
+        self._ended = Future()  # of OptionResult
         self._newest_s = node_time_s(self.node)  # when the latest observation came
 
     @property
@@ -56,9 +56,9 @@ class SkillExecution:
 
     async def run(self, latest: Observation) -> ExecuteSkill.Result:
         """Execute from the newest observation to the end, and conclude the goal."""
-        self._publish_event(SkillEvent.STARTED, Stopped(ErrorCode.NONE))
+        self._publish_event(SkillEvent.STARTED, OptionResult(ErrorCode.NONE))
         self.advance(latest)
-        outcome: Stopped = await self._ended
+        outcome: OptionResult = await self._ended
         if outcome.reached:
             kind, conclude = SkillEvent.REACHED, self.goal.succeed
         elif outcome.code is ErrorCode.SKILL_CANCELED:
@@ -87,7 +87,7 @@ class SkillExecution:
         action = self.execution.advance(
             observation.state, observation.abstract, observation.missing
         )
-        if isinstance(action, Stopped):
+        if isinstance(action, OptionResult):
             self._ended.set_result(action)
         elif self._steps >= self.step_budget:
             self._stop(ErrorCode.STEP_LIMIT, f"not done within {self.step_budget} steps")
@@ -120,12 +120,12 @@ class SkillExecution:
         self._stop(ErrorCode.SKILL_CANCELED, "canceled")
 
     def _stop(self, code: ErrorCode, reason: str) -> None:
-        self._ended.set_result(Stopped(code, f"{self.option}: {reason}"))
+        self._ended.set_result(OptionResult(code, f"{self.option}: {reason}"))
 
-    def _publish_event(self, kind: int, outcome: Stopped) -> None:
+    def _publish_event(self, kind: int, outcome: OptionResult) -> None:
         self.publisher.event(kind, self.option, self.latest, outcome)
 
 
-def result(outcome: Stopped, steps: int) -> ExecuteSkill.Result:
+def result(outcome: OptionResult, steps: int) -> ExecuteSkill.Result:
     """The action's result, without atoms; ``steps`` are environment steps."""
     return ExecuteSkill.Result(steps=steps, error_code=int(outcome.code), error_msg=outcome.reason)

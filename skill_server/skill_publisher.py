@@ -13,7 +13,7 @@ from ensemble import encode
 from ensemble.interfaces import COMMAND, SKILL_EVENTS
 from ensemble.observation import Observation
 from slap_ros.core import Action
-from slap_ros.planning.options import Option, Stopped
+from slap_ros.planning.options import Option, OptionResult
 
 
 class SkillPublisher:
@@ -41,7 +41,7 @@ class SkillPublisher:
         now = self._node.get_clock().now().to_msg()
         self._commands.publish(encode.command(action, at.episode.number, at.step, now))
 
-    def event(self, kind: int, option: Option, at: Observation, outcome: Stopped) -> None:
+    def event(self, kind: int, option: Option, at: Observation, outcome: OptionResult) -> None:
         """Publish a SkillEvent.
 
         Args:

@@ -19,7 +19,7 @@ from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose, sampling
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.approaches import approaches
-from slap_ros.shortcuts.settings import Exploration, training_settings
+from slap_ros.shortcuts.settings import ExplorationSettings, training_settings
 from slap_ros.shortcuts.shipped import shipped_library
 from slap_ros.studies import dynamics, generalisation, perception, planning_time, pruning
 from slap_ros.studies import goals as sampled
@@ -226,7 +226,7 @@ def _given(options: ComparisonOptions, settings: Data) -> Data:
 
 
 def _explore(
-    domain: str, options: TaskOptions, how: Exploration
+    domain: str, options: TaskOptions, how: ExplorationSettings
 ) -> tuple[pruning.PrunedCandidates, ...]:
     with _StudyBars() as bars:
         return pruning.explore(
@@ -236,7 +236,7 @@ def _explore(
 
 def _trainings(folders: Sequence[TrainingFolder]) -> Data:
     """Whose work folders they are."""
-    return {"trainings": [folder.place() for folder in folders]}
+    return {"trainings": [folder.distribution() for folder in folders]}
 
 
 def _command(study: str, domain: str, **options: Any) -> str:

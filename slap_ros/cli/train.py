@@ -20,10 +20,11 @@ from slap_ros.cli.console import console, print_json
 from slap_ros.cli.options import DomainName, Json, Preset
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
-from slap_ros.shortcuts.jobs import Kept, Place
 from slap_ros.shortcuts.library import save_library
 from slap_ros.shortcuts.settings import training_settings
-from slap_ros.shortcuts.training import Candidate, Training
+from slap_ros.shortcuts.task_distribution import TaskDistribution
+from slap_ros.shortcuts.training import CandidateGroup, Training
+from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 from slap_ros.shortcuts.workers import Workers, local_workers, ray_workers
 
 REFRESH_S = 1.0
@@ -66,7 +67,8 @@ def train(
     work = work or output.with_name(f"{output.name}-training")
     began = monotonic()
     with _workers(jobs, ray) as workers, _TrainingBars() as show:
-        library = Training(Place(domain, preset, seed), chosen, work, workers, show).run()
+        distribution = TaskDistribution(domain, preset, seed)
+        library = Training(distribution, chosen, work, workers, show).run()
     command = _command(domain, preset, seed, settings, steps)
     library = replace(library, record={"command": command, **library.record})
     save_library(output, library)
@@ -122,7 +124,7 @@ class _TrainingBars:
         self._unfollow()
         self._bars.stop()
 
-    def counting(self, what: str, done: int, total: int) -> None:
+    def on_progress(self, what: str, done: int, total: int) -> None:
         """So many jobs of a kind are done."""
         self._unfollow()
         if done == 0 or what not in self._counting:
@@ -131,28 +133,30 @@ class _TrainingBars:
         if done == total:
             self._bars.remove_task(self._counting.pop(what))
 
-    def candidates(self, ranked: Sequence[Candidate]) -> None:
+    def on_ranked(self, ranked: Sequence[CandidateGroup]) -> None:
         """What was found worth learning."""
         console.print(f"{len(ranked)} candidates; the most promising:", highlight=False)
-        for candidate in ranked[:5]:
+        for group in ranked[:5]:
+            after = ", ".join(group.operator_path) or "the start"
             console.print(
-                f"  {candidate.signature.name} after {', '.join(candidate.origin) or 'the start'}: "
-                f"{candidate.promise:.0%} of a plan, found in {candidate.tasks} tasks",
+                f"  {group.signature.name} after {after}: {group.relative_saving:.0%} of a plan, "
+                f"found in {group.tasks} tasks",
                 highlight=False,
             )
 
-    def learning(self, name: str, folder: Path, total_steps: int) -> None:
+    def on_learning(self, name: str, folder: Path, total_steps: int) -> None:
         """Follow a training."""
         self._unfollow()
         bar = self._bars.add_task(f"learning {name}", total=total_steps, detail="")
         stop = Event()
-        thread = Thread(target=self._follow, args=(Kept(folder), bar, stop), daemon=True)
+        arguments = (ShortcutWorkFolder(folder), bar, stop)
+        thread = Thread(target=self._follow, args=arguments, daemon=True)
         self._following = stop, thread
         thread.start()
 
-    def _follow(self, kept: Kept, bar: TaskID, stop: Event) -> None:
+    def _follow(self, folder: ShortcutWorkFolder, bar: TaskID, stop: Event) -> None:
         while not stop.wait(REFRESH_S):
-            stages = _latest(kept.progress)
+            stages = _latest(folder.progress)
             if stages:
                 last = stages[max(stages)]
                 length = "-" if last["length"] is None else f"{last['length']:.1f}"
@@ -168,7 +172,7 @@ class _TrainingBars:
             thread.join()
             self._following = None
 
-    def judged(self, name: str, before: float, after: float, kept: bool) -> None:
+    def on_validated(self, name: str, before: float, after: float, kept: bool) -> None:
         """What it is worth."""
         console.print(
             f"{name}: plans of {before:.1f} steps become {after:.1f}{'' if kept else '; not kept'}",

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slap_ros.core import Action, ActionSpace, Domain
-from slap_ros.planning.execution import Episode
+from slap_ros.planning.execution import EpisodeResult
 from slap_ros.relational import State
 
 HOLD = 5  # environment steps for which a random action is repeated, so that it gets somewhere
@@ -46,7 +46,7 @@ class Experience:
 def gather(
     domain: Domain,
     start: State,
-    episodes: Sequence[Episode],
+    episodes: Sequence[EpisodeResult],
     count: int,
     rng: np.random.Generator,
 ) -> Experience:

@@ -12,7 +12,7 @@ from slap_ros.doctor.check import Check
 from slap_ros.errors import SlapError
 from slap_ros.evaluation.approaches import PURE_PLANNING
 from slap_ros.evaluation.experiment import solve
-from slap_ros.planning.execution import Episode
+from slap_ros.planning.execution import EpisodeResult
 
 SHOWN = 3  # reasons for failures that are told
 
@@ -57,7 +57,7 @@ class Solved:
     """
 
     seed: int
-    episodes: tuple[Episode, ...]
+    episodes: tuple[EpisodeResult, ...]
     failures: dict[int, str]
     count: int
 

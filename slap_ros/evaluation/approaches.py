@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from slap_ros.core import Domain
 from slap_ros.planning.planner import Planner, make_planner
 from slap_ros.relational import State
+from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
 from slap_ros.shortcuts.library import Library
-from slap_ros.shortcuts.repertoire import Repertoire
 from slap_ros.shortcuts.shortcut import DEFAULT, PAPER, Sampling, Shortcut
 
 
@@ -32,8 +32,8 @@ class Approach:
         """The planner of that name, for tasks over the objects of ``initial``."""
         if not self.shortcuts:
             return make_planner(name, domain, initial)
-        repertoire = Repertoire(domain, self.shortcuts, initial, self.sampling)
-        return make_planner(name, domain, initial, repertoire)
+        grounded = GroundedShortcuts(domain, self.shortcuts, initial, self.sampling)
+        return make_planner(name, domain, initial, grounded)
 
 
 PURE_PLANNING = Approach("pure_planning")

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from slap_ros.core import Domain, Task
 from slap_ros.domains import get_domain
 from slap_ros.evaluation.approaches import PURE_PLANNING, Approach
-from slap_ros.planning.execution import Episode, Executor
+from slap_ros.planning.execution import EpisodeResult, Executor
 from slap_ros.shortcuts.workers import local_workers
 
 
@@ -33,12 +33,12 @@ class Experiment:
     def __len__(self) -> int:
         return self.tasks * self.seeds
 
-    def run(self, seed: int, index: int, approach: Approach = PURE_PLANNING) -> Episode:
+    def run(self, seed: int, index: int, approach: Approach = PURE_PLANNING) -> EpisodeResult:
         """Solve one task, in a world of its own."""
         return solve(self.domain, self.domain.task(seed, index), approach, self.planner)
 
 
-def solve(domain: Domain, task: Task, approach: Approach, planner: str = "lazy") -> Episode:
+def solve(domain: Domain, task: Task, approach: Approach, planner: str = "lazy") -> EpisodeResult:
     """Plan for any task of a domain and execute the plan, in a world of its own."""
     space = domain.atom_space(task.initial_state)
     return Executor(
@@ -65,7 +65,7 @@ class Trial:
     reason: str  # why not, unless it is a success
 
     @classmethod
-    def of(cls, seed: int, index: int, episode: Episode) -> Trial:
+    def of(cls, seed: int, index: int, episode: EpisodeResult) -> Trial:
         """What an episode came to."""
         return cls(
             seed,

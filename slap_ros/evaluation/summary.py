@@ -44,7 +44,7 @@ class Summary:
         experiment: Experiment,
         approach: str,
         trials: Sequence[Trial],
-        yardstick: Sequence[Trial],
+        baseline: Sequence[Trial],
     ) -> Summary:
         """The summary of an approach, against the trials of pure planning in the same order."""
         lengths = [float(trial.plan_length) for trial in trials if trial.success]
@@ -54,7 +54,7 @@ class Summary:
             approach,
             fmean(trial.success for trial in trials),
             Spread.of(lengths) if lengths else None,
-            _relative_length(trials, yardstick),
+            _relative_length(trials, baseline),
             Spread.of([trial.planning_seconds for trial in trials]),
             fmean(trial.edges_rolled_out for trial in trials),
             sum(trial.shortcut_steps for trial in trials) / steps if steps else 0.0,
@@ -87,11 +87,11 @@ class Summary:
         return self.as_json() | {"shortcut_share": self.shortcut_share}
 
 
-def _relative_length(trials: Sequence[Trial], yardstick: Sequence[Trial]) -> float | None:
+def _relative_length(trials: Sequence[Trial], baseline: Sequence[Trial]) -> float | None:
     """Mean length over that of pure planning, on the tasks that both solved."""
     pairs = [
         (trial.plan_length, other.plan_length)
-        for trial, other in zip(trials, yardstick, strict=True)
+        for trial, other in zip(trials, baseline, strict=True)
         if trial.success and other.success
     ]
     own, other = (sum(lengths) for lengths in zip(*pairs, strict=True)) if pairs else (0, 0)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from slap_ros.errors import PlanningLimitError, UnsolvableError
-from slap_ros.planning.distance import Distance
+from slap_ros.planning.hmax import HMax
 from slap_ros.planning.options import Option
 from slap_ros.relational import GroundOperator
 
@@ -99,7 +99,7 @@ def _goalward(
     max_nodes: int,
 ) -> AbstractGraph:
     """Only what may be on a way to the goal of so many operators, and of one more each time."""
-    distance = Distance(goal, [operator for operator, _ in operators])
+    distance = HMax(goal, [operator for operator, _ in operators])
     reach = distance(start) or 0
     while True:
         growth = _Growth(goal, operators, max_nodes, distance, reach)
@@ -129,7 +129,7 @@ class _Growth:
         goal: int,
         operators: Sequence[tuple[GroundOperator, Option]],
         max_nodes: int,
-        distance: Distance | None = None,
+        distance: HMax | None = None,
         reach: int = 0,
     ) -> None:
         """With a ``distance``, leave out what is not on a way of ``reach`` operators."""

@@ -21,7 +21,7 @@ from slap_ros.errors import (
     UnsolvableError,
 )
 from slap_ros.perception import ExactPerceiver, Perceiver, Percept
-from slap_ros.planning.options import OptionExecution, OptionKind, Stopped
+from slap_ros.planning.options import OptionExecution, OptionKind, OptionResult
 from slap_ros.planning.plan import Plan, PlanEdge
 from slap_ros.planning.planner import Planner
 from slap_ros.relational import AtomSpace, State
@@ -31,7 +31,7 @@ FINAL = frozenset({ErrorCode.STEP_LIMIT, ErrorCode.NO_DETECTION})  # another pla
 
 
 @dataclass
-class Episode:
+class EpisodeResult:
     """What happened in one attempt at a task."""
 
     success: bool = False
@@ -41,7 +41,7 @@ class Episode:
     replans: int = 0
     planning_seconds: float = 0.0
     edges_rolled_out: int = 0
-    error: Stopped = field(default_factory=lambda: Stopped(ErrorCode.NONE))
+    error: OptionResult = field(default_factory=lambda: OptionResult(ErrorCode.NONE))
 
     @property
     def plan_length(self) -> int:
@@ -79,9 +79,9 @@ class Executor:
         self._perceiver = self.perceiver or ExactPerceiver(self.space)
         self._known = self._perceiver.perceive(self.world.state)
 
-    def run(self) -> Episode:
+    def run(self) -> EpisodeResult:
         """Solve from the world's current state, or say why not."""
-        episode = Episode(states=[self.world.state])
+        episode = EpisodeResult(states=[self.world.state])
         while True:
             stopped, blind = self._attempt(episode)
             if stopped.reached:
@@ -91,7 +91,7 @@ class Executor:
                 episode.error = stopped
                 return episode
             if episode.replans == self.max_replans:
-                episode.error = Stopped(
+                episode.error = OptionResult(
                     ErrorCode.REPLANS_EXHAUSTED,
                     f"diverged again after {self.max_replans} replans: {stopped.reason}",
                 )
@@ -100,15 +100,15 @@ class Executor:
             if blind and episode.plan_length < self.step_limit:
                 self._act(np.zeros(len(self.domain.action_space.axes)), episode)  # and look again
 
-    def _attempt(self, episode: Episode) -> tuple[Stopped, bool]:
+    def _attempt(self, episode: EpisodeResult) -> tuple[OptionResult, bool]:
         """One plan, as far as it goes; second, whether there was none from what was seen."""
         try:
             plan = self._plan(episode)
         except (UnsolvableError, PlanningLimitError, InvalidStateError) as error:
-            return Stopped(error.code, str(error)), True
+            return OptionResult(error.code, str(error)), True
         return self._execute(plan, episode), False
 
-    def _plan(self, episode: Episode) -> Plan:
+    def _plan(self, episode: EpisodeResult) -> Plan:
         started = perf_counter()
         try:
             result = self.planner.plan(self._known.state, self.goal)
@@ -117,14 +117,14 @@ class Executor:
         episode.edges_rolled_out += result.edges_rolled_out
         return result.plan
 
-    def _execute(self, plan: Plan, episode: Episode) -> Stopped:
+    def _execute(self, plan: Plan, episode: EpisodeResult) -> OptionResult:
         for edge in plan.edges:
             stopped = self._execute_edge(edge, episode)
             if not stopped.reached:
                 return stopped
-        return Stopped(ErrorCode.NONE)
+        return OptionResult(ErrorCode.NONE)
 
-    def _execute_edge(self, edge: PlanEdge, episode: Episode) -> Stopped:
+    def _execute_edge(self, edge: PlanEdge, episode: EpisodeResult) -> OptionResult:
         try:
             execution = OptionExecution(
                 edge.option,
@@ -134,20 +134,20 @@ class Executor:
                 self.patience,
             )
         except SkillNotApplicableError as error:
-            return Stopped(error.code, str(error))
+            return OptionResult(error.code, str(error))
         while True:
             known = self._known
             action = execution.advance(known.state, known.abstract, known.missing)
-            if isinstance(action, Stopped):
+            if isinstance(action, OptionResult):
                 return action
             if episode.plan_length == self.step_limit:
-                return Stopped(
+                return OptionResult(
                     ErrorCode.STEP_LIMIT, f"the goal was not reached in {self.step_limit} steps"
                 )
             episode.shortcut_steps += edge.option.kind is OptionKind.SHORTCUT
             self._act(action, episode)
 
-    def _act(self, action: Action, episode: Episode) -> None:
+    def _act(self, action: Action, episode: EpisodeResult) -> None:
         episode.actions.append(action)
         episode.states.append(self.world.step(action))
         self._known = self._perceiver.perceive(episode.states[-1])

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from slap_ros.core import ActionSpace, Domain, World
 from slap_ros.errors import SkillNotApplicableError
-from slap_ros.planning.options import Option, OptionExecution, Stopped
+from slap_ros.planning.options import Option, OptionExecution, OptionResult
 from slap_ros.relational import AtomSpace, State
 
 
@@ -57,6 +57,6 @@ class Model:
             return Rollout(False, 0, state)
         while True:
             action = execution.advance(state, self.space.abstract(state))
-            if isinstance(action, Stopped):
+            if isinstance(action, OptionResult):
                 return Rollout(action.reached, execution.steps, state)
             state = self._world.step(action)

@@ -54,7 +54,7 @@ class Option:
     objects: tuple[Object, ...]
     accepts: Callable[[State], bool] = field(default=_any, compare=False, repr=False)
     attempt: int = 0
-    another: Callable[[], Option | None] = field(default=_none, compare=False, repr=False)
+    next_attempt: Callable[[], Option | None] = field(default=_none, compare=False, repr=False)
     given_up: Callable[[], bool] = field(default=_never, compare=False, repr=False)
 
     def __str__(self) -> str:
@@ -112,7 +112,7 @@ def hold_option(actions: ActionSpace) -> Option:
 
 
 @dataclass(frozen=True)
-class Stopped:
+class OptionResult:
     """Why an execution is over: NONE where the target was reached."""
 
     code: ErrorCode
@@ -154,7 +154,7 @@ class OptionExecution:
 
     def advance(
         self, state: State, abstract: int, missing: Collection[str] = ()
-    ) -> Action | Stopped:
+    ) -> Action | OptionResult:
         """The next action from the newest state, or why there is none.
 
         Args:
@@ -163,27 +163,27 @@ class OptionExecution:
             missing: Objects of which nobody knows where they are; those that it is about stop it.
         """
         if lost := [obj.name for obj in self.option.objects if obj.name in missing]:
-            return Stopped(
+            return OptionResult(
                 ErrorCode.NO_DETECTION,
                 f"{self.option}: not seen for too long: {', '.join(lost)}",
             )
         if abstract == self.target and self.steps > 0 and self.option.accepts(state):
-            return Stopped(ErrorCode.NONE)
+            return OptionResult(ErrorCode.NONE)
         if self.steps >= self.option.skill.step_limit:
-            return Stopped(
+            return OptionResult(
                 ErrorCode.SKILL_STEP_LIMIT,
                 f"{self.option} did not end within {self.option.skill.step_limit} steps",
             )
         action = self._next(state)
         if action is None:
-            return Stopped(
+            return OptionResult(
                 ErrorCode.SKILL_STOPPED_SHORT,
                 f"{self.option} ended in another abstract state than expected",
             )
         try:
             self.actions.check(action)
         except InvalidCommandError as error:
-            return Stopped(error.code, f"{self.option}: {error}")
+            return OptionResult(error.code, f"{self.option}: {error}")
         self.steps += 1
         return action
 

@@ -86,7 +86,7 @@ def _ways(
         if not rollout.reached:
             return
         yield replace(edge, option=option), rollout
-        option = option.another()
+        option = option.next_attempt()
 
 
 def search_exhaustively(graph: AbstractGraph, state: State, model: Model) -> Plan:
@@ -192,9 +192,9 @@ def search_lazily(graph: AbstractGraph, state: State, model: Model) -> Plan:
                 if cost < cheapest.get(reached.key, cost + 1):
                     cheapest[reached.key] = cost
                     frontier.push(reached)
-                another = edge.option.another()
-                if another is not None:  # it takes longer, but what comes next may take less
-                    frontier.push(vertex, replace(edge, option=another), rollout.steps)
+                next_attempt = edge.option.next_attempt()
+                if next_attempt is not None:  # it takes longer, but what comes next may take less
+                    frontier.push(vertex, replace(edge, option=next_attempt), rollout.steps)
             elif edge.option.given_up():
                 frontier.give_up()
         elif edge is None and vertex.node in goals:

@@ -3,16 +3,17 @@
 """Collect and prune: which shortcuts are worth learning (SLAP §4.2, Alg. 1).
 
 The paper records the low-level states of a whole abstract graph and makes random rollouts from
-all of them. What a shortcut from i to j can save, though, is what the best plan costs less the
-way to i, the shortcut, and the way on from j. So nodes are explored in the order in which they
-can be reached, and what is known of the rest of the way is what operators cost on average.
+all of them. What a shortcut from node i to node j can save, though, is the cost of the best plan
+less the costs of the way to i, of the shortcut, and of the way on from j. So nodes are explored in
+the order of the cost to reach them, and the rest of the way is estimated with the mean cost of
+each operator.
 """
 
 from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from itertools import count
 from typing import Any
 
@@ -25,87 +26,118 @@ from slap_ros.planning.planner import GraphPlanner, Problem
 from slap_ros.planning.search import Vertex
 from slap_ros.relational import State
 from slap_ros.shortcuts.action_map import ActionMap
-from slap_ros.shortcuts.settings import Exploration
-from slap_ros.shortcuts.sight import learner_interface
+from slap_ros.shortcuts.observation_encoder import learner_interface
+from slap_ros.shortcuts.settings import ExplorationSettings
 from slap_ros.shortcuts.signature import Change, Signature, context_of
+from slap_ros.shortcuts.stored_keys import restored, stored
 
-Origin = tuple[str, ...]  # operators by which a shortcut's source was reached
-MERGED = 0.5  # of a motion's steps that are left where it is part of a shortcut
-ONE_BY_ONE = 4  # worlds that cannot be stepped together
+OperatorPath = tuple[str, ...]  # operators by which a shortcut's source was reached
+ABSORBED_MOTION = 0.5  # of a motion's steps that remain where it is part of a shortcut
+UNBATCHED_WORLDS = 4  # worlds where a domain's cannot be stepped together
 GRIPPER_CHOICES = np.array([0.0, 0.0, 0.0, 1.0, -1.0])  # in every second rollout
 
 
 @dataclass(frozen=True)
-class Find:
-    """A candidate that random rollouts reached.
+class ShortcutCandidate:
+    """A pair of abstract states, up to objects, that random rollouts joined.
 
     Args:
-        signature: What it changes.
-        origin: Where from.
-        hits: In how many rollouts.
-        steps: Of the shortest of them, and of what led there from where the shortcut begins.
-        plan_steps: Of the plan without it.
-        promise: Environment steps by which it would shorten the plan.
+        signature: The lifted change from the one to the other.
+        operator_path: Names of the operators by which the source was reached.
+        hits: Rollouts that reached the target.
+        steps: Environment steps of the shortest of them, and of the options before it that the
+            shortcut would replace.
+        plan_steps: Environment steps of the plan without it.
+        expected_saving: Environment steps by which it is expected to shorten the plan.
     """
 
     signature: Signature
-    origin: Origin
+    operator_path: OperatorPath
     hits: int
     steps: int
     plan_steps: int
-    promise: float
+    expected_saving: float
 
     def as_json(self) -> dict[str, Any]:
-        """Plain data."""
-        return {
-            **{field.name: getattr(self, field.name) for field in fields(self)},
-            "signature": self.signature.as_json(),
-            "origin": list(self.origin),
-        }
+        """A JSON object, under the keys of :mod:`slap_ros.shortcuts.stored_keys`."""
+        return stored(self)
 
     @classmethod
-    def from_json(cls, data: Mapping[str, Any]) -> Find:
-        """The find of :meth:`as_json`."""
-        numbers = {name: data[name] for name in ("hits", "steps", "plan_steps", "promise")}
+    def from_json(cls, data: Mapping[str, Any]) -> ShortcutCandidate:
+        """The candidate of :meth:`as_json`.
+
+        Raises:
+            KeyError, TypeError, ValueError: The data is no candidate.
+        """
+        values = restored(cls, data)
+        names = ("hits", "steps", "plan_steps", "expected_saving")
+        numbers = {name: values[name] for name in names}
         if not all(isinstance(value, int | float) for value in numbers.values()):
             raise TypeError(f"{numbers} are not all numbers")
-        origin = tuple(str(name) for name in data["origin"])
-        return cls(Signature.from_json(data["signature"]), origin, **numbers)
+        operator_path = tuple(str(name) for name in values["operator_path"])
+        return cls(Signature.from_json(values["signature"]), operator_path, **numbers)
 
 
 @dataclass(frozen=True)
-class Explored:
-    """What exploring one task came to."""
+class ExplorationResult:
+    """The outcome of exploring one task.
 
-    finds: tuple[Find, ...]
-    candidates: int  # pairs of abstract states that no option joins
+    Args:
+        candidates: What was not pruned and is expected to shorten the plan.
+        pairs: How many pairs of abstract states no option joins: the paper's candidates.
+        environment_steps: Simulated while exploring.
+        operator_steps: Mean environment steps of each operator, by name.
+    """
+
+    candidates: tuple[ShortcutCandidate, ...]
+    pairs: int
     environment_steps: int
-    operator_steps: Mapping[str, float]  # mean of each operator
+    operator_steps: Mapping[str, float]
 
     def as_json(self) -> dict[str, Any]:
-        """Plain data."""
-        return {
-            **{field.name: getattr(self, field.name) for field in fields(self)},
-            "finds": [find.as_json() for find in self.finds],
-        }
+        """A JSON object, under the keys of :mod:`slap_ros.shortcuts.stored_keys`."""
+        return stored(self)
 
     @classmethod
-    def from_json(cls, data: Mapping[str, Any]) -> Explored:
-        """What :meth:`as_json` wrote."""
+    def from_json(cls, data: Mapping[str, Any]) -> ExplorationResult:
+        """The result of :meth:`as_json`.
+
+        Raises:
+            AttributeError, KeyError, TypeError, ValueError: The data is no result.
+        """
+        values = restored(cls, data)
         return cls(
-            tuple(Find.from_json(find) for find in data["finds"]),
-            int(data["candidates"]),
-            int(data["environment_steps"]),
-            {str(name): float(mean) for name, mean in data["operator_steps"].items()},
+            tuple(ShortcutCandidate.from_json(candidate) for candidate in values["candidates"]),
+            int(values["pairs"]),
+            int(values["environment_steps"]),
+            {str(name): float(mean) for name, mean in values["operator_steps"].items()},
         )
 
 
 class Explorer:
-    """Explores one task."""
+    """Explores one task: collects states, makes random rollouts, values what they reached."""
 
     def __init__(
-        self, domain: Domain, seed: int, index: int, settings: Exploration, rng: np.random.Generator
+        self,
+        domain: Domain,
+        seed: int,
+        index: int,
+        settings: ExplorationSettings,
+        rng: np.random.Generator,
     ) -> None:
+        """Plan for the task and build its abstract graph.
+
+        Args:
+            domain: Whose task.
+            seed: Of the task.
+            index: Of the task.
+            settings: How many rollouts, from how many nodes.
+            rng: Draws the random actions.
+
+        Raises:
+            UnsolvableError: The task has no plan.
+            PlanningLimitError: A limit was reached before a plan was found.
+        """
         self.task = domain.task(seed, index)
         self._domain, self._settings, self._rng = domain, settings, rng
         self._problem = Problem.of(domain, self.task.initial_state)
@@ -120,39 +152,39 @@ class Explorer:
         self.graph = build_abstract_graph(
             self.space.abstract(self.task.initial_state), goal, self._problem.operators
         )
-        worlds = settings.rollouts if domain.steps_together else ONE_BY_ONE
+        worlds = settings.rollouts if domain.steps_together else UNBATCHED_WORLDS
         self._worlds = domain.make_vector_world([self.task.initial_state] * worlds)
         self._gripper = np.arange(worlds) % 2 == 1
         self._steps = 0
 
-    def explore(self) -> Explored:
+    def explore(self) -> ExplorationResult:
         """Collect states, roll out from them, value what was reached."""
         vertices, operator_steps = self._collect()
-        to_go = ways_to_goal(self.graph, operator_steps)
+        to_go = steps_to_goal(self.graph, operator_steps)
         index = {node: j for j, node in enumerate(self.graph.nodes)}
         joined = {(edge.source, edge.target) for edge in self.graph.edges}
-        finds = []
+        candidates = []
         for vertex in vertices:
             for j, lengths in self._roll_out(vertex, index).items():
                 if len(lengths) < self._settings.hits:
                     continue
-                finds += [
-                    self._value(beginning, vertex, j, lengths, to_go[j])
-                    for beginning in self._beginnings(vertex)
-                    if (beginning.node, j) not in joined
+                candidates += [
+                    self._candidate(source, vertex, j, lengths, to_go[j])
+                    for source in self._sources(vertex)
+                    if (source.node, j) not in joined
                 ]
-        return Explored(
-            tuple(find for find in finds if find.promise > 0.0),
+        return ExplorationResult(
+            tuple(candidate for candidate in candidates if candidate.expected_saving > 0.0),
             len(self.graph.candidates()),
             self._steps,
             operator_steps,
         )
 
-    def _beginnings(self, vertex: Vertex) -> Iterator[Vertex]:
-        """Where a shortcut may begin that does what was found from a vertex.
+    def _sources(self, vertex: Vertex) -> Iterator[Vertex]:
+        """Where a shortcut may begin that does what rollouts from a vertex did.
 
-        There, or before the motions of the empty or full hand that led there: what they are good
-        for a shortcut may well do on its way.
+        At the vertex itself, or before the options that led there as far as they change nothing
+        in what is held: a shortcut may well learn to move there by itself.
         """
         yield vertex
         while vertex.parent is not None:
@@ -162,27 +194,38 @@ class Explorer:
             vertex = vertex.parent
             yield vertex
 
-    def _value(
-        self, beginning: Vertex, vertex: Vertex, j: int, lengths: list[int], to_go: float
-    ) -> Find:
-        """What was found from a vertex, as a shortcut that begins there or before."""
-        source = self.graph.nodes[beginning.node]
-        change = Change.between(source, self.graph.nodes[j])
-        context = context_of(source, learner_interface(self._domain).grasping, self.space)
-        motions = vertex.cost - beginning.cost
+    def _candidate(
+        self, source: Vertex, vertex: Vertex, j: int, lengths: list[int], to_go: float
+    ) -> ShortcutCandidate:
+        """What rollouts from a vertex reached, as a shortcut that begins at ``source``.
+
+        Args:
+            source: The vertex itself, or one before it; see :meth:`_sources`.
+            vertex: From where rollouts were made.
+            j: The node that they reached.
+            lengths: Environment steps of each of them.
+            to_go: Environment steps from that node to a goal, as estimated.
+
+        Returns:
+            The candidate, whose expected saving may be negative.
+        """
+        node = self.graph.nodes[source.node]
+        change = Change.between(node, self.graph.nodes[j])
+        context = context_of(node, learner_interface(self._domain).grasping, self.space)
+        motions = vertex.cost - source.cost
         steps = min(lengths)
-        hoped = beginning.cost + MERGED * motions + steps
-        return Find(
+        expected = source.cost + ABSORBED_MOTION * motions + steps
+        return ShortcutCandidate(
             Signature.of(change, self.space, context),
-            origin_of(beginning),
+            operator_path_to(source),
             len(lengths),
             motions + steps,
             self._plan.predicted_steps,
-            self._plan.predicted_steps - (hoped + to_go),
+            self._plan.predicted_steps - (expected + to_go),
         )
 
     def _collect(self) -> tuple[list[Vertex], dict[str, float]]:
-        """The cheapest nodes to reach, and what operators cost on average."""
+        """The cheapest nodes to reach, and the mean steps of each operator."""
         costs: dict[str, list[int]] = {}
         for edge in self._plan.edges:
             costs.setdefault(edge.option.skill.name, []).append(edge.predicted_steps)
@@ -209,12 +252,12 @@ class Explorer:
             closed.add(vertex.node)
             yield vertex
             for edge in forward[vertex.node] if vertex.node not in goals else []:
-                reached = self.follow(vertex, edge)
+                reached = self._follow(vertex, edge)
                 if reached is not None:
                     heapq.heappush(queue, (reached.cost, next(tie), reached))
 
-    def follow(self, vertex: Vertex, edge: Edge) -> Vertex | None:
-        """Where an edge leads to from a vertex, if anywhere."""
+    def _follow(self, vertex: Vertex, edge: Edge) -> Vertex | None:
+        """Where an edge leads to from a vertex; None where it cannot be executed."""
         target = self.graph.nodes[edge.target]
         rollout = self._problem.model.roll_out(edge.option, vertex.state, target)
         self._steps += rollout.steps
@@ -226,13 +269,13 @@ class Explorer:
         """Random rollouts, for all targets at once: steps to each node reached, by node."""
         reached: dict[int, list[int]] = {}
         for _ in range(0, self._settings.rollouts, len(self._gripper)):
-            for first in self._some_rollouts(vertex.state, index):
+            for first in self._roll_out_batch(vertex.state, index):
                 for j, steps in first.items():
                     if j > vertex.node:
                         reached.setdefault(j, []).append(steps)
         return reached
 
-    def _some_rollouts(self, state: State, index: Mapping[int, int]) -> list[dict[int, int]]:
+    def _roll_out_batch(self, state: State, index: Mapping[int, int]) -> list[dict[int, int]]:
         """In every world: the first step at which each node was reached, with all at rest."""
         learner, to_action = learner_interface(self._domain), ActionMap(self._domain, gripper=True)
         worlds = len(self._gripper)
@@ -241,32 +284,32 @@ class Explorer:
         first: list[dict[int, int]] = [{} for _ in range(worlds)]
         alive = np.ones(worlds, dtype=bool)
         for step in range(self._settings.length):
-            if step % self._settings.hold == 0:
-                directions = self._directions(to_action.size)
-            states = self._worlds.step(to_action(directions))
+            if step % self._settings.action_repeat == 0:
+                actions = self._random_actions(to_action.size)
+            states = self._worlds.step(to_action(actions))
             alive &= ~learner.failed(states)
             self._steps += int(alive.sum())
             at_rest = np.flatnonzero(alive & learner.at_rest(states))
-            there = []
+            abstracts = []
             if at_rest.size:
-                there = self.space.abstract_each(State(states.layout, states.data[at_rest]))
-            for number, abstract in zip(at_rest.tolist(), there, strict=True):
+                abstracts = self.space.abstract_each(State(states.layout, states.data[at_rest]))
+            for number, abstract in zip(at_rest.tolist(), abstracts, strict=True):
                 if abstract in index:
                     first[number].setdefault(index[abstract], step + 1)
             if not alive.any():
                 break
         return first
 
-    def _directions(self, axes: int) -> NDArray[np.float64]:
-        """Random ones, for every world; the gripper acts now and then, and in some only."""
-        directions = self._rng.uniform(-1.0, 1.0, (len(self._gripper), axes))
+    def _random_actions(self, axes: int) -> NDArray[np.float64]:
+        """One for every world, shape (worlds, axes); in every second one the gripper acts too."""
+        actions = self._rng.uniform(-1.0, 1.0, (len(self._gripper), axes))
         commands = self._rng.choice(GRIPPER_CHOICES, len(self._gripper))
-        directions[:, -1] = np.where(self._gripper, commands, 0.0)
-        return directions
+        actions[:, -1] = np.where(self._gripper, commands, 0.0)
+        return actions
 
 
-def origin_of(vertex: Vertex) -> Origin:
-    """The operators by which a vertex was reached."""
+def operator_path_to(vertex: Vertex) -> OperatorPath:
+    """The names of the operators by which a vertex was reached."""
     names: list[str] = []
     at: Vertex | None = vertex
     while at is not None and at.edge is not None:
@@ -275,23 +318,26 @@ def origin_of(vertex: Vertex) -> Origin:
     return tuple(reversed(names))
 
 
-def ways_to_goal(graph: AbstractGraph, operator_steps: Mapping[str, float]) -> list[float]:
-    """Steps from each node to a goal, with operators at their mean; infinite without a way."""
+def steps_to_goal(graph: AbstractGraph, operator_steps: Mapping[str, float]) -> list[float]:
+    """Estimated environment steps from each node to a goal; infinite where there is no way.
+
+    Operators count with their mean, and those without one with the mean of the others.
+    """
     usual = float(np.mean(list(operator_steps.values()) or [1.0]))
     incoming: list[list[Edge]] = [[] for _ in graph.nodes]
     for edge in graph.edges:
         incoming[edge.target].append(edge)
-    ways = [float("inf")] * len(graph.nodes)
+    to_go = [float("inf")] * len(graph.nodes)
     queue = [(0.0, goal) for goal in graph.goal_nodes]
     for _, goal in queue:
-        ways[goal] = 0.0
+        to_go[goal] = 0.0
     while queue:
-        way, node = heapq.heappop(queue)
-        if way > ways[node]:
+        rest, node = heapq.heappop(queue)
+        if rest > to_go[node]:
             continue
         for edge in incoming[node]:
-            longer = way + operator_steps.get(edge.option.skill.name, usual)
-            if longer < ways[edge.source]:
-                ways[edge.source] = longer
+            longer = rest + operator_steps.get(edge.option.skill.name, usual)
+            if longer < to_go[edge.source]:
+                to_go[edge.source] = longer
                 heapq.heappush(queue, (longer, edge.source))
-    return ways
+    return to_go

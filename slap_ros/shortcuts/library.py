@@ -32,9 +32,9 @@ from safetensors.numpy import load, save
 
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidLibraryError
-from slap_ros.shortcuts.policy import Normalisation, Policy, Weights
+from slap_ros.shortcuts.mlp_policy import MlpPolicy, Normalisation, Weights
+from slap_ros.shortcuts.observation_encoder import make_action_map, observation_size
 from slap_ros.shortcuts.shortcut import Shortcut
-from slap_ros.shortcuts.sight import action_map, observation_size
 from slap_ros.shortcuts.signature import Signature
 
 FORMAT = 1
@@ -132,7 +132,7 @@ def _require_fit(shortcut: Shortcut, folder: Path, domain: Domain) -> None:
             f"{folder}: the policy sees {size} features, the view of {domain.name} has {seen}: "
             "learned with another version of slap_ros; train anew"
         )
-    actions = action_map(domain, shortcut.signature).size
+    actions = make_action_map(domain, shortcut.signature).size
     if shortcut.policy.log_std.size != actions:
         raise InvalidLibraryError(
             f"{folder}: the policy has {shortcut.policy.log_std.size} actions, shortcuts of this "
@@ -180,7 +180,7 @@ def load_shortcut(folder: Path) -> Shortcut:
     return Shortcut(signature, _load_policy(folder / POLICY, checksum), shortest, record)
 
 
-def _tensors(policy: Policy) -> dict[str, Weights]:
+def _tensors(policy: MlpPolicy) -> dict[str, Weights]:
     tensors = {
         "normalisation.mean": policy.normalisation.mean,
         "normalisation.deviation": policy.normalisation.deviation,
@@ -192,7 +192,7 @@ def _tensors(policy: Policy) -> dict[str, Weights]:
     return tensors
 
 
-def _load_policy(path: Path, checksum: str) -> Policy:
+def _load_policy(path: Path, checksum: str) -> MlpPolicy:
     try:
         content = path.read_bytes()
         tensors = load(content)
@@ -202,7 +202,7 @@ def _load_policy(path: Path, checksum: str) -> Policy:
         raise InvalidLibraryError(f"{path}: damaged: its checksum is not the one in {SHORTCUT}")
     try:
         count = sum(name.endswith(".weights") for name in tensors)
-        policy = Policy(
+        policy = MlpPolicy(
             Normalisation(tensors["normalisation.mean"], tensors["normalisation.deviation"]),
             tuple((tensors[f"layer{i}.weights"], tensors[f"layer{i}.bias"]) for i in range(count)),
             tensors["log_std"],
@@ -213,7 +213,7 @@ def _load_policy(path: Path, checksum: str) -> Policy:
     return policy
 
 
-def _check(path: Path, policy: Policy) -> None:
+def _check(path: Path, policy: MlpPolicy) -> None:
     """Refuse tensors that do not fit together or are not finite."""
     size = policy.normalisation.mean.shape
     fits = bool(policy.layers) and policy.normalisation.deviation.shape == size

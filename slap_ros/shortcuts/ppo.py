@@ -1,12 +1,14 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Proximal policy optimisation of one shortcut, by stable-baselines3. Needs torch."""
+"""Proximal policy optimisation (Schulman et al. 2017) of one shortcut. Needs torch.
+
+The algorithm is stable-baselines3's.
+"""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,72 +18,67 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
-from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env import VecEnv as Sb3VecEnv
 
 from slap_ros.errors import InvalidParameterError
-from slap_ros.shortcuts.policy import Normalisation, Policy
+from slap_ros.shortcuts.mlp_policy import MlpPolicy, Normalisation
 from slap_ros.shortcuts.ppo_settings import PpoSettings
-from slap_ros.shortcuts.practice import Episodes
+from slap_ros.shortcuts.progress import Progress
+from slap_ros.shortcuts.vec_env import VecEnv, VecEnvStep
 
 RECENT = 200  # episodes over which success and length are taken
+ACTION_REPEAT = 8  # steps for which a random action is repeated before normalisation
 
 
-@dataclass(frozen=True)
-class Progress:
-    """How training goes, over recent episodes."""
+class _NormalisedVecEnv(Sb3VecEnv):
+    """A vectorised environment as stable-baselines3 wants it, with statistics of its episodes."""
 
-    steps: int
-    episodes: int
-    success: float
-    length: float  # of successful episodes; NaN where there is none
-    lost: float
-    shortest: int  # success so far; the horizon where there is none
-
-
-class _Adapter(VecEnv):
-    """Practice as stable-baselines3 wants it."""
-
-    def __init__(self, practice: Episodes, normalisation: Normalisation) -> None:
-        self.practice, self.normalisation = practice, normalisation
+    def __init__(self, env: VecEnv, normalisation: Normalisation) -> None:
+        self.env, self.normalisation = env, normalisation
         self.history: deque[tuple[bool, int, bool]] = deque(maxlen=RECENT)
         self.episodes = 0
-        self.shortest = practice.horizon
-        size = practice.observations.shape[1]
+        self.shortest = env.horizon
+        size = env.observations.shape[1]
         super().__init__(
-            practice.episodes,
+            env.num_envs,
             gym.spaces.Box(-np.inf, np.inf, (size,), np.float32),
-            gym.spaces.Box(-1.0, 1.0, (practice.actions.size,), np.float32),
+            gym.spaces.Box(-1.0, 1.0, (env.action_map.size,), np.float32),
         )
 
     def reset(self) -> Any:
-        return self.normalisation(self.practice.observations)
+        return self.normalisation(self.env.observations)
 
     def step_async(self, actions: Any) -> None:
         self._actions = actions
 
     def step_wait(self) -> Any:
-        steps = self.practice.step(self._actions)
+        step = self.env.step(self._actions)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        last = self.normalisation(steps.last)
-        for i in np.flatnonzero(steps.ended):
-            infos[i]["terminal_observation"] = last[i]
-            infos[i]["TimeLimit.truncated"] = bool(steps.late[i])
-            self.history.append((bool(steps.done[i]), int(steps.lengths[i]), bool(steps.lost[i])))
-            self.episodes += 1
-            if steps.done[i]:
-                self.shortest = min(self.shortest, int(steps.lengths[i]))
-        observations = self.normalisation(steps.observations)
-        return observations, steps.rewards.astype(np.float32), steps.ended, infos
+        final = self.normalisation(step.final_observations)
+        for i in np.flatnonzero(step.dones):
+            infos[i]["terminal_observation"] = final[i]
+            infos[i]["TimeLimit.truncated"] = bool(step.truncated[i])
+            self._count(step, int(i))
+        observations = self.normalisation(step.observations)
+        return observations, step.rewards.astype(np.float32), step.dones, infos
+
+    def _count(self, step: VecEnvStep, i: int) -> None:
+        """Take note of an episode that ended."""
+        success, length = bool(step.success[i]), int(step.lengths[i])
+        self.history.append((success, length, bool(step.failure[i])))
+        self.episodes += 1
+        if success:
+            self.shortest = min(self.shortest, length)
 
     def progress(self, steps: int) -> Progress:
-        lengths = [length for done, length, _ in self.history if done]
+        lengths = [length for success, length, _ in self.history if success]
         count = max(len(self.history), 1)
         return Progress(
             steps,
             self.episodes,
             len(lengths) / count,
             float(np.mean(lengths)) if lengths else float("nan"),
-            sum(lost for _, _, lost in self.history) / count,
+            sum(failure for _, _, failure in self.history) / count,
             self.shortest,
         )
 
@@ -92,51 +89,65 @@ class _Adapter(VecEnv):
         return [getattr(self, attr_name, None)] * self.num_envs
 
     def set_attr(self, attr_name: str, *_: Any) -> None:
-        raise NotImplementedError(f"practice has no attribute {attr_name} to be set")
+        raise NotImplementedError(f"the environments have no attribute {attr_name} to be set")
 
     def env_method(self, method_name: str, *_: Any, **__: Any) -> list[Any]:
-        raise NotImplementedError(f"practice has no method {method_name}")
+        raise NotImplementedError(f"the environments have no method {method_name}")
 
     def env_is_wrapped(self, *_: Any) -> list[bool]:
         return [False] * self.num_envs
 
 
-class _Watch(BaseCallback):
-    """Tells how it goes after each rollout, and stops when told to."""
+class _ProgressCallback(BaseCallback):
+    """Reports after each rollout, and stops when the answer is no."""
 
-    def __init__(self, adapter: _Adapter, report: Callable[[Progress], bool]) -> None:
+    def __init__(self, env: _NormalisedVecEnv, report: Callable[[Progress], bool]) -> None:
         super().__init__()
-        self._adapter, self._report, self._go_on = adapter, report, True
+        self._env, self._report, self._go_on = env, report, True
 
     def _on_rollout_end(self) -> None:
-        self._go_on = self._report(self._adapter.progress(self.num_timesteps))
+        self._go_on = self._report(self._env.progress(self.num_timesteps))
 
     def _on_step(self) -> bool:
         return self._go_on
 
 
-def normalisation_of(practice: Episodes, rng: np.random.Generator, steps: int) -> Normalisation:
-    """From what random actions, each held for a while, let a policy see."""
-    seen = []
+def normalisation_of(env: VecEnv, rng: np.random.Generator, steps: int) -> Normalisation:
+    """Mean and deviation of what random actions lead to.
+
+    Args:
+        env: Is stepped.
+        rng: Draws the actions, each of which is repeated for a while.
+        steps: In each environment.
+    """
+    observations = []
     for step in range(steps):
-        if step % 8 == 0:
-            actions = rng.uniform(-1.0, 1.0, (practice.episodes, practice.actions.size))
-        seen.append(practice.step(actions).observations)
-    return Normalisation.of(np.concatenate(seen))
+        if step % ACTION_REPEAT == 0:
+            actions = rng.uniform(-1.0, 1.0, (env.num_envs, env.action_map.size))
+        observations.append(env.step(actions).observations)
+    return Normalisation.of(np.concatenate(observations))
 
 
 class Learner:
-    """PPO on one shortcut's practice."""
+    """PPO on the environments of one shortcut."""
 
     def __init__(
-        self, practice: Episodes, normalisation: Normalisation, settings: PpoSettings, seed: int
+        self, env: VecEnv, normalisation: Normalisation, settings: PpoSettings, seed: int
     ) -> None:
+        """Begin with random weights.
+
+        Args:
+            env: Of the shortcut.
+            normalisation: Of observations.
+            settings: PPO's hyper-parameters.
+            seed: Of weights and noise.
+        """
         torch.set_num_threads(1)  # tiny networks: more threads only wait for one another
         self.settings = settings
-        self._adapter = _Adapter(practice, normalisation)
+        self._env = _NormalisedVecEnv(env, normalisation)
         self._ppo = PPO(
             "MlpPolicy",
-            self._adapter,
+            self._env,
             n_steps=settings.rollout_steps,
             batch_size=settings.batch_size,
             n_epochs=settings.epochs,
@@ -166,42 +177,42 @@ class Learner:
         """
         if logs is not None:
             self._ppo.set_logger(configure(str(logs), ["tensorboard"]))
-        watch = _Watch(self._adapter, report)
+        callback = _ProgressCallback(self._env, report)
         steps = self.settings.total_steps - self._ppo.num_timesteps
         if steps > 0:
-            self._ppo.learn(steps, callback=watch, reset_num_timesteps=False)
+            self._ppo.learn(steps, callback=callback, reset_num_timesteps=False)
 
-    def policy(self) -> Policy:
-        """What was learned so far."""
+    def policy(self) -> MlpPolicy:
+        """The policy as it is now, without torch."""
         weights = {k: v.detach().cpu().numpy().copy() for k, v in self._weights().items()}
         hidden = [f"mlp_extractor.policy_net.{2 * i}" for i in range(len(self.settings.hidden))]
         layers = tuple(
             (weights[f"{name}.weight"], weights[f"{name}.bias"]) for name in [*hidden, "action_net"]
         )
-        return Policy(self._adapter.normalisation, layers, weights["log_std"])
+        return MlpPolicy(self._env.normalisation, layers, weights["log_std"])
 
     def _weights(self) -> dict[str, torch.Tensor]:
         return dict(self._ppo.policy.state_dict())
 
     @property
     def shortest(self) -> int:
-        """Steps of the shortest success."""
-        return self._adapter.shortest
+        """Environment steps of the shortest success; the horizon where there is none."""
+        return self._env.shortest
 
-    def inherit(self, earlier: Learner) -> None:
-        """Begin with what an earlier learner knows, but with this one's noise."""
+    def initialise_from(self, earlier: Learner) -> None:
+        """Begin with the weights of an earlier learner, but with this one's noise."""
         weights = earlier._weights()
         weights["log_std"] = torch.full_like(weights["log_std"], self.settings.log_std)
         self._ppo.policy.load_state_dict(weights)
-        self._adapter.shortest = earlier._adapter.shortest
+        self._env.shortest = earlier._env.shortest
 
     def save(self, path: Path) -> None:
-        """A checkpoint to go on from; there always is a whole one."""
+        """Write a checkpoint. One that is there stays whole until the new one is."""
         draft = path.with_suffix(".draft")
         torch.save(
             {
                 "steps": self._ppo.num_timesteps,
-                "shortest": self._adapter.shortest,
+                "shortest": self._env.shortest,
                 "policy": self._ppo.policy.state_dict(),
                 "optimizer": self._ppo.policy.optimizer.state_dict(),
             },
@@ -210,12 +221,16 @@ class Learner:
         draft.rename(path)
 
     def resume(self, path: Path) -> None:
-        """Go on from a checkpoint. Episodes begin anew."""
+        """Continue from a checkpoint. Episodes begin again.
+
+        Raises:
+            InvalidParameterError: It is damaged.
+        """
         saved = read_checkpoint(path)
         self._ppo.policy.load_state_dict(saved["policy"])
         self._ppo.policy.optimizer.load_state_dict(saved["optimizer"])
         self._ppo.num_timesteps = saved["steps"]
-        self._adapter.shortest = saved["shortest"]
+        self._env.shortest = saved["shortest"]
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:
@@ -235,5 +250,5 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
         }
     except Exception as error:  # torch says in a dozen ways that a file is damaged
         raise InvalidParameterError(
-            f"{path}: damaged: {type(error).__name__}; remove it to learn this stage anew"
+            f"{path}: damaged: {type(error).__name__}; remove it to learn this stage again"
         ) from error

@@ -5,27 +5,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from slap_ros.errors import InvalidParameterError
 from slap_ros.shortcuts.ppo_settings import PpoSettings
-from slap_ros.shortcuts.practice import Rewards
+from slap_ros.shortcuts.rewards import Rewards
 from slap_ros.shortcuts.shortcut import DEFAULT, PAPER, Sampling
+from slap_ros.shortcuts.stored_keys import restored, stored
 
 TRAINING_SEED = 1_000_000  # added to the seed: training never sees the tasks of evaluation
 
 
 @dataclass(frozen=True)
-class Exploration:
+class ExplorationSettings:
     """Collecting states and pruning candidates (SLAP §4.2, B.1).
 
     Args:
-        tasks: How many are explored.
+        tasks: Tasks that are explored.
         rollouts: Random rollouts from each recorded state (N_rollout).
         length: Environment steps of each at most (T_rollout).
         hits: A pair of abstract states reached less often is pruned (K_rollout).
-        hold: Environment steps for which a random direction is held: 1 jitters on the spot.
+        action_repeat: Environment steps for which a random action is repeated: 1 jitters on the
+            spot.
         nodes: Abstract states explored in a task, the cheapest to reach first.
     """
 
@@ -33,8 +35,21 @@ class Exploration:
     rollouts: int = 48
     length: int = 60
     hits: int = 1
-    hold: int = 8
+    action_repeat: int = 8
     nodes: int = 6
+
+    def as_json(self) -> dict[str, Any]:
+        """A JSON object, under the keys of :mod:`slap_ros.shortcuts.stored_keys`."""
+        return stored(self)
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> ExplorationSettings:
+        """The settings of :meth:`as_json`.
+
+        Raises:
+            TypeError: A key is not a setting.
+        """
+        return cls(**restored(cls, data))
 
 
 LEARN = PpoSettings(total_steps=250_000)
@@ -50,27 +65,29 @@ POLISH = PpoSettings(
 
 @dataclass(frozen=True)
 class TrainingSettings:
-    """All of it.
+    """All hyper-parameters of a training.
 
     Args:
         exploration: How candidates are found.
-        ppo: How they are learned.
-        polish: How they are made shorter then, with less noise.
-        rewards: From what.
-        careful: From what, when they are made shorter: what noise still loses can then be spared.
-        horizon: Environment steps of a training episode.
-        starts: Initial states, each of another task.
-        shortcuts: How many are trained at most, the most promising first.
-        least_saving: Part of a plan's length that a candidate must promise, and keep, to stay.
-        validation: Tasks on which plan length is watched.
+        ppo: How a shortcut is learned.
+        polish: How it is then made shorter, with less noise; None: not at all.
+        rewards: What it is learned from.
+        polish_rewards: What it is made shorter from; None: the same. A failure may cost more
+            then, since those that noise still causes can be avoided.
+        horizon: Environment steps after which an episode is truncated.
+        starts: Tasks in which an initial state is looked for.
+        shortcuts: How many are trained at most, those with the largest expected saving first.
+        least_saving: Share of a plan's length that a shortcut must be expected to save, and then
+            save on validation tasks, to be kept.
+        validation: Validation tasks.
         sampling: How shortcuts are tried out when planning.
     """
 
-    exploration: Exploration = field(default_factory=Exploration)
+    exploration: ExplorationSettings = field(default_factory=ExplorationSettings)
     ppo: PpoSettings = LEARN
     polish: PpoSettings | None = POLISH
     rewards: Rewards = field(default_factory=Rewards)
-    careful: Rewards | None = None
+    polish_rewards: Rewards | None = None
     horizon: int = 100
     starts: int = 300
     shortcuts: int = 4
@@ -80,12 +97,12 @@ class TrainingSettings:
 
     @property
     def stages(self) -> tuple[PpoSettings, ...]:
-        """What is done one after the other."""
+        """PPO's hyper-parameters, stage after stage."""
         return (self.ppo,) if self.polish is None else (self.ppo, self.polish)
 
     def rewards_in(self, stage: int) -> Rewards:
-        """From what is learned in a stage, with its discount."""
-        rewards = self.rewards if stage == 0 or self.careful is None else self.careful
+        """The rewards of a stage, with the discount of that stage."""
+        rewards = self.rewards if stage == 0 or self.polish_rewards is None else self.polish_rewards
         return replace(rewards, discount=self.stages[stage].discount)
 
     @property
@@ -93,9 +110,9 @@ class TrainingSettings:
         """Environment steps that a shortcut is trained for."""
         return sum(stage.total_steps for stage in self.stages)
 
-    def as_record(self) -> dict[str, Any]:
-        """Plain data."""
-        return asdict(self)
+    def as_json(self) -> dict[str, Any]:
+        """A JSON object, under the keys of :mod:`slap_ros.shortcuts.stored_keys`."""
+        return stored(self)
 
 
 OURS = TrainingSettings()
@@ -110,13 +127,13 @@ _PAPER_PPO = PpoSettings(
     entropy=0.01,
     log_std=0.0,
 )
-# The paper says -1 a step; its code adds 100 for success, and 0.5 and 10 in Obstacle 2D.
+# The paper says -1 per step; its code adds 100 for success, and 0.5 and 10 in Obstacle 2D.
 _PAPER = replace(
     OURS,
-    exploration=Exploration(rollouts=100, length=300, hits=5, hold=1, nodes=1000),
+    exploration=ExplorationSettings(rollouts=100, length=300, hits=5, action_repeat=1, nodes=1000),
     polish=None,
     ppo=replace(_PAPER_PPO, total_steps=300_000),
-    rewards=Rewards(step=-1.0, done=100.0, lost=0.0, shaping=0.0, discount=0.99, scale=1.0),
+    rewards=Rewards(step=-1.0, success=100.0, failure=0.0, shaping=0.0, discount=0.99, scale=1.0),
     horizon=100,
     sampling=PAPER,
 )
@@ -125,7 +142,7 @@ SETTINGS: Mapping[str, Mapping[str, TrainingSettings]] = {
         "obstacle2d": replace(
             OURS,
             # Its worlds are stepped together, so that many cost little.
-            exploration=Exploration(tasks=6, rollouts=6000, length=16, hold=4),
+            exploration=ExplorationSettings(tasks=6, rollouts=6000, length=16, action_repeat=4),
             ppo=PpoSettings(
                 environments=128, rollout_steps=32, batch_size=512, total_steps=400_000
             ),
@@ -139,7 +156,7 @@ SETTINGS: Mapping[str, Mapping[str, TrainingSettings]] = {
             polish=replace(
                 POLISH, environments=32, parts=2, batch_size=1024, total_steps=1_500_000
             ),
-            careful=Rewards(lost=-30.0),
+            polish_rewards=Rewards(failure=-30.0),
             horizon=50,
             starts=4000,
             shortcuts=1,  # all that is found is the slap, from the one or the other state
@@ -153,7 +170,7 @@ SETTINGS: Mapping[str, Mapping[str, TrainingSettings]] = {
         "cleanup_table": replace(
             OURS,
             # Nodes: everything over which the hand can be, that it can grasp, and lift.
-            exploration=Exploration(tasks=3, rollouts=32, length=40, nodes=13),
+            exploration=ExplorationSettings(tasks=3, rollouts=32, length=40, nodes=13),
             ppo=replace(LEARN, total_steps=120_000),
             polish=replace(POLISH, total_steps=200_000),
             horizon=40,
@@ -165,9 +182,13 @@ SETTINGS: Mapping[str, Mapping[str, TrainingSettings]] = {
     "paper": {
         "obstacle2d": replace(
             _PAPER,
-            exploration=Exploration(rollouts=1000, length=100, hits=1, hold=1, nodes=1000),
+            exploration=ExplorationSettings(
+                rollouts=1000, length=100, hits=1, action_repeat=1, nodes=1000
+            ),
             ppo=replace(_PAPER_PPO, rollout_steps=50, total_steps=50_000),
-            rewards=Rewards(step=-0.5, done=10.0, lost=0.0, shaping=0.0, discount=0.99, scale=1.0),
+            rewards=Rewards(
+                step=-0.5, success=10.0, failure=0.0, shaping=0.0, discount=0.99, scale=1.0
+            ),
             horizon=50,
             sampling=replace(PAPER, horizon=50),
         ),
@@ -178,6 +199,10 @@ SETTINGS: Mapping[str, Mapping[str, TrainingSettings]] = {
 
 def training_settings(name: str, domain: str) -> TrainingSettings:
     """Settings by name, for a domain.
+
+    Args:
+        name: One of ``SETTINGS``.
+        domain: Its name; one without settings of its own has the general ones.
 
     Raises:
         InvalidParameterError: There are none of that name.

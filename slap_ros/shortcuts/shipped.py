@@ -16,7 +16,7 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError
 from slap_ros.planning.planner import WITH_SHORTCUTS
 from slap_ros.shortcuts.library import LIBRARY, Library, load_library
-from slap_ros.shortcuts.sight import learner_interface
+from slap_ros.shortcuts.observation_encoder import learner_interface
 
 NONE = "none"  # the choice of no library
 SHARE = Path("share") / "slap_ros"  # under an installation's prefix

@@ -188,7 +188,7 @@ class Signature:
         words = "_".join(sorted({predicate for predicate, _ in self.add})) or "nothing"
         return f"{words}-{sha256(text.encode()).hexdigest()[:8]}"
 
-    def suits(self, change: Change, space: AtomSpace) -> bool:
+    def matches(self, change: Change, space: AtomSpace) -> bool:
         """Whether the change has all of its patterns, with any number of objects.
 
         As in Alg. 3 the change may delete more atoms, but about these objects only, and, unlike

@@ -19,16 +19,29 @@ from slap_ros.errors import SlapError
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
 from slap_ros.planning.planner import Problem
 from slap_ros.relational import AtomSpace, State
-from slap_ros.shortcuts.explore import Origin, ways_to_goal
-from slap_ros.shortcuts.practice import Start
-from slap_ros.shortcuts.reach import Reach
-from slap_ros.shortcuts.sight import learner_interface
+from slap_ros.shortcuts.explore import OperatorPath, steps_to_goal
+from slap_ros.shortcuts.observation_encoder import learner_interface
 from slap_ros.shortcuts.signature import Change, Signature
+from slap_ros.shortcuts.signature_matcher import SignatureMatcher
+
+
+@dataclass(frozen=True)
+class Start:
+    """An initial state of the shortcut MDP, and the change to be made from there."""
+
+    state: State
+    space: AtomSpace
+    change: Change
+
+    @property
+    def target(self) -> int:
+        """The abstract state to reach."""
+        return self.change.apply(self.space.abstract(self.state))
 
 
 @dataclass(frozen=True)
 class StartRecord:
-    """A start as plain data, to be kept and to be sent to other processes."""
+    """A start as it is written to files and sent to other processes."""
 
     seed: int
     index: int  # of the task
@@ -37,7 +50,7 @@ class StartRecord:
     delete: int
 
     def as_json(self) -> dict[str, Any]:
-        """Plain data; masks as hexadecimal text, for they may be long."""
+        """A JSON object; masks as hexadecimal text, since they may exceed 64 bits."""
         return {
             "seed": self.seed,
             "index": self.index,
@@ -48,14 +61,18 @@ class StartRecord:
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> StartRecord:
-        """The record of :meth:`as_json`."""
+        """The record of :meth:`as_json`.
+
+        Raises:
+            KeyError, TypeError, ValueError: The data is no start.
+        """
         features = tuple(float(value) for value in data["features"])
         add, delete = int(data["add"], 16), int(data["delete"], 16)
         return cls(int(data["seed"]), int(data["index"]), features, add, delete)
 
 
-def recall(domain: Domain, records: Sequence[StartRecord]) -> list[Start]:
-    """The starts of records. Tasks over the same objects share their atoms."""
+def restore_starts(domain: Domain, records: Sequence[StartRecord]) -> list[Start]:
+    """The starts of records, in the same order. Tasks over the same objects share their atoms."""
     spaces: dict[object, AtomSpace] = {}
     starts = []
     for record in records:
@@ -72,13 +89,24 @@ def find_start(
     seed: int,
     index: int,
     signature: Signature,
-    origin: Origin,
+    operator_path: OperatorPath,
     operator_steps: Mapping[str, float],
 ) -> StartRecord | None:
-    """Where a shortcut of this signature would begin in a task; None if nowhere.
+    """Where a shortcut of this signature would begin in a task.
 
-    Of all sources that the operators of ``origin`` lead to, the one from which the shortcut gets
-    nearest to the goal.
+    Of all sources that the operators of ``operator_path`` lead to, it is the one from which the
+    shortcut gets nearest to the goal.
+
+    Args:
+        domain: Whose task.
+        seed: Of the task.
+        index: Of the task.
+        signature: Of the shortcut.
+        operator_path: Names of the operators that lead from the initial state to the start.
+        operator_steps: Mean environment steps of each operator, by name.
+
+    Returns:
+        The start; None where the task has none, or cannot be solved at all.
     """
     task = domain.task(seed, index)
     problem = Problem.of(domain, task.initial_state)
@@ -89,12 +117,12 @@ def find_start(
         )
     except SlapError:  # a task that cannot be solved teaches nothing here
         return None
-    to_go = ways_to_goal(graph, operator_steps)
-    reach = Reach(signature, space, learner_interface(domain).grasping)
+    to_go = steps_to_goal(graph, operator_steps)
+    matcher = SignatureMatcher(signature, space, learner_interface(domain).grasping)
     choices = [
         (to_go[j], path, j)
-        for path in _paths(graph, origin)
-        for j in reach.targets(graph.nodes, path[-1].target if path else 0)
+        for path in _paths(graph, operator_path)
+        for j in matcher.targets(graph.nodes, path[-1].target if path else 0)
         if np.isfinite(to_go[j])
     ]
     for _, path, j in sorted(choices, key=lambda choice: choice[0]):
@@ -106,16 +134,16 @@ def find_start(
     return None
 
 
-def _paths(graph: AbstractGraph, origin: Origin) -> Iterator[tuple[Edge, ...]]:
-    """Sequences of edges from the start with these operators."""
+def _paths(graph: AbstractGraph, operator_path: OperatorPath) -> Iterator[tuple[Edge, ...]]:
+    """Sequences of edges from the initial state with these operators."""
     forward = graph.forward_edges()
 
     def extend(path: tuple[Edge, ...]) -> Iterator[tuple[Edge, ...]]:
-        if len(path) == len(origin):
+        if len(path) == len(operator_path):
             yield path
             return
         for edge in forward[path[-1].target if path else 0]:
-            if edge.option.skill.name == origin[len(path)]:
+            if edge.option.skill.name == operator_path[len(path)]:
                 yield from extend((*path, edge))
 
     return extend(())

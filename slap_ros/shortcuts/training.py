@@ -2,100 +2,126 @@
 # SPDX-License-Identifier: Apache-2.0
 """Training a library: explore, rank, learn, keep what shortens plans, and again (SLAP §4.2).
 
-Everything is kept in a folder as it is done, so that the same command goes on where it was
+Every result is kept in a work folder, so that the same command continues where it was
 interrupted.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import fmean
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol
 
 from slap_ros.errors import InvalidParameterError
 from slap_ros.shortcuts import jobs
-from slap_ros.shortcuts.explore import Explored, Find, Origin
-from slap_ros.shortcuts.jobs import Place
+from slap_ros.shortcuts.explore import ExplorationResult, OperatorPath, ShortcutCandidate
 from slap_ros.shortcuts.library import Library
 from slap_ros.shortcuts.settings import TrainingSettings
 from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.signature import Pattern, Signature
 from slap_ros.shortcuts.starts import StartRecord
+from slap_ros.shortcuts.task_distribution import TaskDistribution
+from slap_ros.shortcuts.work_folder import WorkFolder
 from slap_ros.shortcuts.workers import Workers, in_order
 from slap_ros.versions import versions
 
 
-class Audience(Protocol):
-    """Is told how training goes."""
+class TrainingCallback(Protocol):
+    """Is called as a training goes on."""
 
-    def counting(self, what: str, done: int, total: int) -> None:
-        """So many jobs of a kind are done."""
+    def on_progress(self, what: str, done: int, total: int) -> None:
+        """Some of a step's jobs are done.
+
+        Args:
+            what: The step, in words.
+            done: Jobs done so far; 0 as the step begins.
+            total: Jobs of the step.
+        """
         ...
 
-    def candidates(self, ranked: Sequence[Candidate]) -> None:
-        """What was found worth learning."""
+    def on_ranked(self, ranked: Sequence[CandidateGroup]) -> None:
+        """Exploration is over; these are worth learning, the most promising first."""
         ...
 
-    def learning(self, name: str, folder: Path, total_steps: int) -> None:
-        """A shortcut is being learned; its progress is in the folder."""
+    def on_learning(self, name: str, folder: Path, total_steps: int) -> None:
+        """A shortcut is about to be learned.
+
+        Args:
+            name: Of the shortcut.
+            folder: Where its progress is; see
+                :class:`~slap_ros.shortcuts.work_folder.ShortcutWorkFolder`.
+            total_steps: Environment steps that it takes.
+        """
         ...
 
-    def judged(self, name: str, before: float, after: float, kept: bool) -> None:
-        """Mean plan length on validation tasks without and with it."""
+    def on_validated(self, name: str, before: float, after: float, kept: bool) -> None:
+        """A shortcut was learned, and tried on validation tasks.
+
+        Args:
+            name: Of the shortcut.
+            before: Mean plan length without it, environment steps.
+            after: With it; infinite where a task was not solved.
+            kept: Whether it becomes part of the library.
+        """
         ...
 
 
 @dataclass(frozen=True)
-class Candidate:
-    """Finds of several tasks that are the same up to objects: one learning problem.
+class CandidateGroup:
+    """Candidates of several tasks that are the same up to objects: one learning problem.
 
     Args:
-        signature: Of the find that occurred most.
-        origin: Where from.
-        tasks: In how many explored tasks it was found.
-        promise: Part of a plan's length that it would save, mean over all explored tasks.
+        signature: Of the candidate with the largest expected saving.
+        operator_path: Names of the operators by which their sources were reached.
+        tasks: In how many explored tasks there was one.
+        relative_saving: Share of a plan's length that it is expected to save, mean over all
+            explored tasks.
     """
 
     signature: Signature
-    origin: Origin
+    operator_path: OperatorPath
     tasks: int
-    promise: float
+    relative_saving: float
 
 
-Result = TypeVar("Result")
-# What decoding JSON raises that is not what was written.
-DAMAGED = (OSError, AttributeError, KeyError, TypeError, ValueError, OverflowError)
-Learning = tuple[frozenset[Pattern], frozenset[str]]  # what makes a problem another one
+ProblemKey = tuple[frozenset[Pattern], frozenset[str]]  # equal for equal learning problems
 
 
-def _learning(signature: Signature) -> Learning:
+def _problem_key(signature: Signature) -> ProblemKey:
     return signature.patterns, signature.context
 
 
-def rank(explored: Sequence[Explored]) -> list[Candidate]:
-    """Candidates, the most promising first."""
-    groups: dict[tuple[Learning, Origin], list[Find]] = {}
-    for one in explored:
-        best: dict[tuple[Learning, Origin], Find] = {}
-        for find in one.finds:
-            key = (_learning(find.signature), find.origin)
-            if key not in best or find.promise > best[key].promise:
-                best[key] = find
-        for key, find in best.items():
-            groups.setdefault(key, []).append(find)
+def rank(explored: Sequence[ExplorationResult]) -> list[CandidateGroup]:
+    """Group candidates that are the same up to objects; the largest relative saving first."""
+    groups: dict[tuple[ProblemKey, OperatorPath], list[ShortcutCandidate]] = {}
+    for result in explored:
+        for key, candidate in _best_by_key(result).items():
+            groups.setdefault(key, []).append(candidate)
     ranked = [
-        Candidate(
-            max(finds, key=lambda find: (find.promise, find.signature.name)).signature,
-            origin,
-            len(finds),
-            sum(find.promise / find.plan_steps for find in finds) / len(explored),
+        CandidateGroup(
+            max(group, key=lambda c: (c.expected_saving, c.signature.name)).signature,
+            operator_path,
+            len(group),
+            sum(c.expected_saving / c.plan_steps for c in group) / len(explored),
         )
-        for (_, origin), finds in groups.items()
+        for (_, operator_path), group in groups.items()
     ]
-    return sorted(ranked, key=lambda c: (-c.promise, c.signature.name, c.origin))
+    return sorted(ranked, key=lambda g: (-g.relative_saving, g.signature.name, g.operator_path))
+
+
+def _best_by_key(
+    result: ExplorationResult,
+) -> dict[tuple[ProblemKey, OperatorPath], ShortcutCandidate]:
+    """Of one task's candidates that are the same up to objects, the one that saves most."""
+    best: dict[tuple[ProblemKey, OperatorPath], ShortcutCandidate] = {}
+    for candidate in result.candidates:
+        key = (_problem_key(candidate.signature), candidate.operator_path)
+        if key not in best or candidate.expected_saving > best[key].expected_saving:
+            best[key] = candidate
+    return best
 
 
 @dataclass
@@ -103,81 +129,106 @@ class Training:
     """One training of a library.
 
     Args:
-        place: Whose tasks.
+        distribution: Whose tasks it is for.
         settings: All hyper-parameters.
-        folder: Where everything is kept.
+        folder: Its work folder; see :mod:`slap_ros.shortcuts.work_folder`.
         workers: Where jobs run.
-        audience: Who is told.
+        callback: Is called as it goes on.
     """
 
-    place: Place
+    distribution: TaskDistribution
     settings: TrainingSettings
     folder: Path
     workers: Workers
-    audience: Audience
+    callback: TrainingCallback
     _shortcuts: list[Shortcut] = field(default_factory=list, init=False)
+
+    def __post_init__(self) -> None:
+        self._work = WorkFolder(self.folder)
 
     def run(self) -> Library:
         """Train.
 
         Raises:
-            InvalidParameterError: The folder has a training with other settings.
+            ChildProcessError: A process that stepped environments has ended.
+            InvalidParameterError: The folder has a training with other settings, or is damaged.
+            UnsolvableError: A task to be explored has no plan.
         """
-        self._claim()
+        self._require_same_settings()
         explored = self._explore()
         ranked = rank(explored)
-        self.audience.candidates(ranked)
+        self.callback.on_ranked(ranked)
         operator_steps = mean_steps(explored)
         length = baseline = self._plan_length(())
-        tried: set[Learning] = set()
-        for candidate in ranked:
-            promised = baseline * (1.0 - candidate.promise)
-            if _learning(candidate.signature) in tried or not self._shorter(promised, length):
+        tried: set[ProblemKey] = set()
+        for group in ranked:
+            key, expected = _problem_key(group.signature), baseline * (1.0 - group.relative_saving)
+            if key in tried or not self._shorter(expected, length):
                 continue
             if len(tried) == self.settings.shortcuts:
                 break
-            tried.add(_learning(candidate.signature))
-            shortcut = self._try(candidate, operator_steps)
-            if shortcut is None:
-                continue
-            with_it = self._plan_length((*self._shortcuts, shortcut))
-            kept = self._shorter(with_it, length)
-            self.audience.judged(shortcut.name, length, with_it, kept)
-            if kept:
-                self._shortcuts.append(shortcut)
-                length = with_it
+            tried.add(key)
+            length = self._try(group, operator_steps, length)
         record = self._record(explored, baseline, length)
-        return Library(self.place.domain, tuple(self._shortcuts), record)
+        return Library(self.distribution.domain, tuple(self._shortcuts), record)
 
     def _shorter(self, steps: float, than: float) -> bool:
-        """Whether a plan length is worth the trouble."""
+        """Whether a plan length is less by what a shortcut must save at least."""
         return steps < than * (1.0 - self.settings.least_saving)
 
-    def _try(self, candidate: Candidate, operator_steps: dict[str, float]) -> Shortcut | None:
-        """Learn a candidate; None where no task has a place for it to begin."""
-        starts = self._starts(candidate, operator_steps)
-        return self._learn(candidate.signature, starts) if starts else None
+    def _try(self, group: CandidateGroup, operator_steps: dict[str, float], length: float) -> float:
+        """Learn a shortcut and keep it if it shortens plans.
+
+        Args:
+            group: What to learn.
+            operator_steps: Mean environment steps of each operator, by name.
+            length: Mean plan length before, environment steps.
+
+        Returns:
+            Mean plan length with what is kept.
+        """
+        starts = self._starts(group, operator_steps)
+        if not starts:  # it can begin in no task
+            return length
+        shortcut = self._learn(group.signature, starts)
+        with_it = self._plan_length((*self._shortcuts, shortcut))
+        kept = self._shorter(with_it, length)
+        self.callback.on_validated(shortcut.name, length, with_it, kept)
+        if not kept:
+            return length
+        self._shortcuts.append(shortcut)
+        return with_it
 
     # -- the steps --------------------------------------------------------------------------------
 
-    def _explore(self) -> list[Explored]:
+    def _require_same_settings(self) -> None:
+        """Refuse a folder with another training."""
+        own = {"place": vars(self.distribution), **self.settings.as_json()}
+        own = json.loads(json.dumps(own))
+        if self._work.cached("settings", lambda: own, lambda theirs: theirs) != own:
+            raise InvalidParameterError(
+                f"{self.folder} has a training with other settings; give another folder, or remove "
+                "this one"
+            )
+
+    def _explore(self) -> list[ExplorationResult]:
         tasks = self.settings.exploration.tasks
-        work = [(self.place, i, self.settings.exploration) for i in range(tasks)]
-        return self._kept(
+        work = [(self.distribution, i, self.settings.exploration) for i in range(tasks)]
+        return self._work.cached(
             "explored",
             lambda: self._run("exploring tasks", jobs.explore, work),
-            lambda data: [Explored.from_json(one) for one in data],
+            lambda data: [ExplorationResult.from_json(result) for result in data],
         )
 
     def _starts(
-        self, candidate: Candidate, operator_steps: dict[str, float]
+        self, group: CandidateGroup, operator_steps: dict[str, float]
     ) -> tuple[StartRecord, ...]:
-        name = candidate.signature.name
+        name = group.signature.name
         work = [
-            (self.place, i, candidate.signature, candidate.origin, operator_steps)
+            (self.distribution, i, group.signature, group.operator_path, operator_steps)
             for i in range(self.settings.starts)
         ]
-        return self._kept(
+        return self._work.cached(
             f"{name}/starts",
             lambda: self._run("collecting starts", jobs.start, work),
             lambda data: tuple(StartRecord.from_json(one) for one in data if one is not None),
@@ -185,88 +236,55 @@ class Training:
 
     def _learn(self, signature: Signature, starts: tuple[StartRecord, ...]) -> Shortcut:
         folder = self.folder / signature.name
-        self.audience.learning(signature.name, folder, self.settings.total_steps)
+        self.callback.on_learning(signature.name, folder, self.settings.total_steps)
         processes = self.workers.processes
-        work = [(self.place, signature, starts, self.settings, str(folder), processes)]
+        work = [(self.distribution, signature, starts, self.settings, str(folder), processes)]
         ((_, shortcut),) = self.workers.run(jobs.learn, work)
         return shortcut
 
     def _plan_length(self, shortcuts: tuple[Shortcut, ...]) -> float:
-        """Mean on validation tasks; infinite where one was not solved."""
+        """Mean on validation tasks, environment steps; infinite where one was not solved."""
         work = [
-            (self.place, i, shortcuts, self.settings.sampling)
+            (self.distribution, i, shortcuts, self.settings.sampling)
             for i in range(self.settings.validation)
         ]
         name = "+".join(["plans", *(shortcut.name for shortcut in shortcuts)])
-        return self._kept(
+        return self._work.cached(
             name,
             lambda: self._run("planning", jobs.plan_length, work),
             lambda lengths: float("inf") if None in lengths else fmean(lengths),
         )
 
     def _run(self, what: str, function: Any, work: Sequence[tuple[Any, ...]]) -> list[Any]:
+        """The results of a step's jobs, in their order."""
         results = []
-        self.audience.counting(what, 0, len(work))
+        self.callback.on_progress(what, 0, len(work))
         for result in self.workers.run(function, work):
             results.append(result)
-            self.audience.counting(what, len(results), len(work))
+            self.callback.on_progress(what, len(results), len(work))
         return in_order(results)
 
-    # -- what is kept -----------------------------------------------------------------------------
-
-    def _claim(self) -> None:
-        """Refuse a folder with another training."""
-        mine = json.loads(json.dumps({"place": vars(self.place), **self.settings.as_record()}))
-        if self._kept("settings", lambda: mine, lambda kept: kept) != mine:
-            raise InvalidParameterError(
-                f"{self.folder} has a training with other settings; give another folder, or remove "
-                "this one"
-            )
-
-    def _kept(
-        self, name: str, compute: Callable[[], Any], decode: Callable[[Any], Result]
-    ) -> Result:
-        """A result from the folder, or computed and put there.
-
-        Raises:
-            InvalidParameterError: What is in the folder is damaged.
-        """
-        path = self.folder / f"{name}.json"
-        if not path.exists():
-            data = compute()
-            path.parent.mkdir(parents=True, exist_ok=True)
-            draft = path.with_suffix(".draft")
-            draft.write_text(json.dumps(data), encoding="utf-8")
-            draft.rename(path)
-            return decode(data)
-        try:
-            return decode(json.loads(path.read_text(encoding="utf-8")))
-        except DAMAGED as error:
-            raise InvalidParameterError(
-                f"{path}: damaged: {error!r}; remove it to have it made anew"
-            ) from error
-
     def _record(
-        self, explored: Sequence[Explored], baseline: float, length: float
+        self, explored: Sequence[ExplorationResult], baseline: float, length: float
     ) -> dict[str, Any]:
         steps = [int(shortcut.record.get("environment_steps", 0)) for shortcut in self._shortcuts]
         return {
-            "preset": self.place.preset,
-            "seed": self.place.seed,
+            "preset": self.distribution.preset,
+            "seed": self.distribution.seed,
             "validation": {"pure_planning": baseline, "slap": length},
             "environment_steps": {
-                "exploring": sum(one.environment_steps for one in explored),
+                "exploring": sum(result.environment_steps for result in explored),
                 "learning": sum(steps),
             },
-            "settings": self.settings.as_record(),
+            "settings": self.settings.as_json(),
             "versions": dict(versions()),
         }
 
 
-def mean_steps(explored: Sequence[Explored]) -> dict[str, float]:
-    """Of each operator, over all explored tasks."""
+def mean_steps(explored: Sequence[ExplorationResult]) -> dict[str, float]:
+    """Mean environment steps of each operator over all explored tasks, by name."""
     steps: dict[str, list[float]] = {}
-    for one in explored:
-        for name, mean in one.operator_steps.items():
+    for result in explored:
+        for name, mean in result.operator_steps.items():
             steps.setdefault(name, []).append(mean)
     return {name: fmean(means) for name, means in steps.items()}

@@ -16,7 +16,7 @@ from typing import Any, Protocol, TypeVar
 from slap_ros.errors import InvalidParameterError
 
 Result = TypeVar("Result")
-WATCH_S = 1.0
+PARENT_POLL_S = 1.0
 
 
 class Workers(Protocol):
@@ -34,7 +34,7 @@ class Workers(Protocol):
         ...
 
 
-class NoWorkers:
+class SequentialWorkers:
     """This process does everything itself, one job after the other."""
 
     processes = 1
@@ -82,12 +82,12 @@ class RayWorkers:
             yield numbers[ready], self._ray.get(ready)
 
 
-def end_with(parent: int) -> None:
+def exit_with_parent(parent: int) -> None:
     """Let this process end when its parent is no more, however that came about."""
 
     def watch() -> None:
         while os.getppid() == parent:
-            sleep(WATCH_S)
+            sleep(PARENT_POLL_S)
         os._exit(1)
 
     Thread(target=watch, daemon=True).start()
@@ -99,7 +99,7 @@ def local_workers(count: int) -> Iterator[LocalWorkers]:
     # Spawned, not forked: physics clients and threads do not survive a fork.
     context = get_context("spawn")
     pool = ProcessPoolExecutor(
-        count, mp_context=context, initializer=end_with, initargs=(os.getpid(),)
+        count, mp_context=context, initializer=exit_with_parent, initargs=(os.getpid(),)
     )
     try:
         yield LocalWorkers(pool, count)

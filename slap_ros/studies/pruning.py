@@ -12,9 +12,9 @@ from slap_ros.drawing.palette import MUTED, PLAN
 from slap_ros.errors import InvalidParameterError, PlanningLimitError, UnsolvableError
 from slap_ros.evaluation.summary import Spread
 from slap_ros.shortcuts import jobs as training_jobs
-from slap_ros.shortcuts.explore import Explored
-from slap_ros.shortcuts.jobs import Place
-from slap_ros.shortcuts.settings import Exploration
+from slap_ros.shortcuts.explore import ExplorationResult
+from slap_ros.shortcuts.settings import ExplorationSettings
+from slap_ros.shortcuts.task_distribution import TaskDistribution
 from slap_ros.shortcuts.workers import in_order, local_workers
 from slap_ros.studies.comparison import StudyProgress, format_spread
 from slap_ros.studies.figures import legend_above
@@ -51,24 +51,26 @@ class PrunedCandidates:
 
     seed: int
     index: int
-    explored: Explored
+    explored: ExplorationResult
 
     def remaining(self, hits: int) -> int:
         """Pairs reached in at least so many rollouts."""
-        return sum(find.hits >= hits for find in self.explored.finds)
+        return sum(candidate.hits >= hits for candidate in self.explored.candidates)
 
     def percent(self, hits: int) -> float:
         """The same as part of all candidates, in %; 0 where there are no candidates."""
-        return 100.0 * self.remaining(hits) / max(1, self.explored.candidates)
+        return 100.0 * self.remaining(hits) / max(1, self.explored.pairs)
 
     def as_json(self) -> dict[str, Any]:
         """Plain data."""
         return {
             "seed": self.seed,
             "index": self.index,
-            "candidates": self.explored.candidates,
+            "candidates": self.explored.pairs,
             "environment_steps": self.explored.environment_steps,
-            "hits": sorted((find.hits for find in self.explored.finds), reverse=True),
+            "hits": sorted(
+                (candidate.hits for candidate in self.explored.candidates), reverse=True
+            ),
         }
 
 
@@ -77,7 +79,7 @@ def explore(
     preset: str,
     seeds: int,
     tasks: int,
-    settings: Exploration,
+    settings: ExplorationSettings,
     jobs: int,
     progress: StudyProgress,
 ) -> tuple[PrunedCandidates, ...]:
@@ -87,7 +89,7 @@ def explore(
         UnsolvableError: No task can be planned for, so none can be explored.
     """
     work = [
-        (Place(domain, preset, seed), index, settings)
+        (TaskDistribution(domain, preset, seed), index, settings)
         for seed in range(seeds)
         for index in range(tasks)
     ]
@@ -98,26 +100,29 @@ def explore(
             ended.append((number, outcome))
             progress.advance()
             if isinstance(outcome, str):
-                place, index, _ = work[number]
-                progress.report_failure(f"seed {place.seed}, task {index} not explored: {outcome}")
+                distribution, index, _ = work[number]
+                seed = distribution.seed
+                progress.report_failure(f"seed {seed}, task {index} not explored: {outcome}")
     explored = [outcome for outcome in in_order(ended) if isinstance(outcome, PrunedCandidates)]
     if not explored:
         raise UnsolvableError(f"none of the {len(work)} tasks could be explored")
     return tuple(explored)
 
 
-def _explore(place: Place, index: int, settings: Exploration) -> PrunedCandidates | str:
+def _explore(
+    distribution: TaskDistribution, index: int, settings: ExplorationSettings
+) -> PrunedCandidates | str:
     """Explore one task, or say why it cannot be."""
     try:
-        data = training_jobs.explore(place, index, settings)
+        data = training_jobs.explore(distribution, index, settings)
     except (UnsolvableError, PlanningLimitError) as error:
         return str(error)
-    return PrunedCandidates(place.seed, index, Explored.from_json(data))
+    return PrunedCandidates(distribution.seed, index, ExplorationResult.from_json(data))
 
 
 def explored_in(
     folders: Sequence[TrainingFolder], domain: str
-) -> tuple[tuple[PrunedCandidates, ...], Exploration]:
+) -> tuple[tuple[PrunedCandidates, ...], ExplorationSettings]:
     """What trainings have explored already, and how all of them did.
 
     Raises:
@@ -133,20 +138,22 @@ def explored_in(
                 "that differ in their seeds alone"
             )
     pruned = tuple(
-        PrunedCandidates(folder.place()["seed"], index, explored)
+        PrunedCandidates(folder.distribution()["seed"], index, explored)
         for folder in folders
         for index, explored in enumerate(folder.explored())
     )
     return pruned, how
 
 
-def study(domain: str, pruned: Sequence[PrunedCandidates], settings: Exploration) -> StudyReport:
+def study(
+    domain: str, pruned: Sequence[PrunedCandidates], settings: ExplorationSettings
+) -> StudyReport:
     """What is left, by the number of rollouts that must succeed."""
     thresholds = _thresholds(settings)
     signatures = {
-        (find.signature.patterns, find.signature.context)
+        (candidate.signature.patterns, candidate.signature.context)
         for one in pruned
-        for find in one.explored.finds
+        for candidate in one.explored.candidates
     }
     return StudyReport(
         study="pruning",
@@ -155,7 +162,7 @@ def study(domain: str, pruned: Sequence[PrunedCandidates], settings: Exploration
         measured=MEASURED.format(settings=_said(settings), overall=_overall(pruned, settings)),
         table=_table(pruned, settings, len(signatures)),
         found={
-            "exploration": asdict(settings),
+            "exploration": settings.as_json(),
             "thresholds": [_at(hits, pruned, settings) for hits in thresholds],
             "different_up_to_objects": len(signatures),
             "tasks": [one.as_json() for one in pruned],
@@ -165,15 +172,15 @@ def study(domain: str, pruned: Sequence[PrunedCandidates], settings: Exploration
     )
 
 
-def _said(settings: Exploration) -> str:
+def _said(settings: ExplorationSettings) -> str:
     return (
         f"N = {settings.rollouts} rollouts of {settings.length} environment steps from each of the "
         f"{settings.nodes} cheapest abstract states; training prunes with K = {settings.hits}."
     )
 
 
-def _overall(pruned: Sequence[PrunedCandidates], settings: Exploration) -> str:
-    candidates = sum(one.explored.candidates for one in pruned)
+def _overall(pruned: Sequence[PrunedCandidates], settings: ExplorationSettings) -> str:
+    candidates = sum(one.explored.pairs for one in pruned)
     remaining = sum(one.remaining(settings.hits) for one in pruned)
     part = 100.0 * remaining / max(1, candidates)
     return (
@@ -182,7 +189,7 @@ def _overall(pruned: Sequence[PrunedCandidates], settings: Exploration) -> str:
     )
 
 
-def _thresholds(settings: Exploration) -> list[int]:
+def _thresholds(settings: ExplorationSettings) -> list[int]:
     """Hits to ask for: from what training asks for to all rollouts, doubled again and again."""
     thresholds = [settings.hits]
     while 2 * thresholds[-1] <= settings.rollouts:
@@ -190,7 +197,9 @@ def _thresholds(settings: Exploration) -> list[int]:
     return thresholds
 
 
-def _at(hits: int, pruned: Sequence[PrunedCandidates], settings: Exploration) -> dict[str, Any]:
+def _at(
+    hits: int, pruned: Sequence[PrunedCandidates], settings: ExplorationSettings
+) -> dict[str, Any]:
     """What is left at one threshold."""
     return {
         "k": hits,
@@ -201,17 +210,17 @@ def _at(hits: int, pruned: Sequence[PrunedCandidates], settings: Exploration) ->
 
 
 def _table(
-    pruned: Sequence[PrunedCandidates], settings: Exploration, different: int
+    pruned: Sequence[PrunedCandidates], settings: ExplorationSettings, different: int
 ) -> MarkdownTable:
     """A row a task, then all of them."""
     hits = settings.hits
-    candidates = sum(one.explored.candidates for one in pruned)
+    candidates = sum(one.explored.pairs for one in pruned)
     remaining = sum(one.remaining(hits) for one in pruned)
     rows = [
         [
             str(one.seed),
             str(one.index),
-            f"{one.explored.candidates:,}",
+            f"{one.explored.pairs:,}",
             str(one.remaining(hits)),
             f"{one.percent(hits):.1f}",
             "",
@@ -226,7 +235,7 @@ def _table(
     )
 
 
-def draw(figure: Figure, pruned: Sequence[PrunedCandidates], settings: Exploration) -> None:
+def draw(figure: Figure, pruned: Sequence[PrunedCandidates], settings: ExplorationSettings) -> None:
     """What remains against K/N: a thin line a task, the mean with its spread."""
     axes = figure.subplots()
     thresholds = _thresholds(settings)

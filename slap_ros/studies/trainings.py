@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from slap_ros.errors import InvalidParameterError
-from slap_ros.shortcuts.explore import Explored
-from slap_ros.shortcuts.settings import Exploration
+from slap_ros.shortcuts.explore import ExplorationResult
+from slap_ros.shortcuts.settings import ExplorationSettings
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class TrainingFolder:
                 f"{self.path} has a training of domain {trained!r}, not of {domain!r}"
             )
 
-    def place(self) -> dict[str, Any]:
+    def distribution(self) -> dict[str, Any]:
         """Domain, preset and seed.
 
         Raises:
@@ -66,7 +66,7 @@ class TrainingFolder:
         """
         return dict(self._setting("place"))
 
-    def exploration(self) -> Exploration:
+    def exploration(self) -> ExplorationSettings:
         """How candidates were found.
 
         Raises:
@@ -74,11 +74,11 @@ class TrainingFolder:
         """
         settings = self._setting("exploration")
         try:
-            return Exploration(**settings)
+            return ExplorationSettings.from_json(settings)
         except TypeError as error:
             raise _damaged(self.path / "settings.json", error) from error
 
-    def explored(self) -> tuple[Explored, ...]:
+    def explored(self) -> tuple[ExplorationResult, ...]:
         """What exploring came to, a task each.
 
         Raises:
@@ -87,7 +87,7 @@ class TrainingFolder:
         path = self.path / "explored.json"
         tasks = _read(path)
         try:
-            return tuple(Explored.from_json(task) for task in tasks)
+            return tuple(ExplorationResult.from_json(task) for task in tasks)
         except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
             raise _damaged(path, error) from error
 

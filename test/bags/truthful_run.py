@@ -20,7 +20,7 @@ from slap_ros.messages.events import PlanEventKind, SkillEventKind
 from slap_ros.messages.interfaces import typestore
 from slap_ros.planning.abstract_graph import build_abstract_graph
 from slap_ros.planning.model import Model
-from slap_ros.planning.options import OptionExecution, Stopped, given_option
+from slap_ros.planning.options import OptionExecution, OptionResult, given_option
 from slap_ros.planning.search import search_lazily
 
 METADATA = {"seed": "7", "preset": "fair", "revision": "0123456789ab-dirty"}
@@ -211,7 +211,7 @@ class Script:
             execution = OptionExecution(edge.option, edge.target, domain.action_space, state)
             started = step
             while not isinstance(
-                action := execution.advance(state, self.space.abstract(state)), Stopped
+                action := execution.advance(state, self.space.abstract(state)), OptionResult
             ):
                 state = self._step(world, action, step)
                 step += 1

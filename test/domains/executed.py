@@ -5,12 +5,12 @@
 from __future__ import annotations
 
 from slap_ros.core import Domain, Task
-from slap_ros.planning.execution import Episode, Executor
+from slap_ros.planning.execution import EpisodeResult, Executor
 from slap_ros.planning.planner import make_planner
 from slap_ros.relational import State
 
 
-def executed(task: Task, domain: Domain) -> Episode:
+def executed(task: Task, domain: Domain) -> EpisodeResult:
     """What happens when a task is planned and carried out in the domain's world."""
     space = domain.atom_space(task.initial_state)
     return Executor(

@@ -29,12 +29,13 @@ from slap_ros.messages.interfaces import definition, typestore
 from slap_ros.relational.pddl import write_domain, write_problem
 from slap_ros.report import read_report, render
 from slap_ros.robot.scene_config import read_scene_config
-from slap_ros.shortcuts.jobs import Kept, Place
 from slap_ros.shortcuts.library import load_library
-from slap_ros.shortcuts.settings import Exploration, training_settings
+from slap_ros.shortcuts.settings import ExplorationSettings, training_settings
 from slap_ros.shortcuts.shortcut import Sampling
+from slap_ros.shortcuts.task_distribution import TaskDistribution
 from slap_ros.shortcuts.training import Training
-from slap_ros.shortcuts.workers import NoWorkers
+from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
+from slap_ros.shortcuts.workers import SequentialWorkers
 from slap_ros.studies.trainings import TrainingFolder
 
 pytestmark = pytest.mark.timeout(3600)  # for as many cases as somebody may ask for
@@ -243,10 +244,10 @@ def test_damaged_pddl_is_planned_for_or_refused(tmp_path, name, count):
 
 # -- trainings ------------------------------------------------------------------------------------
 
-PLACE = Place("obstacle2d", "fair", 3)
+PLACE = TaskDistribution("obstacle2d", "fair", 3)
 BRIEF = replace(
     training_settings("ours", "obstacle2d"),
-    exploration=Exploration(tasks=1, rollouts=60, length=30, hold=4),
+    exploration=ExplorationSettings(tasks=1, rollouts=60, length=30, action_repeat=4),
     shortcuts=0,  # nothing is learned: what is there is read
 )
 
@@ -262,8 +263,8 @@ class Nobody:
 def trained(tmp_path_factory):
     """The work folder of a training that was about to learn."""
     folder = tmp_path_factory.mktemp("training") / "work"
-    Training(PLACE, BRIEF, folder, NoWorkers(), Nobody()).run()
-    kept = Kept(folder / SHORTCUT)
+    Training(PLACE, BRIEF, folder, SequentialWorkers(), Nobody()).run()
+    kept = ShortcutWorkFolder(folder / SHORTCUT)
     for steps in (100, 200):
         kept.append({"stage": 0, "steps": steps, "success": 0.5, "length": 9.0, "seconds": 1.0})
     return folder
@@ -276,7 +277,7 @@ def test_a_damaged_training_goes_on_or_is_refused(trained, tmp_path, name, count
     folder = tmp_path / "work"
     shutil.copytree(trained, folder)
     readers = (
-        lambda: Training(PLACE, BRIEF, folder, NoWorkers(), Nobody()).run(),
+        lambda: Training(PLACE, BRIEF, folder, SequentialWorkers(), Nobody()).run(),
         lambda: TrainingFolder(folder).exploration(),
         lambda: TrainingFolder(folder).explored(),
         lambda: TrainingFolder(folder).curves(),

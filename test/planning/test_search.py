@@ -66,7 +66,7 @@ def in_ways(skill, count, attempt=0):
         skill,
         (),
         attempt=attempt,
-        another=lambda: in_ways(skill, count, attempt + 1) if attempt + 1 < count else None,
+        next_attempt=lambda: in_ways(skill, count, attempt + 1) if attempt + 1 < count else None,
     )
 
 
@@ -137,7 +137,7 @@ def brute_force(graph, model):
                 rest = best(edge.target, rollout.final)
                 if rest is not None:
                     costs.append(rollout.steps + rest)
-                option = option.another()
+                option = option.next_attempt()
         return min(costs, default=None)
 
     return best(0, State(LAYOUT, [0.0]))

@@ -14,12 +14,15 @@ import numpy as np
 from slap_ros.domains import get_domain
 from slap_ros.planning.planner import Problem
 from slap_ros.shortcuts.library import Library, save_library
-from slap_ros.shortcuts.ppo import Learner, Progress, normalisation_of
+from slap_ros.shortcuts.ppo import Learner, normalisation_of
 from slap_ros.shortcuts.ppo_settings import PpoSettings
-from slap_ros.shortcuts.practice import Practice, Rewards, Start
+from slap_ros.shortcuts.progress import Progress
+from slap_ros.shortcuts.rewards import Rewards
 from slap_ros.shortcuts.settings import TRAINING_SEED
 from slap_ros.shortcuts.shortcut import Shortcut
+from slap_ros.shortcuts.shortcut_vec_env import ShortcutVecEnv
 from slap_ros.shortcuts.signature import Change, Signature
+from slap_ros.shortcuts.starts import Start
 
 DATA = Path(__file__).parent / "data" / "obstacle2d"
 DOMAIN = get_domain("obstacle2d")
@@ -47,7 +50,9 @@ def main() -> None:
     starts = [found for index in range(TASKS) if (found := start(index)) is not None]
     signature = Signature.of(starts[0].change, starts[0].space, frozenset({"Holding"}))
     rng, settings = np.random.default_rng(0), PpoSettings(total_steps=STEPS)
-    practice = Practice(DOMAIN, signature, starts, settings.environments, HORIZON, Rewards(), rng)
+    practice = ShortcutVecEnv(
+        DOMAIN, signature, starts, settings.environments, HORIZON, Rewards(), rng
+    )
     learner = Learner(practice, normalisation_of(practice, rng, 64), settings, seed=0)
     last = Progress(0, 0, 0.0, 0.0, 0.0, HORIZON)
 

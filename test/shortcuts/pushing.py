@@ -4,8 +4,8 @@
 
 from slap_ros.domains import get_domain
 from slap_ros.planning.planner import Problem
-from slap_ros.shortcuts.practice import Start
 from slap_ros.shortcuts.signature import Change, Signature
+from slap_ros.shortcuts.starts import Start
 
 DOMAIN = get_domain("obstacle2d", "fair")
 

@@ -13,9 +13,10 @@ from slap_ros.evaluation.experiment import Experiment
 from slap_ros.planning.abstract_graph import build_abstract_graph
 from slap_ros.planning.planner import Problem
 from slap_ros.shortcuts.library import load_library
-from slap_ros.shortcuts.policy import Normalisation, Policy
-from slap_ros.shortcuts.shortcut import HOPE, Sampling, Shortcut
-from slap_ros.shortcuts.sight import Sight
+from slap_ros.shortcuts.mlp_policy import MlpPolicy, Normalisation
+from slap_ros.shortcuts.observation_encoder import ObservationEncoder
+from slap_ros.shortcuts.shortcut import Sampling, Shortcut
+from slap_ros.shortcuts.shortcut_rollouts import MAX_NET_FAILURES
 from slap_ros.shortcuts.signature import Change, Signature, context_of
 
 DATA = Path(__file__).parent / "data" / "obstacle2d"
@@ -24,13 +25,13 @@ HASTY = Sampling(samples=3, patience=2, horizon=15)
 
 def always(domain, space, signature, change, initial, value):
     """A shortcut whose policy gives the same number for every axis, whatever it sees."""
-    sight = Sight(domain, space, signature, change)
-    seen = sight.look(initial.alone()).observations.shape[1]
-    axes = sight.actions.size
+    encoder = ObservationEncoder(domain, space, signature, change)
+    seen = encoder.encode(initial.alone()).observations.shape[1]
+    axes = encoder.action_map.size
     zeros, ones = np.zeros(seen, np.float32), np.ones(seen, np.float32)
     layer = np.zeros((axes, seen), np.float32), np.full(axes, value, np.float32)
     quiet = np.full(axes, -30.0, np.float32)
-    return Shortcut(signature, Policy(Normalisation(zeros, ones), (layer,), quiet), shortest=1)
+    return Shortcut(signature, MlpPolicy(Normalisation(zeros, ones), (layer,), quiet), shortest=1)
 
 
 def hostile(domain, seed, value, count):
@@ -85,7 +86,9 @@ def test_what_was_given_up_does_not_mislead_the_search(seed):
     shortcuts = hostile(domain, seed, 0.0, count=4)
     pure = plan(domain, seed, PURE_PLANNING)
     with_it = plan(domain, seed, Approach("hostile", shortcuts, HASTY))
-    assert with_it.edges_rolled_out <= pure.edges_rolled_out + 4 * (HOPE + len(shortcuts))
+    assert with_it.edges_rolled_out <= pure.edges_rolled_out + 4 * (
+        MAX_NET_FAILURES + len(shortcuts)
+    )
 
 
 @pytest.mark.parametrize("value", [1.0, -1.0])

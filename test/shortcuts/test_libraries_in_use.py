@@ -165,14 +165,14 @@ def test_nothing_is_shipped_unless_it_is(nothing_shipped):
     assert chosen_library("", DOMAIN) is None
 
 
-@pytest.mark.parametrize("place", ["lib/models", "share/slap_ros/models", "overlay"])
+@pytest.mark.parametrize("where", ["lib/models", "share/slap_ros/models", "overlay"])
 def test_the_shipped_library_is_found_and_used_unless_told_otherwise(
-    nothing_shipped, place, tmp_path, monkeypatch
+    nothing_shipped, where, tmp_path, monkeypatch
 ):
     overlays = f"{tmp_path / 'none'}:{tmp_path / 'overlay'}"
     monkeypatch.setenv("AMENT_PREFIX_PATH", overlays)
-    root = tmp_path / "overlay/share/slap_ros/models" if place == "overlay" else None
-    folder = (root or nothing_shipped / place) / "obstacle2d"
+    root = tmp_path / "overlay/share/slap_ros/models" if where == "overlay" else None
+    folder = (root or nothing_shipped / where) / "obstacle2d"
     shutil.copytree(DATA, folder)
     assert shipped_library("obstacle2d") == folder
     assert shipped_library("obstacle_tower") is None
@@ -200,7 +200,7 @@ from slap_ros.domains import get_domain
 from slap_ros.planning.options import OptionKind
 from slap_ros.planning.planner import GraphPlanner, Problem
 from slap_ros.shortcuts.library import load_library
-from slap_ros.shortcuts.repertoire import Repertoire
+from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
 from slap_ros.shortcuts.shipped import chosen_library
 from slap_ros.evaluation.approaches import approaches
 import ensemble.cli, ensemble.nodes
@@ -210,24 +210,24 @@ digest = sha256()
 for seed in (1, 4):
     task = domain.task(seed)
     problem = Problem.of(domain, task.initial_state)
-    repertoire = Repertoire(domain, load_library(Path(sys.argv[1]), domain).shortcuts,
+    grounded = GroundedShortcuts(domain, load_library(Path(sys.argv[1]), domain).shortcuts,
                             task.initial_state)
     goal = problem.model.space.mask(task.goal)
-    plan = GraphPlanner(problem, shortcuts=repertoire).plan(task.initial_state, goal).plan
+    plan = GraphPlanner(problem, shortcuts=grounded).plan(task.initial_state, goal).plan
     state = task.initial_state
     for edge in plan.edges:
         policy = edge.option.skill.start(state, edge.option.objects)
         if edge.option.kind is OptionKind.SHORTCUT:
             digest.update(policy(state).tobytes())
-            for attempt in sum(repertoire._rehearsal._memory.values(), ()):
-                digest.update(b"".join(choice.tobytes() for choice in attempt.choices))
+            for attempt in sum(grounded._rollouts._cache.values(), ()):
+                digest.update(b"".join(action.tobytes() for action in attempt.actions))
         state = problem.model.roll_out(edge.option, state, edge.target).final
 print(digest.hexdigest(), sha256().hexdigest() != digest.hexdigest())
 assert "torch" not in sys.modules, "torch was imported"
 """
 
 
-def test_a_rehearsal_is_the_same_in_every_process_and_needs_no_torch():
+def test_a_rollouts_is_the_same_in_every_process_and_needs_no_torch():
     command = [sys.executable, "-c", REHEARSE, str(DATA)]
     told = [
         subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()

@@ -14,8 +14,8 @@ from slap_ros.domains.obstacle_tower import make
 from slap_ros.domains.obstacle_tower.tasks import RandomTowerTasks
 from slap_ros.evaluation.approaches import Approach
 from slap_ros.shortcuts.library import load_library
-from slap_ros.shortcuts.reach import Reach
 from slap_ros.shortcuts.signature import Change, Signature, concerned, context_of
+from slap_ros.shortcuts.signature_matcher import SignatureMatcher
 
 
 def tower(obstacles, seed=0, distractors=0):
@@ -77,15 +77,15 @@ def test_a_table_and_a_target_are_different_roles():
 def test_what_was_learned_on_three_suits_other_towers(obstacles):
     learned = Signature.of(*reversed(tower(3)))
     space, change = tower(obstacles)
-    assert learned.suits(change, space)
+    assert learned.matches(change, space)
 
 
 def test_it_does_not_suit_another_change():
     space, change = tower(3)
     learned = Signature.of(change, space)
     half = Change(change.add & -change.add, 0)
-    assert not learned.suits(half, space)
-    assert not learned.suits(Change(change.delete, change.add), space)
+    assert not learned.matches(half, space)
+    assert not learned.matches(Change(change.delete, change.add), space)
 
 
 def test_it_may_delete_more_about_the_same_objects_but_add_nothing_else():
@@ -93,9 +93,9 @@ def test_it_may_delete_more_about_the_same_objects_but_add_nothing_else():
     learned = Signature.of(change, space)
     holding = space.mask([space.atom("Holding", ["robot", "block1"])])
     turned = space.mask([space.atom("On", ["block2", "block4"])])
-    assert not learned.suits(Change(change.add, change.delete | holding), space)
-    assert learned.suits(Change(change.add, change.delete | turned), space)
-    assert not learned.suits(Change(change.add | turned, change.delete), space)
+    assert not learned.matches(Change(change.add, change.delete | holding), space)
+    assert learned.matches(Change(change.add, change.delete | turned), space)
+    assert not learned.matches(Change(change.add | turned, change.delete), space)
 
 
 def test_what_is_held_is_part_of_what_was_learned():
@@ -107,7 +107,7 @@ def test_what_is_held_is_part_of_what_was_learned():
     nodes = [before | empty, before | holding]
     nodes += [change.apply(node) for node in nodes]
     signature = Signature.of(change, space, context_of(nodes[1], grasping, space))
-    assert list(Reach(signature, space, grasping).pairs(nodes)) == [(1, 3)]
+    assert list(SignatureMatcher(signature, space, grasping).pairs(nodes)) == [(1, 3)]
     assert signature.name != Signature.of(change, space).name
 
 
@@ -122,9 +122,9 @@ def test_all_of_it_or_nothing():
     )
     partly = (change.apply(source) | part) & ~carried
     learned = Signature.of(change, space)
-    assert learned.suits(Change.between(source, partly), space)
+    assert learned.matches(Change.between(source, partly), space)
     nodes = [source, partly, change.apply(source)]
-    assert list(Reach(learned, space, grasping).pairs(nodes)) == [(0, 2)]
+    assert list(SignatureMatcher(learned, space, grasping).pairs(nodes)) == [(0, 2)]
 
 
 def test_algorithm_3_wants_every_atom_of_training():
@@ -169,8 +169,8 @@ def test_reach_finds_exactly_the_pairs_that_suit():
         }
         assert len(signatures) > 3
         for signature in signatures:
-            slowly = {p for p, c in changes.items() if signature.suits(c, space)}
-            reach = Reach(signature, space, grasping)
+            slowly = {p for p, c in changes.items() if signature.matches(c, space)}
+            reach = SignatureMatcher(signature, space, grasping)
             quickly = {(i, j) for i, js in reach._by_source(graph.nodes) for j in js}
             begins = {i for i in range(len(graph.nodes)) if reach._may_begin(graph.nodes[i])}
             assert {(i, j) for i, j in slowly if i in begins} == quickly & set(pairs)

@@ -6,25 +6,25 @@ import json
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
-from slap_ros.shortcuts import jobs
-from slap_ros.shortcuts.explore import Explored, Find
-from slap_ros.shortcuts.jobs import Place
+from slap_ros.shortcuts.explore import ExplorationResult, ShortcutCandidate
 from slap_ros.shortcuts.library import load_library, save_library
-from slap_ros.shortcuts.settings import Exploration, training_settings
+from slap_ros.shortcuts.settings import ExplorationSettings, training_settings
 from slap_ros.shortcuts.signature import Signature
+from slap_ros.shortcuts.task_distribution import TaskDistribution
 from slap_ros.shortcuts.training import Training, rank
-from slap_ros.shortcuts.workers import NoWorkers, ray_workers
+from slap_ros.shortcuts.workers import SequentialWorkers, ray_workers
 
-PLACE = Place("obstacle2d", "fair", 5)
+TASKS = TaskDistribution("obstacle2d", "fair", 5)
 OURS = training_settings("ours", "obstacle2d")
 SMALL = replace(
     OURS,
-    exploration=Exploration(tasks=2, rollouts=60, length=30, hold=4),
+    exploration=ExplorationSettings(tasks=2, rollouts=60, length=30, action_repeat=4),
     ppo=replace(OURS.ppo, total_steps=6_000),
     starts=24,
     validation=3,
@@ -32,29 +32,30 @@ SMALL = replace(
 )
 
 
-class Audience:
-    """Keeps what it is told."""
+class Recorder:
+    """Keeps what it is called with."""
 
     def __init__(self, interrupt_at=None):
         self.verdicts, self.interrupt_at = [], interrupt_at
 
-    def counting(self, what, done, total):
+    def on_progress(self, what, done, total):
         if (what, done) == self.interrupt_at:
             raise KeyboardInterrupt
 
-    def candidates(self, ranked):
+    def on_ranked(self, ranked):
         self.ranked = ranked
 
-    def learning(self, name, folder, total_steps):
+    def on_learning(self, name, folder, total_steps):
         pass
 
-    def judged(self, name, before, after, kept):
+    def on_validated(self, name, before, after, kept):
         self.verdicts.append((name, before, after, kept))
 
 
-def train(folder, settings=SMALL, audience=None, workers=None):
-    audience = audience or Audience()
-    return Training(PLACE, settings, folder, workers or NoWorkers(), audience).run(), audience
+def train(folder, settings=SMALL, callback=None, workers=None):
+    callback = callback or Recorder()
+    training = Training(TASKS, settings, folder, workers or SequentialWorkers(), callback)
+    return training.run(), callback
 
 
 def files(folder):
@@ -70,8 +71,8 @@ def without_time(record):
 
 
 def test_pushing_is_discovered_learned_and_worth_it_and_twice_the_same(tmp_path):
-    library, audience = train(tmp_path / "work")
-    ((name, before, after, kept),) = audience.verdicts
+    library, callback = train(tmp_path / "work")
+    ((name, before, after, kept),) = callback.verdicts
     assert kept
     assert after < 0.9 * before
     assert name.startswith("Clear_On-")
@@ -100,7 +101,7 @@ def test_a_ray_cluster_learns_the_same(tmp_path):
 
 def test_it_goes_on_where_it_was_interrupted(tmp_path):
     with pytest.raises(KeyboardInterrupt):
-        train(tmp_path / "work", audience=Audience(interrupt_at=("collecting starts", 24)))
+        train(tmp_path / "work", callback=Recorder(interrupt_at=("collecting starts", 24)))
     explored = (tmp_path / "work" / "explored.json").read_bytes()
     library, _ = train(tmp_path / "work")
     assert (tmp_path / "work" / "explored.json").read_bytes() == explored
@@ -118,22 +119,23 @@ def test_it_goes_on_where_it_was_interrupted(tmp_path):
 KILLED = """
 import os, sys
 from pathlib import Path
-from slap_ros.shortcuts import jobs
-jobs.CHECKPOINT_S = 0.0
+from slap_ros.shortcuts import progress as checkpoints
+from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
+checkpoints.CHECKPOINT_S = 0.0
 sys.path.insert(0, {tests!r})
 import test_training as t
-original = jobs.Kept.append
+original = ShortcutWorkFolder.append
 def append(self, progress):
     original(self, progress)
     if progress["steps"] > 3000:
         os.kill(os.getpid(), 9)
-jobs.Kept.append = append
+ShortcutWorkFolder.append = append
 t.train(Path({work!r}))
 """
 
 
 def test_a_killed_training_resumes_from_its_checkpoint(tmp_path):
-    work, tests = tmp_path / "work", str(jobs.Path(__file__).parent)
+    work, tests = tmp_path / "work", str(Path(__file__).parent)
     code = KILLED.format(tests=tests, work=str(work))
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == -9
     (progress,) = work.glob("*/progress.jsonl")
@@ -152,20 +154,20 @@ def test_another_training_in_the_same_folder_is_refused(tmp_path):
         train(tmp_path, replace(SMALL, shortcuts=0, starts=25))
 
 
-def find(name, promise, origin=("Pick",)):
-    return Find(
-        Signature(("block",), frozenset({(name, (0,))}), frozenset()), origin, 3, 4, 100, promise
-    )
+def candidate(name, expected_saving, operator_path=("Pick",)):
+    signature = Signature(("block",), frozenset({(name, (0,))}), frozenset())
+    return ShortcutCandidate(signature, operator_path, 3, 4, 100, expected_saving)
 
 
 def test_candidates_are_ranked_by_what_they_save_over_all_tasks():
-    everywhere = [find("A", 40.0), find("A", 30.0)], [find("A", 20.0)]
-    once = [find("B", 50.0)], []
+    everywhere = [candidate("A", 40.0), candidate("A", 30.0)], [candidate("A", 20.0)]
+    once = [candidate("B", 50.0)], []
     explored = [
-        Explored((*a, *b), 10, 100, {"Pick": 5.0}) for a, b in zip(everywhere, once, strict=True)
+        ExplorationResult((*a, *b), 10, 100, {"Pick": 5.0})
+        for a, b in zip(everywhere, once, strict=True)
     ]
     first, second = rank(explored)
     assert first.signature.name.startswith("A-")
-    assert first.promise == pytest.approx(0.3)
-    assert second.promise == pytest.approx(0.25)
+    assert first.relative_saving == pytest.approx(0.3)
+    assert second.relative_saving == pytest.approx(0.25)
     assert (first.tasks, second.tasks) == (2, 1)

@@ -20,11 +20,12 @@ from slap_ros.evaluation.approaches import approaches
 from slap_ros.evaluation.experiment import Experiment
 from slap_ros.planning.planner import Problem, make_planner
 from slap_ros.shortcuts import jobs
-from slap_ros.shortcuts.jobs import Kept, Place
 from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.settings import training_settings
 from slap_ros.shortcuts.shortcut import Sampling
-from slap_ros.shortcuts.workers import NoWorkers
+from slap_ros.shortcuts.task_distribution import TaskDistribution
+from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
+from slap_ros.shortcuts.workers import SequentialWorkers
 from slap_ros.studies import comparison, perception, pruning
 from slap_ros.studies.goals import sample_goals
 from slap_ros.studies.trainings import TrainingFolder, read_curve
@@ -40,7 +41,7 @@ PLANNING = ["--shortcuts", LIBRARY, "--samples", SAMPLES]
 def _in_this_process(monkeypatch):
     """Starting processes takes longer than what they would do here."""
     for module in (experiments, comparison, pruning):
-        monkeypatch.setattr(module, "local_workers", lambda _: nullcontext(NoWorkers()))
+        monkeypatch.setattr(module, "local_workers", lambda _: nullcontext(SequentialWorkers()))
 
 
 def study(folder, *arguments):
@@ -221,14 +222,14 @@ def line(stage, steps, success=0.5, length=9.0):
 def training(tmp_path):
     """The work folder of a training of two stages, interrupted and resumed in the second."""
     folder = tmp_path / "training"
-    kept = Kept(folder / "Clear_On-e41568a9")
+    kept = ShortcutWorkFolder(folder / "Clear_On-e41568a9")
     for entry in (
         line(0, 100, 0.0, float("nan")), line(0, 200), line(1, 100), line(1, 200, 0.6),
         line(1, 150, 0.7), line(1, 250, 0.8, 7.0),
     ):  # fmt: skip
         kept.append(entry)
     how = training_settings("ours", "obstacle2d")
-    settings = {"place": vars(Place("obstacle2d", "fair", 3)), **how.as_record()}
+    settings = {"place": vars(TaskDistribution("obstacle2d", "fair", 3)), **how.as_json()}
     (folder / "settings.json").write_text(json.dumps(settings))
     return folder
 
@@ -255,7 +256,7 @@ def test_a_line_that_is_being_written_is_left_out(training):
 
 def test_trainings_with_several_seeds_are_averaged(tmp_path, training):
     other = tmp_path / "other"
-    kept = Kept(other / "Clear_On-e41568a9")
+    kept = ShortcutWorkFolder(other / "Clear_On-e41568a9")
     kept.append(line(0, 100, 0.2, 11.0))
     kept.append(line(0, 200, 0.9, 5.0))
     (other / "settings.json").write_bytes((training / "settings.json").read_bytes())
@@ -298,8 +299,9 @@ def test_a_folder_without_a_training_or_with_another_domains_is_refused(tmp_path
 
 
 def test_pruning_counts_what_a_training_has_explored(tmp_path, training):
-    place, how = Place("obstacle2d", "fair", 3), training_settings("ours", "obstacle2d").exploration
-    explored = [jobs.explore(place, index, how) for index in range(2)]
+    distribution = TaskDistribution("obstacle2d", "fair", 3)
+    how = training_settings("ours", "obstacle2d").exploration
+    explored = [jobs.explore(distribution, index, how) for index in range(2)]
     (training / "explored.json").write_text(json.dumps(explored))
     data = study(tmp_path / "kept", "pruning", "obstacle2d", "--work", training)
     tasks = data["found"]["tasks"]
@@ -311,8 +313,8 @@ def test_pruning_counts_what_a_training_has_explored(tmp_path, training):
     assert data["found"]["thresholds"][0]["remaining"] == len(hits) > 0
     fresh = pruning.explore("obstacle2d", "fair", 1, 1, how, 1, SilentProgress())
     assert (
-        fresh[0].explored.candidates
-        == jobs.explore(Place("obstacle2d", "fair", 0), 0, how)["candidates"]
+        fresh[0].explored.pairs
+        == jobs.explore(TaskDistribution("obstacle2d", "fair", 0), 0, how)["candidates"]
     )
 
 

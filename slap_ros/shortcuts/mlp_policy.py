@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 LEAST_DEVIATION = 0.3  # views are of magnitude 1 or so
 # Observations at once. Larger products OpenBLAS spreads over threads, which wait for one another
 # where cores are busy, and add up in another order where there are more of them.
-TOGETHER = 64
+MAX_BATCH = 64
 Weights = NDArray[np.float32]
 
 
@@ -42,7 +42,7 @@ class Normalisation:
 
 
 @dataclass(frozen=True, eq=False)
-class Policy:
+class MlpPolicy:
     """A multi-layer perceptron with tanh between its layers, and Gaussian noise on its output.
 
     Args:
@@ -57,8 +57,8 @@ class Policy:
 
     def mean(self, observations: Weights) -> Weights:
         """The most likely actions, shape (n, actions), not yet clipped to [-1, 1]."""
-        rows = range(0, max(len(observations), 1), TOGETHER)
-        return np.concatenate([self._mean(observations[i : i + TOGETHER]) for i in rows])
+        rows = range(0, max(len(observations), 1), MAX_BATCH)
+        return np.concatenate([self._mean(observations[i : i + MAX_BATCH]) for i in rows])
 
     def _mean(self, observations: Weights) -> Weights:
         hidden = self.normalisation(observations)

@@ -41,16 +41,16 @@ def moved(state, kind, by):
 
 def attempt(option, start):
     ground = option.skill
-    return ground.rehearsal.attempts(ground.shortcut, ground.sight, start)[option.attempt]
+    return ground.rollouts.successes(ground.shortcut, ground.encoder, start)[option.attempt]
 
 
 def test_it_is_kept_to_where_things_are_a_little_elsewhere(rehearsed):
     shortcut, start = rehearsed
     follow = shortcut.skill.start(start, shortcut.objects)
     foreseen = attempt(shortcut, start)
-    for state, choice in zip(foreseen.states, foreseen.choices, strict=True):
+    for state, choice in zip(foreseen.states, foreseen.actions, strict=True):
         action = follow(moved(state, "block", 0.003))
-        assert (action == shortcut.skill.act(choice)).all()
+        assert (action == shortcut.skill.command(choice)).all()
 
 
 def test_it_is_left_where_the_robot_is_elsewhere(rehearsed):
@@ -59,9 +59,11 @@ def test_it_is_left_where_the_robot_is_elsewhere(rehearsed):
     foreseen = attempt(shortcut, start)
     follow(foreseen.states[0])
     off = moved(foreseen.states[1], "robot", 0.05)
-    seen = shortcut.skill.sight.look(off.alone()).observations
-    bare = shortcut.skill.act(shortcut.skill.shortcut.policy.mean(seen)[0])
+    seen = shortcut.skill.encoder.encode(off.alone()).observations
+    bare = shortcut.skill.command(shortcut.skill.shortcut.policy.mean(seen)[0])
     assert np.array_equal(follow(off), bare)
     again = follow(foreseen.states[2])  # and not taken up again
-    seen = shortcut.skill.sight.look(foreseen.states[2].alone()).observations
-    assert np.array_equal(again, shortcut.skill.act(shortcut.skill.shortcut.policy.mean(seen)[0]))
+    seen = shortcut.skill.encoder.encode(foreseen.states[2].alone()).observations
+    assert np.array_equal(
+        again, shortcut.skill.command(shortcut.skill.shortcut.policy.mean(seen)[0])
+    )

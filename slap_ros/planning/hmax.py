@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from slap_ros.relational import GroundOperator
 
 
-class Distance:
+class HMax:
     """Layers until the goal holds if operators deleted nothing, and all of a layer ran at once.
 
     That is h_max with unit costs (Bonet, Geffner: Planning as heuristic search, AIJ 129, 2001): it

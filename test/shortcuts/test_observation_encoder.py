@@ -17,38 +17,42 @@ from slap_ros.physics.features import ROBOT
 from slap_ros.physics.panda import JOINT_HIGH, JOINT_LOW, MAX_STEP
 from slap_ros.physics.scene import TABLE_TOP
 from slap_ros.relational import State
-from slap_ros.shortcuts.sight import HANDS_OFF, STRAIN, Sight
+from slap_ros.shortcuts.observation_encoder import (
+    JOINT_LIMIT_WEIGHT,
+    PROXIMITY_WEIGHT,
+    ObservationEncoder,
+)
 from slap_ros.shortcuts.signature import Change, Signature
 
 TOWER = get_domain("obstacle_tower", "paper")
 
 
 @pytest.fixture(scope="module")
-def sight():
+def encoder():
     """On the slap: the tower down from the target."""
     space = TOWER.atom_space(TOWER.task(0).initial_state)
     tower = [space.atom("On", ["block2", "target"])]
     change = Change(space.mask([space.atom("NothingOn", ["target"])]), space.mask(tower))
-    return Sight(TOWER, space, Signature.of(change, space), change)
+    return ObservationEncoder(TOWER, space, Signature.of(change, space), change)
 
 
-def potential(sight, **joints):
+def potential(encoder, **joints):
     """With some joints elsewhere: the seventh turns the hand about itself, and moves nothing."""
     state = TOWER.task(0).initial_state
     (robot,) = state.layout.of_type(ROBOT)
     moved = state.replace({(robot, name): value for name, value in joints.items()})
-    return float(sight.look(moved.alone()).potential[0])
+    return float(encoder.encode(moved.alone()).potential[0])
 
 
-@pytest.mark.parametrize(("share", "strain"), [(0.0, 0.0), (0.79, 0.0), (0.9, 0.25), (1.0, 1.0)])
+@pytest.mark.parametrize(("share", "penalty"), [(0.0, 0.0), (0.79, 0.0), (0.9, 0.25), (1.0, 1.0)])
 @pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_a_joint_close_to_its_limit_costs(sight, share, strain, side):
+def test_a_joint_close_to_its_limit_costs(encoder, share, penalty, side):
     high = JOINT_HIGH[6]  # its range is symmetric
-    less = potential(sight, joint7=0.0) - potential(sight, joint7=side * share * high)
-    assert less == pytest.approx(STRAIN * strain, abs=1e-9)
+    less = potential(encoder, joint7=0.0) - potential(encoder, joint7=side * share * high)
+    assert less == pytest.approx(JOINT_LIMIT_WEIGHT * penalty, abs=1e-9)
 
 
-def test_a_batch_is_strained_like_its_states(sight):
+def test_a_batch_is_strained_like_its_states(encoder):
     state = TOWER.task(0).initial_state
     rng = np.random.default_rng(0)
     rows = np.tile(state.data, (20, 1))
@@ -80,14 +84,14 @@ def after_the_slap(block_to_hand_m, speed):
     return state.replace({**features, (moving, "vx"): speed})
 
 
-def test_the_hand_is_to_leave_what_is_done_but_does_not_rest(sight):
-    def look(block_to_hand_m, speed):
-        return sight.look(after_the_slap(block_to_hand_m, speed).alone())
+def test_the_hand_is_to_leave_what_is_done_but_does_not_rest(encoder):
+    def encode(block_to_hand_m, speed):
+        return encoder.encode(after_the_slap(block_to_hand_m, speed).alone())
 
-    near, far = look(0.02, 0.5), look(0.2, 0.5)
-    assert not near.near[0] and not far.near[0]
-    assert far.potential[0] - near.potential[0] == pytest.approx(0.8 * HANDS_OFF)
-    assert look(0.02, 0.0).potential[0] == pytest.approx(far.potential[0])  # it may rest there
+    near, far = encode(0.02, 0.5), encode(0.2, 0.5)
+    assert not near.achieved[0] and not far.achieved[0]
+    assert far.potential[0] - near.potential[0] == pytest.approx(0.8 * PROXIMITY_WEIGHT)
+    assert encode(0.02, 0.0).potential[0] == pytest.approx(far.potential[0])  # it may rest there
 
 
 @pytest.mark.parametrize(("name", "done"), [("block2", True), ("target", False)])
@@ -105,9 +109,9 @@ def test_fingers_need_room_around_the_target_alone(name, done):
     hovering = {(state.layout.object("block3"), axis): value for axis, value in over}
     state = state.replace(hovering)  # 6 mm over it: it lies on nothing, but not by a finger's width
     change = Change(space.mask([space.atom("NothingOn", [name])]), 0)
-    sight = Sight(TOWER, space, Signature.of(change, space), change)
+    encoder = ObservationEncoder(TOWER, space, Signature.of(change, space), change)
     assert space.abstract(state) & change.add
-    assert sight.look(state.alone()).near[0] == done
+    assert encoder.encode(state.alone()).achieved[0] == done
 
 
 def test_joints_are_seen_to_take_the_hand_as_far_as_they_do():

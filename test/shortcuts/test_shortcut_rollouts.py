@@ -11,13 +11,14 @@ import pytest
 from slap_ros.domains import get_domain
 from slap_ros.planning.planner import Problem
 from slap_ros.shortcuts.library import load_library
-from slap_ros.shortcuts.shortcut import Rehearsal, Sampling
-from slap_ros.shortcuts.sight import Sight
+from slap_ros.shortcuts.observation_encoder import ObservationEncoder
+from slap_ros.shortcuts.shortcut import Sampling
+from slap_ros.shortcuts.shortcut_rollouts import ShortcutRollouts
 from slap_ros.shortcuts.signature import Change
 
 DOMAIN = get_domain("obstacle2d")
 (SHORTCUT,) = load_library(Path(__file__).parent / "data" / "obstacle2d", DOMAIN).shortcuts
-SAMPLING = Sampling(samples=4, crowd=8)
+SAMPLING = Sampling(samples=4, batch=8)
 
 
 def situations(count=6):
@@ -33,23 +34,23 @@ def situations(count=6):
         state = problem.model.roll_out(pick, task.initial_state, target).final
         add = space.mask([space.atom("Clear", ["target"]), space.atom("On", ["block2", "table"])])
         change = Change(add, space.mask([space.atom("Overlap", ["block2", "target"])]))
-        yield Sight(DOMAIN, space, SHORTCUT.signature, change), state
+        yield ObservationEncoder(DOMAIN, space, SHORTCUT.signature, change), state
 
 
-def attempts(domain, sampling, sight, state):
-    return Rehearsal(domain, state, sampling).attempts(SHORTCUT, sight, state)
+def attempts(domain, sampling, encoder, state):
+    return ShortcutRollouts(domain, state, sampling).successes(SHORTCUT, encoder, state)
 
 
 def test_each_attempt_does_in_a_world_of_its_own_what_it_says():
     seen = 0
-    for sight, state in situations():
-        for attempt in attempts(DOMAIN, SAMPLING, sight, state):
+    for encoder, state in situations():
+        for attempt in attempts(DOMAIN, SAMPLING, encoder, state):
             world = DOMAIN.make_world(state)
-            for choice, foreseen in zip(attempt.choices, attempt.states, strict=True):
+            for choice, foreseen in zip(attempt.actions, attempt.states, strict=True):
                 assert np.array_equal(world.state.data, foreseen.data)
-                world.step(sight.actions(choice.astype(np.float64)))
-            goal = sight.change.apply(sight.space.abstract(state))
-            assert sight.space.abstract(world.state) == goal
+                world.step(encoder.action_map(choice.astype(np.float64)))
+            goal = encoder.change.apply(encoder.space.abstract(state))
+            assert encoder.space.abstract(world.state) == goal
             seen += 1
     assert seen > 6
 
@@ -57,28 +58,28 @@ def test_each_attempt_does_in_a_world_of_its_own_what_it_says():
 def test_worlds_that_cannot_be_stepped_together_try_one_after_the_other():
     """Without noise a crowd has nothing to add: both find the same."""
     apart = replace(DOMAIN, learning=replace(DOMAIN.learning, make_vector_world=None))
-    for sight, state in situations():
+    for encoder, state in situations():
         alone = Sampling(samples=1, refinements=0)
-        one, many = (attempts(domain, alone, sight, state) for domain in (apart, DOMAIN))
+        one, many = (attempts(domain, alone, encoder, state) for domain in (apart, DOMAIN))
         assert [a.steps for a in one] == [a.steps for a in many]
         assert len(one) <= 1
 
 
-@pytest.mark.parametrize("crowd", [1, 8])
-def test_the_shortest_come_first_and_no_more_than_wanted(crowd):
-    sampling = replace(SAMPLING, crowd=crowd)
-    for sight, state in situations():
-        steps = [attempt.steps for attempt in attempts(DOMAIN, sampling, sight, state)]
+@pytest.mark.parametrize("batch", [1, 8])
+def test_the_shortest_come_first_and_no_more_than_wanted(batch):
+    sampling = replace(SAMPLING, batch=batch)
+    for encoder, state in situations():
+        steps = [attempt.steps for attempt in attempts(DOMAIN, sampling, encoder, state)]
         assert steps == sorted(steps)
-        assert len(steps) <= sampling.ends + 1
+        assert len(steps) <= sampling.alternatives + 1
 
 
 def test_a_crowd_finds_at_least_as_short_a_way():
-    few, many = (replace(SAMPLING, crowd=crowd) for crowd in (1, 64))
+    few, many = (replace(SAMPLING, batch=batch) for batch in (1, 64))
     sums = [
         sum(
-            found[0].steps if (found := attempts(DOMAIN, sampling, sight, state)) else 40
-            for sight, state in situations()
+            found[0].steps if (found := attempts(DOMAIN, sampling, encoder, state)) else 40
+            for encoder, state in situations()
         )
         for sampling in (few, many)
     ]

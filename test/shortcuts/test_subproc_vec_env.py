@@ -10,35 +10,36 @@ import pytest
 from pushing import SIGNATURE, STARTS
 
 from slap_ros.errors import InvalidStateError
-from slap_ros.shortcuts.practice import Rewards, Steps
+from slap_ros.shortcuts.rewards import Rewards
 from slap_ros.shortcuts.starts import StartRecord
-from slap_ros.shortcuts.team import Exercise, practising
+from slap_ros.shortcuts.subproc_vec_env import VecEnvSpec, make_vec_env
+from slap_ros.shortcuts.vec_env import VecEnvStep
 
 RECORDS = tuple(
     StartRecord(21, index, tuple(start.state.data), start.change.add, start.change.delete)
     for index, start in enumerate(STARTS)
 )
-EXERCISES = [
-    Exercise("obstacle2d", "fair", SIGNATURE, RECORDS, 5, 12, Rewards(), (3, part))
+SPECS = [
+    VecEnvSpec("obstacle2d", "fair", SIGNATURE, RECORDS, 5, 12, Rewards(), (3, part))
     for part in range(3)
 ]
 
 
-def walk(episodes, count=30):
+def walk(env, count=30):
     rng = np.random.default_rng(8)
-    yield episodes.observations
+    yield env.observations
     for _ in range(count):
-        steps = episodes.step(rng.uniform(-1, 1, (episodes.episodes, episodes.actions.size)))
-        assert np.array_equal(episodes.observations, steps.observations)
-        yield from (getattr(steps, field.name) for field in fields(Steps))
+        steps = env.step(rng.uniform(-1, 1, (env.num_envs, env.action_map.size)))
+        assert np.array_equal(env.observations, steps.observations)
+        yield from (getattr(steps, field.name) for field in fields(VecEnvStep))
 
 
 def test_how_many_processes_there_are_makes_no_difference():
     walks = []
     for processes in (1, 2, 3):
-        with practising(EXERCISES, processes) as episodes:
-            assert (episodes.episodes, episodes.horizon) == (15, 12)
-            walks.append(list(walk(episodes)))
+        with make_vec_env(SPECS, processes) as env:
+            assert (env.num_envs, env.horizon) == (15, 12)
+            walks.append(list(walk(env)))
     for one, other in zip(walks[0], walks[1], strict=True):
         assert one.tobytes() == other.tobytes()
     for one, other in zip(walks[0], walks[2], strict=True):
@@ -46,28 +47,28 @@ def test_how_many_processes_there_are_makes_no_difference():
 
 
 def test_parts_differ_from_one_another():
-    with practising(EXERCISES, 2) as episodes:
-        states = np.split(episodes.observations, 3)
+    with make_vec_env(SPECS, 2) as env:
+        states = np.split(env.observations, 3)
     assert not np.array_equal(states[0], states[1])
 
 
 def test_a_process_that_is_killed_is_noticed():
-    with practising(EXERCISES, 2) as episodes:
+    with make_vec_env(SPECS, 2) as env:
         active_children()[-1].kill()
         with pytest.raises(ChildProcessError, match="a process that stepped worlds ended"):
-            for _ in walk(episodes):
+            for _ in walk(env):
                 pass
 
 
 def test_no_process_is_left():
-    with practising(EXERCISES, 2) as episodes:
-        next(walk(episodes))
+    with make_vec_env(SPECS, 2) as env:
+        next(walk(env))
         assert len(active_children()) == 2
     assert not active_children()
 
 
 def test_what_a_process_refuses_is_raised_here():
     broken = replace(RECORDS[0], features=RECORDS[0].features[1:])
-    exercises = [replace(exercise, starts=(broken,)) for exercise in EXERCISES]
-    with pytest.raises(InvalidStateError), practising(exercises, 2):
+    specs = [replace(spec, starts=(broken,)) for spec in SPECS]
+    with pytest.raises(InvalidStateError), make_vec_env(specs, 2):
         pass

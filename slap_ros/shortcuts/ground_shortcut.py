@@ -1,0 +1,124 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A shortcut for given objects, as a skill: tried out in the model, then executed closed loop."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from slap_ros.core import Action, Policy
+from slap_ros.errors import SkillNotApplicableError
+from slap_ros.relational import Object, State
+from slap_ros.shortcuts.mlp_policy import Weights
+from slap_ros.shortcuts.observation_encoder import ObservationEncoder
+from slap_ros.shortcuts.shortcut import Shortcut
+from slap_ros.shortcuts.shortcut_rollouts import ShortcutRollout, ShortcutRollouts
+from slap_ros.shortcuts.signature import Change
+
+STATE_TOLERANCE = 1e-6  # in any feature's unit: up to here a state is as predicted
+ROBOT_TOLERANCE = 0.02  # in any feature's unit: up to here a robot is where it was predicted
+
+
+@dataclass(frozen=True)
+class GroundShortcut:
+    """A shortcut for given objects: the skill behind a shortcut edge.
+
+    Args:
+        shortcut: What was learned.
+        change: What it changes in this task.
+        attempt: Which of its successful rollouts it follows, the shortest first.
+        encoder: Of that change.
+        rollouts: Where it is tried out.
+    """
+
+    shortcut: Shortcut
+    change: Change
+    attempt: int
+    encoder: ObservationEncoder = field(compare=False, repr=False)
+    rollouts: ShortcutRollouts = field(compare=False, repr=False)
+
+    @property
+    def name(self) -> str:
+        """The shortcut's name."""
+        return self.shortcut.name
+
+    @property
+    def step_limit(self) -> int:
+        """Environment steps after which it counts as failed."""
+        return self.rollouts.sampling.horizon
+
+    @property
+    def least_steps(self) -> int:
+        """Half of the shortest success in training, environment steps.
+
+        An assumption, not a bound: sampling may find a way that is shorter still.
+        """
+        return max(1, self.shortcut.shortest // 2)
+
+    def lower_bound(self, state: State, objects: tuple[Object, ...]) -> int:
+        """The same from every state; see :attr:`least_steps`."""
+        del state, objects
+        return self.least_steps
+
+    def start(self, state: State, objects: tuple[Object, ...]) -> Policy:
+        """Try it out, and follow a successful rollout.
+
+        Args:
+            state: Where it begins.
+            objects: What it is applied to, for the message.
+
+        Returns:
+            The policy that follows the rollout.
+
+        Raises:
+            SkillNotApplicableError: Not so many rollouts succeeded.
+        """
+        successes = self.rollouts.successes(self.shortcut, self.encoder, state)
+        if self.attempt >= len(successes):
+            raise SkillNotApplicableError(
+                f"{self.name}({', '.join(obj.name for obj in objects)}) reaches its target "
+                f"{len(successes)} times within {self.step_limit} steps in the model; attempt "
+                f"{self.attempt + 1} was asked for"
+            )
+        return RolloutFollower(self, successes[self.attempt])
+
+    def command(self, action: Weights) -> Action:
+        """The robot's action for one of the policy's, from -1 to 1."""
+        return self.encoder.action_map(action.astype(np.float64))
+
+
+class RolloutFollower:
+    """Follows a rollout as long as states are as predicted; then the policy, closed loop.
+
+    Objects that are pushed never move quite as predicted in a real world, nor are they seen while
+    they move. As long as the robot itself is where it should be, the rollout is still the best
+    guess: it ends where the next option can begin, which the policy alone does not promise.
+    """
+
+    def __init__(self, skill: GroundShortcut, rollout: ShortcutRollout) -> None:
+        self._skill = skill
+        self._predicted: Sequence[tuple[State, Weights]] = list(
+            zip(rollout.states, rollout.actions, strict=True)
+        )
+        self._step = 0
+
+    def __call__(self, state: State) -> Action:
+        """The next action."""
+        if self._step < len(self._predicted):
+            predicted, action = self._predicted[self._step]
+            if self._is_as_predicted(state, predicted):
+                self._step += 1
+                return self._skill.command(action)
+        self._predicted = ()
+        observations = self._skill.encoder.encode(state.alone()).observations
+        return self._skill.command(self._skill.shortcut.policy.mean(observations)[0])
+
+    def _is_as_predicted(self, state: State, predicted: State) -> bool:
+        off = np.abs(state.data - predicted.data)
+        if off.max() <= STATE_TOLERANCE:
+            return True
+        own = self._skill.encoder.robot_columns
+        return bool(own.size and off[own].max() <= ROBOT_TOLERANCE)

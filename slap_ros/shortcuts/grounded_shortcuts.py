@@ -1,0 +1,93 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A library's shortcuts in one task: the pairs of abstract states that they may join."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from slap_ros.core import Domain
+from slap_ros.planning.abstract_graph import AbstractGraph, Edge
+from slap_ros.planning.options import Option, OptionKind
+from slap_ros.relational import State
+from slap_ros.shortcuts.ground_shortcut import GroundShortcut
+from slap_ros.shortcuts.observation_encoder import ObservationEncoder, learner_interface
+from slap_ros.shortcuts.shortcut import DEFAULT, Sampling, Shortcut
+from slap_ros.shortcuts.shortcut_rollouts import ShortcutRollouts
+from slap_ros.shortcuts.signature import Change, concerned
+from slap_ros.shortcuts.signature_matcher import SignatureMatcher
+
+
+class GroundedShortcuts:
+    """Shortcuts over the objects of a task. Rollouts are made in a world of its own."""
+
+    def __init__(
+        self,
+        domain: Domain,
+        shortcuts: Sequence[Shortcut],
+        initial: State,
+        sampling: Sampling = DEFAULT,
+    ) -> None:
+        """Ground shortcuts.
+
+        Args:
+            domain: For which they were learned.
+            shortcuts: What was learned.
+            initial: A state with the objects of the task.
+            sampling: How shortcuts are tried out in the model.
+        """
+        self.shortcuts = tuple(shortcuts)
+        self._domain = domain
+        self._space = domain.atom_space(initial)
+        self._rollouts = ShortcutRollouts(domain, initial, sampling)
+        self._matchers = [
+            SignatureMatcher(s.signature, self._space, learner_interface(domain).grasping)
+            for s in self.shortcuts
+        ]
+        self._encoders: dict[tuple[str, Change], ObservationEncoder] = {}
+
+    def edges(self, graph: AbstractGraph) -> list[Edge]:
+        """An edge for each pair of nodes that no option joins and a shortcut may (Alg. 2)."""
+        joined = {(edge.source, edge.target) for edge in graph.edges}
+        found = []
+        for shortcut, matcher in zip(self.shortcuts, self._matchers, strict=True):
+            for i, j in matcher.pairs(graph.nodes):
+                if (i, j) not in joined:
+                    change = Change.between(graph.nodes[i], graph.nodes[j])
+                    found.append(Edge(i, j, self._option(shortcut, change)))
+        return found
+
+    def option(self, name: str, source: int, target: int, attempt: int = 0) -> Option | None:
+        """A shortcut from one abstract state to another.
+
+        Args:
+            name: Of the shortcut.
+            source: Abstract state in which it begins, a mask.
+            target: Abstract state in which it shall end, a mask.
+            attempt: Which of its successful rollouts to follow, the shortest first.
+
+        Returns:
+            The option; None where there is no such shortcut, or it does not match the change.
+        """
+        change = Change.between(source, target)
+        for shortcut in self.shortcuts:
+            if shortcut.name == name and shortcut.signature.matches(change, self._space):
+                return self._option(shortcut, change, attempt)
+        return None
+
+    def _option(self, shortcut: Shortcut, change: Change, attempt: int = 0) -> Option:
+        key = (shortcut.name, change)
+        if key not in self._encoders:
+            self._encoders[key] = ObservationEncoder(
+                self._domain, self._space, shortcut.signature, change
+            )
+        encoder = self._encoders[key]
+        return Option(
+            OptionKind.SHORTCUT,
+            GroundShortcut(shortcut, change, attempt, encoder, self._rollouts),
+            concerned(change, self._space),
+            accepts=encoder.accepts,
+            attempt=attempt,
+            next_attempt=lambda: self._option(shortcut, change, attempt + 1),
+            given_up=lambda: self._rollouts.given_up(shortcut),
+        )

@@ -1,0 +1,309 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a shortcut's policy observes, and how far a state is from the shortcut's target.
+
+The observation has the robot and a slot for each role, filled with the object that plays it:
+whether there is one, its features relative to the hand, and how much of its atoms is still to be
+achieved (SLAP §4.4: the projection on relevant objects). Where a change concerns more objects of
+a kind than training had, the slots hold those that are not done yet, in their order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slap_ros.core import Domain, LearnerInterface
+from slap_ros.errors import InvalidDomainError
+from slap_ros.relational import AtomSpace, Column, GroundAtom, Object, State
+from slap_ros.relational.predicates import Bools, Predicate
+from slap_ros.relational.state import Array
+from slap_ros.shortcuts.action_map import ActionMap
+from slap_ros.shortcuts.signature import Change, Kind, Signature, concerned, kinds
+
+# Terms of the potential, all against the hand being ``length_m`` away from its next object.
+ATOM_WEIGHT = 3.0  # an atom that is not achieved at all
+PENDING_OBJECT_WEIGHT = 3.0  # an object whose turn has not come
+PROXIMITY_WEIGHT = 3.0  # the hand at the last object, which is in place but still moves
+JOINT_LIMIT_WEIGHT = 3.0  # an axis at its limit: a policy that drives it there is stuck
+ACHIEVED = 1e-9  # deficit below which an atom counts as achieved
+
+
+def learner_interface(domain: Domain) -> LearnerInterface:
+    """What the domain offers to learners.
+
+    Raises:
+        InvalidDomainError: Nothing: ``Domain.learning`` is None.
+    """
+    if domain.learning is None:
+        raise InvalidDomainError(
+            f"domain {domain.name} has no learner's interface, so that nothing can be learned in "
+            "it; see Domain.learning"
+        )
+    return domain.learning.interface
+
+
+def uses_gripper(domain: Domain, signature: Signature) -> bool:
+    """Whether the shortcut changes what is held, so that the gripper is among its actions."""
+    grasping = {predicate.name for predicate in learner_interface(domain).grasping}
+    return any(predicate in grasping for _, predicate, _ in signature.patterns)
+
+
+def make_action_map(domain: Domain, signature: Signature) -> ActionMap:
+    """The map from the policy's actions to the robot's."""
+    return ActionMap(domain, uses_gripper(domain, signature))
+
+
+def observation_size(domain: Domain, signature: Signature) -> int | None:
+    """Features of an observation; None where no task at hand has objects of all its kinds."""
+    interface, state = learner_interface(domain), domain.task(0).initial_state
+    kind = kinds(domain.atom_space(state))
+    examples = {name: obj for obj, name in kind.items()}
+    if not set(signature.slots) <= set(examples):
+        return None
+    batch = state.alone()
+    hand = interface.hand(batch)
+    size = interface.robot(batch, hand).shape[-1]
+    for name, slots in signature.slots.items():
+        features = interface.objects(batch, hand, Column((examples[name],)))
+        size += slots * (2 + features.shape[-1])  # whether there is one, and its deficit
+    return int(size)
+
+
+@dataclass(frozen=True)
+class _Atoms:
+    """Changed atoms of one predicate and sign."""
+
+    predicate: Predicate
+    wanted: bool
+    columns: tuple[Column, ...]
+    tolerance: Array  # of each
+
+    def deficits(self, state: State, length: float) -> Array:
+        """0 where achieved, towards 1 the further away, shape (n, atoms)."""
+        if self.predicate.margin is None:
+            holds = self.predicate.classifier(state, *self.columns)
+            return np.where(holds == self.wanted, 0.0, 1.0)
+        margin = self.predicate.margin(state, *self.columns)
+        missing = np.maximum(self.tolerance + (-margin if self.wanted else margin), 0.0)
+        deficits: Array = missing / (missing + length)
+        return deficits
+
+
+@dataclass(frozen=True)
+class Encoding:
+    """What there is to know of each of n states.
+
+    Args:
+        observations: For the policy, shape (n, size); of the same size for all changes that the
+            signature matches.
+        potential: About minus the steps to go, shape (n,), for shaping rewards. Four terms: the
+            deficits of the changed atoms, through the metric behind each predicate; the way to
+            the lowest object with a deficit, as it carries the others; where everything is in
+            place but still moves, how close the hand is; and the joint limit penalty.
+        achieved: Whether all changed atoms are achieved, past their thresholds by the success
+            tolerance, and nothing moves, shape (n,).
+        failure: Whether something happened that cannot be undone, shape (n,): the domain says
+            so, or an object was released elsewhere than where it should be.
+    """
+
+    observations: NDArray[np.float32]
+    potential: Array
+    achieved: Bools
+    failure: Bools
+
+
+class ObservationEncoder:
+    """Encodes batches of states for one change in one task."""
+
+    def __init__(
+        self, domain: Domain, space: AtomSpace, signature: Signature, change: Change
+    ) -> None:
+        """Work out which atoms are about which objects.
+
+        Args:
+            domain: Whose learner's interface is used.
+            space: The task's atoms.
+            signature: Of the shortcut: its slots.
+            change: What the shortcut changes in this task.
+
+        Raises:
+            InvalidDomainError: The domain has no learner's interface.
+        """
+        self.domain, self.space, self.signature, self.change = domain, space, signature, change
+        self.interface = learner_interface(domain)
+        self.objects = concerned(change, space)
+        self._number = {obj: i for i, obj in enumerate(self.objects)}
+        self._atoms = [
+            self._group(sign == "+", predicate, [atom for _, atom in atoms])
+            for (sign, predicate), atoms in groupby(
+                change.atoms(space), key=lambda signed: (signed[0], signed[1].predicate)
+            )
+        ]
+        self._incidence, self._placing, self._releasing = self._classify_atoms()
+        self._kinds = self._of_kinds()
+        self.action_map = make_action_map(domain, signature)
+        self.robot_columns = _robot_columns(domain, space)
+
+    def _group(self, wanted: bool, predicate: Predicate, atoms: Sequence[GroundAtom]) -> _Atoms:
+        columns = tuple(Column(objs) for objs in zip(*(a.objects for a in atoms), strict=True))
+        tolerance = np.array([self.interface.success_tolerance(atom) for atom in atoms])
+        return _Atoms(predicate, wanted, columns, tolerance)
+
+    def _classify_atoms(self) -> tuple[Bools, Bools, Bools]:
+        """Which changed atoms are about which objects, about no grasp, about an empty hand.
+
+        Returns:
+            Shapes (atoms, objects), (atoms,) and (atoms,).
+        """
+        signed, grasping = list(self.change.atoms(self.space)), self.interface.grasping
+        incidence = np.array([[obj in atom.objects for obj in self.objects] for _, atom in signed])
+        placing = np.array([atom.predicate not in grasping for _, atom in signed])
+        releasing = np.array(
+            [
+                sign == "+"
+                and atom.predicate in grasping
+                and all(obj.type in self.domain.robot_types for obj in atom.objects)
+                for sign, atom in signed
+            ]
+        )
+        return incidence, placing, releasing
+
+    def _of_kinds(self) -> list[tuple[int, Column, NDArray[np.intp]]]:
+        """For each kind: slots, objects, and their numbers."""
+        kind: dict[Kind, list[Object]] = {name: [] for name in self.signature.slots}
+        for obj in self.objects:
+            kind[kinds(self.space)[obj]].append(obj)
+        return [
+            (self.signature.slots[name], Column(tuple(objects)), self._numbers(objects))
+            for name, objects in kind.items()
+        ]
+
+    def _numbers(self, objects: Sequence[Object]) -> NDArray[np.intp]:
+        return np.array([self._number[obj] for obj in objects], dtype=np.intp)
+
+    def encode(self, state: State) -> Encoding:
+        """Encode states, a batch of shape (n, layout.size)."""
+        length = self.interface.length_m
+        deficits = np.concatenate([g.deficits(state, length) for g in self._atoms], axis=-1)
+        hand = self.interface.hand(state)
+        distances = self._distances(state, hand)
+        object_deficits = self._object_deficits(state, deficits, distances)
+        holds, at_rest = deficits < ACHIEVED, self.interface.at_rest(state)
+        in_place = holds.all(axis=-1)
+        achieved = in_place & at_rest
+        dropped = holds[:, self._releasing].any(axis=-1) & at_rest & ~achieved
+        return Encoding(
+            self._observe(state, hand, object_deficits),
+            self._potential(deficits, object_deficits, distances)
+            - PROXIMITY_WEIGHT * np.where(in_place & ~at_rest, self._closeness(distances), 0.0)
+            - JOINT_LIMIT_WEIGHT * self.interface.joint_limit_penalty(state),
+            achieved,
+            self.interface.failed(state) | dropped,
+        )
+
+    def success(self, state: State, encoding: Encoding, targets: Sequence[int]) -> Bools:
+        """Whether each state is one in which the shortcut ends.
+
+        Args:
+            state: A batch of n states.
+            encoding: Of them.
+            targets: The abstract state that each shall reach, n masks.
+
+        Returns:
+            Shape (n,).
+        """
+        success = encoding.achieved.copy()
+        for i in np.flatnonzero(success):
+            abstract = self.space.abstract(State(state.layout, state.data[i]))
+            success[i] = abstract == targets[int(i)]
+        return success
+
+    def accepts(self, state: State) -> bool:
+        """Whether a shortcut may end in this state once its target's atoms hold."""
+        return bool(self.encode(state.alone()).achieved[0])
+
+    def _distances(self, state: State, hand: Array) -> Array:
+        """From the hand to each object, m, shape (n, objects); infinite to a fixed place."""
+        distances = np.full((len(state.data), len(self.objects)), np.inf)
+        for _, column, numbers in self._kinds:
+            distances[:, numbers] = self.interface.distance(state, hand, column)
+        return distances
+
+    def _object_deficits(self, state: State, deficits: Array, distances: Array) -> Array:
+        """The largest deficit among each object's atoms, shape (n, objects).
+
+        The deficit of an atom that is only about places counts for the nearest object that can be
+        moved: a block in the wrong place is what is to be moved, not the place.
+        """
+        own: Array = (deficits[:, :, None] * self._incidence).max(axis=1)
+        movable = np.isfinite(distances[0])
+        orphans = self._placing & ~(self._incidence & movable).any(axis=1)
+        if not orphans.any() or not movable.any():
+            return own
+        choice = np.flatnonzero(movable)
+        column = Column(tuple(self.objects[i] for i in choice))
+        due = (deficits[:, orphans, None] * self._incidence[orphans]).max(axis=1)
+        rows = np.arange(len(own))
+        for i in np.flatnonzero(self._incidence[orphans].any(axis=0)):
+            separation = self.interface.separation(state, self.objects[i], column)
+            nearest = choice[separation.argmin(axis=-1)]
+            own[rows, nearest] = np.maximum(own[rows, nearest], due[:, i])
+        return own
+
+    def _potential(self, deficits: Array, object_deficits: Array, distances: Array) -> Array:
+        """Objects one after the other, in their order; each that is done is a step forward."""
+        # The grasp comes last: a release counts for nothing before everything is in place.
+        due = np.where(self._placing, deficits, 0.0).max(axis=-1, keepdims=True)
+        deficits = np.where(self._placing, deficits, np.maximum(deficits, due))
+        left = (object_deficits > ACHIEVED) & np.isfinite(distances)
+        every, first = np.arange(len(left)), left.argmax(axis=-1)
+        way = np.where(left.any(axis=-1), distances[every, first] / self.interface.length_m, 0.0)
+        pending = PENDING_OBJECT_WEIGHT * np.maximum(left.sum(axis=-1) - 1, 0)
+        potential: Array = -(ATOM_WEIGHT * deficits.sum(axis=-1) + way + pending)
+        return potential
+
+    def _closeness(self, distances: Array) -> Array:
+        """How close the hand is to the nearest object, 0 to 1: what it touches does not rest."""
+        nearest = distances.min(axis=-1, initial=np.inf)
+        closeness: Array = np.maximum(1.0 - nearest / self.interface.length_m, 0.0)
+        return closeness
+
+    def _observe(self, state: State, hand: Array, object_deficits: Array) -> NDArray[np.float32]:
+        parts = [self.interface.robot(state, hand)]
+        for slots, column, numbers in self._kinds:
+            features = self.interface.objects(state, hand, column)
+            present = np.ones((*features.shape[:2], 1))
+            features = np.concatenate(
+                [present, object_deficits[:, numbers, None], features], axis=-1
+            )
+            parts.append(_into_slots(features, slots).reshape(len(features), -1))
+        return np.concatenate(parts, axis=-1).astype(np.float32)
+
+
+def _robot_columns(domain: Domain, space: AtomSpace) -> NDArray[np.intp]:
+    """Where a state has the features of the robot itself."""
+    layout = space.layout
+    return np.array(
+        [
+            layout.column(obj, feature.name)
+            for kind in sorted(domain.robot_types, key=str)
+            for obj in layout.of_type(kind)
+            for feature in kind.features
+        ],
+        dtype=np.intp,
+    )
+
+
+def _into_slots(features: Array, slots: int) -> Array:
+    """Shape (n, objects, f) into (n, slots, f): zeros where absent; of too many, those not done."""
+    count = features.shape[1]
+    if count <= slots:
+        return np.pad(features, ((0, 0), (0, slots - count), (0, 0)))
+    done = features[..., 1] <= ACHIEVED
+    first = np.argsort(done, axis=1, kind="stable")[:, :slots]
+    return np.take_along_axis(features, first[..., None], axis=1)

@@ -1,0 +1,60 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The reward of a shortcut's MDP (SLAP §4.2), with potential-based shaping."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from slap_ros.relational.predicates import Bools
+from slap_ros.relational.state import Array
+
+
+@dataclass(frozen=True)
+class Rewards:
+    """What a step is worth, in environment steps; the sum is multiplied by ``scale``.
+
+    The paper's -1 per step, for ever, adds up to -1 / (1 - discount). Our default has the same
+    optimum, but 0 for standing still and that much more for success: a critic that begins at 0
+    is then right about doing nothing, and the policy does not learn to avoid the first contact.
+
+    Args:
+        step: Of every step.
+        success: Of the step that reaches the target.
+        failure: Of the step after which the target cannot be reached any more, on top of ``step``
+            for ever.
+        shaping: Weight of the difference of the potential.
+        discount: Per step; here, for what ``step`` comes to for ever.
+        scale: Of the whole, so that returns have a magnitude that suits the critic.
+    """
+
+    step: float = 0.0
+    success: float = 43.0
+    failure: float = -5.0
+    shaping: float = 1.0
+    discount: float = 0.97
+    scale: float = 0.1
+
+    def of(self, gain: Array, success: Bools, failure: Bools) -> Array:
+        """Rewards of n steps.
+
+        The gain is not discounted. With the discount (potential-based shaping, Ng, Harada and
+        Russell 1999), shaping changes returns by a function of the state alone, which the critic
+        learns; what remains is what there is without shaping, and a policy that never succeeded
+        yet finds no direction to be better than another.
+
+        A failure ends the episode, so it must cost more than all the steps that it saves.
+
+        Args:
+            gain: By how much each step raised the potential, shape (n,).
+            success: Whether it reached the target, shape (n,).
+            failure: Whether the target cannot be reached any more, shape (n,); a success counts
+                as one even then.
+
+        Returns:
+            Shape (n,).
+        """
+        worst = self.failure + self.step / (1.0 - self.discount)
+        return self.scale * (
+            self.step + self.success * success + self.shaping * gain + worst * (failure & ~success)
+        )

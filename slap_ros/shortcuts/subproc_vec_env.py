@@ -1,0 +1,183 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Environments in several processes: most of the time of learning is spent stepping worlds.
+
+What is learned depends on the parts that the environments are divided into, never on how many
+processes share the parts: each part draws from a generator of its own.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, fields
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slap_ros.domains import get_domain
+from slap_ros.errors import SlapError
+from slap_ros.relational.state import Array
+from slap_ros.shortcuts.action_map import ActionMap
+from slap_ros.shortcuts.observation_encoder import make_action_map
+from slap_ros.shortcuts.rewards import Rewards
+from slap_ros.shortcuts.shortcut_vec_env import ShortcutVecEnv
+from slap_ros.shortcuts.signature import Signature
+from slap_ros.shortcuts.starts import StartRecord, restore_starts
+from slap_ros.shortcuts.vec_env import VecEnv, VecEnvStep
+from slap_ros.shortcuts.workers import exit_with_parent
+
+PATIENCE_S = 5.0  # for a process to end by itself
+CLOSED = (EOFError, ConnectionError)  # raised by a pipe whose other end is closed
+
+
+@dataclass(frozen=True)
+class VecEnvSpec:
+    """What a :class:`ShortcutVecEnv` is made from, as data that other processes can be sent.
+
+    Args:
+        domain: Its name.
+        preset: Of the domain.
+        signature: Of the shortcut.
+        starts: From which episodes draw.
+        num_envs: How many environments.
+        horizon: Environment steps after which an episode is truncated.
+        rewards: The reward function.
+        seed: Of the generator that draws the starts.
+    """
+
+    domain: str
+    preset: str
+    signature: Signature
+    starts: tuple[StartRecord, ...]
+    num_envs: int
+    horizon: int
+    rewards: Rewards
+    seed: tuple[int, ...]
+
+    def make(self) -> ShortcutVecEnv:
+        """The environments themselves, in this process."""
+        domain, rng = get_domain(self.domain, self.preset), np.random.default_rng(self.seed)
+        starts = restore_starts(domain, self.starts)
+        return ShortcutVecEnv(
+            domain, self.signature, starts, self.num_envs, self.horizon, self.rewards, rng
+        )
+
+
+class SubprocVecEnv:
+    """Environments alike in horizon and actions, in processes of their own, as one."""
+
+    def __init__(self, links: Sequence[Connection], shares: Sequence[Sequence[VecEnvSpec]]) -> None:
+        """Wait for the first observations.
+
+        Args:
+            links: To each process.
+            shares: What each of them steps.
+
+        Raises:
+            ChildProcessError: One of the processes has ended.
+        """
+        first = shares[0][0]
+        self.horizon = first.horizon
+        domain = get_domain(first.domain, first.preset)
+        self.action_map: ActionMap = make_action_map(domain, first.signature)
+        self._links = links
+        sizes = [sum(spec.num_envs for spec in share) for share in shares]
+        self.num_envs, self._bounds = sum(sizes), np.cumsum(sizes)[:-1]
+        self.observations: NDArray[np.float32] = np.concatenate(self._receive_all())
+
+    def step(self, actions: Array) -> VecEnvStep:
+        """See :meth:`slap_ros.shortcuts.vec_env.VecEnv.step`.
+
+        Raises:
+            ChildProcessError: One of the processes has ended.
+        """
+        for link, share in zip(self._links, np.split(actions, self._bounds), strict=True):
+            with suppress(ConnectionError):  # reported when its answer is missing
+                link.send(share)
+        step = _concatenated(self._receive_all())
+        self.observations = step.observations
+        return step
+
+    def _receive_all(self) -> list[Any]:
+        return [_receive(link) for link in self._links]
+
+
+@contextmanager
+def make_vec_env(specs: Sequence[VecEnvSpec], processes: int) -> Iterator[VecEnv]:
+    """All parts as one vectorised environment; a single part runs in this process.
+
+    Args:
+        specs: The parts, alike in horizon and actions.
+        processes: How many at most; they end with the context.
+
+    Raises:
+        ChildProcessError: One of the processes has ended before.
+    """
+    if len(specs) == 1:
+        yield specs[0].make()
+        return
+    context = get_context("spawn")  # physics clients do not survive a fork
+    numbers = np.array_split(np.arange(len(specs)), min(processes, len(specs)))
+    shares = [[specs[i] for i in share] for share in numbers]
+    with ExitStack() as stack:
+        links = []
+        for share in shares:
+            mine, theirs = context.Pipe()
+            process = context.Process(target=_step_until_closed, args=(theirs, share, os.getpid()))
+            process.start()
+            theirs.close()  # or nobody would notice its end
+            stack.callback(_end, process, mine)
+            links.append(mine)
+        yield SubprocVecEnv(links, shares)
+
+
+def _end(process: BaseProcess, link: Connection) -> None:
+    link.close()
+    process.join(PATIENCE_S)
+    process.kill()
+    process.join()
+
+
+def _step_until_closed(link: Connection, specs: Sequence[VecEnvSpec], parent: int) -> None:
+    """What such a process does, until the other end of its link is closed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # its parent handles it
+    exit_with_parent(parent)
+    try:
+        envs = [spec.make() for spec in specs]
+        bounds = np.cumsum([env.num_envs for env in envs])[:-1]
+        link.send(np.concatenate([env.observations for env in envs]))
+        while True:
+            parts = zip(envs, np.split(link.recv(), bounds), strict=True)
+            link.send(_concatenated([env.step(actions) for env, actions in parts]))
+    except CLOSED:
+        return
+    except SlapError as error:
+        link.send(error)
+
+
+def _receive(link: Connection) -> Any:
+    try:
+        answer = link.recv()
+    except CLOSED as error:
+        raise ChildProcessError(
+            "a process that stepped worlds ended; if it was killed for memory, use fewer --jobs"
+        ) from error
+    if isinstance(answer, SlapError):
+        raise answer
+    return answer
+
+
+def _concatenated(steps: Sequence[VecEnvStep]) -> VecEnvStep:
+    return VecEnvStep(
+        *(
+            np.concatenate([getattr(step, field.name) for step in steps])
+            for field in fields(VecEnvStep)
+        )
+    )
