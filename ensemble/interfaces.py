@@ -10,6 +10,7 @@ the same names can share a network.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -31,23 +32,27 @@ from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
+from slap_ros.messages import qos
+from slap_ros.messages.qos import OfferedQos
 
-def _reliable(depth: int, durability: DurabilityPolicy) -> QoSProfile:
+
+@cache
+def _profile(offered: OfferedQos) -> QoSProfile:
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
-        depth=depth,
+        depth=offered.depth,
         reliability=ReliabilityPolicy.RELIABLE,
-        durability=durability,
+        durability=(
+            DurabilityPolicy.TRANSIENT_LOCAL
+            if offered.transient_local
+            else DurabilityPolicy.VOLATILE
+        ),
     )
 
 
-# The newest one only, also for those who come late.
-LATCHED = _reliable(1, DurabilityPolicy.TRANSIENT_LOCAL)
-# An episode's worth, also for those who come late: a recorder or planner that starts after the
-# simulator, or starts again, misses nothing.
-EPISODE = _reliable(1000, DurabilityPolicy.TRANSIENT_LOCAL)
-# From now on: for whoever must not act on the past.
-VOLATILE = _reliable(1000, DurabilityPolicy.VOLATILE)
+LATCHED = _profile(qos.LATCHED)
+EPISODE = _profile(qos.EPISODE)
+VOLATILE = _profile(qos.VOLATILE)
 # Whatever a robot's driver offers, reliable or not; what is old is of no use.
 SENSOR_DATA = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,
@@ -72,19 +77,24 @@ class Topic:
         return f"{package}/{kind}/{self.type.__name__}"
 
 
-DOMAIN = Topic("slap/domain", DomainInfo, LATCHED)
-TASK = Topic("slap/task", Task, LATCHED)
-STATE = Topic("slap/state", ObjectCentricState, EPISODE)
-ATOMS = Topic("slap/atoms", AbstractState, EPISODE)
-COMMAND = Topic("slap/command", RobotCommand, EPISODE)
-PLAN = Topic("slap/plan", Plan, LATCHED)
-PLAN_EVENTS = Topic("slap/plan_events", PlanEvent, EPISODE)
-SKILL_EVENTS = Topic("slap/skill_events", SkillEvent, EPISODE)
-DIAGNOSTICS = Topic("diagnostics", DiagnosticArray, VOLATILE)
-MARKERS = Topic("slap/markers", MarkerArray, EPISODE)
-TF = Topic("tf", TFMessage, _reliable(100, DurabilityPolicy.VOLATILE))
-TF_STATIC = Topic("tf_static", TFMessage, _reliable(100, DurabilityPolicy.TRANSIENT_LOCAL))
-JOINT_STATES = Topic("joint_states", JointState, EPISODE)
+def _topic(name: str, message_type: Any) -> Topic:
+    """A topic that is offered as the table for publishers and bags says."""
+    return Topic(name, message_type, _profile(qos.OFFERED[name]))
+
+
+DOMAIN = _topic("slap/domain", DomainInfo)
+TASK = _topic("slap/task", Task)
+STATE = _topic("slap/state", ObjectCentricState)
+ATOMS = _topic("slap/atoms", AbstractState)
+COMMAND = _topic("slap/command", RobotCommand)
+PLAN = _topic("slap/plan", Plan)
+PLAN_EVENTS = _topic("slap/plan_events", PlanEvent)
+SKILL_EVENTS = _topic("slap/skill_events", SkillEvent)
+DIAGNOSTICS = _topic("diagnostics", DiagnosticArray)
+MARKERS = _topic("slap/markers", MarkerArray)
+TF = _topic("tf", TFMessage)
+TF_STATIC = _topic("tf_static", TFMessage)
+JOINT_STATES = _topic("joint_states", JointState)
 RECORDED = (
     DOMAIN,
     TASK,

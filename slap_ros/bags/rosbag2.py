@@ -12,15 +12,13 @@ from typing import Any
 
 import yaml
 
-from slap_ros.messages.interfaces import DOMAIN_INFO, PLAN, TASK
+from slap_ros.messages.qos import offered_qos
 
 VERSION = 9
 ROS_DISTRO = "jazzy"
 FILE_NAME = "metadata.yaml"
 ROOT = "rosbag2_bagfile_information"
 
-LATCHED_TYPES = (DOMAIN_INFO, TASK, PLAN)
-LATCHED_TOPIC = "tf_static"  # whatever its namespace
 EMPTY_START = 2**63 - 1  # ns, where rosbag2 lets a bag without messages begin
 INFINITE = {"sec": 9223372036, "nsec": 854775807}  # rmw's duration without end
 
@@ -37,13 +35,13 @@ class TopicRecord:
     @property
     def qos(self) -> list[dict[str, Any]]:
         """What the publishers offered, so that ``ros2 bag play`` offers it too."""
-        latched = self.type_name in LATCHED_TYPES or self.name.split("/")[-1] == LATCHED_TOPIC
+        offered = offered_qos(self.name)
         return [
             {
                 "history": "keep_last",
-                "depth": 1 if latched else 10,
+                "depth": offered.depth,
                 "reliability": "reliable",
-                "durability": "transient_local" if latched else "volatile",
+                "durability": "transient_local" if offered.transient_local else "volatile",
                 "deadline": dict(INFINITE),
                 "lifespan": dict(INFINITE),
                 "liveliness": "automatic",

@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The bodies around the robot, described once, as data that a domain owns."""
+"""What stands around the robot, described once, as data that a domain owns."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 from slap_ros.errors import InvalidDomainError
 from slap_ros.geometry.oriented_box import OrientedBox
@@ -29,11 +29,12 @@ class Material(NamedTuple):
 
 
 @dataclass(frozen=True)
-class RigidBody:
-    """What bodies of all shapes have in common.
+class Box:
+    """A cuboid.
 
     Args:
         name: That of the object in the state which it embodies.
+        half_extents_m: Half its edges along x, y, z of its own frame.
         mass_kg: 0 for a body that is fixed. A free body may have another one in the state.
         friction: See :class:`Material`; a free body may have another one in the state.
         colour: For pictures.
@@ -43,31 +44,21 @@ class RigidBody:
     """
 
     name: str
-    mass_kg: float = field(default=0.0, kw_only=True)
-    friction: float = field(default=FRICTION, kw_only=True)
-    colour: Colour = field(default=GREY, kw_only=True)
-    pose: Pose = field(default=IDENTITY, kw_only=True)
-    solid: bool = field(default=True, kw_only=True)
+    half_extents_m: Vector
+    mass_kg: float = 0.0
+    friction: float = FRICTION
+    colour: Colour = GREY
+    pose: Pose = IDENTITY
+    solid: bool = True
 
     @property
     def material(self) -> Material:
         """What it is made of, unless the state says otherwise."""
         return Material(self.mass_kg, self.friction)
 
-    def with_material(self, material: Material) -> Self:
-        """The same body of another material."""
+    def of(self, material: Material) -> Box:
+        """The same box of another material."""
         return replace(self, mass_kg=material.mass_kg, friction=material.friction)
-
-
-@dataclass(frozen=True)
-class Box(RigidBody):
-    """A cuboid.
-
-    Args:
-        half_extents_m: Half its edges along x, y, z of its own frame.
-    """
-
-    half_extents_m: Vector
 
     def at(self, pose: Pose) -> OrientedBox:
         """The space it fills at a pose."""
@@ -88,14 +79,31 @@ class Box(RigidBody):
 
 
 @dataclass(frozen=True)
-class Mesh(RigidBody):
-    """A body of convex pieces, whose origin is its centre of mass; the mass is spread evenly.
+class Mesh:
+    """A body of convex pieces, whose origin is its centre of mass.
 
     Args:
+        name: See :class:`Box`, also for all but the next.
         shape: Its pieces; alike for meshes of one shape.
+        mass_kg: Spread evenly.
     """
 
+    name: str
     shape: Solid
+    mass_kg: float = 0.0
+    friction: float = FRICTION
+    colour: Colour = GREY
+    pose: Pose = IDENTITY
+    solid: bool = True
+
+    @property
+    def material(self) -> Material:
+        """What it is made of, unless the state says otherwise."""
+        return Material(self.mass_kg, self.friction)
+
+    def of(self, material: Material) -> Mesh:
+        """The same mesh of another material."""
+        return replace(self, mass_kg=material.mass_kg, friction=material.friction)
 
     def at(self, pose: Pose) -> OrientedBox:
         """A box around it at a pose: the space that the arm takes it to fill."""
@@ -122,7 +130,7 @@ FLOOR_TOP = -0.425  # m
 
 def cube(name: str, colour: Colour = GREY) -> Box:
     """The reference's 5 cm cube."""
-    return Box(name, (CUBE_EDGE / 2,) * 3, colour=colour).with_material(CUBE_MATERIAL)
+    return Box(name, (CUBE_EDGE / 2,) * 3, *CUBE_MATERIAL, colour=colour)
 
 
 @dataclass(frozen=True)

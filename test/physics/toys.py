@@ -15,10 +15,7 @@ MASS = 0.01  # kg
 TOYS = Scene(
     (
         TABLE,
-        *(
-            Mesh(name, shape, mass_kg=MASS)
-            for name, shape in zip(NAMES, shipped().values(), strict=True)
-        ),
+        *(Mesh(name, shape, MASS) for name, shape in zip(NAMES, shipped().values(), strict=True)),
     )
 )
 

@@ -5,14 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
 from slap_ros.core import Task
 from slap_ros.domains.obstacle2d.model import BLOCK, BLOCK_SIZE, IS_TARGET, ON, ROBOT, SURFACE
 from slap_ros.domains.obstacle2d.skills import nearest_free_place
-from slap_ros.domains.variation import TaskSettings
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.relational import GroundAtom, Object, State
 
@@ -39,7 +38,7 @@ def target_block_in_target_area(state: State) -> frozenset[GroundAtom]:
 
 
 @dataclass(frozen=True)
-class RandomObstacle2DTasks(TaskSettings):
+class RandomObstacle2DTasks:
     """Everything sampled anew for each task. Lengths in m."""
 
     bystanders: tuple[int, int] = (0, 2)  # how many blocks stand about besides, inclusive
@@ -78,9 +77,13 @@ class RandomObstacle2DTasks(TaskSettings):
         obstacle = task.initial_state.layout.object("block2")
         return task if nearest_free_place(task.initial_state, obstacle) is not None else None
 
+    def as_configuration(self) -> Mapping[str, str | int | float]:
+        """The settings by name."""
+        return {name: str(value) for name, value in asdict(self).items()}
+
 
 @dataclass(frozen=True)
-class PaperObstacle2DTasks(TaskSettings):
+class PaperObstacle2DTasks:
     """The reference's start states: one scene, the obstacle at one of three places."""
 
     robot: tuple[float, float] = (0.5, 1.0)  # m
@@ -92,6 +95,10 @@ class PaperObstacle2DTasks(TaskSettings):
         """One of the start states."""
         obstacle_x = float(rng.choice(self.obstacle_x))
         return make_task(self.robot, self.target_x, [self.target_block_x, obstacle_x])
+
+    def as_configuration(self) -> Mapping[str, str | int | float]:
+        """The settings by name."""
+        return {name: str(value) for name, value in asdict(self).items()}
 
 
 SETTINGS: Mapping[str, RandomObstacle2DTasks | PaperObstacle2DTasks] = {

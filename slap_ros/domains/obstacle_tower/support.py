@@ -1,35 +1,24 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Obstacle Tower: which thing supports which block. Lengths in m, base frame.
+"""Obstacle Tower: what lies on what. Lengths in m, base frame.
 
-For one block b and one thing t (another block, the table or a target), in plain terms:
-
-- b *touches* t if ``|bottom of b - top of t| <= TOUCHING``.
-- b *covers* t if, seen from above and along both faces of t,
-  ``|distance of the middles| <= half the width of b + half the width of t``.
-- b is *on* a target if it touches it and its middle is at most CENTRED from the target's; on
-  another block if it touches and covers it; on the table if so and it is on no target.
-- There is *room* on a target or a block if no block touches and covers it; on the table, always.
-
-Of many states, or as margins, numpy computes this; of one state, as truths, plain floats do: few
-things are at a height to touch, and one call of numpy takes longer than to find out which.
+Of many states, or as margins, by numpy; of one state, as truths, in plain floats: few things are
+at a height to touch, and one call of numpy takes longer than to find out which.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from slap_ros.domains.classifiers import strictly
 from slap_ros.domains.obstacle_tower.features import TowerObjectIndex
 from slap_ros.domains.tabletop.footprints import (
     TO_EDGES,
-    Complex,
     along_axes,
     complex_of,
+    strictly,
     turned_back,
     unpinched,
     widths,
@@ -44,68 +33,60 @@ CENTRED = 0.015  # m, distance from the target's middle at which a block still i
 
 
 class SupportRelations(NamedTuple):
-    """The relations of one state or of many, as margins in m."""
+    """How everything lies in a state, as margins in m."""
 
-    objects: TowerObjectIndex
+    things: TowerObjectIndex
     on: Array  # of blocks on things, shape (..., blocks * things)
     room: Array  # for a block on things, shape (..., things)
 
 
 @cache_latest
 def support_relations(state: State) -> SupportRelations:
-    """All margins at once, as predicates share most of the work.
+    """How everything lies: all at once, as predicates share most of it.
 
     Horizontal vectors are complex numbers: turned by a product, seen along both axes at once.
     """
-    objects, data = TowerObjectIndex.of(state.layout), state.data
-    blocks = slice(objects.blocks)
-    q = data.take(objects.quaternions, axis=-1)
+    things, data = TowerObjectIndex.of(state.layout), state.data
+    blocks = slice(things.blocks)
+    q = data.take(things.quaternions, axis=-1)
     products = (q[..., None] * q[..., None, :]).reshape(*q.shape[:-1], 16)
-    edges = products @ TO_EDGES * data.take(objects.halves, axis=-1)
+    edges = products @ TO_EDGES * data.take(things.halves, axis=-1)
+    is_movable = data.take(things.is_movable, axis=-1) > 0.5
+    is_target = data.take(things.is_target, axis=-1) > 0.5
 
-    z, height = data.take(objects.z, axis=-1), np.add.reduce(np.abs(edges[..., 6:]), axis=-1)
+    # A block touches what its lowest point is at the height of.
+    z, height = data.take(things.z, axis=-1), np.add.reduce(np.abs(edges[..., 6:]), axis=-1)
     gap = (z - height)[..., blocks, None] - (z + height)[..., None, :]
     touches = unpinched(TOUCHING - np.abs(gap))
 
-    places = complex_of(data.take(objects.places, axis=-1))[..., 0]
-    offset = places[..., blocks, None] - places[..., None, :]
-    covers = _covers(blocks, offset, q, edges)
+    # It covers what it is over, seen along the axes of that thing.
+    places = complex_of(data.take(things.places, axis=-1))[..., 0]
+    way = places[..., blocks, None] - places[..., None, :]
+    back = turned_back(q, edges)[..., None, :]
+    width = widths(complex_of(edges[..., :6])[..., None, :], back)
+    own_width = np.diagonal(width, axis1=-3, axis2=-2).swapaxes(-1, -2)[..., None, :, :]
+    ahead_aside = width[..., blocks, :, :] + own_width - along_axes(way * back)
+    covers = np.minimum(ahead_aside[..., 0], ahead_aside[..., 1])
 
-    is_movable = data.take(objects.is_movable, axis=-1) > 0.5
-    is_target = data.take(objects.is_target, axis=-1) > 0.5
-    centred = CENTRED - np.abs(offset)
-    to_target = np.where(is_target[..., None, :], centred, -1.0)[..., objects.blocks :]
-    off_target = strictly(-np.maximum.reduce(to_target, axis=-1, initial=-1.0))[..., None]
-    on_table = np.minimum(covers, off_target)
+    # It lies in the middle of a target; elsewhere on the table; or on a part of another block.
+    centred = CENTRED - np.abs(way)
+    to_target = np.where(is_target[..., None, :], centred, -1.0)[..., things.blocks :]
+    elsewhere = strictly(-np.maximum.reduce(to_target, axis=-1, initial=-1.0))[..., None]
+    on_table = np.minimum(covers, elsewhere)
     off_targets = np.where(is_movable[..., None, :], covers, on_table)
     sideways = np.where(is_target[..., None, :], centred, off_targets)
     on = np.minimum(touches, sideways)
 
+    # On the table there is always room; on targets and blocks for one block only.
     over = np.maximum.reduce(np.minimum(touches, covers), axis=-2, initial=-1.0)
     room = np.where(is_movable | is_target, strictly(-over), 1.0)
-    return SupportRelations(objects, on.reshape(*on.shape[:-2], -1), room)
-
-
-def _covers(blocks: slice, offset: Complex, q: Array, edges: Array) -> Array:
-    """How far blocks cover things, seen along the axes of the thing: shape (..., blocks, things).
-
-    Args:
-        blocks: Which of the things are blocks.
-        offset: From things to blocks, m, shape (..., blocks, things).
-        q: Parts of the things' quaternions, shape (..., things, 4).
-        edges: Of the things, m, shape (..., things, 9), as ``TO_EDGES`` gives them.
-    """
-    back = turned_back(q, edges)[..., None, :]
-    width = widths(complex_of(edges[..., :6])[..., None, :], back)
-    own_width = np.diagonal(width, axis1=-3, axis2=-2).swapaxes(-1, -2)[..., None, :, :]
-    ahead_aside = width[..., blocks, :, :] + own_width - along_axes(offset * back)
-    return np.minimum(ahead_aside[..., 0], ahead_aside[..., 1])
+    return SupportRelations(things, on.reshape(*on.shape[:-2], -1), room)
 
 
 class SupportTruths(NamedTuple):
-    """The relations of a single state, as truths, and what is held."""
+    """The same of a single state, as truths, and what is held."""
 
-    objects: TowerObjectIndex
+    things: TowerObjectIndex
     on: Bools  # of blocks on things, shape (blocks * things,)
     room: Bools  # for a block on things, shape (things,)
     held: Bools  # shape (blocks,)
@@ -114,17 +95,17 @@ class SupportTruths(NamedTuple):
 
 @cache_latest
 def support_truths(state: State) -> SupportTruths:
-    """The truths of a single state; only what is at a height to touch is examined closely."""
-    objects, values = TowerObjectIndex.of(state.layout), state.data.tolist()
-    boxes = [ScalarBox(*read(values)) for read in objects.boxes]
+    """What lies on what in a single state: what is at the right height is looked at closely."""
+    things, values = TowerObjectIndex.of(state.layout), state.data.tolist()
+    boxes = [ScalarBox(*read(values)) for read in things.boxes]
     is_movable, is_target, held = (
         [values[i] > 0.5 for i in label.tolist()]
-        for label in (objects.is_movable, objects.is_target, objects.held)
+        for label in (things.is_movable, things.is_target, things.held)
     )
-    targets = [boxes[i] for i in range(objects.blocks, len(boxes)) if is_target[i]]
-    on = np.zeros((objects.blocks, len(boxes)), dtype=bool)
+    targets = [boxes[i] for i in range(things.blocks, len(boxes)) if is_target[i]]
+    on = np.zeros((things.blocks, len(boxes)), dtype=bool)
     room = np.ones(len(boxes), dtype=bool)
-    for number, block in enumerate(boxes[: objects.blocks]):
+    for number, block in enumerate(boxes[: things.blocks]):
         for i, thing in enumerate(boxes):
             if abs(block.bottom - thing.top) > TOUCHING:
                 continue
@@ -132,15 +113,14 @@ def support_truths(state: State) -> SupportTruths:
             if is_target[i]:
                 on[number, i] = _is_centred(block, thing)
             else:
-                on[number, i] = covers and (is_movable[i] or not _is_on_any(block, targets))
+                on[number, i] = covers and (
+                    is_movable[i] or not any(_is_centred(block, target) for target in targets)
+                )
             if covers and (is_movable[i] or is_target[i]):
                 room[i] = False
-    empty = np.array([not any(held)])
-    return SupportTruths(objects, on.reshape(-1), room, np.array(held, bool), empty)
-
-
-def _is_on_any(block: ScalarBox, targets: Sequence[ScalarBox]) -> bool:
-    return any(_is_centred(block, target) for target in targets)
+    return SupportTruths(
+        things, on.reshape(-1), room, np.array(held, bool), np.array([not any(held)])
+    )
 
 
 def _is_centred(block: ScalarBox, target: ScalarBox) -> bool:
