@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 TORCH := torch==2.13.0  # pinned: another version trains other policies from the same seed
 METADATA := pyproject.toml setup.py setup.cfg embedded_ros/pyproject.toml
 
-.PHONY: help install demo test faults lint format clean
+.PHONY: help install demo test faults lint format docs clean
 
 help:  ## Show what can be made
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -65,5 +65,13 @@ format: $(VENV)/.tested  ## Format the code
 	$(BIN)/ruff format . embedded_ros
 	$(BIN)/ruff check --fix . embedded_ros
 
+docs: $(VENV)/.documented  ## Build the documentation into site/
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo "open site/index.html; for the search: $(BIN)/python -m http.server --directory site"
+
+$(VENV)/.documented: $(VENV)/.installed
+	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[docs]'
+	@touch $@
+
 clean:  ## Remove what was made
-	rm -rf $(VENV) build install log *.egg-info
+	rm -rf $(VENV) build install log site *.egg-info

@@ -46,7 +46,11 @@ TRAIN = ["torch>=2.4", "stable-baselines3>=2.3", "tensorboard>=2.15"]
 RAY = ["ray>=2.40"]
 STUDIES = ["matplotlib>=3.8"]
 LIVE = ["foxglove-sdk>=0.30,<1"]  # serves `slap run --live` to Foxglove; MIT
-DOCS = ["mkdocs>=1.6,<2"]
+DOCS = [
+    "mkdocs>=1.6,<2",
+    "mkdocs-material>=9.7,<10",
+    "mkdocstrings[python]>=1.0,<2",  # the API reference, from docstrings
+]
 DECOMPOSITION = ["coacd>=1.0.4", "trimesh>=4.4"]  # of other objects than those that come with it
 MESHES = [*DECOMPOSITION, "objaverse>=0.1.7"]  # Objaverse's own client
 TEST = [

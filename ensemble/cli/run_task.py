@@ -29,7 +29,7 @@ from slap_ros.cli.render import render as write_animation
 from slap_ros.cli.report import write_report
 from slap_ros.core import Domain, Task
 from slap_ros.domains import get_domain
-from slap_ros.evaluation.metrics import RunMetrics
+from slap_ros.evaluation.metrics import RunMetrics, known
 from slap_ros.messages.decode import decode_state
 from slap_ros.messages.interfaces import STATE
 from slap_ros.messages.protocols import StateMessage
@@ -177,10 +177,11 @@ def _event_view(live: bool) -> AbstractContextManager[OnMessage]:
 def _conclude(metrics: RunMetrics, record: Path | None) -> None:
     if metrics.success:
         console.print(
-            f"[bold green]solved[/] in {metrics.plan_length} steps, {metrics.shortcut_steps} of "
-            f"them in shortcuts, {metrics.replans} replans, "
-            f"{metrics.planning_seconds:.3f} s of planning, "
-            f"{metrics.edges_rolled_out} edges rolled out",
+            f"[bold green]solved[/] in {metrics.plan_length} steps, "
+            f"{known(metrics.shortcut_steps)} of them in shortcuts, "
+            f"{known(metrics.replans)} replans, "
+            f"{known(metrics.planning_seconds, '.3f')} s of planning, "
+            f"{known(metrics.edges_rolled_out)} edges rolled out",
             highlight=False,
         )
     else:

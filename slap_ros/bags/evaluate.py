@@ -35,7 +35,7 @@ class BagEvaluation:
     # Of them, those whose recorded atoms were compared with recomputed ones: what was perceived
     # with noise cannot be found again.
     compared: int
-    damage: str | None  # where reading had to stop and why
+    damage: str | None  # where reading had to stop and why, or what is missing
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,11 @@ class BagContents:
     log: RunLog
     recording: Recording
 
+    @property
+    def damage(self) -> str | None:
+        """What cannot be read, or what is missing of the runs; None for a whole bag."""
+        return self.bag.damage or "; ".join(self.log.gaps()) or None
+
 
 def read_runs(path: Path | str) -> BagContents:
     """Read a bag once, for everything that is to be known of its runs.
@@ -54,7 +59,12 @@ def read_runs(path: Path | str) -> BagContents:
         DamagedBagError: Nothing in it can be read.
         ForeignBagError: It is not of an ensemble, or of another version of one.
     """
-    reading = BagContents(read_bag(path), RunLog(), Recording())
+    return read_contents(read_bag(path))
+
+
+def read_contents(bag: Bag) -> BagContents:
+    """Everything that is to be known of the runs in a bag that was opened."""
+    reading = BagContents(bag, RunLog(), Recording())
     for _, type_name, _, message in reading.bag:
         reading.log.add(type_name, message)
         reading.recording.add(type_name, message)
@@ -93,7 +103,7 @@ def evaluate(reading: BagContents, domain: Domain | None) -> BagEvaluation:
         ],
         states=len(perceived),
         compared=len(comparable) if domain is not None else 0,
-        damage=reading.bag.damage,
+        damage=reading.damage,
     )
 
 

@@ -7,8 +7,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from slap_ros.bags.storage import open_storage, survey
-from slap_ros.errors import DamagedBagError
+from slap_ros.bags.definitions import check_version, is_ours
+from slap_ros.bags.evaluate import read_contents
+from slap_ros.bags.reader import Bag
+from slap_ros.bags.storage import Storage, Survey, open_storage, survey
+from slap_ros.errors import DamagedBagError, ForeignBagError
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,8 @@ def bag_info(path: Path | str) -> BagInfo:
     """
     storage = open_storage(path)
     found = survey(storage)
+    if found.damage is None:
+        found.damage = _gaps(storage, found)
     if not found.counts and found.damage is not None:
         raise DamagedBagError(f"no message can be read: {found.damage}; record it again")
     return BagInfo(
@@ -69,3 +74,14 @@ def bag_info(path: Path | str) -> BagInfo:
         metadata=storage.metadata(),
         damage=found.damage,
     )
+
+
+def _gaps(storage: Storage, found: Survey) -> str | None:
+    """What is missing of an ensemble's runs; None for other bags, which promise nothing."""
+    ours = [channel for channel in found.counts if is_ours(channel.type_name)]
+    try:
+        for channel in ours:
+            check_version(channel)
+    except ForeignBagError:
+        return None
+    return read_contents(Bag(storage, found)).damage if ours else None

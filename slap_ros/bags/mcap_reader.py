@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO
 
@@ -109,9 +110,10 @@ class _McapScan:
             except _EndOfFileError:
                 return {}
             if opcode == Opcode.METADATA:
-                fields = RecordFields(content)
-                if fields.string() == name:
-                    return fields.string_map()
+                with suppress(MalformedRecordError, UnicodeDecodeError):  # the next one may do
+                    fields = RecordFields(content)
+                    if fields.string() == name:
+                        return fields.string_map()
             elif opcode != Opcode.HEADER:
                 return {}
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from slap_ros.bags.reader import read_bag
-from slap_ros.bags.recording import RecordedEpisode, Recording, initial_state
+from slap_ros.bags.evaluate import read_runs
+from slap_ros.bags.recording import RecordedEpisode, initial_state
 from slap_ros.core import Action, Domain, World
 from slap_ros.errors import DamagedBagError, InvalidCommandError, InvalidStateError
 from slap_ros.messages.decode import decode_state
@@ -38,7 +38,7 @@ class ReplayResult:
     different: int = 0  # states that differ in at least one bit
     first: Difference | None = None
     unreached: int = 0  # states that no recorded commands lead to; the replay goes on from them
-    damage: str | None = None  # where reading the bag had to stop and why
+    damage: str | None = None  # where reading the bag had to stop and why, or what is missing
 
     @property
     def identical(self) -> bool:
@@ -55,12 +55,12 @@ def replay_bag(path: Path | str) -> ReplayResult:
         UnknownDomainError: Its domain is not known here.
         InvalidStateError: It has a state that its domain or its task cannot have.
     """
-    bag = read_bag(path)
-    recording = Recording.of(bag)
+    contents = read_runs(path)
+    recording = contents.recording
     domain = recording.domain()
     if domain is None:
         raise DamagedBagError(f"{path} does not name the domain, so there is nothing to replay in")
-    result = ReplayResult(damage=bag.damage)
+    result = ReplayResult(damage=contents.damage)
     for number, episode in sorted(recording.episodes.items()):
         for step, recorded, replayed in _replay(episode, domain):
             if replayed is None:

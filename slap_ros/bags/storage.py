@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,7 +15,12 @@ from slap_ros.bags.mcap_reader import read_mcap, read_mcap_metadata
 from slap_ros.bags.raw import Channel, RawMessage
 from slap_ros.bags.rosbag2 import FILE_NAME, Extent, read_metadata
 from slap_ros.bags.sqlite_reader import read_sqlite
-from slap_ros.bags.writer import METADATA_NAME
+from slap_ros.bags.writer import (
+    CHECKSUM_KEY,
+    CHECKSUM_NAME,
+    METADATA_NAME,
+    metadata_checksum,
+)
 from slap_ros.errors import DamagedBagError
 
 READERS: Mapping[str, Callable[[Path], Iterator[RawMessage]]] = {
@@ -55,10 +62,32 @@ class Storage:
         if self.suffix == ".mcap" and (found := read_mcap_metadata(self.files[0], METADATA_NAME)):
             return found
         try:
-            custom = self._information().get("custom_data")
+            return _texts(self._information().get("custom_data"))
         except DamagedBagError:
             return {}  # :meth:`messages` reports it
-        return {str(k): str(v) for k, v in custom.items()} if isinstance(custom, dict) else {}
+
+    def contradictions(self, counts: Mapping[Channel, int]) -> list[str]:
+        """In what the files are not what ``metadata.yaml`` and the checksum say, in words.
+
+        Args:
+            counts: The messages that were read, by channel.
+
+        Returns:
+            One text for each; none for a bag that is as it was recorded.
+        """
+        information = self._information()
+        found = list(_contradicted_files(information, self.files))
+        found = found or list(_contradicted_counts(information, counts))
+        if self.suffix == ".mcap":
+            inside = read_mcap_metadata(self.files[0], METADATA_NAME)
+            told = read_mcap_metadata(self.files[0], CHECKSUM_NAME).get(CHECKSUM_KEY)
+            outside = _texts(information.get("custom_data"))
+            if told is not None and told != metadata_checksum(inside):
+                found.append(f"the metadata in {self.files[0].name} do not fit their checksum")
+            elif inside and outside and inside != outside:
+                keys = sorted(k for k in inside | outside if inside.get(k) != outside.get(k))
+                found.append(f"{', '.join(keys)} is another in {FILE_NAME} than in the data file")
+        return found
 
     def _information(self) -> dict[str, object]:
         """The bag's ``metadata.yaml``; empty for a single file.
@@ -118,9 +147,42 @@ def survey(storage: Storage) -> Survey:
         for channel, stamp_ns, _ in storage.messages():
             result.counts[channel] = result.counts.get(channel, 0) + 1
             result.extent.include(stamp_ns)
+        result.damage = "; ".join(storage.contradictions(result.counts)) or None
     except DamagedBagError as error:
         result.damage = str(error)
     return result
+
+
+def _texts(data: object) -> dict[str, str]:
+    return {str(k): str(v) for k, v in data.items()} if isinstance(data, dict) else {}
+
+
+def _contradicted_files(information: Mapping[str, object], files: Sequence[Path]) -> Iterator[str]:
+    listed = information.get("relative_file_paths")
+    if not isinstance(listed, list):
+        return  # a single file, or a metadata.yaml of other software
+    names = {Path(str(name)).name for name in listed}
+    here = {file.name for file in files}
+    if missing := sorted(names - here):
+        yield f"{', '.join(missing)} is missing, which {FILE_NAME} lists"
+    if others := sorted(here - names):
+        yield f"{', '.join(others)} is there, which {FILE_NAME} does not list"
+
+
+def _contradicted_counts(
+    information: Mapping[str, object], counts: Mapping[Channel, int]
+) -> Iterator[str]:
+    topics = information.get("topics_with_message_count")
+    by_name: Counter[str] = Counter()
+    for channel, count in counts.items():
+        by_name[channel.topic] += count
+    told: Counter[str] = Counter()
+    for entry in topics if isinstance(topics, list) else ():
+        with suppress(KeyError, TypeError, ValueError):  # of other software: says nothing
+            told[str(entry["topic_metadata"]["name"])] += int(entry["message_count"])
+    for topic in sorted(told):
+        if by_name[topic] != told[topic]:
+            yield f"{topic} has {by_name[topic]} messages, {FILE_NAME} says {told[topic]}"
 
 
 def _recording_order(file: Path) -> list[tuple[int, str]]:

@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import errno
+import json
+import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,6 +21,8 @@ from slap_ros.errors import BagExistsError, InvalidParameterError, StorageFullEr
 from slap_ros.messages.interfaces import definition, typestore
 
 METADATA_NAME = "slap_ros"  # of the MCAP record with the run's configuration
+CHECKSUM_NAME = "slap_ros.checksum"  # of the MCAP record with that record's checksum,
+CHECKSUM_KEY = "crc32"  # as MCAP has checksums for everything but metadata
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
@@ -30,6 +34,12 @@ def require_new(path: Path) -> None:
     """
     if path.exists():
         raise BagExistsError(f"{path} exists; choose another folder or remove it")
+
+
+def metadata_checksum(metadata: Mapping[str, str]) -> str:
+    """CRC-32 of the run's configuration, whatever the order of its keys: 8 hexadecimal digits."""
+    text = json.dumps(dict(metadata), sort_keys=True)
+    return f"{zlib.crc32(text.encode()):08x}"
 
 
 class BagWriter:
@@ -61,7 +71,9 @@ class BagWriter:
                 raise BagExistsError(
                     f"{self.path} exists and is not overwritten; choose another name or move it"
                 ) from None
-            self._file = McapWriter(self.path / self._file_name, {METADATA_NAME: self._metadata})
+            checksum = {CHECKSUM_KEY: metadata_checksum(self._metadata)}
+            records = {METADATA_NAME: self._metadata, CHECKSUM_NAME: checksum}
+            self._file = McapWriter(self.path / self._file_name, records)
             write_metadata(self.path, self._information())
 
     def write(

@@ -21,7 +21,7 @@ from slap_ros.cli.options import Json
 from slap_ros.cli.render import check_renderable
 from slap_ros.cli.render import render as write_animation
 from slap_ros.errors import DamagedBagError, ErrorCode
-from slap_ros.evaluation.metrics import RunMetrics
+from slap_ros.evaluation.metrics import RunMetrics, known
 from slap_ros.messages.decode import decode_state
 
 app = typer.Typer(
@@ -74,8 +74,12 @@ def evaluate(bag: BagPath, json: Json = False) -> int:
     return int(ErrorCode.REPLAY_MISMATCH) if found.mismatches else code
 
 
-def _perception(found: BagEvaluation) -> dict[str, int]:
-    return {"states_compared": found.compared, "atom_mismatches": len(found.mismatches)}
+def _perception(found: BagEvaluation) -> dict[str, int | str | None]:
+    return {
+        "states_compared": found.compared,
+        "atom_mismatches": len(found.mismatches),
+        "damage": found.damage,
+    }
 
 
 def _table(run: RunMetrics) -> Table:
@@ -86,11 +90,12 @@ def _table(run: RunMetrics) -> Table:
         "steps",
         "outcome",
         title=(
-            f"{run.domain}, preset {run.preset}, seed {run.seed}: {outcome}\n"
-            f"{run.plan_length} steps, {run.shortcut_steps} of them in shortcuts, "
-            f"{run.planning_seconds:.3f} s planning, "
-            f"{run.replans} replans, {run.edges_rolled_out} edges rolled out"
+            f"{run.domain}, preset {run.preset}, seed {known(run.seed)}: {outcome}\n"
+            f"{run.plan_length} steps, {known(run.shortcut_steps)} of them in shortcuts, "
+            f"{known(run.planning_seconds, '.3f')} s planning, "
+            f"{known(run.replans)} replans, {known(run.edges_rolled_out)} edges rolled out"
         ),
+        caption="; ".join(f"{name}: unknown, as {why}" for name, why in run.unknown.items()),
     )
     for option in run.options:
         name = f"{option.name}({', '.join(option.objects)})"

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import asdict, fields, replace
 from typing import TYPE_CHECKING, TypeVar
 
 from slap_ros.errors import InvalidParameterError
@@ -14,6 +14,14 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
     Settings = TypeVar("Settings", bound=DataclassInstance)
+
+
+class TaskSettings:
+    """A dataclass from whose fields tasks are sampled."""
+
+    def as_configuration(self: DataclassInstance) -> Mapping[str, str]:
+        """The settings by name, as bags record them."""
+        return {name: str(value) for name, value in asdict(self).items()}
 
 
 def parse_preset(text: str) -> tuple[str, dict[str, str]]:

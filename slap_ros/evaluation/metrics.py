@@ -3,16 +3,19 @@
 """The metrics of runs, from the messages of an ensemble: the same code for live runs and bags.
 
 A run begins with an episode's first PLANNING_STARTED, or with the first after a run has ended,
-and ends with SOLVED or FAILED. Plan length is the number of environment steps in between.
+and ends with SOLVED or FAILED. Plan length is the number of environment steps in between, by the
+step numbers of its first and last event: states that were lost on the way do not make it shorter.
+A metric that the messages do not give is None, with the reason in ``RunMetrics.unknown``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from slap_ros.errors import ErrorCode
+from slap_ros.evaluation.completeness import missing_events, missing_states, planning_is_whole
 from slap_ros.messages.decode import NANOSECONDS, stamp_ns
 from slap_ros.messages.events import PlanEventKind, SkillEventKind
 from slap_ros.messages.interfaces import (
@@ -46,7 +49,7 @@ OUTCOMES: Mapping[int, str] = {
     SkillEventKind.CANCELED: "canceled",
 }
 UNFINISHED = "unfinished"
-OPERATOR, SHORTCUT = "operator", "shortcut"  # kinds of options
+OPERATOR, SHORTCUT, UNKNOWN = "operator", "shortcut", "unknown"  # kinds of options
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,7 @@ class OptionMetrics:
     """One option as it was executed."""
 
     name: str  # of the operator or shortcut
-    kind: str  # operator or shortcut
+    kind: str  # operator or shortcut; unknown without the plan
     objects: tuple[str, ...]
     steps: int  # environment steps
     outcome: str  # reached, failed, canceled or unfinished
@@ -66,25 +69,27 @@ class RunMetrics:
 
     domain: str
     preset: str
-    seed: int  # -1: the initial state was given explicitly, or no task is known
-    index: int  # which of the seed's tasks
+    seed: int | None  # -1: the initial state was given explicitly
+    index: int | None  # which of the seed's tasks
     success: bool  # the run was SOLVED and the goal atoms hold in its last state, as perceived
     plan_length: int  # environment steps
-    shortcut_steps: int  # of them, those that shortcuts took
-    planning_seconds: float  # s, all plans together
-    replans: int
-    edges_rolled_out: int  # options simulated while planning
+    shortcut_steps: int | None  # of them, those that shortcuts took
+    planning_seconds: float | None  # s, all plans together
+    replans: int | None
+    edges_rolled_out: int | None  # options simulated while planning
     error_code: ErrorCode
     error_msg: str
     options: tuple[OptionMetrics, ...]
-    planner: str  # of the first plan, like what follows; empty: there was no plan
-    library: str  # digest of the shortcuts that it knew
-    samples: int  # attempts of a shortcut in its model
+    planner: str | None  # of the first plan, like what follows; empty: there was no plan
+    library: str | None  # digest of the shortcuts that it knew
+    samples: int | None  # attempts of a shortcut in its model
+    unknown: Mapping[str, str] = field(default_factory=dict)  # by metric: why it is None
 
     def as_json(self) -> dict[str, Any]:
         """Plain data, keys in the order of the fields."""
         return asdict(self) | {
             "error_code": int(self.error_code),
+            "unknown": dict(self.unknown),
             "options": [
                 asdict(option) | {"objects": list(option.objects)} for option in self.options
             ],
@@ -122,6 +127,11 @@ class _Run:
     @property
     def end(self) -> PlanEventMessage | None:
         return self.events[-1] if self.events[-1].kind in RUN_ENDS else None
+
+    @property
+    def planned(self) -> list[PlanEventMessage]:
+        """The events that announce a plan, in order."""
+        return [event for event in self.events if event.kind == PlanEventKind.PLANNED]
 
     def planning_ns(self) -> int:
         total, started = 0, None
@@ -163,14 +173,16 @@ class RunLog:
         self._plans: dict[int, list[PlanMessage]] = {}
         self._plan_events: list[PlanEventMessage] = []
         self._skill_events: list[SkillEventMessage] = []
+        self._seen_events: set[tuple[object, ...]] = set()
+        self._repeated_events = 0
         self._add: Mapping[str, Callable[[Any], None]] = {
             DOMAIN_INFO: self._add_domain,
             TASK: self._add_task,
             STATE: self._add_state,
             ATOMS: self._add_atoms,
             PLAN: self._add_plan,
-            PLAN_EVENT: self._plan_events.append,
-            SKILL_EVENT: self._skill_events.append,
+            PLAN_EVENT: self._add_plan_event,
+            SKILL_EVENT: self._add_skill_event,
         }
 
     def add(self, type_name: str, message: object) -> None:
@@ -193,6 +205,23 @@ class RunLog:
 
     def _add_plan(self, msg: PlanMessage) -> None:
         self._plans.setdefault(msg.episode, []).append(msg)
+
+    def _add_plan_event(self, msg: PlanEventMessage) -> None:
+        if self._is_new(msg, msg.plan_number, msg.edge):
+            self._plan_events.append(msg)
+
+    def _add_skill_event(self, msg: SkillEventMessage) -> None:
+        if self._is_new(msg, msg.skill, *msg.objects):
+            self._skill_events.append(msg)
+
+    def _is_new(self, msg: PlanEventMessage | SkillEventMessage, *about: object) -> bool:
+        """No event happens twice at one time: then it was recorded, or read, twice."""
+        key = (type(msg), stamp_ns(msg.header), msg.episode, msg.step, msg.kind, *about)
+        if key in self._seen_events:
+            self._repeated_events += 1
+            return False
+        self._seen_events.add(key)
+        return True
 
     def runs(self) -> list[RunMetrics]:
         """The metrics of every run so far, in order."""
@@ -224,11 +253,41 @@ class RunLog:
             and self._has_plan(run)
         )
 
+    def gaps(self) -> list[str]:
+        """What is missing of the runs so far, or there twice, in words; empty for a whole log.
+
+        A run that is still under way, or breaks off, lacks nothing for that reason alone.
+        """
+        found = []
+        runs = _split(self._plan_events)
+        for run in runs:
+            where = f"episode {run.episode}: " if len(runs) > 1 else ""
+            found += [where + gap for gap in self._gaps_of(run)]
+        if before := _without_start(self._plan_events):
+            found.append(f"{before} plan events belong to a run whose start is missing")
+        if self._repeated_events:
+            found.append(f"{self._repeated_events} events are there twice")
+        return found
+
+    def _gaps_of(self, run: _Run) -> Iterator[str]:
+        recorded = self._steps.get(run.episode, set())
+        if states := missing_states(run.start.step, self._last_step(run), recorded):
+            yield states
+        yield from missing_events(run.events)
+        if lost := len(run.planned) - len(self._plans_of(run)):
+            yield f"{lost} of {len(run.planned)} plans are missing"
+        first, last = run.start.step, self._last_step(run)
+        reached = sum(
+            e.end is not None and e.end.kind == SkillEventKind.REACHED
+            for e in _pair(self._skill_events)
+            if e.start.episode == run.episode and first <= e.start.step <= last
+        )
+        if (lost := run.count(PlanEventKind.EDGE_REACHED) - reached) > 0:
+            yield f"skill events of {lost} executed options are missing"
+
     def _has_plan(self, run: _Run) -> bool:
         """Whether the newest plan is here, if there is one: it tells shortcuts from options."""
-        planned = [stamp_ns(e.header) for e in run.events if e.kind == PlanEventKind.PLANNED]
-        plans = self._plans.get(run.episode, ())
-        return not planned or any(stamp_ns(plan.header) >= planned[-1] for plan in plans)
+        return not run.planned or self._plan_of(run.planned[-1]) is not None
 
     def _trace(self, run: _Run, executions: Sequence[_Execution]) -> RunTrace:
         return RunTrace(
@@ -248,13 +307,14 @@ class RunLog:
         success, error_code, error_msg = self._verdict(run)
         options = tuple(self._measure_option(run, execution) for execution in executions)
         first = next(iter(self._plans_of(run)), None)
-        return RunMetrics(
+        unknown = self._unknown(run)
+        known = RunMetrics(
             domain=domain,
             preset=self._presets.get(domain, ""),
-            seed=task.seed if task is not None else -1,
-            index=task.index if task is not None else 0,
+            seed=task.seed if task is not None else None,
+            index=task.index if task is not None else None,
             success=success,
-            plan_length=self._plan_length(run),
+            plan_length=self._last_step(run) - run.start.step,
             shortcut_steps=sum(option.steps for option in options if option.kind == SHORTCUT),
             planning_seconds=run.planning_ns() / NANOSECONDS,
             replans=run.count(PlanEventKind.PLANNING_STARTED) - 1,
@@ -266,6 +326,8 @@ class RunLog:
             library=first.library if first is not None else "",
             samples=first.samples if first is not None else 0,
         )
+        blanks: dict[str, Any] = dict.fromkeys(unknown)
+        return replace(known, **blanks, unknown=unknown)
 
     def _verdict(self, run: _Run) -> tuple[bool, ErrorCode, str]:
         end = run.end
@@ -292,19 +354,46 @@ class RunLog:
         return atom_names(task.goal) if task is not None else None
 
     def _plans_of(self, run: _Run) -> list[PlanMessage]:
-        """The plans made in a run, in order."""
-        first, last = stamp_ns(run.start.header), stamp_ns(run.events[-1].header)
-        plans = self._plans.get(run.episode, ())
-        return [plan for plan in plans if first <= stamp_ns(plan.header) <= last]
+        """The plans made in a run, in order, as far as they are here."""
+        plans = (self._plan_of(event) for event in run.planned)
+        return [plan for plan in plans if plan is not None]
 
-    def _plan_length(self, run: _Run) -> int:
-        first, last = run.start.step, self._last_step(run)
-        return sum(first < step <= last for step in self._steps.get(run.episode, ()))
+    def _plan_of(self, planned: PlanEventMessage) -> PlanMessage | None:
+        """The plan that an event announced.
+
+        By number and order, not by stamps: clocks are set back, and each run counts from 0.
+        """
+        plans = list(self._plans.get(planned.episode, ()))
+        for event in self._plan_events:
+            if event.episode == planned.episode and event.kind == PlanEventKind.PLANNED:
+                numbers = [plan.number for plan in plans]
+                found = numbers.index(event.plan_number) if event.plan_number in numbers else None
+                if event is planned:
+                    return None if found is None else plans[found]
+                del plans[: 0 if found is None else found + 1]
+        return None
 
     def _last_step(self, run: _Run) -> int:
+        """The step of the run's last event, or of the last state where it has not ended."""
         if run.end is not None:
             return run.end.step
-        return max(self._steps.get(run.episode, {run.start.step}))
+        return max(run.events[-1].step, *self._steps.get(run.episode, ()), run.start.step)
+
+    def _unknown(self, run: _Run) -> dict[str, str]:
+        """The metrics that cannot be had, and why."""
+        reasons: dict[str, str] = {}
+        if run.episode not in self._tasks:
+            reasons |= dict.fromkeys(("seed", "index"), "the task is missing")
+        if len(self._plans_of(run)) < len(run.planned):
+            reasons["shortcut_steps"] = "a plan is missing, which tells shortcuts from operators"
+        if run.planned and self._plan_of(run.planned[0]) is None:
+            reasons |= dict.fromkeys(("planner", "library", "samples"), "the plan is missing")
+        if not planning_is_whole(run.events):
+            planning = ("planning_seconds", "replans", "edges_rolled_out")
+            reasons |= dict.fromkeys(planning, "an event of planning is missing")
+        if run.planning_ns() < 0:
+            reasons["planning_seconds"] = "the clock was set back while planning"
+        return reasons
 
     def _measure_option(self, run: _Run, execution: _Execution) -> OptionMetrics:
         start, end = execution.start, execution.end
@@ -314,13 +403,19 @@ class RunLog:
             for edge in plan.edges
         )
         last = end.step if end is not None else self._last_step(run)
+        known = learned or len(self._plans.get(start.episode, ())) > 0
         return OptionMetrics(
             name=start.skill,
-            kind=SHORTCUT if learned else OPERATOR,
+            kind=(SHORTCUT if learned else OPERATOR) if known else UNKNOWN,
             objects=tuple(start.objects),
             steps=max(0, last - start.step),
             outcome=OUTCOMES[end.kind] if end is not None else UNFINISHED,
         )
+
+
+def known(value: float | str | None, form: str = "") -> str:
+    """A metric for people: by a format specification, or ``unknown``."""
+    return "unknown" if value is None else format(value, form)
 
 
 def atom_names(msgs: Iterable[GroundAtomMessage]) -> AtomNames:
@@ -353,6 +448,19 @@ def _split(events: Iterable[PlanEventMessage]) -> list[_Run]:
         runs[-1].append(event)
         under_way = event.kind not in RUN_ENDS
     return [_Run(run) for run in runs]
+
+
+def _without_start(events: Iterable[PlanEventMessage]) -> int:
+    """How many plan events precede the start of the run that they belong to."""
+    count, under_way, episode = 0, False, None
+    for event in events:
+        under_way = event.kind == PlanEventKind.PLANNING_STARTED or (
+            under_way and event.episode == episode
+        )
+        count += not under_way
+        episode = event.episode
+        under_way = under_way and event.kind not in RUN_ENDS
+    return count
 
 
 def _pair(events: Iterable[SkillEventMessage]) -> list[_Execution]:

@@ -8,8 +8,9 @@ import math
 from itertools import product
 from typing import NamedTuple
 
-from slap_ros.geometry.pose import Pose, Quaternion, Vector, conjugate, multiply, rotate
+from slap_ros.geometry.pose import Pose, Vector, conjugate, multiply, rotate, rotation_matrix
 
+UP: Vector = (0.0, 0.0, 1.0)
 PARALLEL = 1e-9  # edges whose cross product is shorter than this span no axis of their own
 
 
@@ -36,8 +37,18 @@ class OrientedBox(NamedTuple):
         """Half the diagonal, m."""
         return math.hypot(*self.half)
 
+    def half_extent(self, axis: Vector) -> float:
+        """How far it reaches from its centre along an axis of length 1, seen from outside, m."""
+        along = rotate(conjugate(self.pose.quaternion), axis)
+        return sum(abs(a) * half for a, half in zip(along, self.half, strict=True))
+
+    @property
+    def top(self) -> float:
+        """Height of its highest point, m."""
+        return self.pose.position[2] + self.half_extent(UP)
+
     def corners(self) -> list[Vector]:
-        """The eight corners."""
+        """The eight corners, m, seen from outside."""
         x, y, z = self.half
         return [self.pose.apply(corner) for corner in product((-x, x), (-y, y), (-z, z))]
 
@@ -65,7 +76,7 @@ class OrientedBox(NamedTuple):
             (r00, r01, r02),
             (r10, r11, r12),
             (r20, r21, r22),
-        ) = _rows(multiply(turn, other.pose.quaternion))
+        ) = rotation_matrix(multiply(turn, other.pose.quaternion))
         # Upwards first: most of what could overlap stands above the other.
         if abs(z) > c + abs(r20) * e + abs(r21) * f + abs(r22) * g:
             return False
@@ -78,16 +89,6 @@ class OrientedBox(NamedTuple):
             if abs(x * u + y * v + z * w) > half + a * abs(u) + b * abs(v) + c * abs(w):
                 return False
         return not _edges_separate(self.half, other.half, (x, y, z), columns)
-
-
-def _rows(q: Quaternion) -> tuple[Vector, Vector, Vector]:
-    """The rotation matrix of a quaternion."""
-    x, y, z, w = q
-    return (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
-        (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
-        (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
-    )
 
 
 def _edges_separate(

@@ -27,7 +27,7 @@ def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
 
 
 def conjugate(q: Quaternion) -> Quaternion:
-    """The opposite rotation."""
+    """The rotation back: the inverse of a quaternion of length 1."""
     return (-q[0], -q[1], -q[2], q[3])
 
 
@@ -38,6 +38,27 @@ def from_rotation_vector(v: Vector) -> Quaternion:
         return NO_ROTATION
     part = math.sin(0.5 * angle) / angle
     return (part * v[0], part * v[1], part * v[2], math.cos(0.5 * angle))
+
+
+def from_yaw(yaw: float) -> Quaternion:
+    """The rotation about z by an angle in rad."""
+    return (0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
+
+
+def normalised(q: Quaternion) -> Quaternion:
+    """The quaternion divided by its length."""
+    length = math.hypot(*q)
+    return (q[0] / length, q[1] / length, q[2] / length, q[3] / length)
+
+
+def rotation_matrix(q: Quaternion) -> tuple[Vector, Vector, Vector]:
+    """The rotation matrix of a quaternion, row by row."""
+    x, y, z, w = q
+    return (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
+        (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
+        (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
+    )
 
 
 def rotate(q: Quaternion, v: Vector) -> Vector:

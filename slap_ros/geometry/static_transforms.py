@@ -16,7 +16,13 @@ class StaticTransforms:
         self._parents: dict[str, tuple[str, Pose]] = {}
 
     def add(self, parent: str, child: str, pose: Pose) -> None:
-        """Take a static transform: the child's pose in its parent."""
+        """Take a static transform; a later one of the same child replaces it.
+
+        Args:
+            parent: Name of the frame in which the pose is given.
+            child: Name of the frame that is there.
+            pose: Of the child in its parent, position in m.
+        """
         self._parents[child] = (parent, pose)
 
     def in_base(self, frame: str) -> Pose | None:

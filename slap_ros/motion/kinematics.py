@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from slap_ros.geometry.pose import Pose
+from slap_ros.geometry.pose import Pose, rotation_matrix
 from slap_ros.motion.joints import Array, Joints
 from slap_ros.physics.panda import JOINTS, grasp_pose, link_poses
 
@@ -17,13 +17,8 @@ LAST_LINK = JOINTS  # link 7, which carries the hand
 
 def matrix(pose: Pose) -> Array:
     """The pose as a homogeneous transform, shape (4, 4), lengths in m."""
-    x, y, z, w = pose.quaternion
     transform = np.eye(4)
-    transform[:3, :3] = (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
-        (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
-        (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
-    )
+    transform[:3, :3] = rotation_matrix(pose.quaternion)
     transform[:3, 3] = pose.position
     return transform
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from slap_ros.geometry.oriented_box import OrientedBox
-from slap_ros.geometry.pose import IDENTITY, Pose, Quaternion, Vector, conjugate, rotate
+from slap_ros.geometry.pose import IDENTITY, Pose, Quaternion, Vector
 from slap_ros.physics.links import LINK_SHAPES
 from slap_ros.physics.panda import HAND, link_poses
 from slap_ros.physics.scene import Body
@@ -21,7 +21,7 @@ from slap_ros.physics.scene import Body
 CLEARANCE = 0.003  # m, between the boxes around a link and a body, at which they do not touch
 LINK_DEPTH = 0.01  # m, how far a link may reach into a fixed body
 HELD_DEPTH = 0.02  # m, how far a held body may
-SAMPLING = 0.02  # m, of a link's way between two looks at what it hits, at the finest
+SAMPLING = 0.02  # m, of a link's way between two samples of what it hits, at the finest
 FINE = 0.01  # m, the same for what it comes near
 
 _RADII = tuple(shape.radius for shape in LINK_SHAPES)
@@ -44,7 +44,17 @@ class Arm:
         held: Body | None = None,
         grasp: Pose = IDENTITY,
     ) -> Arm:
-        """The arm for joint positions in rad, finger position in m, and what is in the hand."""
+        """The arm in one configuration.
+
+        Args:
+            joints: Joint positions, rad, shape (7,).
+            finger: Distance of each finger from the middle, m.
+            held: What is in the hand, if anything.
+            grasp: Its pose in the hand's frame.
+
+        Returns:
+            Everything in the base's frame.
+        """
         poses = link_poses(joints, finger)
         links = [poses[shape.link] for shape in LINK_SHAPES]
         centres = [
@@ -68,7 +78,16 @@ class Arm:
         return self.box_at(link, self.links[link])
 
     def near(self, link: int, point: Vector, distance: float) -> bool:
-        """Whether a point is within ``distance`` m of the box around a link."""
+        """Whether a point is near the box around a link.
+
+        Args:
+            link: Index in ``LINK_SHAPES``; one more is the held body.
+            point: In the base's frame, m.
+            distance: At which it no longer is near, m.
+
+        Returns:
+            Whether it is closer than that.
+        """
         reach = distance + self.radii[link]
         return math.dist(point, self.centres[link]) < reach and self.box(link).near(point, distance)
 
@@ -90,9 +109,7 @@ class Obstacle(NamedTuple):
     @classmethod
     def of(cls, box: OrientedBox) -> Obstacle:
         """An obstacle that fills a box."""
-        down = rotate(conjugate(box.pose.quaternion), (0.0, 0.0, 1.0))
-        height = sum(abs(a) * half for a, half in zip(down, box.half, strict=True))
-        return cls(box, box.pose.position[2] + height)
+        return cls(box, box.top)
 
 
 class Penetration(NamedTuple):
@@ -100,18 +117,18 @@ class Penetration(NamedTuple):
 
     link: int  # index in panda.LINKS
     point: Vector
-    depth: float  # m, by which it is to rise
+    depth: float  # m, by which it has to be raised
 
 
 class Sweep:
     """The arm's way from one configuration to another in a control step."""
 
-    __slots__ = ("end", "start", "ways")
+    __slots__ = ("end", "start", "travel")
 
     def __init__(self, start: Arm, end: Arm) -> None:
         self.start, self.end = start, end
         # How far any point of each link goes at most, in m.
-        self.ways = [
+        self.travel = [
             math.dist(a, b) + _angle(p.quaternion, q.quaternion) * radius
             for a, b, p, q, radius in zip(
                 start.centres, end.centres, start.links, end.links, start.radii, strict=True
@@ -121,35 +138,35 @@ class Sweep:
     def stays_clear(self, boxes: Sequence[OrientedBox]) -> bool:
         """Whether no link comes near any of the boxes, which stand still."""
         around = [(box, box.radius) for box in boxes]
-        return not any(self._comes_near(link, around) for link in range(len(self.ways)))
+        return not any(self._comes_near(link, around) for link in range(len(self.travel)))
 
     def _comes_near(self, link: int, around: Sequence[tuple[OrientedBox, float]]) -> bool:
-        """Whether a link comes near a box; of most, the ball around the box tells that not."""
+        """Whether a link comes near a box; mostly, the ball around the box already excludes it."""
         # A point is never further than half of its way from where it starts or where it ends.
-        margin = CLEARANCE + 0.5 * self.ways[link]
+        margin = CLEARANCE + 0.5 * self.travel[link]
         for box, radius in around:
             ball = box.pose.position, margin + radius
             near = self.start.near(link, *ball) or self.end.near(link, *ball)
-            if near and self._brushes(link, box):
+            if near and self._touches_on_the_way(link, box):
                 return True
         return False
 
-    def _brushes(self, link: int, box: OrientedBox) -> bool:
+    def _touches_on_the_way(self, link: int, box: OrientedBox) -> bool:
         """Whether the box around a link comes near another anywhere on its way."""
-        looks = math.ceil(self.ways[link] / FINE) or 1
-        around = box.grown(CLEARANCE + 0.5 * self.ways[link] / looks)
-        return any(around.overlaps(self._at(link, k / looks)) for k in range(looks + 1))
+        samples = math.ceil(self.travel[link] / FINE) or 1
+        around = box.grown(CLEARANCE + 0.5 * self.travel[link] / samples)
+        return any(around.overlaps(self._at(link, k / samples)) for k in range(samples + 1))
 
     def hits(self, obstacles: Sequence[Obstacle]) -> bool:
         """Whether the arm enters an obstacle deeper than it may, at the end of its way.
 
-        Thin obstacles are looked for on the way too, lest the arm passes through them.
+        Thin obstacles are also looked for on the way, or the arm would pass through them.
         """
         end = self.end
-        for link, (way, centre, radius) in enumerate(
-            zip(self.ways, end.centres, end.radii, strict=True)
+        for link, (travel, centre, radius) in enumerate(
+            zip(self.travel, end.centres, end.radii, strict=True)
         ):
-            reach = radius + way
+            reach = radius + travel
             for box, top in obstacles:
                 if centre[2] - reach < top and box.near(centre, reach) and self._enters(link, box):
                     return True
@@ -158,8 +175,8 @@ class Sweep:
     def deepest_penetration(self, obstacles: Sequence[Obstacle]) -> Penetration | None:
         """Where the arm would be deepest in an obstacle, seen from above; None if in none."""
         found = None
-        for link, way in enumerate(self.ways):
-            reach = self.end.radii[link] + way
+        for link, travel in enumerate(self.travel):
+            reach = self.end.radii[link] + travel
             for box, top in obstacles:
                 if box.near(self.end.centres[link], reach) and self._enters(link, box):
                     point = min(self.end.box(link).corners(), key=lambda corner: corner[2])
@@ -174,8 +191,8 @@ class Sweep:
 
     def _enters(self, link: int, box: OrientedBox) -> bool:
         core = box.shrunk(_depth(link))
-        looks = math.ceil(self.ways[link] / max(2.0 * min(box.half), SAMPLING)) or 1
-        return any(core.overlaps(self._at(link, k / looks)) for k in range(1, looks + 1))
+        samples = math.ceil(self.travel[link] / max(2.0 * min(box.half), SAMPLING)) or 1
+        return any(core.overlaps(self._at(link, k / samples)) for k in range(1, samples + 1))
 
     def _at(self, link: int, part: float) -> OrientedBox:
         """The box around a link after a part of its way."""

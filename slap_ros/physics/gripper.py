@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from slap_ros.geometry.pose import IDENTITY, Pose, conjugate, rotate
+from slap_ros.geometry.pose import IDENTITY, Pose, conjugate, normalised, rotate
 from slap_ros.physics.panda import FINGER_OPEN, grasp_pose, hand_pose
 from slap_ros.physics.scene import Body, Scene
 from slap_ros.physics.snapshot import BodyState, Snapshot
@@ -22,7 +22,16 @@ CLOSE, OPEN = 0.5, -0.5  # gripper commands beyond which it closes or opens
 
 
 def grip(scene: Scene, snapshot: Snapshot, command: float) -> Snapshot:
-    """What the gripper command changes before the arm moves."""
+    """What the gripper command changes before the arm moves.
+
+    Args:
+        scene: What there is.
+        snapshot: How it is before the command.
+        command: Above 0.5 closes, below -0.5 opens, anything between does nothing.
+
+    Returns:
+        How it is afterwards; the same object where nothing changes.
+    """
     if command > CLOSE and snapshot.held is None:
         return _grasp(scene, snapshot)
     if command < OPEN and snapshot.held is not None:
@@ -41,7 +50,7 @@ def _grasp(scene: Scene, snapshot: Snapshot) -> Snapshot:
         return snapshot
     pose = snapshot.bodies[nearest].pose
     grasp = hand_pose(snapshot.joints).inverse().compose(pose)
-    grasp = Pose(grasp.position, _normalised(grasp.quaternion))
+    grasp = Pose(grasp.position, normalised(grasp.quaternion))
     grasped = replace(
         snapshot, held=nearest, grasp=grasp, finger=finger_around(scene.free[nearest], grasp)
     )
@@ -57,8 +66,3 @@ def finger_around(body: Body, grasp: Pose) -> float:
     # The way the fingers move, seen from the body.
     along = rotate(conjugate(grasp.quaternion), (0.0, 1.0, 0.0))
     return min(FINGER_OPEN, body.extent(along) + abs(grasp.position[1]))
-
-
-def _normalised(q: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
-    length = math.hypot(*q)
-    return (q[0] / length, q[1] / length, q[2] / length, q[3] / length)

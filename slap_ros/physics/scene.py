@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What stands around the robot, described once, as data that a domain owns."""
+"""The bodies around the robot, described once, as data that a domain owns."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 from slap_ros.errors import InvalidDomainError
 from slap_ros.geometry.oriented_box import OrientedBox
@@ -29,12 +29,11 @@ class Material(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Box:
-    """A cuboid.
+class RigidBody:
+    """What bodies of all shapes have in common.
 
     Args:
         name: That of the object in the state which it embodies.
-        half_extents_m: Half its edges along x, y, z of its own frame.
         mass_kg: 0 for a body that is fixed. A free body may have another one in the state.
         friction: See :class:`Material`; a free body may have another one in the state.
         colour: For pictures.
@@ -44,21 +43,31 @@ class Box:
     """
 
     name: str
-    half_extents_m: Vector
-    mass_kg: float = 0.0
-    friction: float = FRICTION
-    colour: Colour = GREY
-    pose: Pose = IDENTITY
-    solid: bool = True
+    mass_kg: float = field(default=0.0, kw_only=True)
+    friction: float = field(default=FRICTION, kw_only=True)
+    colour: Colour = field(default=GREY, kw_only=True)
+    pose: Pose = field(default=IDENTITY, kw_only=True)
+    solid: bool = field(default=True, kw_only=True)
 
     @property
     def material(self) -> Material:
         """What it is made of, unless the state says otherwise."""
         return Material(self.mass_kg, self.friction)
 
-    def of(self, material: Material) -> Box:
-        """The same box of another material."""
+    def with_material(self, material: Material) -> Self:
+        """The same body of another material."""
         return replace(self, mass_kg=material.mass_kg, friction=material.friction)
+
+
+@dataclass(frozen=True)
+class Box(RigidBody):
+    """A cuboid.
+
+    Args:
+        half_extents_m: Half its edges along x, y, z of its own frame.
+    """
+
+    half_extents_m: Vector
 
     def at(self, pose: Pose) -> OrientedBox:
         """The space it fills at a pose."""
@@ -79,31 +88,14 @@ class Box:
 
 
 @dataclass(frozen=True)
-class Mesh:
-    """A body of convex pieces, whose origin is its centre of mass.
+class Mesh(RigidBody):
+    """A body of convex pieces, whose origin is its centre of mass; the mass is spread evenly.
 
     Args:
-        name: See :class:`Box`, also for all but the next.
         shape: Its pieces; alike for meshes of one shape.
-        mass_kg: Spread evenly.
     """
 
-    name: str
     shape: Solid
-    mass_kg: float = 0.0
-    friction: float = FRICTION
-    colour: Colour = GREY
-    pose: Pose = IDENTITY
-    solid: bool = True
-
-    @property
-    def material(self) -> Material:
-        """What it is made of, unless the state says otherwise."""
-        return Material(self.mass_kg, self.friction)
-
-    def of(self, material: Material) -> Mesh:
-        """The same mesh of another material."""
-        return replace(self, mass_kg=material.mass_kg, friction=material.friction)
 
     def at(self, pose: Pose) -> OrientedBox:
         """A box around it at a pose: the space that the arm takes it to fill."""
@@ -130,7 +122,7 @@ FLOOR_TOP = -0.425  # m
 
 def cube(name: str, colour: Colour = GREY) -> Box:
     """The reference's 5 cm cube."""
-    return Box(name, (CUBE_EDGE / 2,) * 3, *CUBE_MATERIAL, colour=colour)
+    return Box(name, (CUBE_EDGE / 2,) * 3, colour=colour).with_material(CUBE_MATERIAL)
 
 
 @dataclass(frozen=True)

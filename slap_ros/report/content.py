@@ -48,6 +48,8 @@ class RunReport:
     @property
     def approach(self) -> str:
         """How it was planned."""
+        if self.metrics.planner is None:
+            return "a plan that was not recorded"
         if not self.metrics.planner:
             return "no plan"
         if not self.metrics.library:

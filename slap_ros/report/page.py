@@ -24,6 +24,7 @@ import slap_ros
 from slap_ros.drawing.svg import clean_value
 from slap_ros.drawing.words import counted
 from slap_ros.errors import InvalidParameterError, StorageFullError
+from slap_ros.evaluation.metrics import known
 from slap_ros.report.animation import Drawing, draw
 from slap_ros.report.content import PURE_PLANNING, BagReport, RunReport
 
@@ -88,6 +89,7 @@ def render(bags: Sequence[BagReport]) -> str:
         finalize=_readable,
     )
     environment.filters["counted"] = counted
+    environment.filters["known"] = known
     last = max((run.length for run in runs), default=0)
     return environment.get_template("page.html.j2").render(
         bags=bags,

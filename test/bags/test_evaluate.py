@@ -38,6 +38,7 @@ def test_the_numbers_are_those_of_what_happened(tmp_path: Path, seed: int) -> No
         "planner": "lazy",
         "library": "0123456789abcdef",
         "samples": 16,
+        "unknown": {},
     }
     assert sum(option["steps"] for option in script.truth.options) == run.plan_length
     assert evaluation.mismatches == []

@@ -10,17 +10,16 @@ from executed import executed, fluent_atoms
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.cleanup_table import make
-from slap_ros.domains.cleanup_table.model import (
+from slap_ros.domains.cleanup_table.features import BLOCK, WALL
+from slap_ros.domains.cleanup_table.relations import (
     ASIDE,
     BAND,
-    BLOCK,
     CLEAR,
     HAND_CLEAR,
     LOW,
     OVER,
     SLOW,
     TIP,
-    WALL,
 )
 from slap_ros.domains.cleanup_table.scene import BIN, FLOOR_TOP, TABLE, scene_of
 from slap_ros.domains.cleanup_table.shapes import TOYS, WIPER, shipped

@@ -10,7 +10,8 @@ import pytest
 from executed import executed, fluent_atoms
 
 from slap_ros.domains import get_domain
-from slap_ros.domains.cluttered_drawer.model import BLOCK, SIDES, FingerClearance
+from slap_ros.domains.cluttered_drawer.blocking import SIDES, FingerClearance
+from slap_ros.domains.cluttered_drawer.features import BLOCK
 from slap_ros.domains.cluttered_drawer.scene import BOTTOM, FRONT, HALF_WIDTH, MIDDLE
 from slap_ros.domains.cluttered_drawer.skills import FRONT_BACK, LEFT_RIGHT, _way_to_grasp
 from slap_ros.domains.cluttered_drawer.tasks import (

@@ -51,10 +51,10 @@ def test_a_tower_is_perceived_as_it_stands():
 
 
 def test_a_block_half_on_the_target_is_on_the_table_and_leaves_no_room():
-    scenery = TowerArrangement(
+    arrangement = TowerArrangement(
         target=(0.5, 0.0, 0.4), target_block=(0.4, 0.2, 0), tower=((0.54, 0.0, 0.9),)
     )
-    seen = atoms(scenery.task().initial_state)
+    seen = atoms(arrangement.task().initial_state)
     assert "On(block2, table)" in seen
     assert "On(block2, target)" not in seen
     assert "NothingOn(target)" not in seen
@@ -185,8 +185,8 @@ def test_masses_and_frictions_are_sampled_last_and_alike_for_all_blocks():
 
 @pytest.mark.parametrize("material", [Material(0.05, 0.3), Material(3.0, 1.2)])
 def test_towers_of_other_materials_are_taken_apart_too(material):
-    scenery = replace(PaperTowerTasks().scenery, material=material)
-    episode = solve(scenery.task())
+    arrangement = replace(PaperTowerTasks().arrangement, material=material)
+    episode = solve(arrangement.task())
     assert episode.success, episode.error
     blocks = episode.states[-1].layout.of_type(BLOCK)
     assert all(episode.states[-1].get(b, "mass") == material.mass_kg for b in blocks)

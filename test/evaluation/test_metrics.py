@@ -31,6 +31,7 @@ class Story:
 
     def __init__(self) -> None:
         self.messages: list[Message] = []
+        self.plan_number = -1
         self.now_ns = 1_700_000_000_999_000_000
 
     def tell(self, type_name: str, **values: Any) -> None:
@@ -49,8 +50,14 @@ class Story:
             self.tell(ATOMS, episode=episode, step=step, atoms=atoms)
 
     def plan_event(self, kind: PlanEventKind, step: int, episode: int = 1, **values: Any) -> None:
-        rest = {"edges_rolled_out": 0, "error_code": 0, "error_msg": ""} | values
-        self.tell(PLAN_EVENT, kind=int(kind), step=step, episode=episode, **rest)
+        self.plan_number += kind == PlanEventKind.PLANNING_STARTED
+        rest = {"edges_rolled_out": 0, "edge": 0, "error_code": 0, "error_msg": ""} | values
+        number = self.plan_number
+        self.tell(
+            PLAN_EVENT, kind=int(kind), step=step, episode=episode, plan_number=number, **rest
+        )
+        if kind in (PlanEventKind.SOLVED, PlanEventKind.FAILED):
+            self.plan_number = -1
 
     def planning(self, step: int, rolled: int = 0, episode: int = 1) -> None:
         self.plan_event(PlanEventKind.PLANNING_STARTED, step, episode)
@@ -59,7 +66,8 @@ class Story:
     def plan(self, *edges: tuple[int, str], episode: int = 1, goal: Any = ()) -> None:
         named = [SimpleNamespace(kind=kind, name=name) for kind, name in edges]
         origin = {"planner": "lazy", "library": "0123456789abcdef", "samples": 16}
-        self.tell(PLAN, episode=episode, edges=named, goal=goal, **origin)
+        number = self.plan_number
+        self.tell(PLAN, episode=episode, number=number, edges=named, goal=goal, **origin)
 
     def skill(self, kind: SkillEventKind, step: int, name: str = "Pick", episode: int = 1) -> None:
         self.tell(
@@ -131,6 +139,7 @@ def test_a_solved_run() -> None:
         "planner": "lazy",
         "library": "0123456789abcdef",
         "samples": 16,
+        "unknown": {},
     }
     plain = solved().run().as_json()
     assert plain == expected
@@ -228,7 +237,8 @@ def test_without_a_task_nothing_is_a_success() -> None:
     story = solved()
     story.messages = [m for m in story.messages if m[0] != TASK]
     run = story.run()
-    assert (run.success, run.seed, run.index, run.domain) == (False, -1, 0, "obstacle2d")
+    assert (run.success, run.seed, run.index, run.domain) == (False, None, None, "obstacle2d")
+    assert run.unknown == dict.fromkeys(("seed", "index"), "the task is missing")
     assert "lacks the task" in run.error_msg
 
 

@@ -112,7 +112,7 @@ def test_a_world_takes_on_the_masses_and_frictions_of_each_state(world):
 
 @pytest.mark.parametrize("material", [CUBE_MATERIAL, Material(0.3, 0.37)])
 def test_the_same_numbers_in_the_scene_and_in_the_state_are_the_same_physics(material):
-    scene = Scene((TABLE, *(cube(name).of(material) for name in NAMES)))
+    scene = Scene((TABLE, *(cube(name).with_material(material) for name in NAMES)))
     features = ["x", "y", "z", "qx", "qy", "qz", "qw", "vx", "vy", "vz", "wx", "wy", "wz"]
 
     def thrown(state: State) -> State:

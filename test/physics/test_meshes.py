@@ -21,7 +21,7 @@ from slap_ros.physics.simulation import Simulation, Stepping
 from slap_ros.physics.world import PandaWorld
 
 CUBE = Solid.of([make.block((0.0, 0.0, 0.0), (CUBE_EDGE,) * 3)])
-CUBES = Scene((TABLE, *(Mesh(name, CUBE, *CUBE_MATERIAL) for name in NAMES)))
+CUBES = Scene((TABLE, *(Mesh(name, CUBE).with_material(CUBE_MATERIAL) for name in NAMES)))
 STILL = np.zeros(8)
 
 
@@ -102,7 +102,7 @@ def test_fingers_stand_at_the_sides_of_what_they_hold():
     duck, cubic = TOYS.free[0], cube("cube")
     across = Pose()  # fingers along the duck's y
     assert finger_around(duck, across) == pytest.approx(duck.shape.points[:, 1].max())
-    assert finger_around(Mesh("cube", CUBE, 1.0), GRASP) == pytest.approx(
+    assert finger_around(Mesh("cube", CUBE, mass_kg=1.0), GRASP) == pytest.approx(
         finger_around(cubic, GRASP)
     )
 

@@ -223,7 +223,7 @@ def test_the_nearest_body_is_grasped():
             BLOCK("b"): body_features((0.405, 0.0, 0.1)),
         }
     )
-    thin = [Box(name, (0.005, 0.025, 0.025), 0.1) for name in ("a", "b")]
+    thin = [Box(name, (0.005, 0.025, 0.025), mass_kg=0.1) for name in ("a", "b")]
     with PandaWorld(Scene((TABLE, *thin)), state) as world:
         after = world.step(CLOSE)
         assert (after.get(BLOCK("a"), "held"), after.get(BLOCK("b"), "held")) == (0.0, 1.0)
@@ -253,7 +253,7 @@ def test_a_held_block_pushes_the_tower_over(world):
 
 def test_what_lies_on_a_held_body_rides_along():
     """A plank is lifted by its middle, with a block on its end."""
-    plank = Box("plank", (0.15, 0.03, 0.01), 0.3)
+    plank = Box("plank", (0.15, 0.03, 0.01), mass_kg=0.3)
     state = State.build(
         {
             ROBOT("robot"): robot_features(joints(hand_at((0.5, 0.0, 0.085))).tolist()),
@@ -274,7 +274,7 @@ def test_what_lies_on_a_held_body_rides_along():
 
 
 def test_a_body_wider_than_the_fingers_open_can_be_let_go_and_left():
-    plank = Box("plank", (0.03, 0.07, 0.02), 0.3)
+    plank = Box("plank", (0.03, 0.07, 0.02), mass_kg=0.3)
     state = State.build(
         {
             ROBOT("robot"): robot_features(joints(hand_at((0.5, 0.0, 0.095))).tolist()),
@@ -292,7 +292,7 @@ def test_a_body_wider_than_the_fingers_open_can_be_let_go_and_left():
 
 def test_the_gripper_does_not_open_into_a_wall():
     place = np.array([0.5, 0.057, 0.4])  # a closed finger is clear of the wall, an open one not
-    body = Box("T", (0.01, 0.01, 0.01), 0.1)
+    body = Box("T", (0.01, 0.01, 0.01), mass_kg=0.1)
     q = reach(place, 0.0, np.array(HOME))
     grasp = hand_pose(q).inverse().compose(Pose(grasp_pose(q).position))
     state = State.build(
@@ -361,7 +361,7 @@ def test_scenes_that_contradict_themselves():
     with pytest.raises(InvalidDomainError, match="two bodies named a"):
         Scene((cube("a"), cube("a")))
     with pytest.raises(InvalidDomainError, match="must be solid, not so a"):
-        Scene((Box("a", (0.1, 0.1, 0.1), 1.0, solid=False),))
+        Scene((Box("a", (0.1, 0.1, 0.1), mass_kg=1.0, solid=False),))
 
 
 def test_a_scene_without_free_bodies():

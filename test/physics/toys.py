@@ -15,7 +15,10 @@ MASS = 0.01  # kg
 TOYS = Scene(
     (
         TABLE,
-        *(Mesh(name, shape, MASS) for name, shape in zip(NAMES, shipped().values(), strict=True)),
+        *(
+            Mesh(name, shape, mass_kg=MASS)
+            for name, shape in zip(NAMES, shipped().values(), strict=True)
+        ),
     )
 )
 

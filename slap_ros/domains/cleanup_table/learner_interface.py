@@ -7,14 +7,8 @@ from __future__ import annotations
 import numpy as np
 
 from slap_ros.core import LearnerInterface
-from slap_ros.domains.cleanup_table.model import (
-    BLOCK,
-    GRIPPER_EMPTY,
-    HALF,
-    HOLDING,
-    NOT_HOLDING,
-    CleanupObjectIndex,
-)
+from slap_ros.domains.cleanup_table.features import BLOCK, HALF, CleanupObjectIndex
+from slap_ros.domains.cleanup_table.predicates import GRIPPER_EMPTY, HOLDING, NOT_HOLDING
 from slap_ros.domains.tabletop import observation
 from slap_ros.relational import Column, State
 from slap_ros.relational.predicates import Bools

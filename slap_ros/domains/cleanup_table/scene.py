@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from slap_ros.domains.cleanup_table.model import BLOCK, HALF, MIDDLE, SURFACE, WALL
+from slap_ros.domains.cleanup_table.features import BLOCK, HALF, MIDDLE, SURFACE, WALL
 from slap_ros.domains.tabletop.planning_scene import PlanningScene
 from slap_ros.domains.tabletop.state_access import box_of, pose_of
 from slap_ros.geometry.oriented_box import OrientedBox
@@ -54,7 +54,8 @@ def scene_of(state: State, shapes: Mapping[str, Solid]) -> Scene:
             bodies.append(Box(surface.name, half, colour=WOOD))
     for block in state.layout.of_type(BLOCK):
         kind = kind_of(block)
-        bodies.append(Mesh(block.name, shapes[kind], *MATERIAL, COLOURS.get(kind, OTHERS)))
+        colour = COLOURS.get(kind, OTHERS)
+        bodies.append(Mesh(block.name, shapes[kind], colour=colour).with_material(MATERIAL))
     return Scene(tuple(bodies), floor_m=FLOOR_TOP)
 
 

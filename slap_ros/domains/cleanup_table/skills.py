@@ -12,17 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from slap_ros.core import Action, Policy, Skill
-from slap_ros.domains.cleanup_table.model import (
-    BLOCK,
-    HAND_CLEAR,
-    ON,
-    OVER,
-    SLOW,
-    TIP,
-    VELOCITY,
-    WALL,
-    cleanup_relations,
-)
+from slap_ros.domains.cleanup_table.features import BLOCK, VELOCITY, WALL
+from slap_ros.domains.cleanup_table.predicates import ON
+from slap_ros.domains.cleanup_table.relations import HAND_CLEAR, OVER, SLOW, TIP, cleanup_relations
 from slap_ros.domains.cleanup_table.scene import PLANNING_SCENE, carried
 from slap_ros.domains.tabletop import observation
 from slap_ros.domains.tabletop.grasps import from_above
@@ -35,7 +27,6 @@ from slap_ros.domains.tabletop.state_access import (
     grasp_of,
     joints_of,
     pose_of,
-    top_of,
 )
 from slap_ros.domains.tabletop.timing import Timing
 from slap_ros.domains.tabletop.transit import CLEARANCE, PLANS, SEED, memoized
@@ -121,7 +112,7 @@ def grasps(state: State, block: Object, table: Object) -> list[Pose]:
     frame, half = carried(state, block)
     box = OrientedBox(pose_of(state, block).compose(frame), half)
     x, y, z = pose_of(state, block).position
-    lowest = max(z, top_of(box_of(state, table)) + UNDER, top_of(box) - PALM)
+    lowest = max(z, box_of(state, table).top + UNDER, box.top - PALM)
     yaw = _yaw(pose_of(state, block))
     yaws = [2.0 * math.pi * k / YAWS for k in range(YAWS)]
     yaws += [yaw + k * math.pi / 2 for k in range(4)]

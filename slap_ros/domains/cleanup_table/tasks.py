@@ -6,18 +6,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
 
 from slap_ros.core import Task
-from slap_ros.domains.cleanup_table.model import BLOCK, HALF, IS_DRAWER, MIDDLE, ON, SURFACE, TOOL
+from slap_ros.domains.cleanup_table.features import BLOCK, HALF, MIDDLE, SURFACE, TOOL
+from slap_ros.domains.cleanup_table.predicates import IS_DRAWER, ON
 from slap_ros.domains.cleanup_table.scene import BIN, MATERIAL, TABLE, TABLE_TOP, kind_of
 from slap_ros.domains.cleanup_table.shapes import WIPER
+from slap_ros.domains.variation import TaskSettings
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.geometry.oriented_box import OrientedBox
-from slap_ros.geometry.pose import Vector
+from slap_ros.geometry.pose import Vector, from_yaw
 from slap_ros.meshes.solid import Solid
 from slap_ros.physics.features import (
     ROBOT,
@@ -73,7 +75,7 @@ def everything_in_the_bin(state: State) -> frozenset[GroundAtom]:
 
 
 @dataclass(frozen=True)
-class RandomCleanupTasks:
+class RandomCleanupTasks(TaskSettings):
     """Toys anywhere beside the bin, turned as they like; the wiper on the other side."""
 
     toys: tuple[int, int] = (3, 3)  # inclusive
@@ -113,13 +115,9 @@ class RandomCleanupTasks:
                     placed.append((x, y, rng.uniform(*self.toy_yaw)))
         raise InvalidParameterError(f"the table has no room for {count} toys {self.gap} m apart")
 
-    def as_configuration(self) -> Mapping[str, str | int | float]:
-        """The settings by name."""
-        return {name: str(value) for name, value in asdict(self).items()}
-
 
 @dataclass(frozen=True)
-class PaperCleanupTasks:
+class PaperCleanupTasks(TaskSettings):
     """One start state, as the reference has; toys in its ranges."""
 
     toys: tuple[PlanarPose, ...] = ((0.40, 0.10, 0.0), (0.50, 0.20, 0.0), (0.60, 0.10, 0.0))
@@ -129,10 +127,6 @@ class PaperCleanupTasks:
         """That state."""
         names = _names(shapes, len(self.toys))
         return make_task({**dict(zip(names, self.toys, strict=True)), WIPER: self.wiper}, shapes)
-
-    def as_configuration(self) -> Mapping[str, str | int | float]:
-        """The settings by name."""
-        return {name: str(value) for name, value in asdict(self).items()}
 
 
 def _names(shapes: Mapping[str, Solid], count: int) -> Sequence[str]:
@@ -145,9 +139,8 @@ def _names(shapes: Mapping[str, Solid], count: int) -> Sequence[str]:
 def _block(shape: Solid, material: Material, x: float, y: float, yaw: float) -> Mapping[str, float]:
     middle, half = shape.bounds
     z = TABLE_TOP + half[2] - middle.position[2]
-    turn = (0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
     return {
-        **body_features((x, y, z), turn),
+        **body_features((x, y, z), from_yaw(yaw)),
         **material_features(material),
         **_thing(middle.position, half, is_movable=1.0, is_drawer=0.0),
     }

@@ -1,25 +1,26 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Cluttered Drawer: take a block out of a drawer in which other blocks hem it in (SLAP §5).
+"""Cluttered Drawer: take a block out of a drawer from among surrounding blocks (SLAP §5).
 
 A Panda at the origin, an open drawer before it, a table behind that; x to the front, z up, m and
-rad. Read on in this order: ``model`` (types, predicates, operators), ``scenery``, ``tasks``,
-``skills``. The world is that of ``slap_ros.physics``.
+rad. Read on in this order: ``features`` (types), ``blocking`` (what is in a finger's way),
+``predicates``, ``operators``, ``scene``, ``tasks``, ``skills``. The world is that of
+``slap_ros.physics``.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from dataclasses import replace
 from types import MappingProxyType
 
-from slap_ros.core import ActionSpace, Display, Domain, Execution, Learning
-from slap_ros.domains.cluttered_drawer import model, skills, tasks
+from slap_ros.core import Display, Domain, Execution, Learning
+from slap_ros.domains.cluttered_drawer import features, operators, skills, tasks
+from slap_ros.domains.cluttered_drawer.blocking import FingerClearance
 from slap_ros.domains.cluttered_drawer.learner_interface import LEARNER_INTERFACE
+from slap_ros.domains.cluttered_drawer.predicates import HAND_PREDICATES, predicates
 from slap_ros.domains.cluttered_drawer.scene import scene_of
+from slap_ros.domains.tabletop.presets import ACTION_SPACES, TIMINGS
 from slap_ros.domains.tabletop.settling import settling
-from slap_ros.domains.tabletop.timing import FixedStepTiming, SpeedLimitTiming, Timing
 from slap_ros.domains.tabletop.visualization import animation, visible_arm, visible_bodies
 from slap_ros.domains.variation import varied
 from slap_ros.physics.features import ROBOT
@@ -31,12 +32,6 @@ SETTINGS: Mapping[str, tasks.RandomDrawerTasks | tasks.PaperDrawerTasks] = {
     "fair": tasks.RandomDrawerTasks(),
     "paper": tasks.PaperDrawerTasks(),
 }
-# The reference has no limit to what its planned motions do in a step, and jumps by 3 rad.
-UNLIMITED_ACTION_SPACE = replace(
-    ACTION_SPACE, low=(*(-math.pi,) * 7, -1.0), high=(*(math.pi,) * 7, 1.0)
-)
-ACTIONS: Mapping[str, ActionSpace] = {"fair": ACTION_SPACE, "paper": UNLIMITED_ACTION_SPACE}
-TIMINGS: Mapping[str, Timing] = {"fair": SpeedLimitTiming(), "paper": FixedStepTiming()}
 
 VIEWPOINT = Viewpoint(
     eye=(0.9, -1.3, 1.0), target=(0.3, 0.0, 0.28)
@@ -45,14 +40,14 @@ VIEWPOINT = Viewpoint(
 
 def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Domain:
     """The domain: preset ``fair`` samples different tasks, ``paper`` has the reference's one."""
-    settings, actions = varied(SETTINGS[preset], changes), ACTIONS[preset]
-    room = model.FingerClearance(settings.reach, settings.half_width)
+    settings, actions = varied(SETTINGS[preset], changes), ACTION_SPACES[preset]
+    clearance = FingerClearance(settings.reach, settings.half_width)
     return Domain(
         name="cluttered_drawer",
         preset=preset,
-        types=model.TYPES,
-        predicates=model.predicates(room),
-        operators=model.OPERATORS,
+        types=features.TYPES,
+        predicates=predicates(clearance),
+        operators=operators.OPERATORS,
         skills=skills.skills(TIMINGS[preset]),
         action_space=actions,
         sample_task=settings.sample,
@@ -60,7 +55,7 @@ def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Doma
         default_goal=tasks.target_block_on_table,
         step_limit=tasks.STEP_LIMIT,
         robot_types=frozenset({ROBOT}),
-        robot_predicates=model.HAND_PREDICATES,
+        robot_predicates=HAND_PREDICATES,
         execution=Execution(
             control_period_s=CONTROL_PERIOD_S,
             settle=settling(scene_of),

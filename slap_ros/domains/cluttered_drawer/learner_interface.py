@@ -7,7 +7,9 @@ from __future__ import annotations
 import numpy as np
 
 from slap_ros.core import LearnerInterface
-from slap_ros.domains.cluttered_drawer.model import BLOCK, GRASPING, SIDES, SURFACE, TARGET
+from slap_ros.domains.cluttered_drawer.blocking import SIDES
+from slap_ros.domains.cluttered_drawer.features import BLOCK, SURFACE, TARGET
+from slap_ros.domains.cluttered_drawer.predicates import GRASPING
 from slap_ros.domains.cluttered_drawer.scene import BOTTOM
 from slap_ros.domains.tabletop import observation
 from slap_ros.relational import Column, GroundAtom, State

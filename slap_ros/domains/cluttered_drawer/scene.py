@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from slap_ros.domains.cluttered_drawer.model import BLOCK, DRAWER, TABLE, TARGET, WALL
+from slap_ros.domains.cluttered_drawer.features import BLOCK, DRAWER, TABLE, TARGET, WALL
 from slap_ros.geometry.pose import Pose, Vector
 from slap_ros.physics import scene
 from slap_ros.physics.scene import TABLE_TOP, WOOD, Box, Colour, Scene, cube

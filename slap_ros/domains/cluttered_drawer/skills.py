@@ -8,13 +8,14 @@ import math
 from collections.abc import Iterator, Sequence
 
 from slap_ros.core import Skill
-from slap_ros.domains.cluttered_drawer.model import BLOCK, DRAWER, SIDES, TABLE, TARGET, WALL
+from slap_ros.domains.cluttered_drawer.blocking import SIDES
+from slap_ros.domains.cluttered_drawer.features import BLOCK, DRAWER, TABLE, TARGET, WALL
 from slap_ros.domains.cluttered_drawer.tasks import APART
 from slap_ros.domains.tabletop.grasps import from_above, grasps_to_stand, quarter_turns
 from slap_ros.domains.tabletop.placements import GAP, free_placements
 from slap_ros.domains.tabletop.planning_scene import PlanningScene
 from slap_ros.domains.tabletop.skills import GRIP, RELEASE, ReachSkill, Transits, TransitSkill
-from slap_ros.domains.tabletop.state_access import box_of, held_body, pose_of, top_of, yaw_of
+from slap_ros.domains.tabletop.state_access import box_of, held_body, pose_of, yaw_of
 from slap_ros.domains.tabletop.timing import Timing
 from slap_ros.domains.tabletop.transit import Transit, memoized
 from slap_ros.errors import SkillNotApplicableError
@@ -79,7 +80,7 @@ def _way_to_place(state: State, place: tuple[float, float], surface: Object) -> 
     block = held_body(state)
     if block is None:
         raise SkillNotApplicableError("nothing is held")
-    top, yaws = top_of(box_of(state, surface)), quarter_turns(yaw_of(pose_of(state, block)))
+    top, yaws = box_of(state, surface).top, quarter_turns(yaw_of(pose_of(state, block)))
     ends = grasps_to_stand(state, box_of(state, block), place, top, yaws)
     return Transit(PLANNING_SCENE, state, ends, touched=(surface,))
 

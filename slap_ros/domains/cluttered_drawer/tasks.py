@@ -6,24 +6,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from slap_ros.core import Task
-from slap_ros.domains.cluttered_drawer.model import (
-    BLOCK,
-    ON,
-    SIDES,
-    TABLE,
-    TARGET,
-    FingerClearance,
-    blocking_relations,
-)
+from slap_ros.domains.cluttered_drawer import blocking
+from slap_ros.domains.cluttered_drawer.blocking import SIDES, FingerClearance, blocking_relations
+from slap_ros.domains.cluttered_drawer.features import BLOCK, TABLE, TARGET
+from slap_ros.domains.cluttered_drawer.predicates import ON
 from slap_ros.domains.cluttered_drawer.scene import BOTTOM, FIXED, HALF_WIDTH, MIDDLE, OPENING
 from slap_ros.domains.tabletop.placements import GAP
+from slap_ros.domains.variation import TaskSettings
 from slap_ros.errors import InvalidParameterError, InvalidStateError
-from slap_ros.geometry.pose import Pose
+from slap_ros.geometry.pose import Pose, from_yaw
 from slap_ros.physics.features import (
     ROBOT,
     body_features,
@@ -88,11 +84,11 @@ def _neighbour(
     return x + way.real, y + way.imag, yaw + turn
 
 
-TOWARDS = (-1.0 + 0j, 1.0 + 0j, 1j, -1j)  # front, back, left, right
+TOWARDS: tuple[complex, ...] = tuple(blocking.TOWARDS.tolist())
 
 
 @dataclass(frozen=True)
-class RandomDrawerTasks:
+class RandomDrawerTasks(TaskSettings):
     """Everything sampled anew for each task. Lengths in m, angles in rad, masses in kg."""
 
     obstacles: tuple[int, int] = (4, 6)  # inclusive: four hem the target in, others stand about
@@ -113,9 +109,9 @@ class RandomDrawerTasks:
         """A task."""
         obstacles = int(rng.integers(self.obstacles[0], self.obstacles[1] + 1))
         for _ in range(TRIES):
-            scenery = self._draw(rng, obstacles)
-            if scenery is not None:
-                return scenery.task()
+            arrangement = self._draw(rng, obstacles)
+            if arrangement is not None:
+                return arrangement.task()
         raise InvalidParameterError(f"the drawer has no room for {obstacles} obstacles")
 
     def _draw(self, rng: np.random.Generator, obstacles: int) -> DrawerArrangement | None:
@@ -146,18 +142,16 @@ class RandomDrawerTasks:
             others.append(other)
         # Last, so that where things stand does not depend on it.
         material = Material(float(rng.uniform(*self.mass)), float(rng.uniform(*self.friction)))
-        scenery = DrawerArrangement(target, blockers, tuple(others), material)
-        return scenery if _blocked_sides(scenery) == [[side] for side in sides] else None
-
-    def as_configuration(self) -> Mapping[str, str | int | float]:
-        """The settings by name."""
-        return {name: str(value) for name, value in asdict(self).items()}
+        arrangement = DrawerArrangement(target, blockers, tuple(others), material)
+        stands = _blocked_sides(arrangement) == [[side] for side in sides]
+        return arrangement if stands else None
 
 
 @dataclass(frozen=True)
-class PaperDrawerTasks:
+class PaperDrawerTasks(TaskSettings):
     """The single start state of the reference."""
 
+    # In the configuration that bags record, arrangements go by this name.
     scenery: DrawerArrangement = field(
         default_factory=lambda: DrawerArrangement(
             target=(MIDDLE, 0.0, 0.0),
@@ -173,30 +167,23 @@ class PaperDrawerTasks:
         """That state."""
         return self.scenery.task()
 
-    def as_configuration(self) -> Mapping[str, str | int | float]:
-        """The settings by name."""
-        return {name: str(value) for name, value in asdict(self).items()}
-
 
 def _between(one: PlanarPose, other: PlanarPose) -> float:
     return math.hypot(one[0] - other[0], one[1] - other[1])
 
 
-def _blocked_sides(scenery: DrawerArrangement) -> list[list[int]]:
+def _blocked_sides(arrangement: DrawerArrangement) -> list[list[int]]:
     """The sides of the target block that each blocker blocks."""
-    state = scenery.task().initial_state
-    blocking = (
-        blocking_relations(FingerClearance(), state).blocking[:, 1 : 1 + len(scenery.blockers)]
-        >= 0.0
-    )
-    return [np.flatnonzero(sides).tolist() for sides in blocking.T]
+    relations = blocking_relations(FingerClearance(), arrangement.task().initial_state)
+    blocks = relations.blocking[:, 1 : 1 + len(arrangement.blockers)] >= 0.0
+    return [np.flatnonzero(sides).tolist() for sides in blocks.T]
 
 
 def _block(material: Material, placed: PlanarPose) -> Mapping[str, float]:
     x, y, yaw = placed
     half = CUBE_EDGE / 2
     return {
-        **body_features((x, y, BOTTOM + half), (0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))),
+        **body_features((x, y, BOTTOM + half), from_yaw(yaw)),
         **material_features(material),
         **_size(half, half, half),
     }

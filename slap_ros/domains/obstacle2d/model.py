@@ -8,6 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from slap_ros.domains.classifiers import always, is_held, strictly
 from slap_ros.relational import (
     Column,
     Feature,
@@ -38,20 +39,12 @@ TYPES = (ROBOT, BLOCK, SURFACE)
 # -- predicates ---------------------------------------------------------------------------------
 
 
-def _always(state: State, column: Column) -> Bools:
-    return np.ones((*state.data.shape[:-1], len(column.objects)), dtype=bool)
-
-
 def _is_target(state: State, surface: Column) -> Bools:
     return state.stack(surface, "is_target") > 0.5
 
 
 def _is_not_target(state: State, surface: Column) -> Bools:
     return state.stack(surface, "is_target") < 0.5
-
-
-def _is_held(state: State, _: Column, block: Column) -> Bools:
-    return state.stack(block, "held") > 0.5
 
 
 def _reach(state: State, block: Column, surface: Column) -> Array:
@@ -103,7 +96,7 @@ def _columns_of(layout: Layout, kind: Type) -> list[Column]:
 def _on_margin(state: State, block: Column, surface: Column) -> Array:
     """On a target area: inside it. On the table: at rest and off every target area."""
     overlaps = [_overlap_margin(state, block, other) for other in _each(state, SURFACE)]
-    off_targets = _strictly(-np.max(overlaps, axis=0))
+    off_targets = strictly(-np.max(overlaps, axis=0))
     on_table = np.minimum(_rest_margin(state, block), off_targets)
     inside = _inside_margin(state, block, surface)
     return np.where(_is_target(state, surface), inside, on_table)
@@ -111,12 +104,7 @@ def _on_margin(state: State, block: Column, surface: Column) -> Array:
 
 def _clear_margin(state: State, surface: Column) -> Array:
     overlaps = [_overlap_margin(state, block, surface) for block in _each(state, BLOCK)]
-    return _strictly(-np.max(overlaps, axis=0))
-
-
-def _strictly(margin: Array) -> Array:
-    """Make a negated margin false at 0, where the original still holds."""
-    return margin - np.finfo(np.float64).tiny
+    return strictly(-np.max(overlaps, axis=0))
 
 
 def _gripper_empty(state: State, _: Column) -> Bools:
@@ -125,14 +113,14 @@ def _gripper_empty(state: State, _: Column) -> Bools:
     return empty
 
 
-IS_ROBOT = Predicate("IsRobot", (ROBOT,), _always)
-IS_BLOCK = Predicate("IsBlock", (BLOCK,), _always)
-IS_SURFACE = Predicate("IsSurface", (SURFACE,), _always)
+IS_ROBOT = Predicate("IsRobot", (ROBOT,), always)
+IS_BLOCK = Predicate("IsBlock", (BLOCK,), always)
+IS_SURFACE = Predicate("IsSurface", (SURFACE,), always)
 IS_TARGET = Predicate("IsTarget", (SURFACE,), _is_target)
 NOT_IS_TARGET = Predicate("NotIsTarget", (SURFACE,), _is_not_target)
 ON = Predicate.threshold("On", (BLOCK, SURFACE), _on_margin)
 OVERLAP = Predicate.threshold("Overlap", (BLOCK, SURFACE), _overlap_margin)
-HOLDING = Predicate("Holding", (ROBOT, BLOCK), _is_held)
+HOLDING = Predicate("Holding", (ROBOT, BLOCK), is_held)
 GRIPPER_EMPTY = Predicate("GripperEmpty", (ROBOT,), _gripper_empty)
 CLEAR = Predicate.threshold("Clear", (SURFACE,), _clear_margin)
 PREDICATES = (

@@ -5,13 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
 from slap_ros.core import Task
 from slap_ros.domains.obstacle2d.model import BLOCK, BLOCK_SIZE, IS_TARGET, ON, ROBOT, SURFACE
 from slap_ros.domains.obstacle2d.skills import nearest_free_place
+from slap_ros.domains.variation import TaskSettings
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.relational import GroundAtom, Object, State
 
@@ -38,7 +39,7 @@ def target_block_in_target_area(state: State) -> frozenset[GroundAtom]:
 
 
 @dataclass(frozen=True)
-class RandomObstacle2DTasks:
+class RandomObstacle2DTasks(TaskSettings):
     """Everything sampled anew for each task. Lengths in m."""
 
     bystanders: tuple[int, int] = (0, 2)  # how many blocks stand about besides, inclusive
@@ -77,13 +78,9 @@ class RandomObstacle2DTasks:
         obstacle = task.initial_state.layout.object("block2")
         return task if nearest_free_place(task.initial_state, obstacle) is not None else None
 
-    def as_configuration(self) -> Mapping[str, str | int | float]:
-        """The settings by name."""
-        return {name: str(value) for name, value in asdict(self).items()}
-
 
 @dataclass(frozen=True)
-class PaperObstacle2DTasks:
+class PaperObstacle2DTasks(TaskSettings):
     """The reference's start states: one scene, the obstacle at one of three places."""
 
     robot: tuple[float, float] = (0.5, 1.0)  # m
@@ -95,10 +92,6 @@ class PaperObstacle2DTasks:
         """One of the start states."""
         obstacle_x = float(rng.choice(self.obstacle_x))
         return make_task(self.robot, self.target_x, [self.target_block_x, obstacle_x])
-
-    def as_configuration(self) -> Mapping[str, str | int | float]:
-        """The settings by name."""
-        return {name: str(value) for name, value in asdict(self).items()}
 
 
 SETTINGS: Mapping[str, RandomObstacle2DTasks | PaperObstacle2DTasks] = {

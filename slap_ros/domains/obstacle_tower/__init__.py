@@ -3,23 +3,21 @@
 """Obstacle Tower: put a block on a target on which a tower of other blocks stands (SLAP §5).
 
 A Panda at the origin, a table before it; x to the front, z up, m and rad. Read on in this order:
-``things`` (types), ``lying`` (what lies on what), ``model`` (predicates, operators), ``tasks``,
-``skills``. The world is that of ``slap_ros.physics``.
+``features`` (types), ``support`` (what lies on what), ``predicates``, ``operators``, ``scene``,
+``tasks``, ``skills``. The world is that of ``slap_ros.physics``.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from dataclasses import replace
 from types import MappingProxyType
 
-from slap_ros.core import ActionSpace, Display, Domain, Execution, Learning
-from slap_ros.domains.obstacle_tower import model, skills, tasks
+from slap_ros.core import Display, Domain, Execution, Learning
+from slap_ros.domains.obstacle_tower import features, operators, predicates, skills, tasks
 from slap_ros.domains.obstacle_tower.learner_interface import LEARNER_INTERFACE
 from slap_ros.domains.obstacle_tower.scene import scene_of
+from slap_ros.domains.tabletop.presets import ACTION_SPACES, TIMINGS
 from slap_ros.domains.tabletop.settling import settling
-from slap_ros.domains.tabletop.timing import FixedStepTiming, SpeedLimitTiming, Timing
 from slap_ros.domains.tabletop.visualization import animation, visible_arm, visible_bodies
 from slap_ros.domains.variation import varied
 from slap_ros.physics.features import ROBOT
@@ -30,23 +28,17 @@ SETTINGS: Mapping[str, tasks.RandomTowerTasks | tasks.PaperTowerTasks] = {
     "fair": tasks.RandomTowerTasks(),
     "paper": tasks.PaperTowerTasks(),
 }
-# The reference has no limit to what its planned motions do in a step, and jumps by 3 rad.
-UNLIMITED_ACTION_SPACE = replace(
-    ACTION_SPACE, low=(*(-math.pi,) * 7, -1.0), high=(*(math.pi,) * 7, 1.0)
-)
-ACTIONS: Mapping[str, ActionSpace] = {"fair": ACTION_SPACE, "paper": UNLIMITED_ACTION_SPACE}
-TIMINGS: Mapping[str, Timing] = {"fair": SpeedLimitTiming(), "paper": FixedStepTiming()}
 
 
 def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Domain:
     """The domain: preset ``fair`` samples different tasks, ``paper`` has the reference's one."""
-    settings, actions = varied(SETTINGS[preset], changes), ACTIONS[preset]
+    settings, actions = varied(SETTINGS[preset], changes), ACTION_SPACES[preset]
     return Domain(
         name="obstacle_tower",
         preset=preset,
-        types=model.TYPES,
-        predicates=model.PREDICATES,
-        operators=model.OPERATORS,
+        types=features.TYPES,
+        predicates=predicates.PREDICATES,
+        operators=operators.OPERATORS,
         skills=skills.skills(TIMINGS[preset]),
         action_space=actions,
         sample_task=settings.sample,

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Obstacle Tower: the types of things, and where a state has their features."""
+"""Obstacle Tower: types, their features, and where the features are in a state's array."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ import numpy as np
 
 from slap_ros.domains.tabletop.footprints import HALVES, PARTS, Indices
 from slap_ros.domains.tabletop.state_access import HALF_NAMES
-from slap_ros.physics.features import BODY_FEATURES, MATERIAL_FEATURES, POSE_FEATURES
+from slap_ros.physics.features import BODY_FEATURES, MATERIAL_FEATURES, POSE_FEATURES, ROBOT
 from slap_ros.relational import Column, Feature, Layout, Object, Type
 
-CACHE_SIZE = 1024  # columns of objects, a layout
+CACHE_SIZE = 1024  # columns of objects, for each layout
 
 Asked = Column | tuple[Column, Column]
 Read = Callable[[Sequence[float]], tuple[Any, ...]]
@@ -31,14 +31,15 @@ THING_FEATURES = (
 THING = Type("thing")
 BLOCK = Type("block", (*BODY_FEATURES, *MATERIAL_FEATURES, *THING_FEATURES), THING)
 SURFACE = Type("surface", (*POSE_FEATURES, *THING_FEATURES), THING)
+TYPES = (ROBOT, THING, BLOCK, SURFACE)
 
 
 @dataclass(frozen=True, eq=False)
 class TowerObjectIndex:
-    """The blocks, then the surfaces of a layout, and where their features are."""
+    """The things of a layout, blocks before surfaces, and where their features are."""
 
     blocks: int  # how many
-    objects: tuple[Object, ...]
+    things: tuple[Object, ...]
     quaternions: Indices  # (things, 4), parts as read
     places: Indices  # (things, 2): x, y
     halves: Indices  # (things, 9), as in TO_EDGES
@@ -47,17 +48,17 @@ class TowerObjectIndex:
     is_target: Indices
     held: Indices  # (blocks,)
     boxes: tuple[Read, ...]  # of each, what a ScalarBox is made of
-    _numbers: dict[Asked, Indices] = field(default_factory=dict)
+    _positions: dict[Asked, Indices] = field(default_factory=dict)
 
     @staticmethod
     @lru_cache(maxsize=256)
     def of(layout: Layout) -> TowerObjectIndex:
-        """Those of a layout."""
+        """The index of a layout."""
         blocks = layout.of_type(BLOCK)
-        objects = (*blocks, *layout.of_type(SURFACE))
+        things = (*blocks, *layout.of_type(SURFACE))
 
-        def where(*features: str) -> Indices:
-            return np.array([layout.columns(objects, name) for name in features])
+        def columns(*features: str) -> Indices:
+            return np.array([layout.columns(things, name) for name in features])
 
         def box(obj: Object) -> Read:
             names = ("x", "y", "z", *PARTS, *HALF_NAMES)
@@ -65,34 +66,34 @@ class TowerObjectIndex:
 
         return TowerObjectIndex(
             len(blocks),
-            objects,
-            quaternions=where(*PARTS).T,
-            places=where("x", "y").T,
-            halves=where(*HALVES).T,
-            z=where("z")[0],
-            is_movable=where("is_movable")[0],
-            is_target=where("is_target")[0],
+            things,
+            quaternions=columns(*PARTS).T,
+            places=columns("x", "y").T,
+            halves=columns(*HALVES).T,
+            z=columns("z")[0],
+            is_movable=columns("is_movable")[0],
+            is_target=columns("is_target")[0],
             held=layout.columns(blocks, "held"),
-            boxes=tuple(box(obj) for obj in objects),
+            boxes=tuple(box(obj) for obj in things),
         )
 
-    def numbers(self, column: Column) -> Indices:
-        """The objects of a column as numbers."""
-        numbers = self._numbers.get(column)
-        if numbers is None:
-            numbers = np.array([self.objects.index(obj) for obj in column.objects])
-            self._remember(column, numbers)
-        return numbers
+    def positions(self, column: Column) -> Indices:
+        """At which positions among the things those of a column are."""
+        positions = self._positions.get(column)
+        if positions is None:
+            positions = np.array([self.things.index(obj) for obj in column.objects])
+            self._cache(column, positions)
+        return positions
 
     def pairs(self, blocks: Column, things: Column) -> Indices:
-        """The numbers of pairs of a block and a thing."""
-        pairs = self._numbers.get((blocks, things))
+        """``position of the block * number of things + position of the thing``, for each pair."""
+        pairs = self._positions.get((blocks, things))
         if pairs is None:
-            pairs = self.numbers(blocks) * len(self.objects) + self.numbers(things)
-            self._remember((blocks, things), pairs)
+            pairs = self.positions(blocks) * len(self.things) + self.positions(things)
+            self._cache((blocks, things), pairs)
         return pairs
 
-    def _remember(self, asked: Asked, numbers: Indices) -> None:
-        if len(self._numbers) == CACHE_SIZE:
-            self._numbers.clear()
-        self._numbers[asked] = numbers
+    def _cache(self, asked: Asked, positions: Indices) -> None:
+        if len(self._positions) == CACHE_SIZE:
+            self._positions.clear()
+        self._positions[asked] = positions

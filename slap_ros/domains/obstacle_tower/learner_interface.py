@@ -8,7 +8,12 @@ import numpy as np
 
 from slap_ros.core import LearnerInterface
 from slap_ros.domains.obstacle_tower.features import BLOCK, SURFACE
-from slap_ros.domains.obstacle_tower.model import GRIPPER_EMPTY, HOLDING, NOT_HOLDING, NOTHING_ON
+from slap_ros.domains.obstacle_tower.predicates import (
+    GRIPPER_EMPTY,
+    HOLDING,
+    NOT_HOLDING,
+    NOTHING_ON,
+)
 from slap_ros.domains.tabletop import observation
 from slap_ros.physics.features import ROBOT
 from slap_ros.physics.scene import CUBE_EDGE, TABLE_TOP

@@ -16,7 +16,7 @@ from slap_ros.domains.tabletop.grasps import grasps_along_faces, grasps_to_stand
 from slap_ros.domains.tabletop.placements import GAP, Placement, free_placements
 from slap_ros.domains.tabletop.planning_scene import PlanningScene
 from slap_ros.domains.tabletop.skills import GRIP, RELEASE, TransitSkill
-from slap_ros.domains.tabletop.state_access import box_of, held_body, pose_of, top_of, yaw_of
+from slap_ros.domains.tabletop.state_access import box_of, held_body, pose_of, yaw_of
 from slap_ros.domains.tabletop.timing import Timing
 from slap_ros.domains.tabletop.transit import Transit, memoized
 from slap_ros.errors import SkillNotApplicableError
@@ -53,7 +53,7 @@ def _way_to_place(state: State, place: Placement, yaw: float, thing: Object) -> 
     block = held_body(state)
     if block is None:
         raise SkillNotApplicableError("nothing is held")
-    top = top_of(box_of(state, thing))
+    top = box_of(state, thing).top
     yaws = quarter_turns(yaw)
     ends = grasps_to_stand(state, box_of(state, block), place, top, yaws)
     return Transit(PLANNING_SCENE, state, ends, touched=(thing,))

@@ -1,24 +1,35 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Obstacle Tower: what lies on what. Lengths in m, base frame.
+"""Obstacle Tower: which thing supports which block. Lengths in m, base frame.
 
-Of many states, or as margins, by numpy; of one state, as truths, in plain floats: few things are
-at a height to touch, and one call of numpy takes longer than to find out which.
+For one block b and one thing t (another block, the table or a target), in plain terms:
+
+- b *touches* t if ``|bottom of b - top of t| <= TOUCHING``.
+- b *covers* t if, seen from above and along both faces of t,
+  ``|distance of the middles| <= half the width of b + half the width of t``.
+- b is *on* a target if it touches it and its middle is at most CENTRED from the target's; on
+  another block if it touches and covers it; on the table if so and it is on no target.
+- There is *room* on a target or a block if no block touches and covers it; on the table, always.
+
+Of many states, or as margins, numpy computes this; of one state, as truths, plain floats do: few
+things are at a height to touch, and one call of numpy takes longer than to find out which.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from slap_ros.domains.classifiers import strictly
 from slap_ros.domains.obstacle_tower.features import TowerObjectIndex
 from slap_ros.domains.tabletop.footprints import (
     TO_EDGES,
+    Complex,
     along_axes,
     complex_of,
-    strictly,
     turned_back,
     unpinched,
     widths,
@@ -33,60 +44,68 @@ CENTRED = 0.015  # m, distance from the target's middle at which a block still i
 
 
 class SupportRelations(NamedTuple):
-    """How everything lies in a state, as margins in m."""
+    """The relations of one state or of many, as margins in m."""
 
-    things: TowerObjectIndex
+    objects: TowerObjectIndex
     on: Array  # of blocks on things, shape (..., blocks * things)
     room: Array  # for a block on things, shape (..., things)
 
 
 @cache_latest
 def support_relations(state: State) -> SupportRelations:
-    """How everything lies: all at once, as predicates share most of it.
+    """All margins at once, as predicates share most of the work.
 
     Horizontal vectors are complex numbers: turned by a product, seen along both axes at once.
     """
-    things, data = TowerObjectIndex.of(state.layout), state.data
-    blocks = slice(things.blocks)
-    q = data.take(things.quaternions, axis=-1)
+    objects, data = TowerObjectIndex.of(state.layout), state.data
+    blocks = slice(objects.blocks)
+    q = data.take(objects.quaternions, axis=-1)
     products = (q[..., None] * q[..., None, :]).reshape(*q.shape[:-1], 16)
-    edges = products @ TO_EDGES * data.take(things.halves, axis=-1)
-    is_movable = data.take(things.is_movable, axis=-1) > 0.5
-    is_target = data.take(things.is_target, axis=-1) > 0.5
+    edges = products @ TO_EDGES * data.take(objects.halves, axis=-1)
 
-    # A block touches what its lowest point is at the height of.
-    z, height = data.take(things.z, axis=-1), np.add.reduce(np.abs(edges[..., 6:]), axis=-1)
+    z, height = data.take(objects.z, axis=-1), np.add.reduce(np.abs(edges[..., 6:]), axis=-1)
     gap = (z - height)[..., blocks, None] - (z + height)[..., None, :]
     touches = unpinched(TOUCHING - np.abs(gap))
 
-    # It covers what it is over, seen along the axes of that thing.
-    places = complex_of(data.take(things.places, axis=-1))[..., 0]
-    way = places[..., blocks, None] - places[..., None, :]
-    back = turned_back(q, edges)[..., None, :]
-    width = widths(complex_of(edges[..., :6])[..., None, :], back)
-    own_width = np.diagonal(width, axis1=-3, axis2=-2).swapaxes(-1, -2)[..., None, :, :]
-    ahead_aside = width[..., blocks, :, :] + own_width - along_axes(way * back)
-    covers = np.minimum(ahead_aside[..., 0], ahead_aside[..., 1])
+    places = complex_of(data.take(objects.places, axis=-1))[..., 0]
+    offset = places[..., blocks, None] - places[..., None, :]
+    covers = _covers(blocks, offset, q, edges)
 
-    # It lies in the middle of a target; elsewhere on the table; or on a part of another block.
-    centred = CENTRED - np.abs(way)
-    to_target = np.where(is_target[..., None, :], centred, -1.0)[..., things.blocks :]
-    elsewhere = strictly(-np.maximum.reduce(to_target, axis=-1, initial=-1.0))[..., None]
-    on_table = np.minimum(covers, elsewhere)
+    is_movable = data.take(objects.is_movable, axis=-1) > 0.5
+    is_target = data.take(objects.is_target, axis=-1) > 0.5
+    centred = CENTRED - np.abs(offset)
+    to_target = np.where(is_target[..., None, :], centred, -1.0)[..., objects.blocks :]
+    off_target = strictly(-np.maximum.reduce(to_target, axis=-1, initial=-1.0))[..., None]
+    on_table = np.minimum(covers, off_target)
     off_targets = np.where(is_movable[..., None, :], covers, on_table)
     sideways = np.where(is_target[..., None, :], centred, off_targets)
     on = np.minimum(touches, sideways)
 
-    # On the table there is always room; on targets and blocks for one block only.
     over = np.maximum.reduce(np.minimum(touches, covers), axis=-2, initial=-1.0)
     room = np.where(is_movable | is_target, strictly(-over), 1.0)
-    return SupportRelations(things, on.reshape(*on.shape[:-2], -1), room)
+    return SupportRelations(objects, on.reshape(*on.shape[:-2], -1), room)
+
+
+def _covers(blocks: slice, offset: Complex, q: Array, edges: Array) -> Array:
+    """How far blocks cover things, seen along the axes of the thing: shape (..., blocks, things).
+
+    Args:
+        blocks: Which of the things are blocks.
+        offset: From things to blocks, m, shape (..., blocks, things).
+        q: Parts of the things' quaternions, shape (..., things, 4).
+        edges: Of the things, m, shape (..., things, 9), as ``TO_EDGES`` gives them.
+    """
+    back = turned_back(q, edges)[..., None, :]
+    width = widths(complex_of(edges[..., :6])[..., None, :], back)
+    own_width = np.diagonal(width, axis1=-3, axis2=-2).swapaxes(-1, -2)[..., None, :, :]
+    ahead_aside = width[..., blocks, :, :] + own_width - along_axes(offset * back)
+    return np.minimum(ahead_aside[..., 0], ahead_aside[..., 1])
 
 
 class SupportTruths(NamedTuple):
-    """The same of a single state, as truths, and what is held."""
+    """The relations of a single state, as truths, and what is held."""
 
-    things: TowerObjectIndex
+    objects: TowerObjectIndex
     on: Bools  # of blocks on things, shape (blocks * things,)
     room: Bools  # for a block on things, shape (things,)
     held: Bools  # shape (blocks,)
@@ -95,17 +114,17 @@ class SupportTruths(NamedTuple):
 
 @cache_latest
 def support_truths(state: State) -> SupportTruths:
-    """What lies on what in a single state: what is at the right height is looked at closely."""
-    things, values = TowerObjectIndex.of(state.layout), state.data.tolist()
-    boxes = [ScalarBox(*read(values)) for read in things.boxes]
+    """The truths of a single state; only what is at a height to touch is examined closely."""
+    objects, values = TowerObjectIndex.of(state.layout), state.data.tolist()
+    boxes = [ScalarBox(*read(values)) for read in objects.boxes]
     is_movable, is_target, held = (
         [values[i] > 0.5 for i in label.tolist()]
-        for label in (things.is_movable, things.is_target, things.held)
+        for label in (objects.is_movable, objects.is_target, objects.held)
     )
-    targets = [boxes[i] for i in range(things.blocks, len(boxes)) if is_target[i]]
-    on = np.zeros((things.blocks, len(boxes)), dtype=bool)
+    targets = [boxes[i] for i in range(objects.blocks, len(boxes)) if is_target[i]]
+    on = np.zeros((objects.blocks, len(boxes)), dtype=bool)
     room = np.ones(len(boxes), dtype=bool)
-    for number, block in enumerate(boxes[: things.blocks]):
+    for number, block in enumerate(boxes[: objects.blocks]):
         for i, thing in enumerate(boxes):
             if abs(block.bottom - thing.top) > TOUCHING:
                 continue
@@ -113,14 +132,15 @@ def support_truths(state: State) -> SupportTruths:
             if is_target[i]:
                 on[number, i] = _is_centred(block, thing)
             else:
-                on[number, i] = covers and (
-                    is_movable[i] or not any(_is_centred(block, target) for target in targets)
-                )
+                on[number, i] = covers and (is_movable[i] or not _is_on_any(block, targets))
             if covers and (is_movable[i] or is_target[i]):
                 room[i] = False
-    return SupportTruths(
-        things, on.reshape(-1), room, np.array(held, bool), np.array([not any(held)])
-    )
+    empty = np.array([not any(held)])
+    return SupportTruths(objects, on.reshape(-1), room, np.array(held, bool), empty)
+
+
+def _is_on_any(block: ScalarBox, targets: Sequence[ScalarBox]) -> bool:
+    return any(_is_centred(block, target) for target in targets)
 
 
 def _is_centred(block: ScalarBox, target: ScalarBox) -> bool:

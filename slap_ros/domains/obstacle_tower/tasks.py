@@ -12,10 +12,11 @@ import numpy as np
 
 from slap_ros.core import Task
 from slap_ros.domains.obstacle_tower.features import BLOCK, SURFACE
-from slap_ros.domains.obstacle_tower.model import NOT_IS_TARGET, ON
+from slap_ros.domains.obstacle_tower.predicates import NOT_IS_TARGET, ON
 from slap_ros.domains.tabletop.placements import GAP
+from slap_ros.domains.variation import TaskSettings
 from slap_ros.errors import InvalidParameterError, InvalidStateError
-from slap_ros.geometry.pose import Pose
+from slap_ros.geometry.pose import Pose, from_yaw
 from slap_ros.physics.features import (
     ROBOT,
     body_features,
@@ -53,7 +54,7 @@ class TowerArrangement:
         for number, place in enumerate(others, start=2):
             features[BLOCK(f"block{number}")] = _block(self.material, *place)
         x, y, yaw = self.target
-        plate = Pose((x, y, TABLE_TOP - PLATE_HALF[2]), _turn(yaw))
+        plate = Pose((x, y, TABLE_TOP - PLATE_HALF[2]), from_yaw(yaw))
         features[SURFACE("target")] = _surface(plate, PLATE_HALF, is_target=1.0)
         features[SURFACE("table")] = _surface(TABLE.pose, TABLE.half_extents_m, is_target=0.0)
         state = State.build(features)
@@ -74,7 +75,7 @@ def target_block_on_target(state: State) -> frozenset[GroundAtom]:
 
 
 @dataclass(frozen=True)
-class RandomTowerTasks:
+class RandomTowerTasks(TaskSettings):
     """Everything sampled anew for each task. Lengths in m, angles in rad, masses in kg."""
 
     obstacles: tuple[int, int] = (3, 3)  # blocks of the tower, inclusive
@@ -127,16 +128,12 @@ class RandomTowerTasks:
             f"the table has no room for {len(placed)} blocks that stand apart from the tower"
         )
 
-    def as_configuration(self) -> Mapping[str, str | int | float]:
-        """The settings by name."""
-        return {name: str(value) for name, value in asdict(self).items()}
-
 
 @dataclass(frozen=True)
-class PaperTowerTasks:
+class PaperTowerTasks(TaskSettings):
     """The single start state of the reference."""
 
-    scenery: TowerArrangement = TowerArrangement(
+    arrangement: TowerArrangement = TowerArrangement(
         target=(0.5, 0.0, 0.0),
         target_block=(0.375, -0.2, 0.0),
         tower=((0.5, 0.0, 0.0),) * 3,
@@ -144,11 +141,11 @@ class PaperTowerTasks:
 
     def sample(self, _: np.random.Generator) -> Task:
         """That state."""
-        return self.scenery.task()
+        return self.arrangement.task()
 
-    def as_configuration(self) -> Mapping[str, str | int | float]:
-        """The settings by name."""
-        return {name: str(value) for name, value in asdict(self.scenery).items()}
+    def as_configuration(self) -> Mapping[str, str]:
+        """The arrangement's parts by name."""
+        return {name: str(value) for name, value in asdict(self.arrangement).items()}
 
 
 def _block(
@@ -157,7 +154,7 @@ def _block(
     z = TABLE_TOP + CUBE_EDGE * (level + 0.5)
     half = CUBE_EDGE / 2
     return {
-        **body_features((x, y, z), _turn(yaw)),
+        **body_features((x, y, z), from_yaw(yaw)),
         **material_features(material),
         **_thing((half, half, half), is_movable=1.0, is_target=0.0),
     }
@@ -180,7 +177,3 @@ def _thing(
         "is_movable": is_movable,
         "is_target": is_target,
     }
-
-
-def _turn(yaw: float) -> tuple[float, float, float, float]:
-    return 0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2)

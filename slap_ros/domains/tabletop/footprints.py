@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from slap_ros.relational.state import Array
 
-TINY = float(np.finfo(np.float64).tiny)
 STEEPNESS = 50.0  # 1, of tolerances in margins: 4 mm count as 20 cm sideways
 
 Complex = NDArray[np.complex128]
@@ -74,8 +73,3 @@ def widths(edges: Complex, back: Complex) -> Array:
 def unpinched(tolerance: Array) -> Array:
     """A tolerance that, where it is kept, leaves a smallest margin to the distances sideways."""
     return np.maximum(tolerance, STEEPNESS * tolerance)
-
-
-def strictly(margin: Array) -> Array:
-    """Make a negated margin false at 0, where the original still holds."""
-    return margin - TINY

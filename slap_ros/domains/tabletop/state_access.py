@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from slap_ros.geometry.oriented_box import OrientedBox
-from slap_ros.geometry.pose import Pose, conjugate, rotate
+from slap_ros.geometry.pose import Pose, rotate
 from slap_ros.motion import Joints
 from slap_ros.physics.features import (
     BODY_FEATURES,
@@ -70,12 +70,6 @@ def box_of(state: State, obj: Object) -> OrientedBox:
     """An object that is a box, and says so by its features."""
     half_x, half_y, half_z = _features(state, obj, HALF_NAMES)
     return OrientedBox(pose_of(state, obj), (half_x, half_y, half_z))
-
-
-def top_of(box: OrientedBox) -> float:
-    """Height of a box's highest point."""
-    up = rotate(conjugate(box.pose.quaternion), (0.0, 0.0, 1.0))
-    return box.pose.position[2] + sum(abs(u) * h for u, h in zip(up, box.half, strict=True))
 
 
 def yaw_of(pose: Pose) -> float:

@@ -3,14 +3,13 @@
 """Draws ``images/seeing.png`` from a bag: what viewers are sent, drawn without one.
 
 slap run obstacle_tower --seed 1 --record BAG
-python docs/pictures.py BAG
+python -m tools.pictures.viewers BAG
 """
 
 from __future__ import annotations
 
 import sys
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -18,8 +17,9 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from slap_ros.bags import read_bag
 from slap_ros.messages.decode import stamp_ns
+from tools.imports import ROOT
 
-OUTPUT = Path(__file__).parent / "images" / "seeing.png"
+OUTPUT = ROOT / "docs" / "images" / "seeing.png"
 MOMENTS = (0.0, 0.55, 1.0)  # of the run
 CORNERS = np.array(list(product((-0.5, 0.5), repeat=3)))
 AROUND = (0, 1, 3, 2)  # order of a face's corners

@@ -1,9 +1,10 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What MkDocs is told beyond its configuration: pages that are made, links that leave the docs.
+"""What MkDocs is told beyond ``mkdocs.yml``: pages that are made, links that leave the docs.
 
-The README is the first page. The interface reference is made from the ``.msg``, ``.srv`` and
-``.action`` files, whose comments say what everything means.
+The README is the first page; changelog and contributing guide are pages as well. The reference of
+the ROS interfaces is made from the ``.msg``, ``.srv`` and ``.action`` files, whose comments say
+what everything means, and that of the Python API from the docstrings, one page per package.
 """
 
 from __future__ import annotations
@@ -23,26 +24,49 @@ PARTS = {
     "srv": ("Request", "Response"),
     "action": ("Goal", "Result", "Feedback"),
 }
+COPIED = {
+    "index.md": "README.md",
+    "contributing.md": "CONTRIBUTING.md",
+    "changelog.md": "CHANGELOG.md",
+}
+RESULTS = ROOT / "docs" / "results"
 LINK = re.compile(r"\]\((?P<target>[^)#:]+)(?P<anchor>#[^)]*)?\)")
 SECTION = re.compile(r"^---\s*$", re.MULTILINE)
 FIELD = re.compile(r"^(?P<type>\S+)\s+(?P<name>\w+)(=(?P<value>\S+))?\s*(#\s*(?P<comment>.*))?$")
 
 
+def on_config(config: Any) -> Any:
+    """Complete the navigation by the pages of which there is one per package or study."""
+    for section in config.nav:
+        for title, entries in section.items():
+            if title == "Reference":
+                entries.append({"Python API": [{name: page} for name, page in api_pages().items()]})
+            elif title == "Results":
+                entries += [f"results/{path.name}" for path in sorted(RESULTS.glob("*_*.md"))]
+                entries.append("results/soak.md")
+    return config
+
+
 def on_files(files: Files, config: Any) -> Files:
     """Add the pages that are made."""
-    files.append(File.generated(config, "index.md", content=first_page()))
-    files.append(File.generated(config, "interfaces.md", content=interface_reference()))
+    made = {page: copied(source) for page, source in COPIED.items()}
+    made["interfaces.md"] = interface_reference()
+    made |= {page: api_reference(name) for name, page in api_pages().items()}
+    for page, content in made.items():
+        files.append(File.generated(config, page, content=content))
     return files
 
 
 def on_page_markdown(markdown: str, page: Any, config: Any, **_: Any) -> str:
     """Show what a link to a source file points to, as that is not part of the site."""
     folder = (Path(config.docs_dir) / page.file.src_uri).parent
+    up = "../" * page.file.src_uri.count("/")
+    pages = {ROOT / source: page for page, source in COPIED.items()}
 
     def shown(match: re.Match[str]) -> str:
         target = (folder / match["target"]).resolve()
-        if target == ROOT / "README.md":
-            return f"]({'../' * page.file.src_uri.count('/')}index.md{match['anchor'] or ''})"
+        if target in pages:
+            return f"]({up}{pages[target]}{match['anchor'] or ''})"
         if target.is_relative_to(config.docs_dir) or not target.exists():
             return match[0]
         return f"] (`{target.relative_to(ROOT)}`)"
@@ -50,9 +74,9 @@ def on_page_markdown(markdown: str, page: Any, config: Any, **_: Any) -> str:
     return LINK.sub(shown, markdown)
 
 
-def first_page() -> str:
-    """The README, seen from the docs."""
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+def copied(source: str) -> str:
+    """A page from the root of the project, its links seen from the docs."""
+    text = (ROOT / source).read_text(encoding="utf-8")
 
     def moved(match: re.Match[str]) -> str:
         target, anchor = match["target"], match["anchor"] or ""
@@ -60,6 +84,33 @@ def first_page() -> str:
         return f"]({target.removeprefix('docs/') if inside else f'../{target}'}{anchor})"
 
     return LINK.sub(moved, text)
+
+
+def api_pages() -> dict[str, str]:
+    """The page of each package and module right below ``slap_ros``."""
+    names = sorted(
+        path.stem
+        for path in (ROOT / "slap_ros").iterdir()
+        if (not path.name.startswith(("_", ".")) and (path / "__init__.py").is_file())
+        or path.suffix == ".py"
+    )
+    return {f"slap_ros.{name}": f"api/{name}.md" for name in names if not name.startswith("_")}
+
+
+def api_reference(package: str) -> str:
+    """A package's page: what its docstring says, then module by module."""
+    folder = ROOT / package.replace(".", "/")
+    modules = [
+        path.relative_to(ROOT).with_suffix("")
+        for path in sorted(folder.rglob("*.py"))
+        if not path.name.startswith("_")
+    ]
+    alone = not modules  # a module, not a package
+    lines = [f"# {package}", "", f"::: {package}", "    options:", "      show_root_heading: false"]
+    lines += [] if alone else ["      members: false"]
+    for module in modules:
+        lines += ["", f"::: {'.'.join(module.parts)}"]
+    return "\n".join(lines) + "\n"
 
 
 def interface_reference() -> str:

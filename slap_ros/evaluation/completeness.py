@@ -1,0 +1,87 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a log of a run lacks: states, plans and events that others presuppose."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from itertools import pairwise
+
+from slap_ros.messages.events import PlanEventKind as Kind
+from slap_ros.messages.protocols import PlanEventMessage
+
+# What may follow upon an event of a run. A planner that was started again begins with plan 0.
+FOLLOWERS: Mapping[int, Collection[Kind]] = {
+    Kind.PLANNING_STARTED: (Kind.PLANNED, Kind.PLANNING_STARTED, Kind.FAILED),
+    Kind.PLANNED: (Kind.EDGE_STARTED, Kind.SOLVED, Kind.FAILED),
+    Kind.EDGE_STARTED: (Kind.EDGE_REACHED, Kind.DIVERGED, Kind.FAILED),
+    Kind.EDGE_REACHED: (Kind.EDGE_STARTED, Kind.SOLVED, Kind.FAILED),
+    Kind.DIVERGED: (Kind.PLANNING_STARTED, Kind.FAILED),
+}
+
+
+def missing_states(first: int, last: int, recorded: Collection[int]) -> str | None:
+    """Which states of a run are missing.
+
+    Args:
+        first: The run's first environment step.
+        last: Its last.
+        recorded: The steps of the states that there are, of the whole episode.
+
+    Returns:
+        How many of how many, and which is the first; None if all are there.
+    """
+    missing = [step for step in range(first, last + 1) if step not in recorded]
+    if not missing:
+        return None
+    total = last - first + 1
+    if len(missing) == total:
+        return f"all {total} states are missing"
+    return f"{len(missing)} of {total} states are missing, the first that of step {missing[0]}"
+
+
+def missing_events(events: Sequence[PlanEventMessage]) -> Iterator[str]:
+    """Each place of a run at which a plan event is missing, in order.
+
+    Args:
+        events: The run's plan events, in order; the first is PLANNING_STARTED.
+    """
+    for before, after in pairwise(events):
+        if not _may_follow(before, after):
+            yield (f"a plan event is missing between {_told(before)} and {_told(after)}")
+
+
+def planning_is_whole(events: Sequence[PlanEventMessage]) -> bool:
+    """Whether a run's plan events tell of each plan when it was begun and when it was there."""
+    for before, after in pairwise(events):
+        begins = after.kind == Kind.PLANNING_STARTED
+        if (after.kind == Kind.PLANNED) > (before.kind == Kind.PLANNING_STARTED):
+            return False
+        if before.kind == Kind.PLANNING_STARTED and after.kind not in FOLLOWERS[before.kind]:
+            return False
+        if begins and after.plan_number not in (0, before.plan_number + 1):
+            return False
+        if not begins and after.plan_number != before.plan_number:
+            return False
+    return True
+
+
+def _may_follow(before: PlanEventMessage, after: PlanEventMessage) -> bool:
+    restarted = after.kind == Kind.PLANNING_STARTED and after.plan_number == 0
+    if restarted:
+        return True
+    if after.kind not in FOLLOWERS.get(before.kind, ()):
+        return False
+    if after.kind == Kind.PLANNING_STARTED:
+        return after.plan_number == before.plan_number + 1
+    if after.kind == Kind.EDGE_STARTED:
+        return after.edge == (0 if before.kind == Kind.PLANNED else before.edge + 1)
+    if after.kind in (Kind.EDGE_REACHED, Kind.DIVERGED):
+        return after.edge == before.edge
+    return True
+
+
+def _told(event: PlanEventMessage) -> str:
+    kind = Kind(event.kind)
+    edge = f" {event.edge}" if kind in (Kind.EDGE_STARTED, Kind.EDGE_REACHED) else ""
+    return f"{kind.name}{edge} at step {event.step}"
