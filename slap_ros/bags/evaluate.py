@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Offline evaluation: the metrics of a bag's runs, and perception put to the test."""
+"""Offline evaluation: the metrics of a bag's runs, and a check of what was perceived."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class AtomMismatch:
 
 @dataclass(frozen=True)
 class BagEvaluation:
-    """What a bag tells."""
+    """Metrics of a bag's runs, and how its atoms compare with recomputed ones."""
 
     runs: list[RunMetrics]
     mismatches: list[AtomMismatch]
@@ -40,7 +40,7 @@ class BagEvaluation:
 
 @dataclass(frozen=True)
 class BagContents:
-    """A bag's messages, sorted by what they tell."""
+    """A bag's messages, sorted by run and by episode."""
 
     bag: Bag
     log: RunLog
@@ -85,7 +85,7 @@ def evaluate_bag(path: Path | str) -> BagEvaluation:
 
 
 def evaluate(reading: BagContents, domain: Domain | None) -> BagEvaluation:
-    """What a bag tells; without its domain, no atoms are recomputed.
+    """Evaluate a bag that was read; without its domain, no atoms are recomputed.
 
     Raises:
         InvalidStateError: It has a state that its domain cannot have.

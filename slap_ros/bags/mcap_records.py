@@ -113,7 +113,7 @@ class RecordFields:
         return self.take(self.u32())
 
     def string(self) -> str:
-        """A string."""
+        """A string field, without its length."""
         return bytes(self.prefixed()).decode()
 
     def string_map(self) -> dict[str, str]:

@@ -143,6 +143,11 @@ class McapWriter:
     def write(self, channel: int, stamp_ns: int, data: bytes | bytearray | memoryview) -> None:
         """Append a message.
 
+        Args:
+            channel: Its number, from :meth:`add_channel`.
+            stamp_ns: When it was received, ns since the epoch.
+            data: The message, serialised.
+
         Raises:
             OSError: There is no room; nothing was written.
         """

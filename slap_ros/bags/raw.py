@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 @dataclass(frozen=True)
 class MessageDefinition:
-    """What a bag itself says of a message type; empty where it says nothing."""
+    """The definition of a message type that a bag carries; empty where it carries none."""
 
     encoding: str = ""  # ros2msg or ros2idl
     text: str = ""

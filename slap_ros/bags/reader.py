@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Reading bags, ours and those of ``ros2 bag record``, damaged ones as far as they go."""
+"""Reading bags, ours and those of ``ros2 bag record``, damaged ones up to the damage."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The episodes of a bag: what the simulator showed and was told, as core objects."""
+"""The episodes of a bag: states, atoms and commands as core objects."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Recording:
         return recording
 
     def add(self, type_name: str, message: object) -> None:
-        """Take a message; types that tell nothing of an episode do not count."""
+        """Take a message; types that belong to no episode are left out."""
         if type_name in self._add:
             self._add[type_name](message)
 

@@ -72,14 +72,21 @@ class Extent:
 
     @property
     def duration_ns(self) -> int:
-        """From the first message to the last."""
+        """The time from the first message to the last."""
         return max(0, self.end_ns - self.start_ns)
 
 
 def bag_information(
     file_name: str, topics: list[TopicRecord], extent: Extent, custom: Mapping[str, str]
 ) -> dict[str, Any]:
-    """What ``metadata.yaml`` says of a bag of one MCAP file."""
+    """The content of ``metadata.yaml`` for a bag of one MCAP file.
+
+    Args:
+        file_name: Of the MCAP file.
+        topics: In the order of their channels.
+        extent: Number of messages and the time from the first to the last.
+        custom: What the run was made with.
+    """
     when = {
         "starting_time": {"nanoseconds_since_epoch": extent.start_ns},
         "duration": {"nanoseconds": extent.duration_ns},

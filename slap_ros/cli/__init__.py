@@ -10,6 +10,7 @@ from slap_ros import __version__
 from slap_ros.cli import bag, check, domains, evaluate, plan, report, study, train
 from slap_ros.cli import doctor as doctor_command
 from slap_ros.cli.console import exits
+from slap_ros.cli.options import flat_options
 
 app = typer.Typer(
     name="slap",
@@ -25,7 +26,7 @@ app = typer.Typer(
 app.command("plan")(exits(plan.plan))
 app.command("evaluate")(exits(evaluate.evaluate))
 app.command("report")(exits(report.report))
-app.command("train")(exits(train.train))
+app.command("train")(exits(flat_options(train.train)))
 app.add_typer(study.app, name="study")
 app.add_typer(bag.app, name="bag")
 app.command("check")(exits(check.check))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where words for people go: stderr. Where data goes: stdout."""
+"""Messages for people go to stderr, data goes to stdout."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def exits(command: Callable[P, int | None]) -> Callable[P, None]:
 
 
 def print_json(data: Any) -> None:
-    """Data on stdout."""
+    """Write data as one line of JSON to stdout."""
     sys.stdout.write(json.dumps(data, allow_nan=False) + "\n")
     sys.stdout.flush()
 

@@ -32,7 +32,13 @@ def check_renderable(domain: Domain, path: Path) -> None:
 def render(domain: Domain, states: Sequence[State], path: Path) -> None:
     """Write an animation.
 
+    Args:
+        domain: Of the states.
+        states: One per frame.
+        path: The file; its ending gives the format.
+
     Raises:
+        InvalidParameterError: The domain has no pictures.
         StorageFullError: It cannot be written.
     """
     if domain.display.animate is None:

@@ -22,7 +22,7 @@ def report(
     ],
     output: Annotated[Path, typer.Option(help="The .html to write.")],
 ) -> int:
-    """Tell a run, or compare several, on one page that opens in any browser."""
+    """Report a run, or compare several, on one page that opens in any browser."""
     check_output(output)
     return write_report(bags, output)
 

@@ -27,7 +27,12 @@ Samples = Annotated[
 
 
 def choose(choice: str | None, domain: Domain, planner: str) -> Library | None:
-    """The library to plan with, if any; say what of it is left out and why.
+    """The library to plan with, if any; warns about shortcuts that are left out.
+
+    Args:
+        choice: A library's folder, or none; None for the shipped one.
+        domain: What it must fit.
+        planner: Name of the planner that is to use it.
 
     Raises:
         InvalidLibraryError: It cannot be used as a whole.
@@ -41,5 +46,5 @@ def choose(choice: str | None, domain: Domain, planner: str) -> Library | None:
 
 
 def sampling(samples: int) -> Sampling:
-    """The usual, with so many attempts."""
+    """The default sampling with so many attempts."""
     return replace(DEFAULT, samples=samples)

@@ -7,7 +7,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Event, Thread
 from time import monotonic
@@ -21,7 +21,7 @@ from slap_ros.cli.options import DomainName, Json, Preset
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.shortcuts.library import save_library
-from slap_ros.shortcuts.settings import training_settings
+from slap_ros.shortcuts.settings import TrainingSettings, training_settings
 from slap_ros.shortcuts.task_distribution import TaskDistribution
 from slap_ros.shortcuts.training import CandidateGroup, Training
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
@@ -30,54 +30,84 @@ from slap_ros.shortcuts.workers import Workers, local_workers, ray_workers
 REFRESH_S = 1.0
 
 
-def train(
-    domain: DomainName,
+@dataclass(frozen=True)
+class TrainOptions:
+    """What to train, how, and where to keep it."""
+
+    domain: DomainName
     output: Annotated[
         Path | None, typer.Option(help="The library's folder. Default: runs/models/DOMAIN.")
-    ] = None,
-    preset: Preset = "fair",
-    seed: Annotated[int, typer.Option(min=0, help="Of everything.")] = 0,
-    settings: Annotated[
-        str, typer.Option(help="ours, or paper: the paper's hyper-parameters.")
-    ] = "ours",
+    ] = None
+    preset: Preset = "fair"
+    seed: Annotated[int, typer.Option(min=0, help="Of everything.")] = 0
+    settings: Annotated[str, typer.Option(help="ours, or paper: the paper's hyper-parameters.")] = (
+        "ours"
+    )
     steps: Annotated[
-        int | None, typer.Option(min=1, help="Environment steps per shortcut; default: settings'.")
-    ] = None,
-    jobs: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
+        int | None,
+        typer.Option(min=1, help="Environment steps per shortcut; default: settings'."),
+    ] = None
+    jobs: Annotated[int, typer.Option(min=1, help="Processes.")] = 2
     ray: Annotated[
         str | None, typer.Option(help="Address of a Ray cluster to run on instead, or local.")
-    ] = None,
+    ] = None
     work: Annotated[
         Path | None,
         typer.Option(help="Folder for checkpoints and logs; the same one again goes on."),
-    ] = None,
-    json: Json = False,
-) -> int:
+    ] = None
+    json: Json = False
+
+    @property
+    def library_folder(self) -> Path:
+        """Where the library is saved."""
+        return self.output or Path("runs/models") / self.domain
+
+    @property
+    def work_folder(self) -> Path:
+        """Where checkpoints and logs are, by default beside the library."""
+        return self.work or self.library_folder.with_name(f"{self.library_folder.name}-training")
+
+    @property
+    def training_settings(self) -> TrainingSettings:
+        """Hyper-parameters of the training.
+
+        Raises:
+            InvalidParameterError: There are none of that name.
+        """
+        chosen = training_settings(self.settings, self.domain)
+        if self.steps is None:
+            return chosen
+        return replace(chosen, ppo=replace(chosen.ppo, total_steps=self.steps))
+
+    @property
+    def command(self) -> str:
+        """The command that trains the same library again."""
+        command = f"slap train {self.domain} --preset {self.preset} --seed {self.seed}"
+        steps = "" if self.steps is None else f" --steps {self.steps}"
+        return f"{command} --settings {self.settings}{steps}"
+
+
+def train(options: TrainOptions) -> int:
     """Discover and learn shortcuts: explore, rank, train, keep what makes plans shorter.
 
     Interrupted, it goes on where it was when the same command is given again. Progress for
     TensorBoard is in the work folder.
     """
-    get_domain(domain, preset)
-    chosen = training_settings(settings, domain)
-    if steps is not None:
-        chosen = replace(chosen, ppo=replace(chosen.ppo, total_steps=steps))
+    get_domain(options.domain, options.preset)
+    settings = options.training_settings
     _require_torch()
-    output = output or Path("runs/models") / domain
-    work = work or output.with_name(f"{output.name}-training")
-    began = monotonic()
-    with _workers(jobs, ray) as workers, _TrainingBars() as show:
-        distribution = TaskDistribution(domain, preset, seed)
-        library = Training(distribution, chosen, work, workers, show).run()
-    command = _command(domain, preset, seed, settings, steps)
-    library = replace(library, record={"command": command, **library.record})
-    save_library(output, library)
-    if json:
-        print_json({"library": str(output), **library.record, "seconds": monotonic() - began})
+    began, folder = monotonic(), options.library_folder
+    distribution = TaskDistribution(options.domain, options.preset, options.seed)
+    with _workers(options.jobs, options.ray) as workers, _TrainingBars() as bars:
+        library = Training(distribution, settings, options.work_folder, workers, bars).run()
+    library = replace(library, record={"command": options.command, **library.record})
+    save_library(folder, library)
+    seconds = monotonic() - began
+    if options.json:
+        print_json({"library": str(folder), **library.record, "seconds": seconds})
     console.print(
-        f"{len(library.shortcuts)} shortcuts in {output}, "
-        f"{monotonic() - began:.0f} s; see what they are worth with "
-        f"`slap evaluate {domain} --shortcuts {output}`",
+        f"{len(library.shortcuts)} shortcuts in {folder}, {seconds:.0f} s; see what they are worth "
+        f"with `slap evaluate {options.domain} --shortcuts {folder}`",
         highlight=False,
     )
     return 0
@@ -85,11 +115,6 @@ def train(
 
 def _workers(jobs: int, ray: str | None) -> AbstractContextManager[Workers]:
     return local_workers(jobs) if ray is None else ray_workers(ray)
-
-
-def _command(domain: str, preset: str, seed: int, settings: str, steps: int | None) -> str:
-    parts = [f"slap train {domain} --preset {preset} --seed {seed} --settings {settings}"]
-    return " ".join([*parts, *([f"--steps {steps}"] if steps is not None else [])])
 
 
 def _require_torch() -> None:

@@ -45,7 +45,14 @@ def draw_abstract_graph(
 
 
 def compose(graph: AbstractGraph, space: AtomSpace, plan: Plan | None, title: str) -> SvgPicture:
-    """The picture as shapes; see :func:`draw_abstract_graph`."""
+    """The picture as shapes.
+
+    Args:
+        graph: See :func:`draw_abstract_graph`, as for the others.
+        space: The atoms of the graph's task.
+        plan: A plan from the graph's start node, if there is one.
+        title: A line above the picture.
+    """
     selection, words = select(graph, plan), AtomNaming(space)
     many = len(selection.nodes) > MANY_NODES
     cards = _cards(selection, words, graph.nodes[0], many)

@@ -31,7 +31,14 @@ MEANINGS = {
 def state_facts(
     graph: AbstractGraph, words: AtomNaming, plan: Plan | None, selection: Selection
 ) -> list[str]:
-    """Sentences under the title."""
+    """The sentences under the title: goal, size of the graph, plan.
+
+    Args:
+        graph: What is drawn.
+        words: Names of the task's atoms.
+        plan: Whose steps are predicted; None where there is none.
+        selection: What of the graph is shown.
+    """
     nodes, edges = counted(len(graph.nodes), "abstract state"), counted(len(graph.edges), "option")
     facts = [
         f"Goal: {', '.join(words.atoms(graph.goal)) or 'nothing'}.",
@@ -55,7 +62,13 @@ def _plan_fact(plan: Plan | None) -> str:
 
 
 def write_header(title: str, facts: Sequence[str], width: float) -> Iterator[SvgText]:
-    """The title and the facts below it, broken into lines."""
+    """The title and the facts below it, broken into lines.
+
+    Args:
+        title: In bold.
+        facts: A paragraph each.
+        width: Of the lines, px.
+    """
     y = PAGE_MARGIN_PX
     for line in text.wrap(title, TITLE_PX, width, bold=True):
         yield SvgText(PAGE_MARGIN_PX, y + TITLE_PX * 0.8, line, TITLE_PX, INK, bold=True)
@@ -67,7 +80,13 @@ def write_header(title: str, facts: Sequence[str], width: float) -> Iterator[Svg
 
 
 def draw_legend(selection: Selection, y: float, width: float) -> tuple[list[SvgShape], float]:
-    """What marks mean, of those that occur, in rows; and where the last row ends."""
+    """What the marks mean that occur, in rows, and the height at which the last row ends, px.
+
+    Args:
+        selection: What is drawn.
+        y: Where the first row begins, px from the top.
+        width: Of the rows, px.
+    """
     shapes: list[SvgShape] = []
     x, row_px, sample_px = PAGE_MARGIN_PX, 24.0, 30.0
     for kind, meaning in _legend_entries(selection):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Cards: what is said of a node or on an edge, in a frame."""
+"""Cards: text about a node or an edge, in a frame."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from slap_ros.drawing.words import ADDED, REMOVED, AtomNaming, counted
 
 @dataclass(frozen=True)
 class CardStyle:
-    """How large a card is and how much it says."""
+    """Size of a card's text, and how much of it a card has."""
 
     text_px: float
     padding_px: float
@@ -40,7 +40,7 @@ class CardStyle:
 
     @property
     def line_px(self) -> float:
-        """From one baseline to the next."""
+        """The distance from one baseline to the next."""
         return self.text_px * 1.4
 
 
@@ -71,7 +71,7 @@ class Card:
 
     @property
     def size(self) -> Size:
-        """Room for the text."""
+        """Width and height that the text needs."""
         style = self.style
         widths = (text.width_px(line.content, style.text_px, line.bold) for line in self.lines)
         height = len(self.lines) * style.line_px
@@ -94,7 +94,16 @@ class Card:
 
 
 def list_bodies(selection: Selection, words: AtomNaming, start: int) -> list[list[CardLine]]:
-    """What each card would list if it had room for it."""
+    """Lines that each card would have, given the room.
+
+    Args:
+        selection: The nodes.
+        words: Names of the task's atoms.
+        start: Atoms of the start node, as a mask.
+
+    Returns:
+        One list per node: the atoms of the start node, and how the others differ from it.
+    """
     return [
         [CardLine(d, difference_colour(d)) for d in words.differences(start, node.atoms)]
         if node.number > 0
@@ -104,7 +113,13 @@ def list_bodies(selection: Selection, words: AtomNaming, start: int) -> list[lis
 
 
 def cut(lines: list[CardLine], limit: int, common: Counter[str]) -> list[CardLine]:
-    """The lines, or as many as there is room for of those on the fewest cards, which tell most."""
+    """The lines, or as many as there is room for of those that are on the fewest cards.
+
+    Args:
+        lines: Of one card.
+        limit: Greatest number of lines.
+        common: On how many cards each line is: the rarest say most about a card.
+    """
     if len(lines) <= limit:
         return lines
     rarest = sorted(lines, key=lambda line: common[line.content])[: limit - 1]
@@ -113,7 +128,13 @@ def cut(lines: list[CardLine], limit: int, common: Counter[str]) -> list[CardLin
 
 
 def make_card(node: ShownNode, body: Sequence[CardLine], style: CardStyle) -> Card:
-    """A node's card."""
+    """A node's card.
+
+    Args:
+        node: Its role gives heading and frame.
+        body: The lines below the heading.
+        style: Size of the text.
+    """
     heading, colour = _heading(node)
     lines = [CardLine(heading, colour, bold=True), *body]
     return Card(
@@ -134,7 +155,7 @@ def _heading(node: ShownNode) -> tuple[str, str]:
 
 
 def difference_colour(difference: str) -> str:
-    """Of what is there in addition, or no more."""
+    """The colour of an atom that holds in addition, or no longer holds."""
     return {ADDED: GAINED, REMOVED: LOST}[difference[: len(ADDED)]]
 
 
@@ -144,7 +165,7 @@ def _fitting(line: CardLine, style: CardStyle) -> CardLine:
 
 
 def make_label(edge: ShownEdge, words: AtomNaming) -> Card:
-    """An edge's label; the plan's have their place in the plan and their steps as well."""
+    """An edge's label; on the plan with its number in the plan and its predicted steps."""
     name, *rest = words.option(edge.option)
     if edge.step is None:
         lines = [CardLine(name), *(CardLine(line, MUTED) for line in rest)]

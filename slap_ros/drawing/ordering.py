@@ -22,6 +22,9 @@ def order(ranks: Ranks, before: Neighbours, after: Neighbours) -> Ranks:
         ranks: The items of each rank in an initial order, which breaks ties.
         before: Each item's neighbours in the rank to its left.
         after: Each item's neighbours in the rank to its right.
+
+    Returns:
+        The items of each rank in the order found, from the top.
     """
     current = best = [list(rank) for rank in ranks]
     fewest = count_crossings(best, after)

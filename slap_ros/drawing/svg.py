@@ -156,7 +156,7 @@ class SvgCurve:
 
 @dataclass(frozen=True)
 class SvgGroup:
-    """Shapes that are one thing, with a title that viewers show and screen readers read."""
+    """Several shapes with one title, which viewers show and screen readers read."""
 
     title: str
     shapes: Sequence[SvgShape]
@@ -219,7 +219,13 @@ def texts(shapes: Sequence[SvgShape]) -> Iterator[SvgText]:
 
 
 def element(name: str, attributes: Mapping[str, str], inner: str = "") -> str:
-    """An element; ``inner`` is markup already."""
+    """An SVG element.
+
+    Args:
+        name: Of the element.
+        attributes: Values are escaped here.
+        inner: Markup of what is inside.
+    """
     written = "".join(f" {key}={quoteattr(clean_value(v))}" for key, v in attributes.items())
     return f"<{name}{written}>{inner}</{name}>" if inner else f"<{name}{written}/>"
 

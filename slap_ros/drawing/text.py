@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How much room text takes, without asking a font.
+"""The room that text takes, estimated without the font.
 
-Whoever looks at a picture has another font than we do, so widths are estimated from one of the
+A picture is viewed with other fonts than ours, so widths are estimated from one of the
 widest in common use (DejaVu Sans, much like Verdana). Text then fits with any other.
 """
 
@@ -25,13 +25,26 @@ ELLIPSIS = "…"
 
 
 def width_px(text: str, size_px: float, bold: bool = False) -> float:
-    """An upper estimate of the width of a line of text."""
+    """An upper estimate of the width of a line of text, px.
+
+    Args:
+        text: The line.
+        size_px: Font size.
+        bold: Whether it is set in bold, which is wider.
+    """
     ems = sum(_WIDTHS.get(character, _WIDEST) for character in text)
     return ems * size_px * (_BOLD if bold else 1.0)
 
 
 def shorten(text: str, size_px: float, limit_px: float, bold: bool = False) -> str:
-    """The text, or its beginning and an ellipsis where it is wider than the limit."""
+    """The text, or its beginning and an ellipsis where it is wider than the limit.
+
+    Args:
+        text: A line.
+        size_px: Font size.
+        limit_px: Greatest width.
+        bold: Whether it is set in bold.
+    """
     if width_px(text, size_px, bold) <= limit_px:
         return text
     while text and width_px(text + ELLIPSIS, size_px, bold) > limit_px:
@@ -40,7 +53,17 @@ def shorten(text: str, size_px: float, limit_px: float, bold: bool = False) -> s
 
 
 def wrap(text: str, size_px: float, limit_px: float, bold: bool = False) -> list[str]:
-    """Lines no wider than the limit, broken at spaces; a longer word is shortened."""
+    """Break text at spaces into lines; a word that is too long for a line is shortened.
+
+    Args:
+        text: A paragraph.
+        size_px: Font size.
+        limit_px: Greatest width of a line.
+        bold: Whether it is set in bold.
+
+    Returns:
+        The lines, from the top.
+    """
     lines: list[str] = []
     for word in text.split():
         longer = f"{lines[-1]} {word}" if lines else word

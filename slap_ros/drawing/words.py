@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a drawing says: abstract states and options in short words."""
+"""Short names for abstract states and options in drawings."""
 
 from __future__ import annotations
 
@@ -60,5 +60,5 @@ def _kind(type_: Type) -> str:
 
 
 def counted(number: int, noun: str) -> str:
-    """A number with its noun in the plural where that is due."""
+    """A number with its noun, in the plural unless the number is 1."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

@@ -16,7 +16,7 @@ from slap_ros.relational.objects import Column, Object, Type
 from slap_ros.relational.predicates import Classifier, GroundAtom, Margin, Predicate
 from slap_ros.relational.state import Layout, State
 
-MAX_CACHED_STATES = 1024  # states perceived
+MAX_CACHED_STATES = 1024
 
 
 class AtomSpace:
@@ -33,8 +33,8 @@ class AtomSpace:
         static: Collection[Predicate],
         layout: Layout,
         holds: Callable[[GroundAtom], bool],
-        unread: Collection[Type] = (),
-        reading: Collection[Predicate] = (),
+        rarely_read: Collection[Type] = (),
+        readers: Collection[Predicate] = (),
     ) -> None:
         """Enumerate the atoms over the objects of ``layout``.
 
@@ -43,9 +43,9 @@ class AtomSpace:
             static: Those that no operator changes.
             layout: The task's objects.
             holds: Whether an atom of a static predicate holds.
-            unread: Types of objects whose features few predicates read, the robot as a rule: of
-                states that differ only there, the others are perceived once.
-            reading: These few.
+            rarely_read: Types of objects whose features few predicates read, the robot as a rule:
+                for states that differ only there, all other predicates are evaluated once.
+            readers: These few predicates.
         """
         self.layout = layout
         self.predicates = {predicate.name: predicate for predicate in predicates}
@@ -59,28 +59,17 @@ class AtomSpace:
         statics = {atom: bit for atom, bit in self._bits.items() if atom.predicate in static}
         self.static = sum(statics.values())
         self.static_truth = sum(bit for atom, bit in statics.items() if holds(atom))
-        about_something = {atom.predicate for atom in self.atoms} - self.static_predicates
-        self._fluents = [
-            _Block.of(predicate, self.atoms)
-            for predicate in predicates
-            if predicate in about_something
-        ]
-        self._read = np.concatenate(
-            [
-                np.arange(part.start, part.stop)
-                for obj, part in layout.slices.items()
-                if obj.type not in unread
-            ]
-            or [np.empty(0, np.intp)]
-        )
-        self._rereading = [
-            _Block.of(predicate, self.atoms)
-            for predicate in reading
-            if predicate in about_something
-        ]
-        self._reread = self.mask(atom for atom in self.atoms if atom.predicate in reading)
-        self._cached_masks: dict[bytes, int] = {}
         self._truth = np.array([bool(statics.get(a, 0) & self.static_truth) for a in self.atoms])
+        self._fluents = self._blocks(predicates)
+        self._cached_masks: dict[bytes, int] = {}
+        self._key_columns = _columns_of(layout, rarely_read)
+        self._reader_blocks = self._blocks(readers)
+        self._reader_atoms = self.mask(atom for atom in self.atoms if atom.predicate in readers)
+
+    def _blocks(self, predicates: Collection[Predicate]) -> list[_Block]:
+        """The atoms of each fluent predicate that has any."""
+        fluent = {atom.predicate for atom in self.atoms} - self.static_predicates
+        return [_Block.of(predicate, self.atoms) for predicate in predicates if predicate in fluent]
 
     @classmethod
     def of_state(
@@ -88,25 +77,33 @@ class AtomSpace:
         predicates: Sequence[Predicate],
         static: Collection[Predicate],
         state: State,
-        unread: Collection[Type] = (),
-        reading: Collection[Predicate] = (),
+        rarely_read: Collection[Type] = (),
+        readers: Collection[Predicate] = (),
     ) -> AtomSpace:
-        """The space over a state's objects, static atoms as they are in that state."""
+        """The space over a state's objects, static atoms as they are in that state.
+
+        Args:
+            predicates: The domain's.
+            static: Those that no operator changes.
+            state: Gives the objects, and the truth of static atoms.
+            rarely_read: See the constructor, as for ``readers``.
+            readers: The predicates that read them.
+        """
         return cls(
-            predicates, static, state.layout, lambda atom: atom.holds(state), unread, reading
+            predicates, static, state.layout, lambda atom: atom.holds(state), rarely_read, readers
         )
 
     def abstract(self, state: State) -> int:
         """The abstract state of a single state."""
-        read = state.data.take(self._read).tobytes()
-        mask = self._cached_masks.get(read)
+        key = state.data.take(self._key_columns).tobytes()
+        mask = self._cached_masks.get(key)
         if mask is None:
             mask = _mask(self.truth(state))
             if len(self._cached_masks) == MAX_CACHED_STATES:
                 self._cached_masks.clear()
-            self._cached_masks[read] = mask & ~self._reread
-        elif self._rereading:
-            mask |= _mask(self._evaluate(self._rereading, state, np.zeros_like(self._truth)))
+            self._cached_masks[key] = mask & ~self._reader_atoms
+        elif self._reader_blocks:
+            mask |= _mask(self._evaluate(self._reader_blocks, state, np.zeros_like(self._truth)))
         return mask
 
     def abstract_within(self, state: State, shifts: NDArray[np.float64]) -> int:
@@ -215,6 +212,16 @@ class _Block:
 def _mask(truth: NDArray[np.bool_]) -> int:
     """Bits of one state's atoms."""
     return int.from_bytes(np.packbits(truth, bitorder="little").tobytes(), "little")
+
+
+def _columns_of(layout: Layout, left_out: Collection[Type]) -> NDArray[np.intp]:
+    """Indices of the features of all objects but those of some types."""
+    parts = [
+        np.arange(part.start, part.stop)
+        for obj, part in layout.slices.items()
+        if obj.type not in left_out
+    ]
+    return np.concatenate(parts or [np.empty(0, np.intp)])
 
 
 def _type_consistent(

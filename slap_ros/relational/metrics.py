@@ -213,7 +213,13 @@ def at_most(metric: Metric, upper: float, *arguments: int) -> Condition:
 
 
 def at_least(metric: Metric, lower: float, *arguments: int) -> Condition:
-    """The metric is at least a threshold; arguments as for :func:`at_most`."""
+    """The metric is at least a threshold.
+
+    Args:
+        metric: What is measured.
+        lower: In its unit.
+        arguments: Positions of the objects among the predicate's; in order if left out.
+    """
     return Condition(metric, _in_order(metric, arguments), lower=lower)
 
 

@@ -43,7 +43,13 @@ class Predicate:
 
     @classmethod
     def threshold(cls, name: str, types: tuple[Type, ...], margin: Margin) -> Predicate:
-        """A predicate that holds where its margin is at least 0."""
+        """A predicate that holds where its margin is at least 0.
+
+        Args:
+            name: The predicate's.
+            types: Of the objects it relates.
+            margin: Signed distance to the threshold, in the unit of the metric behind it.
+        """
 
         def classifier(state: State, *columns: Column) -> Bools:
             return margin(state, *columns) >= 0.0

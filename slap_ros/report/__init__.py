@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A page that tells a run, or compares several, from their bags alone."""
+"""A page about a run, or one that compares several, made from their bags alone."""
 
 from slap_ros.report.content import BagReport, RunReport, read_report
 from slap_ros.report.page import check_output, render, write_page

@@ -25,7 +25,7 @@ class AtomRow:
 
 @dataclass(frozen=True)
 class AtomTimeline:
-    """The atoms of a run."""
+    """When each atom of a run held."""
 
     rows: tuple[AtomRow, ...]  # in the order in which they changed first
     hidden: int  # rows left out

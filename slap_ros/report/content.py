@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a report says of a run, gathered from its bag alone."""
+"""What a report shows of a run, gathered from its bag alone."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ PURE_PLANNING = "pure planning"
 
 @dataclass(frozen=True)
 class RunReport:
-    """One run."""
+    """Everything that a page shows of one run."""
 
     bag: str  # name of the bag
     metrics: RunMetrics
@@ -64,7 +64,7 @@ class RunReport:
 
 @dataclass(frozen=True)
 class BagReport:
-    """A bag."""
+    """Everything that a page shows of one bag."""
 
     name: str
     runs: tuple[RunReport, ...]
@@ -73,7 +73,7 @@ class BagReport:
 
 
 def read_report(path: Path | str) -> BagReport:
-    """What a bag tells of its runs.
+    """Gather what a page shows of a bag.
 
     A domain that cannot be imported here, as one without its simulator, costs only the second
     opinion on perception: all else is in the bag.

@@ -160,7 +160,7 @@ def _relative_length(run: RunReport, runs: Sequence[RunReport]) -> float | None:
 
 
 def _summary(shown: Sequence[PageRun]) -> list[str]:
-    """What came out, in a sentence each."""
+    """A sentence per run: how it ended, and in how many steps."""
     sentences = []
     for one in shown:
         metrics = one.run.metrics

@@ -83,7 +83,7 @@ class Canvas:
 
     @property
     def units_high(self) -> int:
-        """Its height."""
+        """The height in drawing units."""
         return round(self.height * self.scale)
 
     def path(self, points: Iterable[Point], closed: bool = True) -> str:
@@ -96,7 +96,13 @@ class Canvas:
 
 
 def box_paths(body: VisibleBody, view: Projection, canvas: Canvas) -> tuple[str, str, str]:
-    """The visible faces of a box; of them, those in the light, and those in the shade."""
+    """The visible faces of a box as paths: all of them, those in the light, those in the shade.
+
+    Args:
+        body: Drawn as a box.
+        view: From where it is seen.
+        canvas: The part of the view that is drawn, with the scale.
+    """
     drawn = [
         (light, canvas.path(map(view.project, corners))) for light, corners in _seen(body, view)
     ]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What stood where at each step: the bodies that were shown, and the arm."""
+"""Where the bodies and the arm were at each step."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ METAL = (0.62, 0.65, 0.69, 1.0)  # of the hand
 
 @dataclass(frozen=True)
 class SceneFrame:
-    """A moment."""
+    """Where everything is at one step."""
 
     step: int  # from the run's start
     bodies: tuple[VisibleBody, ...]  # in the world frame; the n-th is the same in every frame
@@ -40,7 +40,7 @@ class SceneFrame:
 
 @dataclass(frozen=True)
 class RecordedScene:
-    """A run to be watched."""
+    """The frames of a run."""
 
     frames: tuple[SceneFrame, ...]  # in the order of their steps
 
@@ -53,9 +53,15 @@ class RecordedScene:
 def scene(
     trace: RunTrace, episode: RecordedEpisode, recording: Recording, domain: Domain | None
 ) -> RecordedScene | None:
-    """The frames of a run; None where the bag does not tell what anything looks like.
+    """The frames of a run; None where nothing in the bag says what bodies look like.
 
-    Bodies are those of the recorded markers. Without markers the domain says what to show.
+    Bodies are those of the recorded markers; without markers, those that the domain displays.
+
+    Args:
+        trace: The run.
+        episode: Its states.
+        recording: Markers, and the layout of the robot's features.
+        domain: None where it is not known here.
 
     Raises:
         InvalidStateError: It has a state that its domain cannot have.

@@ -46,7 +46,13 @@ class Series:
 def robot_series(
     trace: RunTrace, episode: RecordedEpisode, recording: Recording
 ) -> tuple[Series, ...]:
-    """Every feature of the robot that moves, in the order of its type."""
+    """Every feature of the robot that moves, in the order of its type.
+
+    Args:
+        trace: The run.
+        episode: Its states.
+        recording: Names and units of the robot's features.
+    """
     info = recording.domain_info
     steps = sorted(s for s in episode.states if trace.first_step <= s <= trace.last_step)
     if info is None or not steps:

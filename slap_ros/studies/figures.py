@@ -150,12 +150,15 @@ def legend_above(figure: Figure, axes: Axes) -> None:
 
 
 def dodged(places: Sequence[float], number: int, count: int, apart: float = 0.1) -> list[float]:
-    """Places of one of several series, moved so that their markers do not cover each other.
+    """Move the places of one of several series, so that markers do not cover each other.
 
     Args:
         places: Horizontal coordinates that the series share.
         number: Which of the series, from 0.
         count: How many series there are.
         apart: Between neighbouring series, in the unit of ``places``.
+
+    Returns:
+        The places of that series.
     """
     return [place + (number - (count - 1) / 2) * apart for place in places]

@@ -56,7 +56,7 @@ operators and not in the world."""
 
 
 def sample_goals(domain: Domain, task: Task, count: int, rng: np.random.Generator) -> list[Goal]:
-    """Goals for a task's initial state, all different, none of which holds there.
+    """Sample goals for a task's initial state, all different, none of which holds there.
 
     Nodes of the abstract graph, which ends where the task's own goal first holds, are taken in
     random order, each giving a goal that is not there yet, and again until there are ``count`` or
@@ -67,6 +67,9 @@ def sample_goals(domain: Domain, task: Task, count: int, rng: np.random.Generato
         task: Its initial state is where goals are reached from.
         count: How many goals at most.
         rng: Chooses nodes and atoms.
+
+    Returns:
+        The goals, in the order in which they were found.
 
     Raises:
         UnsolvableError: Operators cannot reach the task's own goal.
@@ -145,13 +148,19 @@ def study(comparison: Comparison, count: int, progress: StudyProgress) -> StudyR
         Summary.of(comparison.experiment, approach.name, own, trials[0])
         for approach, own in zip(comparison.approaches, trials, strict=True)
     ]
+    return _report(comparison, outcomes, summaries)
+
+
+def _report(
+    comparison: Comparison, outcomes: Sequence[GoalTrials], summaries: Sequence[Summary]
+) -> StudyReport:
     names = [approach.name for approach in comparison.approaches]
     return StudyReport(
         study="goals",
         source="SLAP Fig. 9",
         title=f"Other goals: {comparison.domain.name}",
         measured=f"{MEASURED}\n\n{_compared(outcomes)}",
-        table=_table(len(jobs), summaries),
+        table=_table(len(outcomes), summaries),
         found={
             "approaches": [summary.as_row() for summary in summaries],
             "goals": [_as_json(outcome, names) for outcome in outcomes],

@@ -62,7 +62,7 @@ class PrunedCandidates:
         return 100.0 * self.remaining(hits) / max(1, self.explored.pairs)
 
     def as_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """Candidates, environment steps and hits, for the report's JSON."""
         return {
             "seed": self.seed,
             "index": self.index,
@@ -83,7 +83,19 @@ def explore(
     jobs: int,
     progress: StudyProgress,
 ) -> tuple[PrunedCandidates, ...]:
-    """Explore the first ``tasks`` tasks of trainings with seeds from 0 on, as training does.
+    """Explore the first tasks of trainings with seeds from 0 on, as training does.
+
+    Args:
+        domain: Name of the domain.
+        preset: Of the domain.
+        seeds: Number of trainings.
+        tasks: Number of tasks per training.
+        settings: How to explore.
+        jobs: Number of processes.
+        progress: Is called as tasks end.
+
+    Returns:
+        What is left of each task's candidates; tasks that could not be explored are left out.
 
     Raises:
         UnsolvableError: No task can be planned for, so none can be explored.
@@ -148,7 +160,13 @@ def explored_in(
 def study(
     domain: str, pruned: Sequence[PrunedCandidates], settings: ExplorationSettings
 ) -> StudyReport:
-    """What is left, by the number of rollouts that must succeed."""
+    """The report on what is left, by the number of rollouts that must succeed.
+
+    Args:
+        domain: Name of the domain.
+        pruned: One per task.
+        settings: How all of them were explored.
+    """
     thresholds = _thresholds(settings)
     signatures = {
         (candidate.signature.patterns, candidate.signature.context)
@@ -212,7 +230,7 @@ def _at(
 def _table(
     pruned: Sequence[PrunedCandidates], settings: ExplorationSettings, different: int
 ) -> MarkdownTable:
-    """A row a task, then all of them."""
+    """One row per task, then all of them."""
     hits = settings.hits
     candidates = sum(one.explored.pairs for one in pruned)
     remaining = sum(one.remaining(hits) for one in pruned)
@@ -236,7 +254,13 @@ def _table(
 
 
 def draw(figure: Figure, pruned: Sequence[PrunedCandidates], settings: ExplorationSettings) -> None:
-    """What remains against K/N: a thin line a task, the mean with its spread."""
+    """Draw what remains against K/N: one thin line per task, the mean with its spread.
+
+    Args:
+        figure: To draw into.
+        pruned: One per task.
+        settings: How all of them were explored.
+    """
     axes = figure.subplots()
     thresholds = _thresholds(settings)
     places = [100.0 * hits / settings.rollouts for hits in thresholds]

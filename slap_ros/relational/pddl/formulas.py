@@ -27,7 +27,7 @@ class Formula:
 
 
 def read_formula(node: Node) -> Formula:
-    """An atom.
+    """The atom that a node consists of.
 
     Raises:
         MalformedPddlError: Anything else.

@@ -55,7 +55,12 @@ def check_name(kind: str, name: str) -> None:
 
 
 def check_new_name(kind: str, name: str, taken: set[str]) -> None:
-    """Check a name and add it to those taken, which are in lower case.
+    """Check a name and add it to those taken.
+
+    Args:
+        kind: What it names, for messages.
+        name: As it is written.
+        taken: Names in lower case; it is added to them.
 
     Raises:
         MalformedPddlError: It is no name, or taken up to the case of its letters.
@@ -95,7 +100,13 @@ class Names(Generic[T]):
     """Things of one kind by name: by the very name, or by the only one that differs in case."""
 
     def __init__(self, kind: str, things: Mapping[str, T], error: type[SlapError]) -> None:
-        """Look up among ``things``; raise ``error`` for others."""
+        """Look up names of one kind.
+
+        Args:
+            kind: What they name, for messages.
+            things: By name.
+            error: To be raised for a name that is not among them.
+        """
         self._kind = kind
         self._things = things
         self._error = error

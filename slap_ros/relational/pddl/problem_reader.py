@@ -35,6 +35,9 @@ def parse_problem(text: str, domain: PddlDomain, source: str = "<problem>") -> P
         domain: The domain that the problem says it belongs to.
         source: Where the text comes from, for messages.
 
+    Returns:
+        The problem, its atoms ground over its objects.
+
     Raises:
         MalformedPddlError: Not PDDL, more than STRIPS with types, or of another domain.
         UnknownPredicateError: An atom of a predicate that the domain does not have.
@@ -63,6 +66,9 @@ def parse_goal(text: str, space: AtomSpace, source: str = "<goal>") -> frozenset
         text: PDDL.
         space: The task's atoms.
         source: Where the text comes from, for messages.
+
+    Returns:
+        The atoms; none for ``()`` and ``(and)``.
 
     Raises:
         MalformedPddlError: Not PDDL, or more than a conjunction of atoms.

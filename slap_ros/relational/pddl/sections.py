@@ -65,6 +65,9 @@ def read_definition(text: str, source: str, kind: str, keywords: Collection[str]
         kind: ``domain`` or ``problem``.
         keywords: Of the sections that such a text may have.
 
+    Returns:
+        The name and the sections.
+
     Raises:
         MalformedPddlError: No such definition, or with a section or requirement unknown to us.
     """

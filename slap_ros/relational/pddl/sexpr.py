@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Tokens nested as the parentheses say."""
+"""S-expressions: tokens nested by parentheses."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ class Word:
 
 @dataclass(frozen=True)
 class ListNode:
-    """What stands between two parentheses."""
+    """A list: what stands between two parentheses."""
 
     items: tuple[Node, ...]
     position: Position  # of the opening parenthesis
 
     @property
     def head(self) -> str:
-        """The first word in lower case; empty where the group does not begin with a word."""
+        """The first word in lower case; empty where the list does not begin with a word."""
         first = self.items[0] if self.items else None
         return first.keyword if isinstance(first, Word) else ""
 
@@ -49,12 +49,12 @@ Node = Word | ListNode
 
 
 def read_list(text: str, source: str) -> ListNode:
-    """The one group that a text consists of.
+    """The one list that a text consists of.
 
     Raises:
-        MalformedPddlError: Parentheses do not match, or there is nothing or more than one group.
+        MalformedPddlError: Parentheses do not match, or there is nothing or more than one list.
     """
-    starts: list[Position] = []  # of the groups that are still open
+    starts: list[Position] = []  # of the lists that are still open
     levels: list[list[Node]] = [[]]  # what they hold so far; the text itself is the outermost
     for token in tokenise(text, source):
         if token.text == "(":
@@ -86,7 +86,7 @@ def expect_word(node: Node, what: str) -> Word:
     """The node, which must be a word.
 
     Raises:
-        MalformedPddlError: It is a group.
+        MalformedPddlError: It is a list.
     """
     if isinstance(node, ListNode):
         raise MalformedPddlError(f"{node.position}: expected {what}, found {node}")
@@ -94,7 +94,7 @@ def expect_word(node: Node, what: str) -> Word:
 
 
 def expect_list(node: Node, what: str) -> ListNode:
-    """The node, which must be a group.
+    """The node, which must be a list.
 
     Raises:
         MalformedPddlError: It is a word.

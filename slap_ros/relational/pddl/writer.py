@@ -28,6 +28,12 @@ def write_domain(
 
     A type ``object`` is PDDL's own, from which every type descends.
 
+    Args:
+        name: The domain's.
+        types: All of them, parents too.
+        predicates: Those that operators, problems and goals may use.
+        operators: In the order in which they are written.
+
     Raises:
         MalformedPddlError: A name that PDDL cannot hold, or two that differ in case alone.
         InvalidDomainError: A type or predicate is used, but not among those given.
@@ -60,7 +66,7 @@ def write_problem(
         domain_name: The name under which its domain is written.
         objects: All of them.
         init_atoms: The atoms that hold at first, static ones too.
-        goal_atoms: The atoms that shall hold in the end.
+        goal_atoms: The atoms that must hold in the end.
 
     Raises:
         MalformedPddlError: A name that PDDL cannot hold, or two that differ in case alone.
