@@ -30,7 +30,7 @@ def header(stamp: Time) -> Header:
 
 
 def domain_info(domain: Domain, stamp: Time) -> msgs.DomainInfo:
-    """What world runs."""
+    """Which world runs: types, predicates, operators, configuration and versions."""
     arm = domain.action_space.axes[:-1]
     return msgs.DomainInfo(
         header=header(stamp),
@@ -64,7 +64,17 @@ def key_values(values: Mapping[str, object]) -> list[KeyValue]:
 
 
 def state(value: State, episode: int, step: int, stamp: Time) -> msgs.ObjectCentricState:
-    """A state after a step."""
+    """A state.
+
+    Args:
+        value: The state.
+        episode: Its episode's number.
+        step: Environment steps taken before it.
+        stamp: When it came to be.
+
+    Returns:
+        The message, objects in the state's own order.
+    """
     return msgs.ObjectCentricState(
         header=header(stamp),
         episode=episode,
@@ -87,7 +97,17 @@ def atoms(ground_atoms: Iterable[GroundAtom]) -> list[msgs.GroundAtom]:
 def percept(
     value: Percept, of: msgs.ObjectCentricState, space: AtomSpace, known: State
 ) -> msgs.AbstractState:
-    """What is perceived of a state; ``known``: that state, decoded."""
+    """What is perceived of a state.
+
+    Args:
+        value: The percept.
+        of: The message that was perceived; header, episode and step are taken from it.
+        space: Atom space of the episode.
+        known: ``of``, decoded: only objects that are perceived otherwise go into the message.
+
+    Returns:
+        The message; objects whose place nobody knows are sorted by name.
+    """
     return msgs.AbstractState(
         header=of.header,
         episode=of.episode,
@@ -111,7 +131,19 @@ def goal(ground_atoms: Iterable[GroundAtom]) -> list[msgs.GroundAtom]:
 def task(
     value: Task, domain: Domain, episode: int, seed: int, index: int, stamp: Time
 ) -> msgs.Task:
-    """The task that opens an episode."""
+    """The task that opens an episode.
+
+    Args:
+        value: The task.
+        domain: What it is a task of.
+        episode: Number of the episode.
+        seed: What sampled it; -1 where it was given or measured.
+        index: Which of the seed's tasks.
+        stamp: When the episode was opened.
+
+    Returns:
+        The message; its initial state is step 0 of the episode.
+    """
     return msgs.Task(
         header=header(stamp),
         episode=episode,
@@ -125,7 +157,17 @@ def task(
 
 
 def command(action: Action, episode: int, step: int, stamp: Time) -> msgs.RobotCommand:
-    """What to do from the state of ``step``."""
+    """What the robot is to do next.
+
+    Args:
+        action: As in the domain's action space, gripper last; shape (n + 1,).
+        episode: Number of the episode.
+        step: The step of the state that it answers.
+        stamp: When it was decided.
+
+    Returns:
+        The message.
+    """
     *deltas, gripper = action.tolist()
     return msgs.RobotCommand(
         header=header(stamp), episode=episode, step=step, deltas=deltas, gripper=gripper
@@ -133,7 +175,7 @@ def command(action: Action, episode: int, step: int, stamp: Time) -> msgs.RobotC
 
 
 def plan_edge(edge: PlanEdge, space: AtomSpace) -> msgs.PlanEdge:
-    """One edge of a plan."""
+    """One edge of a plan, with the atoms that are expected at its end."""
     return msgs.PlanEdge(
         kind=edge.option.kind.value,
         name=edge.option.skill.name,
@@ -153,7 +195,20 @@ def plan(
     stamp: Time,
     provenance: Mapping[str, str | int],
 ) -> msgs.Plan:
-    """The ``number``-th plan of a run; ``provenance``: what made it, as the message has it."""
+    """A plan.
+
+    Args:
+        value: The plan.
+        goal_mask: What it is to reach, as a mask over ``space``.
+        space: Atom space of the episode.
+        episode: Number of the episode.
+        number: Which plan of the run, from 0 on.
+        stamp: When it was made.
+        provenance: What made it: fields ``planner``, ``library`` and ``samples`` of the message.
+
+    Returns:
+        The message.
+    """
     return msgs.Plan(
         **provenance,
         header=header(stamp),

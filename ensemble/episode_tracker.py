@@ -18,15 +18,21 @@ from slap_ros.messages.decode import decode_goal, decode_state, stamp_ns
 
 
 def subscribe(node: Node, topic: Topic, callback: Callable[..., None]) -> None:
-    """Subscribe with the topic's own QoS."""
+    """Subscribe with the topic's own QoS.
+
+    Args:
+        node: Who subscribes.
+        topic: What to.
+        callback: Called with each message.
+    """
     node.create_subscription(topic.type, topic.name, callback, topic.qos)
 
 
 class EpisodeTracker:
-    """Follows ``domain`` and ``task``, which may arrive in either order.
+    """Follows ``slap/domain`` and ``slap/task``, which may arrive in either order.
 
-    Raises out of the callbacks, and so out of ``spin``:
-        UnknownDomainError: The simulator runs a domain that is not installed here.
+    An UnknownDomainError comes out of the callbacks, and so out of ``spin``, where the simulator
+    runs a domain that is not installed here.
     """
 
     def __init__(self, node: Node, on_episode: Callable[[Episode], None]) -> None:
@@ -38,8 +44,8 @@ class EpisodeTracker:
         subscribe(node, DOMAIN, self._on_domain)
         subscribe(node, TASK, self._on_task)
 
-    # What is latched comes again after two nodes had lost sight of each other for a moment. That
-    # is no new episode.
+    # What is latched is sent again when two nodes find each other again after a moment of silence.
+    # That is no new episode.
 
     def _on_domain(self, message: DomainInfo) -> None:
         if message != self._domain:

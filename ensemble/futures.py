@@ -13,11 +13,11 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 T = TypeVar("T")
-LOOK_PERIOD = 0.02  # s, how often a condition is looked at
+POLL_PERIOD = 0.02  # s, between two looks at a condition
 
 
 def node_time_s(node: Node) -> float:
-    """The node's time in s."""
+    """The node's time, s."""
     return float(node.get_clock().now().nanoseconds) * 1e-9
 
 
@@ -35,7 +35,12 @@ async def run_in_executor(workers: Executor, function: Callable[[], T]) -> T:
 
 
 async def wait_for_first(node: Node, future: Future, condition: Callable[[], bool]) -> bool:
-    """Wait for a future or for a condition, looked at every ``LOOK_PERIOD``.
+    """Wait for a future or for a condition, whichever comes first.
+
+    Args:
+        node: Whose timer looks at the condition, every ``POLL_PERIOD``.
+        future: What to wait for.
+        condition: What else to wait for.
 
     Returns:
         Whether the future is done.
@@ -46,12 +51,12 @@ async def wait_for_first(node: Node, future: Future, condition: Callable[[], boo
         if not ended.done():
             ended.set_result(None)
 
-    def look() -> None:
+    def poll() -> None:
         if condition():
             end()
 
     future.add_done_callback(end)
-    timer = node.create_timer(LOOK_PERIOD, look)
+    timer = node.create_timer(POLL_PERIOD, poll)
     try:
         await ended
     finally:

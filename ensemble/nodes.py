@@ -45,7 +45,7 @@ class RunSettings:
     index: int
     planner: str
     record: Path | None  # the bag's folder; None: no recorder
-    pace: float = 0.0  # environment steps a second; 0: as fast as commands come
+    pace: float = 0.0  # environment steps per second; 0: as fast as commands come
     shortcuts: str = ""  # a library's folder, or none; empty: the shipped one
     samples: int = DEFAULT.samples  # attempts of a shortcut in the model
     world: str = SIM  # the simulator, a robot, or the bridge with a mock robot behind it

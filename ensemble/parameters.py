@@ -45,10 +45,13 @@ def parse_parameters(
         text: The parameters.
         kind: The dataclass that they are of.
         what: Whose they are, for messages.
-        given: Those that are not to be given here.
+        given: Names of those that come from elsewhere, and are refused here.
+
+    Returns:
+        Parameters by name, of the types that the dataclass has.
 
     Raises:
-        InvalidParameterError: One that there is not, or a value that it cannot have.
+        InvalidParameterError: An unknown parameter, or a value that it cannot have.
     """
     kinds = {item.name: type(item.default) for item in fields(kind)}  # type: ignore[arg-type]
     known = [name for name in kinds if name not in given]

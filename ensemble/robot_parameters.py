@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from ensemble.parameters import parameter, parse_parameters
 from slap_ros.errors import InvalidParameterError
+from slap_ros.physics.panda import JOINTS
 from slap_ros.robot.limits import Limits, Workspace, arm_limits
 from slap_ros.robot.tracking import TrackingSettings
 
@@ -23,6 +24,21 @@ def action_name(name: str, arm: str) -> str:
     return name.replace("ARM", arm)
 
 
+def arm_joints(arm: str) -> list[str]:
+    """Names of an arm's joints."""
+    return [f"{arm}_joint{i + 1}" for i in range(JOINTS)]
+
+
+def finger_joints(arm: str) -> list[str]:
+    """Names of the joints of its two fingers."""
+    return [f"{arm}_finger_joint{i + 1}" for i in range(2)]
+
+
+def base_frame(arm: str) -> str:
+    """Name of the frame of its base."""
+    return f"{arm}_link0"
+
+
 @dataclass(frozen=True)
 class RobotParameters:
     """What a robot is: see the docstring of ``robot_bridge.node``."""
@@ -33,7 +49,7 @@ class RobotParameters:
     workspace: tuple[float, ...] = parameter(WORKSPACE, "m, fingertips, lowest x y z, highest")
     trajectory_action: str = parameter(TRAJECTORY_ACTION, "the arm's controller")
     gripper_action: str = parameter(GRIPPER_ACTION, "the gripper's controller")
-    gripper_scale: float = parameter(0.5, "position to be sent for each m between the fingers")
+    gripper_scale: float = parameter(0.5, "position to be sent per m between the fingers")
     gripper_effort: float = parameter(20.0, "N")
     position_noise: float = parameter(0.002, "m, of detections, along each axis")
     turn_noise: float = parameter(0.01, "rad, of detections, about each axis")
@@ -82,7 +98,7 @@ class MockRobotParameters:
     arm: str = parameter("panda", "prefix of joints and frames")
     trajectory_action: str = parameter(TRAJECTORY_ACTION, "the arm's controller")
     gripper_action: str = parameter(GRIPPER_ACTION, "the gripper's controller")
-    gripper_scale: float = parameter(0.5, "position that is sent for each m between the fingers")
+    gripper_scale: float = parameter(0.5, "position that is sent per m between the fingers")
     latency: float = parameter(0.02, "s, of goals and detections")
     jitter: float = parameter(0.0, "s, at most, on top of the latency")
     pose_noise: float = parameter(0.002, "m, of detections along each axis")
@@ -105,6 +121,6 @@ def parse_mock_robot(text: str) -> dict[str, str | int | float]:
         Parameters by name, of the types that they have.
 
     Raises:
-        InvalidParameterError: One that there is not, or a value that it cannot have.
+        InvalidParameterError: An unknown parameter, or a value that it cannot have.
     """
     return parse_parameters(text, MockRobotParameters, "mock robot", GIVEN_WITH_THE_RUN)

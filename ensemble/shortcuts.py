@@ -30,7 +30,12 @@ class ShortcutProvider:
     """The library of whatever domain the simulator runs, and what it offers in each episode."""
 
     def __init__(self, node: Node, settings: ShortcutParameters, planner: str = "lazy") -> None:
-        """Refuse what can be seen to be wrong before a domain is known.
+        """Refuse what is wrong whatever the domain.
+
+        Args:
+            node: Logs which shortcuts of a library are left out.
+            settings: Which library, and how many samples.
+            planner: Name of the planner that is to use the shortcuts.
 
         Raises:
             InvalidParameterError: No samples, or a planner that cannot use shortcuts.

@@ -18,7 +18,7 @@ from slap_ros.messages.decode import decode_atoms, decode_seen, decode_state, st
 
 
 class StateSynchronizer:
-    """Pairs states with their atoms and hands on each pair that is newer than the last."""
+    """Pairs states with the atoms of the same step, and reports each pair newer than the last."""
 
     def __init__(
         self,
@@ -26,7 +26,13 @@ class StateSynchronizer:
         on_observation: Callable[[Observation], None],
         on_episode: Callable[[Episode], None] = lambda _: None,
     ) -> None:
-        """``on_episode`` is called for each new episode, before its first observation."""
+        """Subscribe.
+
+        Args:
+            node: Who subscribes.
+            on_observation: Called with each observation that is newer than the last.
+            on_episode: Called with each new episode, before its first observation.
+        """
         self.latest: Observation | None = None
         self._node = node
         self._on_observation = on_observation
@@ -53,6 +59,9 @@ class StateSynchronizer:
             episode: The number of the episode; 0: any.
             timeout_s: How long to wait, s of the node's time.
             missing: The error to raise where no such observation comes in time.
+
+        Returns:
+            An observation of this episode, or of a later one.
 
         Raises:
             SlapError: ``missing``.

@@ -48,7 +48,16 @@ class Visualizer:
 
 
 def markers(bodies: Sequence[VisibleBody], stamp: Time, namespace: str = BODIES) -> MarkerArray:
-    """A box or triangles for each body."""
+    """Bodies as markers: boxes, or triangles where a body has a mesh.
+
+    Args:
+        bodies: What is shown, in the world frame.
+        stamp: When they are there.
+        namespace: Of the markers.
+
+    Returns:
+        A marker per body, numbered from 0 on.
+    """
     return MarkerArray(
         markers=[
             Marker(

@@ -32,7 +32,7 @@ ARGUMENTS = {
     "latency": ("0.02", "s, the mock robot's"),
     "pose_noise": ("0.002", "m, the mock robot's"),
     "dropout": ("0.0", "share of detections that the mock robot loses"),
-    "pace": ("0.0", "environment steps a second, for watching; 0: at full speed"),
+    "pace": ("0.0", "environment steps per second, for watching; 0: at full speed"),
     "record": ("", "folder of the bag to record; empty: none"),
     "rviz": ("false", "open RViz as well"),
     "namespace": ("", "of every node: /robot1 gives /robot1/slap/state"),
@@ -41,72 +41,91 @@ ARGUMENTS = {
 
 def generate_launch_description() -> LaunchDescription:
     """Describe the ensemble."""
-    folder = Path(get_package_share_directory("slap_ros")) / "config"
-    config = folder / "ensemble.yaml"
+    arguments = [
+        DeclareLaunchArgument(name, default_value=default, description=description)
+        for name, (default, description) in ARGUMENTS.items()
+    ]
+    return LaunchDescription([*arguments, *_worlds(), *_solvers(), _recorder(), _rviz()])
 
-    def value(name: str, kind: type) -> ParameterValue:
-        return ParameterValue(LaunchConfiguration(name), value_type=kind)
 
-    def node(name: str, parameters: dict[str, ParameterValue], **options: object) -> Node:
-        return Node(
-            package="slap_ros",
-            executable=name,
-            name=name,
-            namespace=LaunchConfiguration("namespace"),
-            parameters=[str(config), parameters],
-            output="screen",
-            **options,
-        )
+def _worlds() -> list[Node]:
+    """The simulator, or the bridge with or without a mock robot behind it."""
+    task = {"domain": _value("domain", str), "preset": _value("preset", str)}
+    task |= {"seed": _value("seed", int), "index": _value("index", int)}
+    arm = {"arm": _value("arm", str)}
+    noise = {name: _value(name, float) for name in ("latency", "pose_noise", "dropout")}
+    return [
+        _node(
+            "sim_node",
+            task | {"pace": _value("pace", float)},
+            condition=LaunchConfigurationEquals("world", "sim"),
+        ),
+        _node(
+            "robot_bridge",
+            task | arm | {"scene": _value("scene", str)},
+            condition=LaunchConfigurationNotEquals("world", "sim"),
+        ),
+        _node(
+            "mock_robot",
+            task | arm | noise,
+            condition=LaunchConfigurationEquals("world", "mock"),
+        ),
+    ]
 
-    task = {"domain": value("domain", str), "preset": value("preset", str)}
-    task |= {"seed": value("seed", int), "index": value("index", int)}
-    arm = {"arm": value("arm", str)}
-    noise = {name: value(name, float) for name in ("latency", "pose_noise", "dropout")}
-    # A robot takes its time to move and to look.
-    patience = ParameterValue(
+
+def _solvers() -> list[Node]:
+    """Perception, skill server and planner."""
+    shortcuts = {"shortcuts": _value("shortcuts", str), "samples": _value("samples", int)}
+    # A robot takes its time to move and to be measured.
+    state_timeout = ParameterValue(
         PythonExpression(["2.0 if '", LaunchConfiguration("world"), "' == 'sim' else 8.0"]),
         value_type=float,
     )
-    learned = {"shortcuts": value("shortcuts", str), "samples": value("samples", int)}
-    return LaunchDescription(
-        [
-            *(
-                DeclareLaunchArgument(name, default_value=default, description=description)
-                for name, (default, description) in ARGUMENTS.items()
-            ),
-            node(
-                "sim_node",
-                task | {"pace": value("pace", float)},
-                condition=LaunchConfigurationEquals("world", "sim"),
-            ),
-            node(
-                "robot_bridge",
-                task | arm | {"scene": value("scene", str)},
-                condition=LaunchConfigurationNotEquals("world", "sim"),
-            ),
-            node(
-                "mock_robot",
-                task | arm | noise,
-                condition=LaunchConfigurationEquals("world", "mock"),
-            ),
-            node("perception_node", {}),
-            node("skill_server", learned | {"state_timeout": patience}),
-            node("planner_node", {"planner": value("planner", str)} | learned),
-            node(
-                "recorder_node",
-                {"bag": value("record", str)},
-                condition=LaunchConfigurationNotEquals("record", ""),
-            ),
-            Node(
-                package="rviz2",
-                executable="rviz2",
-                name="rviz",
-                arguments=["-d", str(folder / "slap.rviz")],
-                remappings=[
-                    (topic, [LaunchConfiguration("namespace"), topic])
-                    for topic in ("/slap/markers", "/tf", "/tf_static")
-                ],
-                condition=LaunchConfigurationEquals("rviz", "true"),
-            ),
-        ]
+    return [
+        _node("perception_node", {}),
+        _node("skill_server", shortcuts | {"state_timeout": state_timeout}),
+        _node("planner_node", {"planner": _value("planner", str)} | shortcuts),
+    ]
+
+
+def _recorder() -> Node:
+    return _node(
+        "recorder_node",
+        {"bag": _value("record", str)},
+        condition=LaunchConfigurationNotEquals("record", ""),
     )
+
+
+def _rviz() -> Node:
+    return Node(
+        package="rviz2",
+        executable="rviz2",
+        name="rviz",
+        arguments=["-d", str(_config() / "slap.rviz")],
+        remappings=[
+            (topic, [LaunchConfiguration("namespace"), topic])
+            for topic in ("/slap/markers", "/tf", "/tf_static")
+        ],
+        condition=LaunchConfigurationEquals("rviz", "true"),
+    )
+
+
+def _node(name: str, parameters: dict[str, ParameterValue], **options: object) -> Node:
+    """A node of the ensemble: defaults from the configuration file, then ``parameters``."""
+    return Node(
+        package="slap_ros",
+        executable=name,
+        name=name,
+        namespace=LaunchConfiguration("namespace"),
+        parameters=[str(_config() / "ensemble.yaml"), parameters],
+        output="screen",
+        **options,
+    )
+
+
+def _value(name: str, kind: type) -> ParameterValue:
+    return ParameterValue(LaunchConfiguration(name), value_type=kind)
+
+
+def _config() -> Path:
+    return Path(get_package_share_directory("slap_ros")) / "config"

@@ -34,14 +34,31 @@ class PlanPublisher:
         at: Observation,
         provenance: Mapping[str, str | int],
     ) -> None:
-        """Publish the ``number``-th plan of a run, to reach the mask ``goal``."""
+        """Publish a plan.
+
+        Args:
+            plan: The plan.
+            goal: What it is to reach, as a mask over the episode's atom space.
+            number: Which plan of the run, from 0 on.
+            at: From where it starts.
+            provenance: What made it, as the message has it.
+        """
         space, episode = at.episode.space, at.episode.number
         self._plans.publish(
             encode.plan(plan, goal, space, episode, number, self._now(), provenance)
         )
 
     def event(self, kind: int, at: Observation, **details: Any) -> int:
-        """Publish a PlanEvent; its stamp in ns."""
+        """Publish a PlanEvent.
+
+        Args:
+            kind: One of PlanEvent's.
+            at: When: the newest observation.
+            details: Other fields of the message.
+
+        Returns:
+            The event's stamp, ns since the epoch.
+        """
         header = encode.header(self._now())
         self._events.publish(
             PlanEvent(header=header, episode=at.episode.number, step=at.step, kind=kind, **details)

@@ -28,7 +28,15 @@ class Controllers:
     """Clients of the arm's and the gripper's controller."""
 
     def __init__(self, node: Node, arm: str, gripper: str, joints: list[str], grace_s: float):
-        """Names of both actions and of the joints; goals may take ``grace_s`` longer than asked."""
+        """Make the clients.
+
+        Args:
+            node: Who asks.
+            arm: Name of the arm's FollowJointTrajectory action.
+            gripper: Name of the gripper's GripperCommand action.
+            joints: Names of the arm's joints.
+            grace_s: How much longer than asked a motion may take.
+        """
         self._node, self._joints, self._grace_s = node, joints, grace_s
         self._arm = ActionClient(node, FollowJointTrajectory, arm)
         self._gripper = ActionClient(node, GripperCommand, gripper)
@@ -46,7 +54,7 @@ class Controllers:
         return bool(self._arm.server_is_ready() and self._gripper.server_is_ready())
 
     async def move(self, motion: JointMotion) -> None:
-        """Move the arm; a safe motion is the only kind there is.
+        """Move the arm; its limits were checked when the motion was made.
 
         Raises:
             ControllerRejectedError: The goal was not accepted.
@@ -66,14 +74,14 @@ class Controllers:
         """Move the fingers, or close them around something.
 
         Args:
-            position: As the controller wants it.
-            effort: N.
+            position: As the controller expects it: Franka's half the gap, in m.
+            effort: At most, N.
             limit_s: How long it may take.
 
         Raises:
-            ControllerRejectedError: As above.
-            ControllerAbortedError: As above; not where the fingers stalled at something.
-            ControllerTimeoutError: As above.
+            ControllerRejectedError: The goal was not accepted.
+            ControllerAbortedError: It was given up, and the fingers did not stall at something.
+            ControllerTimeoutError: No controller, or no answer in time; the goal is canceled.
         """
         command = GripperGoal(position=position, max_effort=effort)
         outcome = await self._run(self._gripper, GripperCommand.Goal(command=command), limit_s)

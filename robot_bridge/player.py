@@ -49,7 +49,13 @@ class Player(Node):
     def __init__(
         self, recorded: RecordedMotion, dry_run: DryRun, settings: PlayerParameters, **kwargs: Any
     ) -> None:
-        """Play what was checked.
+        """Connect to the robot; nothing moves before :meth:`play`.
+
+        Args:
+            recorded: What to execute.
+            dry_run: Of ``recorded``, within the limits of this robot.
+            settings: Of the robot.
+            kwargs: The node's.
 
         Raises:
             UnsafeCommandError: The dry run says that it must not be executed.
@@ -72,7 +78,7 @@ class Player(Node):
         self._robot.controllers.hold()
 
     async def play(self) -> None:
-        """Play it; what goes wrong is in ``failure``."""
+        """Execute the recording; why it ended early, if it did, is in ``failure``."""
         try:
             await self._begin()
             for waypoint, motion in zip(self._recorded.waypoints, self._motions, strict=True):

@@ -12,7 +12,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 from ensemble.futures import node_time_s, wait_for_first
-from ensemble.robot_parameters import RobotParameters, action_name
+from ensemble.robot_parameters import RobotParameters, action_name, arm_joints
 from robot_bridge.controllers import Controllers
 from robot_bridge.sensors import Sensors
 from slap_ros.core import Domain
@@ -49,12 +49,12 @@ class Robot:
             else sampled_scene_config(sampled())
         )
         self.world = RobotWorld(domain, scene_config, settings.limits, settings.tracking)
-        self.sensors = Sensors(node, self.world, settings.arm, f"{settings.arm}_link0")
+        self.sensors = Sensors(node, self.world, settings.arm)
         self.controllers = Controllers(
             node,
             action_name(settings.trajectory_action, settings.arm),
             action_name(settings.gripper_action, settings.arm),
-            self.sensors.joints,
+            arm_joints(settings.arm),
             settings.controller_timeout,
         )
 

@@ -14,6 +14,7 @@ from tf2_msgs.msg import TFMessage
 
 from ensemble.futures import node_time_s
 from ensemble.interfaces import JOINT_STATES, SENSOR_DATA, TF, TF_STATIC
+from ensemble.robot_parameters import arm_joints, base_frame, finger_joints
 from slap_ros.errors import InvalidMeasurementError
 from slap_ros.geometry.pose import Pose
 from slap_ros.geometry.static_transforms import StaticTransforms
@@ -21,19 +22,23 @@ from slap_ros.messages.decode import NANOSECONDS, stamp_ns
 from slap_ros.robot.robot_world import JointReading, RobotWorld
 from slap_ros.robot.tracking import measured_pose
 
-FINGERS = 2
 AHEAD = 0.05  # s, by which clocks of machines may differ
 
 
 class Sensors:
-    """Hands joint positions and detections to a cell; counts what it refuses."""
+    """Gives joint positions and detections to a RobotWorld; counts what that refuses."""
 
-    def __init__(self, node: Node, world: RobotWorld, prefix: str, base: str) -> None:
-        """Joints are named ``PREFIX_joint1`` and so on, the base's frame ``base``."""
+    def __init__(self, node: Node, world: RobotWorld, arm: str) -> None:
+        """Subscribe to joint states and frames.
+
+        Args:
+            node: Who subscribes.
+            world: What takes the measurements.
+            arm: Prefix of the names of joints and frames.
+        """
         self._node, self._world = node, world
-        self._arm = [f"{prefix}_joint{i + 1}" for i in range(7)]
-        self._fingers = [f"{prefix}_finger_joint{i + 1}" for i in range(FINGERS)]
-        self._frames = StaticTransforms(base)
+        self._arm, self._fingers = arm_joints(arm), finger_joints(arm)
+        self._frames = StaticTransforms(base_frame(arm))
         self.counts: Counter[str] = Counter(readings=0, detections=0, refused_measurements=0)
         self.gap: float | None = None  # m, between the fingers
         self.gap_s = 0.0  # stamp of the gap
@@ -41,13 +46,8 @@ class Sensors:
         node.create_subscription(TF.type, TF.name, self._on_frames, SENSOR_DATA)
         node.create_subscription(TF_STATIC.type, TF_STATIC.name, self._on_static, TF_STATIC.qos)
 
-    @property
-    def joints(self) -> list[str]:
-        """Names of the arm's joints."""
-        return self._arm
-
     def _on_joints(self, message: JointState) -> None:
-        """The arm's joints, the fingers', or both; others are none of ours."""
+        """The arm's joints, the fingers', or both; others are ignored."""
         stamp_s = self._stamp_s(message.header)
         if stamp_s is None:
             return

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What comes between a cell and its robot: noise, loss, delay; a function of a seed."""
+"""What comes between a robot and its sensors: noise, loss, delay; a function of a seed."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from slap_ros.geometry.pose import Pose, multiply
 
 @dataclass(frozen=True)
 class NoiseSettings:
-    """How bad it is; standard deviations along or about each axis."""
+    """How large it is; standard deviations along or about each axis."""
 
     latency_s: float = 0.0
     jitter_s: float = 0.0  # at most, on top of the latency
@@ -25,7 +25,7 @@ class NoiseSettings:
     dropout: float = 0.0  # share of detections lost
 
     def __post_init__(self) -> None:
-        """Refuse what is no disturbance.
+        """Refuse values that cannot be.
 
         Raises:
             InvalidParameterError: Negative, or everything lost.
@@ -38,28 +38,28 @@ class NoiseSettings:
 
 
 class NoiseModel:
-    """Draws disturbances."""
+    """Draws noise, losses and delays."""
 
-    def __init__(self, disturbance: NoiseSettings, rng: np.random.Generator) -> None:
-        self._by, self._rng = disturbance, rng
+    def __init__(self, settings: NoiseSettings, rng: np.random.Generator) -> None:
+        self._settings, self._rng = settings, rng
 
     def delay_s(self) -> float:
-        """How late something is."""
-        return self._by.latency_s + self._by.jitter_s * float(self._rng.random())
+        """A delay, s."""
+        return self._settings.latency_s + self._settings.jitter_s * float(self._rng.random())
 
     def dropped(self) -> bool:
         """Whether a detection is lost."""
-        return bool(self._rng.random() < self._by.dropout)
+        return bool(self._rng.random() < self._settings.dropout)
 
     def joints(self, joints: list[float]) -> list[float]:
-        """Joint positions as encoders tell them, rad."""
-        noise = self._by.joint_rad * self._rng.standard_normal(len(joints))
+        """Joint positions as encoders measure them, rad."""
+        noise = self._settings.joint_rad * self._rng.standard_normal(len(joints))
         return [float(q + n) for q, n in zip(joints, noise, strict=True)]
 
-    def seen(self, pose: Pose) -> Pose:
-        """A pose as a detector tells it."""
-        dx, dy, dz = (self._by.position_m * self._rng.standard_normal(3)).tolist()
-        a, b, c = (0.5 * self._by.turn_rad * self._rng.standard_normal(3)).tolist()
+    def perturbed(self, pose: Pose) -> Pose:
+        """A pose as a detector measures it."""
+        dx, dy, dz = (self._settings.position_m * self._rng.standard_normal(3)).tolist()
+        a, b, c = (0.5 * self._settings.turn_rad * self._rng.standard_normal(3)).tolist()
         length = math.sqrt(1.0 + a * a + b * b + c * c)
         turn = (a / length, b / length, c / length, 1.0 / length)
         x, y, z = pose.position

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The cell that a mock robot moves in: the domain's world, which does not wait for anybody."""
+"""What a mock robot moves in: the domain's world, where time passes without commands."""
 
 from __future__ import annotations
 

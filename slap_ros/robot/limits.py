@@ -93,6 +93,9 @@ class Limits:
             target: Where it is to go, rad, shape (7,).
             least_s: How long it takes at least.
 
+        Returns:
+            The motion, as long as velocity and acceleration limits ask for.
+
         Raises:
             UnsafeCommandError: Not finite, beyond a limit, too far for one command, or out of the
                 workspace, at the end or on the way; says which.

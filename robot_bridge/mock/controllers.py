@@ -1,0 +1,144 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The mock robot's controllers: action servers that move the plant."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from control_msgs.action import FollowJointTrajectory, GripperCommand
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.action.server import ServerGoalHandle
+from rclpy.node import Node
+from rclpy.task import Future
+from trajectory_msgs.msg import JointTrajectoryPoint
+
+from ensemble.robot_parameters import MockRobotParameters, action_name, arm_joints
+from robot_bridge.mock.noise_model import NoiseModel
+from robot_bridge.mock.plant import Plant
+
+
+class MockControllers:
+    """A joint trajectory controller and a gripper controller.
+
+    While ``busy``, a goal is under way, which makes the plant's time pass.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        plant: Plant,
+        noise: NoiseModel,
+        settings: MockRobotParameters,
+        period_s: float,
+        counts: Counter[str],
+    ) -> None:
+        """Open both action servers.
+
+        Args:
+            node: Whose they are.
+            plant: What they move.
+            noise: By how much they are late.
+            settings: Of the mock robot.
+            period_s: How long a control period lasts here, s.
+            counts: Where goals are counted by outcome.
+        """
+        self.busy = False
+        self._node, self._plant, self._noise = node, plant, noise
+        self._settings, self._period_s, self._counts = settings, period_s, counts
+        self._joints = arm_joints(settings.arm)
+        self._arm = ActionServer(
+            node,
+            FollowJointTrajectory,
+            action_name(settings.trajectory_action, settings.arm),
+            self._move,
+            goal_callback=self._on_motion,
+            cancel_callback=lambda _: CancelResponse.ACCEPT,
+        )
+        self._gripper = ActionServer(
+            node,
+            GripperCommand,
+            action_name(settings.gripper_action, settings.arm),
+            self._grip,
+        )
+
+    def destroy(self) -> None:
+        """Destroy the action servers."""
+        self._arm.destroy()
+        self._gripper.destroy()
+
+    def _fails(self, fault: str) -> bool:
+        """Whether a motion is to fail in this way now."""
+        due = self._counts["motions"] >= self._settings.fault_after
+        return self._settings.fault == fault and due
+
+    def _on_motion(self, goal: FollowJointTrajectory.Goal) -> GoalResponse:
+        known = list(goal.trajectory.joint_names) == self._joints
+        if self.busy or self._fails("reject") or not known:
+            self._counts["refused"] += 1
+            return GoalResponse.REJECT
+        return GoalResponse.ACCEPT
+
+    async def _move(self, goal: ServerGoalHandle) -> FollowJointTrajectory.Result:
+        self.busy = True
+        try:
+            await pause(self._node, self._noise.delay_s())
+            if self._fails("abort"):
+                return self._abort(goal)
+            return await self._follow(goal, goal.request.trajectory.points[-1])
+        finally:
+            self.busy = False
+
+    def _abort(self, goal: ServerGoalHandle) -> FollowJointTrajectory.Result:
+        self._counts["aborted"] += 1
+        goal.abort()
+        return FollowJointTrajectory.Result(
+            error_code=FollowJointTrajectory.Result.PATH_TOLERANCE_VIOLATED,
+            error_string="told to fail",
+        )
+
+    async def _follow(
+        self, goal: ServerGoalHandle, point: JointTrajectoryPoint
+    ) -> FollowJointTrajectory.Result:
+        lasts_s = point.time_from_start.sec + point.time_from_start.nanosec * 1e-9
+        ignored = self._fails("ignore")
+        periods = self._plant.periods_to(point.positions)
+        done = 0
+        while ignored or done < periods:
+            await pause(self._node, lasts_s / periods / self._settings.pace)
+            if goal.is_cancel_requested:
+                self._counts["canceled"] += 1
+                goal.canceled()
+                return FollowJointTrajectory.Result()
+            if not ignored:
+                self._plant.approach(point.positions)
+                done += 1
+        self._counts["motions"] += 1
+        goal.succeed()
+        return FollowJointTrajectory.Result()
+
+    async def _grip(self, goal: ServerGoalHandle) -> GripperCommand.Result:
+        self.busy = True
+        try:
+            await pause(self._node, self._noise.delay_s() + self._period_s)
+            wanted = goal.request.command.position / self._settings.gripper_scale
+            self._plant.move_fingers(shut=wanted < self._plant.gap)
+        finally:
+            self.busy = False
+        self._counts["grips"] += 1
+        goal.succeed()
+        return GripperCommand.Result(
+            position=self._plant.gap * self._settings.gripper_scale,
+            stalled=self._plant.holding,
+            reached_goal=not self._plant.holding,
+        )
+
+
+async def pause(node: Node, duration_s: float) -> None:
+    """Wait without blocking the executor."""
+    over = Future()
+    timer = node.create_timer(max(duration_s, 1e-3), lambda: over.done() or over.set_result(None))
+    try:
+        await over
+    finally:
+        node.destroy_timer(timer)

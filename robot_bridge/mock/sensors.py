@@ -1,0 +1,90 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The mock robot's sensors: joint states, and detections that are noisy, late and lost."""
+
+from __future__ import annotations
+
+import heapq
+from itertools import count
+
+from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+from tf2_msgs.msg import TFMessage
+
+from ensemble.futures import node_time_s
+from ensemble.interfaces import JOINT_STATES, TF
+from ensemble.robot_parameters import MockRobotParameters, arm_joints, base_frame, finger_joints
+from robot_bridge.mock.noise_model import NoiseModel
+from robot_bridge.mock.plant import Plant
+from slap_ros.geometry.pose import Pose
+from slap_ros.robot.scene_config import DETECTED
+
+DELIVERY_PERIOD = 0.005  # s, between two looks at which detections are due
+
+
+class MockSensors:
+    """Publishes joint states, and detections a little after they are made."""
+
+    def __init__(
+        self, node: Node, plant: Plant, noise: NoiseModel, settings: MockRobotParameters
+    ) -> None:
+        """Begin to publish.
+
+        Args:
+            node: Publishes.
+            plant: What is measured.
+            noise: What comes between.
+            settings: Rates, the arm's name, and what is never detected.
+        """
+        self._node, self._plant, self._noise, self._settings = node, plant, noise, settings
+        self._frame = base_frame(settings.arm)
+        self._names = [*arm_joints(settings.arm), *finger_joints(settings.arm)]
+        self._pending: list[tuple[float, int, TransformStamped]] = []  # by the time they are due
+        self._numbers = count()
+        self._frames = node.create_publisher(TF.type, TF.name, TF.qos)
+        self._joints = node.create_publisher(JOINT_STATES.type, JOINT_STATES.name, JOINT_STATES.qos)
+        node.create_timer(1.0 / settings.joint_rate, self._publish_joints)
+        node.create_timer(1.0 / settings.rate, self._detect)
+        node.create_timer(DELIVERY_PERIOD, self._deliver)
+
+    def _header(self) -> Header:
+        return Header(stamp=self._node.get_clock().now().to_msg(), frame_id=self._frame)
+
+    def _publish_joints(self) -> None:
+        finger = 0.5 * self._plant.gap
+        positions = [*self._noise.joints(self._plant.joints), finger, finger]
+        self._joints.publish(
+            JointState(header=self._header(), name=self._names, position=positions)
+        )
+
+    def _detect(self) -> None:
+        """Measure everything now; it is published a little later, not always in order."""
+        now_s, header = node_time_s(self._node), self._header()
+        for name, pose in self._plant.poses().items():
+            if self._noise.dropped() or name == self._settings.hidden:
+                continue
+            item = transform(self._noise.perturbed(pose), f"{DETECTED}{name}")
+            item.header = header
+            due_s = now_s + self._noise.delay_s()
+            heapq.heappush(self._pending, (due_s, next(self._numbers), item))
+
+    def _deliver(self) -> None:
+        now_s, due = node_time_s(self._node), []
+        while self._pending and self._pending[0][0] <= now_s:
+            due.append(heapq.heappop(self._pending)[2])
+        if due:
+            self._frames.publish(TFMessage(transforms=due))
+
+
+def transform(pose: Pose, child: str) -> TransformStamped:
+    """A pose as the transform of the frame ``child``."""
+    x, y, z = pose.position
+    qx, qy, qz, qw = pose.quaternion
+    return TransformStamped(
+        child_frame_id=child,
+        transform=Transform(
+            translation=Vector3(x=x, y=y, z=z), rotation=Quaternion(x=qx, y=qy, z=qz, w=qw)
+        ),
+    )
