@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Every node's 1 Hz sign of life on ``diagnostics``."""
+"""The counts that every node publishes on ``diagnostics`` once per second."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ PERIOD = 1.0  # s
 
 
 class DiagnosticsPublisher:
-    """Publishes what a node counts."""
+    """Publishes what a node counts, as its heartbeat."""
 
     def __init__(self, node: Node, counts: Callable[[], Mapping[str, object]]) -> None:
-        """``counts`` is called for each heartbeat."""
+        """Publish as ``node``; ``counts`` is called for each message."""
         self._node = node
         self._counts = counts
         self._publisher = node.create_publisher(DIAGNOSTICS.type, DIAGNOSTICS.name, DIAGNOSTICS.qos)
-        node.create_timer(PERIOD, self._beat)
+        node.create_timer(PERIOD, self._publish)
 
-    def _beat(self) -> None:
+    def _publish(self) -> None:
         name = self._node.get_fully_qualified_name()
         status = DiagnosticStatus(
             level=DiagnosticStatus.OK,

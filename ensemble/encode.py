@@ -106,7 +106,7 @@ def percept(
         known: ``of``, decoded: only objects that are perceived otherwise go into the message.
 
     Returns:
-        The message; objects whose place nobody knows are sorted by name.
+        The message; missing objects are sorted by name.
     """
     return msgs.AbstractState(
         header=of.header,

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How every node's ``main`` runs: one place for start, stop and exit codes."""
+"""What every node's ``main`` does: start, stop and exit codes."""
 
 from __future__ import annotations
 

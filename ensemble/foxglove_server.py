@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A run for Foxglove, on a WebSocket of this machine: ROS messages as they are, without ROS 2.
+"""Serves a run to Foxglove on a WebSocket of this machine: ROS messages as they are, without ROS 2.
 
 Channels have the names, types and bytes that bags and ``foxglove_bridge`` have, so that one layout
 fits all three. Needs ``foxglove-sdk``.
@@ -25,25 +25,25 @@ if TYPE_CHECKING:
 
 SHOWN_TOPICS = tuple(topic for topic in RECORDED if topic is not DIAGNOSTICS)
 EVENTS = (PLAN_EVENTS.type_name, SKILL_EVENTS.type_name)
-HOST = "127.0.0.1"  # nobody else's business
+HOST = "127.0.0.1"  # reachable from this machine only
 PORT = 8765  # where Foxglove looks
 BACKLOG = 4096  # messages kept for a viewer that is slow
 
 
 def foxglove_installed() -> bool:
-    """Whether what it takes is installed."""
+    """Whether foxglove-sdk is installed."""
     return find_spec("foxglove") is not None
 
 
 class FoxgloveServer:
-    """Sends what it is given to whoever watches; latecomers get the newest of each topic at once.
+    """Sends messages to all viewers; one that joins late gets the newest of each topic at once.
 
     Raises:
-        InvalidParameterError: foxglove-sdk is not installed, or somebody else has the port.
+        InvalidParameterError: foxglove-sdk is not installed, or the port is in use.
     """
 
     def __init__(self, port: int | None = None) -> None:
-        """``port``: None for the usual one, or any other that is free."""
+        """Serve on ``port``; None: Foxglove's own port, or any other that is free."""
         if not foxglove_installed():
             raise InvalidParameterError(
                 "Foxglove is served with foxglove-sdk, which is not installed: "
@@ -67,7 +67,7 @@ class FoxgloveServer:
         }
         self._by_id = {channel.id(): channel for channel in self._channels.values()}
         self._newest: dict[int, bytes] = {}  # by channel
-        self._lock = threading.Lock()  # viewers come in threads of the server's
+        self._lock = threading.Lock()  # the server calls back in threads of its own
         self._subscriptions = 0
         self._server = self._start((PORT, 0) if port is None else (port,))
 
@@ -95,24 +95,24 @@ class FoxgloveServer:
 
     @property
     def has_viewers(self) -> bool:
-        """Whether somebody watches anything."""
+        """Whether any viewer subscribes to a topic."""
         return self._subscriptions > 0
 
     def __call__(self, type_name: str, message: Any) -> None:
-        """Take a message of the run."""
+        """Send a message of the run."""
         channel = self._channels.get(type_name)
         if channel is None:
             return
         data = bytes(serialize_message(message))
         with self._lock:
-            if type_name not in EVENTS:  # which are not to be heard twice
+            if type_name not in EVENTS:  # which must not arrive twice
                 self._newest[channel.id()] = data
             channel.log(data)
 
     def on_subscribe(self, client: Client, channel: ChannelView) -> None:
-        """Somebody begins to watch a topic: what it said last is news to them.
+        """Send the newest message of a topic that a viewer has just subscribed to.
 
-        The server does not tell how to say it to them alone, so others hear it twice.
+        The server cannot send it to one viewer alone, so the others receive it twice.
         """
         del client
         with self._lock:
@@ -121,7 +121,7 @@ class FoxgloveServer:
                 self._by_id[channel.id].log(self._newest[channel.id])
 
     def on_unsubscribe(self, client: Client, channel: ChannelView) -> None:
-        """Somebody watches a topic no more."""
+        """Count a viewer that has unsubscribed from a topic."""
         del client, channel
         with self._lock:
             self._subscriptions -= 1

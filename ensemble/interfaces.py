@@ -53,7 +53,7 @@ def _profile(offered: OfferedQos) -> QoSProfile:
 LATCHED = _profile(qos.LATCHED)
 EPISODE = _profile(qos.EPISODE)
 VOLATILE = _profile(qos.VOLATILE)
-# Whatever a robot's driver offers, reliable or not; what is old is of no use.
+# As a robot's driver publishes, reliable or not; old messages are of no use.
 SENSOR_DATA = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,
     depth=100,

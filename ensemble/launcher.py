@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where an ensemble's nodes live: each in a process of its own, or all in this one."""
+"""Starts an ensemble's nodes: each in a process of its own, or all in this one."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class NodeLauncher(Protocol):
     """Runs an ensemble from entering to leaving the context."""
 
     def check(self) -> None:
-        """Look after the nodes.
+        """Check that every node still runs.
 
         Raises:
             NodeDiedError: One has ended.
@@ -40,7 +40,7 @@ class NodeLauncher(Protocol):
         ...
 
     def require(self, name: str) -> None:
-        """Look after one node.
+        """Check that one node still runs.
 
         Raises:
             NodeDiedError: It has ended.
@@ -58,10 +58,10 @@ class NodeLauncher(Protocol):
 
 
 class ProcessLauncher:
-    """Each node a process. None outlives this one, however it ends."""
+    """Runs each node as a process. None outlives this one, however it ends."""
 
     def __init__(self, nodes: NodeParameters) -> None:
-        """``nodes`` are the parameters by node."""
+        """Run nodes, given their parameters by name."""
         self._nodes = nodes
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
 
@@ -124,10 +124,10 @@ def _died(name: str, code: int) -> NodeDiedError:
 
 
 class InProcessLauncher:
-    """Every node in this process, on one executor."""
+    """Runs every node in this process, on one executor."""
 
     def __init__(self, nodes: NodeParameters, executor: Executor) -> None:
-        """``nodes`` are the parameters by node; ``executor`` is spun by somebody else."""
+        """Run nodes, given their parameters by name, on an executor that the caller spins."""
         self._nodes = nodes
         self._executor = executor
         self._made: list[Node] = []
@@ -143,10 +143,10 @@ class InProcessLauncher:
         return self
 
     def check(self) -> None:
-        """Nothing to look after: errors of nodes come out of the executor."""
+        """Nothing to check: errors of nodes come out of the executor."""
 
     def require(self, name: str) -> None:
-        """Nothing to look after, as above."""
+        """Nothing to check, as above."""
 
     def __exit__(
         self,

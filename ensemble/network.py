@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Joining the network: whoever is on this host, unless the environment says otherwise."""
+"""Joining the network: nodes on this host only, unless the environment is set otherwise."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 def join_network(**options: Any) -> None:
     """``rclpy.init``, so that a robot takes no commands from elsewhere by accident.
 
-    Left to itself Jazzy looks for others on the whole subnet. Whoever wants that sets the variable
+    By default Jazzy discovers nodes on the whole subnet. To have that, set the variable
     ``ROS_AUTOMATIC_DISCOVERY_RANGE``.
 
     Raises:

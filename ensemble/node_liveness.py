@@ -9,7 +9,7 @@ from rclpy.node import Node
 from ensemble.futures import node_time_s
 from ensemble.interfaces import Topic
 
-PERIOD = 0.5  # s between two looks at the graph, which cost time; DDS takes longer to miss a node
+PERIOD = 0.5  # s between two queries of the graph, which cost time; DDS takes longer to miss a node
 
 
 class NodeLiveness:
@@ -20,22 +20,22 @@ class NodeLiveness:
     """
 
     def __init__(self, node: Node, topic: Topic) -> None:
-        """Follow whoever publishes ``topic`` now or, if nobody does yet, first."""
+        """Follow the nodes that publish ``topic`` now or, if none does yet, the first that do."""
         self._node = node
         self._topic = node.resolve_topic_name(topic.name)
         self._known = self._now = self._publishers()
-        self._looked_s = node_time_s(node)
+        self._queried_s = node_time_s(node)
 
     def is_alive(self) -> bool:
         """Whether one of them is there."""
-        if node_time_s(self._node) - self._looked_s > PERIOD:
+        if node_time_s(self._node) - self._queried_s > PERIOD:
             self._now = self._publishers()
             self._known = self._known or self._now
-            self._looked_s = node_time_s(self._node)
+            self._queried_s = node_time_s(self._node)
         return not self._known.isdisjoint(self._now)
 
     def is_lost(self) -> bool:
-        """Whether they were there and are no more; False as long as none was found."""
+        """Whether they were there and are gone; False as long as none was found."""
         return not self.is_alive() and bool(self._known)
 
     def _publishers(self) -> frozenset[tuple[int, ...]]:

@@ -57,7 +57,7 @@ class Observation:
         step: Environment steps taken before it.
         state: As perceived.
         abstract: The atoms that hold, as a mask over the episode's atom space.
-        missing: Names of objects whose place nobody knows.
+        missing: Names of objects whose place is not known.
         exact: Whether perceiving the same state again would give the same.
     """
 

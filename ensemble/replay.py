@@ -83,7 +83,7 @@ def replay_on_robot(
         dry_run: Of ``recorded``, within the limits of this robot.
         parameters: Of the robot.
         mock: Parameters of a mock robot to start; None where there is a real one.
-        on_step: Called with the number of steps executed, again and again.
+        on_step: Called with the number of steps executed, often.
 
     Returns:
         What came of it.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A node of one's own on the network, spun while something is waited for."""
+"""A short-lived node on the network, spun while something is waited for."""
 
 from __future__ import annotations
 
@@ -16,36 +16,39 @@ from rclpy.signals import SignalHandlerOptions
 
 from ensemble.network import join_network
 
-SPIN = 0.05  # s, the longest time between two looks at the nodes
+SPIN_PERIOD = 0.05  # s, the longest time between two checks
 
 N = TypeVar("N", bound=Node)
 
 
 class Spinner:
-    """Spins an executor until something holds, looking after the nodes meanwhile."""
+    """Spins an executor until a condition holds, and calls ``check`` meanwhile."""
 
     def __init__(self, executor: Executor) -> None:
         self.check: Callable[[], None] = lambda: None
         self.executor = executor
 
     def spin_until(self, condition: Callable[[], bool], timeout_s: float) -> bool:
-        """Whether the condition came to hold in time.
+        """Spin until a condition holds, for at most ``timeout_s``.
+
+        Returns:
+            Whether it came to hold in time.
 
         Raises:
-            NodeDiedError: A node ended meanwhile.
+            NodeDiedError: A node ended meanwhile, if ``check`` finds that out.
         """
         end = monotonic() + timeout_s
         while not condition():
             if monotonic() > end:
                 return False
-            self.executor.spin_once(timeout_sec=SPIN)
+            self.executor.spin_once(timeout_sec=SPIN_PERIOD)
             self.check()
         return True
 
 
 @contextmanager
 def temporary_node(make: Callable[[], N]) -> Iterator[tuple[N, Spinner]]:
-    """Join the network with a node, and leave it in the end.
+    """Join the network with a node, and leave it at the end.
 
     No signal handlers: after Ctrl-C there still is something to be canceled and closed.
 

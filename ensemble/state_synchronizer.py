@@ -53,7 +53,7 @@ class StateSynchronizer:
     ) -> Observation:
         """The newest observation, waited for until there is one of this episode or a later one.
 
-        Whoever has just reset the world may know of the new episode before this node does.
+        A client that has just reset the world may know of the new episode before this node does.
 
         Args:
             episode: The number of the episode; 0: any.

@@ -2,19 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """Turns states into ground atoms. The place for a lab's own detectors.
 
-By default nothing is perceived otherwise than it is. With noise, whatever can be moved is seen
-where it is not quite, and planner and skill server know of no other place.
+By default perception is exact. With noise, movable objects are perceived a little off their true
+place, and planner and skill server know the perceived place only.
 
 ROS Parameters:
     position_noise (double, 0.0): m, standard deviation of positions along each axis.
     turn_noise (double, 0.0): rad, standard deviation of orientations about each axis.
-    threshold_noise (double, 0.0): standard deviation of predicates' thresholds, in the unit of each
-        one's metric: m or rad.
-    dropout (double, 0.0): share of the sightings of an object that are lost.
-    hidden (string, ""): objects that are never seen, separated by blanks.
-    memory (int, 40): environment steps for which what is not seen is taken to be where it was; then
-        it is missing, and a skill that is about it ends with NO_DETECTION.
-    debounce (int, 1): an atom changes once it was perceived as changed so many times in a row.
+    threshold_noise (double, 0.0): standard deviation of predicates' thresholds, in the unit of the
+        predicate's metric: m or rad.
+    dropout (double, 0.0): share of the detections of an object that are lost.
+    hidden (string, ""): objects that are never detected, separated by blanks.
+    memory (int, 40): environment steps for which an object that is not detected is taken to be
+        where it was; then it is missing, and a skill that is about it ends with NO_DETECTION.
+    debounce (int, 1): how many times in a row an atom must be perceived as changed to change.
     noise_seed (int, 0): noise is a function of it, of the episode and of its states.
 
 Publishers:
@@ -50,7 +50,7 @@ from slap_ros.perception import ExactPerceiver, NoisyPerceiver, Perceiver
 
 
 class PerceptionNode(Node):
-    """Perception by the domain's own predicates, as well as it is told to perceive."""
+    """Perception by the domain's own predicates, as well as the parameters allow."""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("perception_node", **kwargs)
@@ -58,15 +58,15 @@ class PerceptionNode(Node):
         self._quality, self._seed = parameters.quality, parameters.noise_seed
         self._perceiver: Perceiver
         self._perceived = 0
-        self._waiting: deque[ObjectCentricState] = deque()
+        self._pending: deque[ObjectCentricState] = deque()
         self._atoms = self.create_publisher(ATOMS.type, ATOMS.name, ATOMS.qos)
-        self._watcher = EpisodeTracker(self, self._open)
+        self._episodes = EpisodeTracker(self, self._open)
         subscribe(self, STATE, self._on_state)
         DiagnosticsPublisher(self, lambda: {"states": self._perceived})
 
     def _open(self, episode: Episode) -> None:
         self._perceiver = self._perceiver_of(episode)
-        self._perceive_waiting()
+        self._perceive_pending()
 
     def _perceiver_of(self, episode: Episode) -> Perceiver:
         if self._quality.exact:
@@ -76,17 +76,17 @@ class PerceptionNode(Node):
         return NoisyPerceiver.of(episode.domain, episode.space, initial, self._quality, rng)
 
     def _on_state(self, message: ObjectCentricState) -> None:
-        self._waiting.append(message)
-        self._perceive_waiting()
+        self._pending.append(message)
+        self._perceive_pending()
 
-    def _perceive_waiting(self) -> None:
+    def _perceive_pending(self) -> None:
         """States may arrive before the task that says what they consist of."""
-        episode = self._watcher.current
-        while episode is not None and self._waiting:
-            if episode.has(self._waiting[0]):
-                self._perceive(self._waiting.popleft(), episode)
-            elif episode.follows(self._waiting[0]):
-                self._waiting.popleft()
+        episode = self._episodes.current
+        while episode is not None and self._pending:
+            if episode.has(self._pending[0]):
+                self._perceive(self._pending.popleft(), episode)
+            elif episode.follows(self._pending[0]):
+                self._pending.popleft()
             else:
                 return  # its task is still to come
 

@@ -39,7 +39,7 @@ from slap_ros.planning.plan import Plan, PlanEdge, PlanningResult
 from slap_ros.planning.planner import Planner
 
 ANSWER_TIMEOUT = 5.0  # s, for the skill server to accept a goal, or to end one that is canceled
-ASK_AGAIN = 2.0  # s without a result after which it is asked for once more
+ASK_AGAIN = 2.0  # s without a result after which it is asked for again
 OBSERVE_TIMEOUT = 5.0  # s, for a state that the skill server has seen to be seen here too
 
 # Outcomes of an edge after which a new plan from wherever the robot is now makes sense.
@@ -51,7 +51,7 @@ DIVERGENCES = frozenset(
         ErrorCode.INVALID_COMMAND,
     }
 )
-# Where these come of what was seen wrongly, another look may help.
+# Where wrong perception is the cause of these, perceiving again may help.
 UNPLANNED = frozenset({ErrorCode.UNSOLVABLE, ErrorCode.PLANNING_LIMIT, ErrorCode.INVALID_STATE})
 
 
@@ -101,10 +101,10 @@ class TaskExecution:
         return latest.step if latest.episode is self._start.episode else self._start.step
 
     async def run(self) -> SolveTask.Result:
-        """Solve, or say why not; every outcome is published as an event."""
+        """Solve the task; every outcome is published as an event, too."""
         while True:
             try:
-                stopped = await self._attempt()
+                stopped = await self._plan_and_execute()
             except SlapError as error:
                 stopped = OptionResult(error.code, str(error))
             blind = stopped.code in UNPLANNED and not self._latest.exact
@@ -115,9 +115,9 @@ class TaskExecution:
                 stopped = OptionResult(ErrorCode.REPLANS_EXHAUSTED, f"{limit}: {stopped.reason}")
                 break
             if blind:
-                looked = await self._look_again()
-                if looked.code is not ErrorCode.SKILL_STEP_LIMIT:  # as it ends
-                    stopped = looked
+                perceived = await self._perceive_again()
+                if perceived.code is not ErrorCode.SKILL_STEP_LIMIT:  # as it ends
+                    stopped = perceived
                     break
         if stopped.reached:
             self._event(PlanEvent.SOLVED)
@@ -125,8 +125,8 @@ class TaskExecution:
             self._event(PlanEvent.FAILED, error_code=int(stopped.code), error_msg=stopped.reason)
         return self._statistics.result(self._last_step, stopped)
 
-    async def _attempt(self) -> OptionResult:
-        """One plan, as far as it goes."""
+    async def _plan_and_execute(self) -> OptionResult:
+        """Make one plan and execute it, up to its first edge that fails."""
         plan = await self._plan()
         for number, edge in enumerate(plan.edges):
             self._event(PlanEvent.EDGE_STARTED, edge=number)
@@ -139,8 +139,8 @@ class TaskExecution:
             self._event(PlanEvent.EDGE_REACHED, edge=number)
         return OptionResult(ErrorCode.NONE)
 
-    async def _look_again(self) -> OptionResult:
-        """Hold for a step, to see the same anew."""
+    async def _perceive_again(self) -> OptionResult:
+        """Hold for a step, to perceive the same again."""
         hold = hold_option(self._latest.episode.domain.action_space)
         try:
             return await self._execute(PlanEdge(hold, 0, hold.skill.step_limit))
@@ -155,7 +155,7 @@ class TaskExecution:
         self._feedback(SolveTask.Feedback.PLANNING)
         started = self._event(PlanEvent.PLANNING_STARTED)
         job = submit(self.workers, lambda: self.planner.plan(state, self.goal_mask))
-        await self._done(job)
+        await self._wait(job)
         result: PlanningResult = job.result().result()
         rolled_out = result.edges_rolled_out
         done = self._event(PlanEvent.PLANNED, edges_rolled_out=rolled_out)
@@ -184,7 +184,7 @@ class TaskExecution:
             step_budget=budget,
         )
         sent = self.skills.send_goal_async(request)
-        if not await self._done(sent, ANSWER_TIMEOUT):
+        if not await self._wait(sent, ANSWER_TIMEOUT):
             raise NodeDiedError(f"skill_server did not accept {edge} within {ANSWER_TIMEOUT} s")
         handle = sent.result()
         if not handle.accepted:
@@ -198,22 +198,22 @@ class TaskExecution:
     async def _result(self, goal: ClientGoalHandle) -> ExecuteSkill.Result:
         """How a skill ended.
 
-        Asked for again and again: services are not latched, so that an answer is lost for good
-        where the two nodes had lost sight of each other for a moment.
+        Asked for repeatedly: services are not latched, so that an answer is lost for good when
+        the connection between the two nodes is interrupted for a moment.
         """
         ended = goal.get_result_async()
         try:
-            while not await self._done(ended, ASK_AGAIN):
+            while not await self._wait(ended, ASK_AGAIN):
                 ended = goal.get_result_async()
         except TaskCanceledError:
             goal.cancel_goal_async()
-            await self._holds(ended)
+            await self._wait_for_hold(ended)
             raise
         if ended.result().status == GoalStatus.STATUS_UNKNOWN:
-            raise NodeDiedError("skill_server has forgotten the skill: it was started anew")
+            raise NodeDiedError("skill_server has forgotten the skill: it was started again")
         return ended.result().result
 
-    async def _holds(self, ended: Future) -> None:
+    async def _wait_for_hold(self, ended: Future) -> None:
         """Wait for a canceled skill to end, unless the skill server is gone."""
         deadline = node_time_s(self.node) + ANSWER_TIMEOUT
         await wait_for_first(
@@ -226,14 +226,14 @@ class TaskExecution:
         """Wait until the state of a step is known here too, not only to the skill server.
 
         Raises:
-            NoStateError: It was lost on the way.
+            NoStateError: It does not arrive in time.
         """
         if self._latest.step >= step:
             return
-        if not await self._done(Future(), OBSERVE_TIMEOUT, lambda: self._latest.step >= step):
+        if not await self._wait(Future(), OBSERVE_TIMEOUT, lambda: self._latest.step >= step):
             raise NoStateError(f"step {step} was not perceived within {OBSERVE_TIMEOUT} s")
 
-    async def _done(
+    async def _wait(
         self,
         future: Future,
         timeout_s: float = inf,
@@ -242,7 +242,7 @@ class TaskExecution:
         """Wait for a future or a condition unless the run is over before.
 
         Returns:
-            Whether it came, rather than the end of the time.
+            Whether it came before the time was up.
 
         Raises:
             TaskCanceledError: The goal was canceled.
@@ -253,7 +253,7 @@ class TaskExecution:
         await wait_for_first(
             self.node,
             future,
-            lambda: condition() or self._over() or node_time_s(self.node) > deadline,
+            lambda: condition() or self._interrupted() or node_time_s(self.node) > deadline,
         )
         if self.goal.is_cancel_requested:
             raise TaskCanceledError("canceled")
@@ -264,14 +264,14 @@ class TaskExecution:
             raise NodeDiedError("skill_server does not answer: it was stopped or died")
         return done
 
-    def _over(self) -> bool:
+    def _interrupted(self) -> bool:
         return (
             self.goal.is_cancel_requested
             or self._latest.episode is not self._start.episode
             or self.skill_server.is_lost()
         )
 
-    # -- telling --------------------------------------------------------------------------------
+    # -- reporting -------------------------------------------------------------------------------
 
     def _event(self, kind: int, **details: object) -> int:
         number = max(self._statistics.plans - 1, 0)

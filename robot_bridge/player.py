@@ -2,9 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Executes a recorded plan on a robot, open loop: ``slap bag replay BAG --to robot``.
 
-It looks once before it begins, and once when it is done. In between it trusts the recording for
-everything but the arm's own joints, fingers and controllers: the first of these that fails ends the
-replay, and nothing more is sent, so that the controllers hold.
+It measures the whole state once before it begins, and once when it is done. In between it trusts
+the recording for everything but the arm's own joints, fingers and controllers: the first of these
+that fails ends the replay, and nothing more is sent, so that the controllers hold.
+
+ROS Parameters:
+    none: whatever makes the node gives it ``ensemble.robot_parameters.PlayerParameters``.
 
 Subscribers:
     joint_states (sensor_msgs/JointState), tf, tf_static (tf2_msgs/TFMessage): as robot_bridge.
@@ -69,7 +72,7 @@ class Player(Node):
         self.final: State | None = None  # as measured at the end; None where something is held
 
     def destroy_node(self) -> None:
-        """Hold, and give back what is held."""
+        """Hold, and release what the robot's clients use."""
         self._robot.destroy()
         super().destroy_node()
 
@@ -85,7 +88,7 @@ class Player(Node):
                 await self._step(waypoint, motion)
                 self.done += 1
             if not any(_held(self._recorded.states[-1], name) for name in self._names):
-                self.final = await self._look("at the end")
+                self.final = await self._measure("at the end")
         except SlapError as error:
             self.hold()
             self.failure = error
@@ -105,7 +108,7 @@ class Player(Node):
         )
         if not self._robot.controllers.ready:
             raise ControllerTimeoutError("the controllers are not there: are they running?")
-        state = await self._look("at the start")
+        state = await self._measure("at the start")
         off = self._robot.world.joint_distance(self._recorded.start)
         if off > self._settings.start_tolerance:
             raise StartMismatchError(
@@ -130,8 +133,8 @@ class Player(Node):
                 f"{self._settings.place_tolerance} m: put it to ({place})"
             )
 
-    async def _look(self, when: str) -> State:
-        """The state, measured anew."""
+    async def _measure(self, when: str) -> State:
+        """The state, measured from now on."""
         since_s = node_time_s(self)
         end_s = since_s + self._settings.start_timeout
         found: list[State] = []
@@ -174,7 +177,7 @@ class Player(Node):
             )
 
     async def _require_at(self, joints: tuple[float, ...], when: str) -> None:
-        """Hear anew where the arm is, which must be where the recording had it."""
+        """Wait for new joint positions, which must be where the recording had the arm."""
         since_s = node_time_s(self)
         end_s = since_s + self._settings.joint_timeout
         await wait_for_first(

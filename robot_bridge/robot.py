@@ -25,15 +25,15 @@ GAP_AGE = 0.1  # s, by which finger positions may be older than their stamp: dri
 
 
 class Robot:
-    """What a node knows of a robot, and has it do."""
+    """A robot: its world as far as it is measured, and its controllers."""
 
     def __init__(
         self, node: Node, domain: Domain, sampled: Callable[[], State], settings: RobotParameters
     ) -> None:
-        """Listen to it and look for its controllers.
+        """Subscribe to its sensors and connect to its controllers.
 
         Args:
-            node: The node that does.
+            node: Who does.
             domain: What the robot is to do.
             sampled: The state whose objects there are, where no scene says which.
             settings: Of the robot.
@@ -59,7 +59,7 @@ class Robot:
         )
 
     def destroy(self) -> None:
-        """Hold, and give back what is held."""
+        """Hold, and release clients and world."""
         self.controllers.hold()
         self.controllers.destroy()
         self.world.close()
@@ -101,7 +101,7 @@ class Robot:
 
         Raises:
             ControllerRejectedError, ControllerAbortedError, ControllerTimeoutError: Of the gripper.
-            NoJointStateError: Nobody says where they are.
+            NoJointStateError: No joint state has their positions.
         """
         settings, sensors = self._settings, self.sensors
         await self.controllers.move_gripper(

@@ -19,7 +19,8 @@ from slap_ros.errors import InvalidMeasurementError
 from slap_ros.geometry.pose import Pose
 from slap_ros.geometry.static_transforms import StaticTransforms
 from slap_ros.messages.decode import NANOSECONDS, stamp_ns
-from slap_ros.robot.robot_world import JointReading, RobotWorld
+from slap_ros.robot.joint_reading import JointReading
+from slap_ros.robot.robot_world import RobotWorld
 from slap_ros.robot.tracking import measured_pose
 
 AHEAD = 0.05  # s, by which clocks of machines may differ

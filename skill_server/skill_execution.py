@@ -32,7 +32,7 @@ class SkillExecution:
         execution: The option on its way to the expected atoms.
         start: Where it starts.
         step_budget: Environment steps that it may take.
-        planner: Nobody watches the plan when it is gone.
+        planner: Whether it is there: without it the skill is given up.
         publisher: Of commands and events.
     """
 
@@ -95,7 +95,7 @@ class SkillExecution:
             self.publisher.command(action, self.latest)
 
     def check(self, state_timeout_s: float) -> None:
-        """End if no state has come for so long, or nobody watches the plan any more."""
+        """End if no state has come for ``state_timeout_s``, or the planner is gone."""
         if self._ended.done():
             return
         silence_s = node_time_s(self.node) - self._newest_s

@@ -94,7 +94,7 @@ class MockControllers:
         goal.abort()
         return FollowJointTrajectory.Result(
             error_code=FollowJointTrajectory.Result.PATH_TOLERANCE_VIOLATED,
-            error_string="told to fail",
+            error_string="set up to fail",
         )
 
     async def _follow(

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The shapes of slap_msgs messages, whoever made them: rclpy, rosbags or a test.
+"""The fields of slap_msgs messages, whether rclpy, rosbags or a test made them.
 
 Fields have the names, units and meaning that the ``.msg`` files give. Only what the core reads
 is listed.

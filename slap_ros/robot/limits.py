@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a real arm may do, checked again right before it is told to move.
+"""What a real arm may do, checked again right before it is commanded to move.
 
-A motion goes straight from joint positions at rest to others at rest, so whoever sends nothing
-more leaves an arm that stands. Its time course is the quintic with no velocity or acceleration at
+A motion goes straight from joint positions at rest to others at rest: when nothing more is sent,
+the arm stands. Its time course is the quintic with no velocity or acceleration at
 either end; it takes as long as velocity and acceleration limits ask for.
 """
 
@@ -22,7 +22,7 @@ from slap_ros.physics.panda import JOINT_HIGH, JOINT_LOW, JOINTS, MAX_STEP, gras
 PEAK_VELOCITY = 1.875
 PEAK_ACCELERATION = 10.0 / math.sqrt(3.0)
 
-LOOKS = 4  # places on the way at which the workspace is checked
+WORKSPACE_CHECKS = 4  # places on the way at which the workspace is checked
 STEP_TOLERANCE = 1e-6  # rad, rounding of a displacement computed as a difference
 
 Joints = tuple[float, ...]
@@ -102,8 +102,8 @@ class Limits:
         """
         at, to = tuple(map(float, start)), tuple(map(float, target))
         self._require_joints(at, to)
-        for k in range(1, LOOKS + 1):
-            part = k / LOOKS
+        for k in range(1, WORKSPACE_CHECKS + 1):
+            part = k / WORKSPACE_CHECKS
             self.workspace.require(tuple(a + part * (b - a) for a, b in zip(at, to, strict=True)))
         return JointMotion(at, to, max(least_s, self._least_duration_s(at, to)))
 

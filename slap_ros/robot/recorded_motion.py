@@ -73,7 +73,7 @@ def read_recorded_motion(path: Path) -> RecordedMotion:
     states = tuple(_states(episode, domain))
     if _holds(states[0]):
         raise InvalidParameterError(
-            f"{path} begins with something in the hand, and nobody could put it there just so"
+            f"{path} begins with something in the hand, which cannot be put there just so"
         )
     space = domain.atom_space(states[0])
     return RecordedMotion(

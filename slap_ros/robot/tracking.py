@@ -4,7 +4,7 @@
 
 What lies still is averaged and then stays where it is known to be for as long as detections agree
 with that: a state that is measured again is the same state. What does not agree has been moved,
-and is averaged anew.
+and is averaged again.
 """
 
 from __future__ import annotations

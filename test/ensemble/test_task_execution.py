@@ -41,7 +41,7 @@ def test_a_run_whose_episode_is_over_ends_with_that_and_with_no_steps_fewer_than
         synchronizer.latest = seen(2, 0)
         raise EpisodeChangedError("the simulator was reset during the run")
 
-    run._attempt = overtaken
+    run._plan_and_execute = overtaken
     result = asyncio.run(run.run())
     assert result.error_code == ErrorCode.EPISODE_CHANGED
     assert result.plan_length == 0

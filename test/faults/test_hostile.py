@@ -57,7 +57,7 @@ def test_a_recorder_writes_where_it_was_told_whatever_messages_say(network, tmp_
             publisher = source.create_publisher(topic.type, topic.name, topic.qos)
             message = DomainInfo(name=name, preset=name) if topic is DOMAIN else Task(domain=name)
             publisher.publish(message)
-        assert Spinner(executor).until(lambda: list(bag.glob("*.mcap")), LIMIT)
+        assert Spinner(executor).spin_until(lambda: list(bag.glob("*.mcap")), LIMIT)
     finally:
         recorder.destroy_node()
         source.destroy_node()

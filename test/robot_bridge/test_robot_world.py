@@ -18,8 +18,9 @@ from slap_ros.errors import (
 )
 from slap_ros.geometry.pose import IDENTITY, Pose
 from slap_ros.physics.features import JOINT_FEATURES, POSE_FEATURES
+from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.limits import PANDA, Workspace
-from slap_ros.robot.robot_world import GripperAction, JointReading, RobotWorld
+from slap_ros.robot.robot_world import GripperAction, RobotWorld
 from slap_ros.robot.scene_config import read_scene_config, sampled_scene_config
 
 DOMAIN = get_domain("obstacle_tower", "fair")

@@ -1,0 +1,126 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A state made of measurements, with objects where physics would have them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from slap_ros.geometry.pose import IDENTITY, ORIGIN, Pose
+from slap_ros.physics.features import (
+    GRASP_FEATURES,
+    JOINT_FEATURES,
+    POSE_FEATURES,
+    ROBOT,
+    VELOCITY_FEATURES,
+)
+from slap_ros.physics.panda import FINGER_OPEN, hand_pose
+from slap_ros.physics.scene import Scene
+from slap_ros.physics.settling import resting_poses
+from slap_ros.relational import Feature, Object, State
+from slap_ros.robot.joint_reading import JointReading
+from slap_ros.robot.tracking import PoseEstimate
+
+Changes = dict[tuple[Object, str], float]
+
+
+@dataclass(frozen=True)
+class Grasp:
+    """What the hand holds."""
+
+    obj: Object
+    pose: Pose  # in the hand's frame
+    finger: float  # m, of each from the middle
+
+
+class StateAssembler:
+    """Puts measurements into the state of a scene."""
+
+    def __init__(self, template: State, scene: Scene) -> None:
+        """Assemble states like ``template``, whose bodies are those of ``scene``."""
+        self._template, self._scene = template, scene
+        (self._robot,) = template.layout.of_type(ROBOT)
+        self._bodies = [template.layout.object(body.name) for body in scene.free]
+
+    def assemble(
+        self, reading: JointReading, known: Mapping[Object, PoseEstimate], grasp: Grasp | None
+    ) -> State:
+        """The state that was measured.
+
+        Args:
+            reading: Joints of the arm, at rest.
+            known: Where detected objects are, in the base's frame; without what is held.
+            grasp: What is held.
+
+        Returns:
+            The state: resting objects stand upon one another, what is held is where the hand is,
+            and objects that are not detected are as in the template.
+        """
+        changes = self._robot_changes(reading, grasp)
+        flat = self._resting_poses(known)
+        for obj, estimate in known.items():
+            pose = estimate.pose
+            if obj in self._bodies:
+                pose = flat.get(self._bodies.index(obj), pose)
+                motion = (*estimate.velocity, *estimate.spin)
+                changes |= _named(obj, VELOCITY_FEATURES, motion) | {(obj, "held"): 0.0}
+            changes |= _pose_changes(obj, pose)
+        if grasp is not None:
+            changes |= _pose_changes(grasp.obj, hand_pose(reading.joints).compose(grasp.pose))
+            changes |= _named(grasp.obj, VELOCITY_FEATURES, (*ORIGIN, *ORIGIN))
+            changes |= {(grasp.obj, "held"): 1.0}
+        return self._template.replace(changes)
+
+    def _robot_changes(self, reading: JointReading, grasp: Grasp | None) -> Changes:
+        pose = IDENTITY if grasp is None else grasp.pose
+        finger = FINGER_OPEN if grasp is None else grasp.finger
+        return {
+            **_named(self._robot, JOINT_FEATURES, reading.joints),
+            **_named(self._robot, GRASP_FEATURES, (*pose.position, *pose.quaternion)),
+            (self._robot, "finger"): finger,
+        }
+
+    def _resting_poses(self, known: Mapping[Object, PoseEstimate]) -> dict[int, Pose]:
+        """Where physics would have objects that do not move, by the index of their body."""
+        fixed = [
+            body.at(self._fixed_pose(body.name, body.pose, known))
+            for body in self._scene.fixed
+            if body.solid
+        ]
+        steady = {
+            i: known[o].pose for i, o in enumerate(self._bodies) if o in known and known[o].steady
+        }
+        return resting_poses(steady, self._scene.free, fixed)
+
+    def _fixed_pose(self, name: str, otherwise: Pose, known: Mapping[Object, PoseEstimate]) -> Pose:
+        obj = self._template.layout.by_name.get(name)
+        if obj is None:
+            return otherwise
+        if obj in known:
+            return known[obj].pose
+        x, y, z, qx, qy, qz, qw = feature_values(self._template, obj, POSE_FEATURES)
+        return Pose((x, y, z), (qx, qy, qz, qw))
+
+
+def feature_values(state: State, obj: Object, features: Sequence[Feature]) -> list[float]:
+    """Some features of an object.
+
+    Args:
+        state: Has the object.
+        obj: The object.
+        features: Which.
+
+    Returns:
+        Their values, in the order asked for.
+    """
+    return [float(state.get(obj, f.name)) for f in features]
+
+
+def _pose_changes(obj: Object, pose: Pose) -> Changes:
+    return _named(obj, POSE_FEATURES, (*pose.position, *pose.quaternion))
+
+
+def _named(obj: Object, features: Sequence[Feature], values: Sequence[float]) -> Changes:
+    names = (feature.name for feature in features)
+    return {(obj, name): float(v) for name, v in zip(names, values, strict=True)}
