@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where meshes are kept that were worked out or downloaded before."""
+"""The folder in which decomposed and downloaded meshes are cached."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Any mesh as a solid: taken apart into convex pieces by CoACD, once.
+"""Any mesh as a solid: decomposed into convex pieces by CoACD, once.
 
 X. Wei et al.: Approximate Convex Decomposition for 3D Meshes with Collision-Aware Concavity and
 Tree Search, SIGGRAPH 2022.
@@ -22,12 +22,12 @@ from slap_ros.meshes.solid import Array, ConvexPiece, Solid
 
 Y_IS_UP = (".glb", ".gltf")  # by their standard; of other files z is taken to be
 TO_Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-FORMAT = 1  # of what is kept; a new one forgets what was kept before
+FORMAT = 1  # of cached files; with a new one, old files are no longer read
 
 
 @dataclass(frozen=True)
 class DecompositionSettings:
-    """How closely convex pieces follow a mesh. Few are fast, and smooth where they rest."""
+    """How closely convex pieces follow a mesh. Few are fast, and rest smoothly on surfaces."""
 
     threshold: float = 0.05  # 1, concavity that is tolerated, of a mesh of size 1
     pieces: int = 12  # at most
@@ -43,13 +43,16 @@ def load_mesh(
 ) -> Solid:
     """A mesh, of whatever size in its file, as a solid of a given size that stands upright.
 
-    The pieces are kept in the user's cache folder, by the content of the file and all that went
-    into them; what is kept there is read without any library.
+    The pieces are cached in the user's cache folder, by the content of the file and all that went
+    into them; what is there is read without any library.
 
     Args:
         file: OBJ, GLB, STL, PLY or what else trimesh reads.
         size_m: The longest edge that the box around the solid is to have.
         settings: How closely to follow the mesh.
+
+    Returns:
+        The solid; its origin is its centre of mass.
 
     Raises:
         MeshUnavailableError: The file cannot be read, or a library for it is not installed.
@@ -70,7 +73,17 @@ def load_mesh(
 def cached_file(
     content: bytes, suffix: str, size_m: float, settings: DecompositionSettings = DEFAULT_SETTINGS
 ) -> Path:
-    """Where the pieces of a mesh are kept, for what its file has in it and how that ends."""
+    """Where the pieces of a mesh are cached.
+
+    Args:
+        content: Of the mesh's file.
+        suffix: Of the file's name, lower case, with its dot.
+        size_m: The longest edge of the box around it, m.
+        settings: How closely the pieces follow it.
+
+    Returns:
+        A path that differs wherever any of these does.
+    """
     key = repr((FORMAT, suffix, size_m, astuple(settings))).encode()
     digest = hashlib.blake2b(content, key=hashlib.blake2b(key).digest(), digest_size=16)
     return cache_folder() / f"{digest.hexdigest()}.obj"

@@ -30,6 +30,9 @@ def load_objaverse(
         size_m: See :func:`slap_ros.meshes.decomposition.load_mesh`, also for what else may fail.
         settings: How closely to follow it.
 
+    Returns:
+        The solid; its origin is its centre of mass.
+
     Raises:
         MeshUnavailableError: It cannot be downloaded.
         InvalidMeshError: That is no identifier.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Plans that were made before."""
+"""A cache of motion plans."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ _Key = tuple[bytes, bytes, bytes, tuple[int, ...]]  # start, goal, everything th
 
 
 class PlanCache:
-    """Remembers the paths, and the failures, that were asked for last."""
+    """Keeps the paths, and the failures, that were asked for most recently."""
 
     def __init__(self, capacity: int = CAPACITY, attempts: int = ATTEMPTS) -> None:
-        """Remember nothing yet.
+        """An empty cache.
 
         Args:
-            capacity: Plans to keep; the one not asked for longest goes first.
+            capacity: Plans to keep; the least recently used one is removed first.
             attempts: Random paths to find for a plan where one bend will not do.
         """
         self._capacity = capacity
@@ -37,13 +37,22 @@ class PlanCache:
         return len(self._plans)
 
     def clear(self) -> None:
-        """Forget every plan."""
+        """Remove every plan, as from a new cache."""
         self._plans.clear()
 
     def plan_path(
         self, start: Joints, goal: Joints, free: CollisionChecker, *, seed: int | Sequence[int]
     ) -> Path:
-        """What :func:`slap_ros.motion.planning.plan_path` gives, read-only.
+        """What :func:`slap_ros.motion.planning.plan_path` gives, from the cache where it is there.
+
+        Args:
+            start: rad, shape (7,).
+            goal: rad, shape (7,).
+            free: Which configurations are free of collisions.
+            seed: Fixes the result.
+
+        Returns:
+            rad, shape (k, 7), read-only.
 
         Raises:
             MotionPlanningError: Now or before, there was no path.

@@ -59,6 +59,9 @@ def interpolate(start: Joints, goal: Joints, resolution: float = RESOLUTION) -> 
         start: Shape (7,).
         goal: Shape (7,).
         resolution: Largest distance between neighbours, control steps.
+
+    Returns:
+        rad, shape (n, 7), n >= 1; the last row is exactly the goal.
     """
     count = max(1, int(np.ceil(control_steps(start, goal) / resolution)))
     fractions = np.arange(1, count + 1)[:, None] / count

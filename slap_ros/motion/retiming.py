@@ -1,6 +1,10 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""From paths to joint positions at each control step."""
+"""Retiming: from paths to joint positions at each control step, as fast as the joints allow.
+
+The arm has a velocity limit for each joint and none on acceleration, so the time-optimal timing of
+a straight piece is that of its slowest joint at full speed throughout.
+"""
 
 from __future__ import annotations
 

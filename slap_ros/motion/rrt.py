@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Two trees that grow towards each other from start and goal.
+"""Bidirectional RRT: two trees that grow towards each other from start and goal.
 
-J. Kuffner, S. LaValle: RRT-Connect, ICRA 2000. Distances are control steps. Samples come from
-a box around start and goal that widens to the joint limits, so that near ways are found first.
+J. Kuffner, S. LaValle: RRT-Connect: An Efficient Approach to Single-Query Path Planning, ICRA 2000.
+Unlike there, a tree grows towards a sample by one straight piece, not by small steps. Distances are
+control steps. Samples come from a box around start and goal that widens to the joint limits, so
+that near ways are found first.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from slap_ros.motion.joints import (
     interpolate,
 )
 
-REACH = 15.0  # control steps that a tree grows at most towards a sample
+MAX_GROWTH = 15.0  # control steps that a tree grows at most towards a sample
 WIDENING = 50  # samples until the sampled box has reached the joint limits
 _LEAST_GROWTH = 0.5  # control steps; less is no progress
 
@@ -105,7 +107,7 @@ def rrt_connect(
         sample = rng.uniform(low + widened * (LOW - low), high + widened * (HIGH - high))
         growing, other = trees if forward else trees[::-1]
         forward = not forward
-        if not growing.grow(_within_reach(growing, sample), free, resolution):
+        if not growing.grow(_limited(growing, sample), free, resolution):
             continue
         meeting = growing.newest()
         if other.grow(meeting, free, resolution) and np.array_equal(other.newest(), meeting):
@@ -115,7 +117,8 @@ def rrt_connect(
     return None
 
 
-def _within_reach(tree: _Tree, sample: Joints) -> Joints:
+def _limited(tree: _Tree, sample: Joints) -> Joints:
+    """The sample, or where the way to it from the nearest node is as long as it may be."""
     nearest = tree[tree.nearest(sample)]
-    fraction = min(1.0, REACH / float(control_steps(nearest, sample)))
+    fraction = min(1.0, MAX_GROWTH / float(control_steps(nearest, sample)))
     return nearest + fraction * (sample - nearest)

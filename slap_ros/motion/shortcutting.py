@@ -1,6 +1,10 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Make a path shorter by joining points on it straight."""
+"""Path shortcutting: a path becomes shorter where two points on it are joined straight.
+
+R. Geraerts, M. Overmars: Creating High-Quality Paths for Motion Planning, IJRR 2007, "shortcut"
+and "pruning".
+"""
 
 from __future__ import annotations
 
@@ -22,6 +26,9 @@ def shorten(
         rng: Where the points come from.
         tries: Pairs of points to try.
         resolution: Control steps between checked configurations.
+
+    Returns:
+        rad, shape (k', 7), with the same ends.
     """
     for _ in range(tries):
         if len(path) < 3:
@@ -41,7 +48,16 @@ def shorten(
 
 
 def straighten(path: Path, free: Free, *, resolution: float) -> Path:
-    """The path without the rows that can be skipped, one after the other."""
+    """The path without the rows that can be skipped, one after the other (pruning).
+
+    Args:
+        path: rad, shape (k, 7).
+        free: Which configurations are free of collisions.
+        resolution: Control steps between checked configurations.
+
+    Returns:
+        rad, shape (k', 7), with the same ends.
+    """
     rows = list(path)
     i = 1
     while i < len(rows) - 1:

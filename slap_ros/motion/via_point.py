@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Past what is in the way with a single bend, which is mostly enough.
+"""Around an obstacle over a single via point, which is mostly enough.
 
 The slowest joint alone sets the length of a path, so while it is on its way the others may well
-make a detour. How long a bend makes the path is known at once, whether it is free is not: many are
-drawn, and the shortest that is free is taken.
+make a detour. How long a via point makes the path is known at once, whether the path is free is
+not: many are drawn and checked from the shortest path on. The first free one is taken, so that the
+paths that it dominates are never checked.
 """
 
 from __future__ import annotations
@@ -25,22 +26,22 @@ from slap_ros.motion.joints import (
 from slap_ros.physics.panda import JOINTS
 
 VIA_POINTS = 512  # to choose from
-SPREAD = 10.0  # control steps, the widest standard deviation of the bends from the straight way
+SPREAD = 10.0  # control steps, the largest standard deviation from the straight way
 _MIDDLE = 0.2, 0.8  # where on the straight way
-_BATCH = 32  # bends that are looked at together
-_GLANCES = 1, 3, 6  # configurations each way, up to a bend: most blocked paths show at a few
+_BATCH = 32  # via points that are checked together
+_COARSE_CHECKS = 1, 3, 6  # configurations each way: a few reveal most blocked paths
 
 
 def via_point_path(
     start: Joints, goal: Joints, free: Free, rng: np.random.Generator, *, resolution: float
 ) -> Path | None:
-    """The path of fewest control steps that is free, of many with one bend.
+    """The free path of fewest control steps, of many with one via point.
 
     Args:
         start: Free, rad, shape (7,).
         goal: Free, rad, shape (7,).
         free: Which configurations are free of collisions.
-        rng: Where the bends come from.
+        rng: Where the via points come from.
         resolution: Control steps between checked configurations.
 
     Returns:
@@ -49,9 +50,9 @@ def via_point_path(
     via_points = _via_points(start, goal, rng)
     for i in range(0, len(via_points), _BATCH):
         batch = via_points[i : i + _BATCH]
-        for count in _GLANCES:
-            glances = _glances(start, batch, goal, count)
-            batch = batch[free(glances.reshape(-1, JOINTS)).reshape(glances.shape[:2]).all(0)]
+        for count in _COARSE_CHECKS:
+            checked = _spread_along(start, batch, goal, count)
+            batch = batch[free(checked.reshape(-1, JOINTS)).reshape(checked.shape[:2]).all(0)]
         for via_point in batch:
             path: Path = np.stack([start, via_point, goal])
             if free(path_configurations(path, resolution)).all():
@@ -60,7 +61,7 @@ def via_point_path(
 
 
 def _via_points(start: Joints, goal: Joints, rng: np.random.Generator) -> Joints:
-    """Configurations around the straight way, those that bend it least first: rad, shape (k, 7)."""
+    """Configurations around the straight way, those of the shortest paths first: shape (k, 7)."""
     along = rng.uniform(*_MIDDLE, (VIA_POINTS, 1))
     aside = rng.uniform(0.0, SPREAD, (VIA_POINTS, 1)) * rng.normal(size=(VIA_POINTS, JOINTS))
     q = start + along * (goal - start) + aside * STEP
@@ -69,8 +70,8 @@ def _via_points(start: Joints, goal: Joints, rng: np.random.Generator) -> Joints
     return cast(Joints, q[np.argsort(lengths, kind="stable")])
 
 
-def _glances(start: Joints, via_points: Joints, goal: Joints, count: int) -> Joints:
-    """So many configurations each way from some bends: rad, shape (2 count - 1, k, 7)."""
+def _spread_along(start: Joints, via_points: Joints, goal: Joints, count: int) -> Joints:
+    """So many configurations each way from via points: rad, shape (2 count - 1, k, 7)."""
     fractions = np.arange(1, count + 1)[:, None, None] / count
     there, back = (end + fractions * (via_points - end) for end in (start, goal))
-    return np.concatenate([there, back[:-1]])  # the bends themselves once
+    return np.concatenate([there, back[:-1]])  # the via points themselves once

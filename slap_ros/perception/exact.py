@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Perception that errs in nothing."""
+"""Perception without error."""
 
 from __future__ import annotations
 
@@ -17,5 +17,5 @@ class ExactPerceiver:
     space: AtomSpace
 
     def perceive(self, state: State) -> Percept:
-        """See :class:`~slap_ros.perception.percept.Perceiver`."""
+        """The state itself and its atoms; see :class:`~slap_ros.perception.percept.Perceiver`."""
         return Percept(state, self.space.abstract(state))

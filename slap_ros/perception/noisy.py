@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Perception that errs, by so much as one says: noise, lost sightings, and what is done about it.
+"""Perception with noise and lost sightings, and what is done about them.
 
-A state is seen, put where physics would have it, and abstracted with thresholds that are not quite
-right; then atoms are debounced. The planner plans from the poses, not from the debounced atoms:
-its model has predicates of its own, and the two must agree where a plan begins.
+Poses are measured, put where physics would have them, and abstracted with thresholds that are not
+quite right; then atoms are debounced. The planner plans from the poses, not from the debounced
+atoms: its model has predicates of its own, and the two must agree where a plan begins.
 """
 
 from __future__ import annotations
@@ -41,7 +41,17 @@ class NoisyPerceiver:
         quality: Quality,
         rng: np.random.Generator,
     ) -> NoisyPerceiver:
-        """The perceiver of an episode that begins in ``initial``, as its task says.
+        """The perceiver of an episode.
+
+        Args:
+            domain: Whose ``settle`` corrects measured poses.
+            space: The ground atoms of the task.
+            initial: Where the episode begins, as its task says.
+            quality: How well is perceived.
+            rng: Where noise comes from; used by this perceiver alone.
+
+        Returns:
+            One that has perceived nothing yet.
 
         Raises:
             InvalidParameterError: An object that is to be hidden is none of the task's.
@@ -51,7 +61,10 @@ class NoisyPerceiver:
         return cls(domain, space, quality, rng, sensor, Debouncer(quality.debounce))
 
     def perceive(self, state: State) -> Percept:
-        """See :class:`~slap_ros.perception.percept.Perceiver`."""
+        """Measure a state, settle what rests, then abstract and debounce.
+
+        See :class:`~slap_ros.perception.percept.Perceiver`.
+        """
         seen = self.domain.execution.settle(self.sensor.measure(state))
         abstract = self.debouncer.add(self._abstract(seen))
         return Percept(seen, abstract, self.sensor.missing, self.quality.exact)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How well is perceived."""
+"""The quality of perception: noise, dropout, memory and debouncing."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Quality:
     debounce: int = 1
 
     def __post_init__(self) -> None:
-        """Refuse what is no quality.
+        """Check that every value is in its range.
 
         Raises:
             InvalidParameterError: Says what.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A Panda among rigid bodies. Read on in this order: ``pose``, ``panda``, ``scene``, ``world``.
+"""A Panda among rigid bodies. Read on in this order: ``panda``, ``scene``, ``snapshot``, ``world``.
 
-``pose``, ``panda`` and ``scene`` need no simulator; ``world`` and ``rendering`` use PyBullet.
+``world`` and ``rendering`` use PyBullet; the others need no simulator.
 """

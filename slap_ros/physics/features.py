@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The features that physics needs in a state, and nothing else that it remembers.
+"""The features that physics needs in a state; it keeps no other state between steps.
 
 A domain's robot is a :data:`ROBOT`; the types of its free bodies begin with
 :data:`BODY_FEATURES`, as in ``Type("block", BODY_FEATURES)``; fixed bodies whose place differs
@@ -43,6 +43,9 @@ def robot_features(
         joints: Joint positions, rad.
         finger: Distance of each finger from the middle, m.
         grasp: The held body's pose in the hand's frame.
+
+    Returns:
+        A value for each feature of :data:`ROBOT`, by name.
     """
     values = (*joints, finger, *grasp.position, *grasp.quaternion)
     return dict(zip((f.name for f in ROBOT.features), values, strict=True))
@@ -61,7 +64,18 @@ def body_features(
     angular_velocity: Vector = ORIGIN,
     held: bool = False,
 ) -> Mapping[str, float]:
-    """A free body's features, for ``State.build``: m, m/s and rad/s in the base's frame."""
+    """A free body's features, for ``State.build``, all in the base's frame.
+
+    Args:
+        position: m.
+        quaternion: x y z w, of length 1.
+        velocity: m/s.
+        angular_velocity: rad/s.
+        held: Whether it is in the hand.
+
+    Returns:
+        A value for each of :data:`BODY_FEATURES`, by name.
+    """
     values = (*position, *quaternion, *velocity, *angular_velocity, float(held))
     return dict(zip((f.name for f in BODY_FEATURES), values, strict=True))
 

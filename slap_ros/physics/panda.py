@@ -131,12 +131,15 @@ def jacobian(q: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
 def vertical_jacobian(
     q: Sequence[float] | NDArray[np.float64], link: int, point: Vector
 ) -> tuple[float, ...]:
-    """How fast a point of a link rises with each joint, m/rad.
+    """The row of a point's Jacobian for z: how fast the point rises with each joint.
 
     Args:
         q: Joint positions, rad, shape (7,).
-        link: Which of :data:`LINKS`.
-        point: In the base's frame.
+        link: Which of :data:`LINKS` the point moves with.
+        point: In the base's frame, m.
+
+    Returns:
+        m/rad, one for each joint; 0 for joints beyond the link.
     """
     x, y, _ = point
     rates = []
@@ -148,7 +151,7 @@ def vertical_jacobian(
 
 
 class GraspKinematics:
-    """The grasp point in one configuration, and how it would move: kinematics done once."""
+    """Kinematics of the grasp point in one configuration, computed once: its pose and Jacobian."""
 
     __slots__ = ("_links", "grasp")
 

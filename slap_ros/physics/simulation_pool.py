@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Simulations lent to worlds and used again: building one takes longer than hundreds of steps.
+"""A pool of simulations for worlds: building one takes longer than hundreds of steps.
 
-Sharing is safe because a simulation remembers nothing that matters.
+Using one again is safe because it keeps no state between control periods that a world does not set.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from threading import RLock
 from slap_ros.physics.scene import Scene
 from slap_ros.physics.simulation import Simulation, Stepping
 
-MOST_IDLE = 4  # simulations kept for later
+MAX_IDLE = 4  # simulations kept for later
 
 _idle: deque[Simulation] = deque()  # the one that waited longest first
 _lock = RLock()  # a world may be collected, and give back, while another is being made
@@ -31,10 +31,10 @@ def acquire(scene: Scene, stepping: Stepping) -> Simulation:
 
 
 def release(simulation: Simulation) -> None:
-    """Keep it for the next world, and close the one that waited longest if there are many."""
+    """Keep a simulation for the next world; close the one that waited longest if there are many."""
     with _lock:
         _idle.append(simulation)
-        if len(_idle) > MOST_IDLE:
+        if len(_idle) > MAX_IDLE:
             _idle.popleft().close()
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Scenes that cannot be."""
+"""Refuses states that no scene can be in."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def require_valid(
     arm: Arm,
     obstacles: Sequence[Obstacle],
 ) -> None:
-    """Refuse scenes that cannot be.
+    """Refuse a state that no scene can be in.
 
     Args:
         scene: What there is.

@@ -44,11 +44,11 @@ STEPPING = Stepping()
 REST_SPEED = 0.02  # m/s and rad/s, along each axis
 REST_SHIFT = 2e-4  # m, along each axis
 REST_TURN = 1e-3  # 1, of each component of the quaternion
-PRESSED = 0.006  # m, how far the arm may press bodies into one another; deeper, it yields
-JAMMED = 0.02  # m, where no body moves: between two immovable ones the solver has no answer
-RAISED = 8  # times that the arm is raised at most, lest it enters a fixed body
-CLEAR = 1e-4  # m, over where it just does not
-CACHE_SIZE = 256  # arrangements of bodies known to stand or not
+PRESS_LIMIT = 0.006  # m, how far the arm may press bodies into one another; deeper, it yields
+JAM_LIMIT = 0.02  # m, where no body moves: between two immovable ones the solver has no answer
+MAX_RAISES = 8  # times that the arm is raised so that it does not enter a fixed body
+RAISE_CLEARANCE = 1e-4  # m, over where it just does not
+CACHE_SIZE = 256  # arrangements of bodies of which it is known whether they are stable
 
 
 class PandaWorld:
@@ -75,7 +75,7 @@ class PandaWorld:
         self._scene = scene
         self._actions = actions
         self._reader = SnapshotCodec.of(scene, state.layout)
-        self._standing: dict[object, bool] = {}
+        self._stability: dict[object, bool] = {}
         self._solid = [i for i, body in enumerate(scene.fixed) if body.solid]
         self._adopt(state)
         self._simulation = acquire(scene, stepping)
@@ -99,12 +99,12 @@ class PandaWorld:
 
     @property
     def scene(self) -> Scene:
-        """What there is."""
+        """The bodies of this world."""
         return self._scene
 
     @property
     def state(self) -> State:
-        """The current state."""
+        """The current state, all that the next step depends on."""
         return self._state
 
     def reset(self, state: State) -> None:
@@ -119,7 +119,7 @@ class PandaWorld:
         self._prepare()
 
     def _prepare(self) -> None:
-        """Tell the simulation what it remembers between control periods."""
+        """Set what the simulation keeps between control periods."""
         self._simulation.place_fixed(self._fixed_poses)
         self._simulation.set_materials(self._materials)
 
@@ -177,7 +177,7 @@ class PandaWorld:
             sweep = Sweep(start, self._arm(goal))
         bodies, depth = self._bodies_after(now, sweep)
         for softer in (_hand_raised, _half_way, _stay):
-            if depth <= PRESSED or goal is now:
+            if depth <= PRESS_LIMIT or goal is now:
                 break
             other = softer(now, goal, depth)
             way = Sweep(start, self._arm(other))
@@ -185,18 +185,18 @@ class PandaWorld:
                 relieved, less = self._bodies_after(now, way)
                 if less < depth:
                     goal, sweep, bodies, depth = other, way, relieved, less
-        if depth > JAMMED:
+        if depth > JAM_LIMIT:
             bodies = self._frozen(now, sweep.end)
         return replace(goal, bodies=bodies), sweep.end
 
     def _sliding(self, now: Snapshot, goal: Snapshot, start: Arm) -> Snapshot:
         """The goal with the arm raised until it enters nothing; ``now`` if it cannot be raised."""
-        for _ in range(RAISED):
+        for _ in range(MAX_RAISES):
             sweep = Sweep(start, self._arm(goal))
-            contact = sweep.deepest_penetration(self._obstacles)
-            if contact is None:
+            penetration = sweep.deepest_penetration(self._obstacles)
+            if penetration is None:
                 return now if sweep.hits(self._obstacles) else goal
-            goal = replace(goal, joints=_raised(now.joints, goal.joints, contact))
+            goal = replace(goal, joints=_raised(now.joints, goal.joints, penetration))
         return now
 
     def _arm(self, snapshot: Snapshot) -> Arm:
@@ -232,9 +232,9 @@ class PandaWorld:
         if not all(bodies[i].still for i in loose):
             return False
         boxes = [self._scene.free[i].at(bodies[i].pose) for i in loose]
-        return sweep.stays_clear(boxes) and self._stand(now, loose)
+        return sweep.stays_clear(boxes) and self._stable(now, loose)
 
-    def _stand(self, now: Snapshot, loose: list[int]) -> bool:
+    def _stable(self, now: Snapshot, loose: list[int]) -> bool:
         """Whether bodies without velocity would stay where they are if there were no arm.
 
         So they do where they came to rest by themselves. They do not in mid-air, over an edge,
@@ -242,14 +242,14 @@ class PandaWorld:
         """
         poses = tuple(now.bodies[i].pose for i in loose)
         key = (self._fixed_poses, self._materials, now.held, poses)
-        stands = self._standing.get(key)
-        if stands is None:
+        stable = self._stability.get(key)
+        if stable is None:
             after = self._simulation.run(now.bodies, now.held)
-            stands = all(_rests(now.bodies[i], after[i]) for i in loose)
-            if len(self._standing) == CACHE_SIZE:
-                self._standing.clear()
-            self._standing[key] = stands
-        return stands
+            stable = all(_rests(now.bodies[i], after[i]) for i in loose)
+            if len(self._stability) == CACHE_SIZE:
+                self._stability.clear()
+            self._stability[key] = stable
+        return stable
 
 
 def _within_limits(joints: tuple[float, ...], displacement: list[float]) -> tuple[float, ...]:
@@ -276,20 +276,20 @@ def _hand_raised(now: Snapshot, goal: Snapshot, depth: float) -> Snapshot:
     """The goal with the hand higher by ``depth`` m; an arm that was not to move stays."""
     if goal.joints == now.joints:
         return now
-    contact = Penetration(HAND, grasp_pose(goal.joints).position, depth)
-    return replace(goal, joints=_raised(now.joints, goal.joints, contact))
+    penetration = Penetration(HAND, grasp_pose(goal.joints).position, depth)
+    return replace(goal, joints=_raised(now.joints, goal.joints, penetration))
 
 
 def _raised(
-    start: tuple[float, ...], goal: tuple[float, ...], contact: Penetration
+    start: tuple[float, ...], goal: tuple[float, ...], penetration: Penetration
 ) -> tuple[float, ...]:
     """The goal with a point raised, fast joints first; within the speed limit from the start."""
-    rates = vertical_jacobian(goal, contact.link, contact.point)
+    rates = vertical_jacobian(goal, penetration.link, penetration.point)
     weights = [rate * step * step for rate, step in zip(rates, MAX_STEP, strict=True)]
     yielding = sum(rate * weight for rate, weight in zip(rates, weights, strict=True))
     if yielding <= 0.0:
         return start
-    lift = (contact.depth + CLEAR) / yielding
+    lift = (penetration.depth + RAISE_CLEARANCE) / yielding
     displacement = [
         min(max(g + lift * weight - s, -step), step)
         for g, s, weight, step in zip(goal, start, weights, MAX_STEP, strict=True)

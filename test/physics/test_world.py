@@ -386,7 +386,7 @@ def test_ten_worlds_made_and_closed_leak_no_clients():
     assert states[2] == states[4] != states[3] == states[5]
     for world in worlds:
         world.close()
-    assert connected() == before + simulation_pool.MOST_IDLE
+    assert connected() == before + simulation_pool.MAX_IDLE
     simulation_pool.close_idle()
     assert connected() == before
 
