@@ -3,6 +3,7 @@
 """The paper's figures: their numbers are those of experiments, their files are made again alike."""
 
 import json
+import shlex
 import xml.etree.ElementTree as ET
 from contextlib import nullcontext
 from itertools import product
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.main import get_command
 from typer.testing import CliRunner
 
 from ensemble.cli import app
@@ -26,11 +28,12 @@ from slap_ros.shortcuts.shortcut import Sampling
 from slap_ros.shortcuts.task_distribution import TaskDistribution
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 from slap_ros.shortcuts.workers import SequentialWorkers
-from slap_ros.studies import comparison, perception, pruning
+from slap_ros.studies import comparison, perception, pruning, results
 from slap_ros.studies.goals import sample_goals
 from slap_ros.studies.trainings import TrainingFolder, read_curve
 from slap_ros.studies.variations import Variation, offered, parse_variation
 
+PUBLISHED = Path(__file__).parent.parent.parent / "docs" / "results"
 LIBRARY = Path(__file__).parent.parent / "shortcuts" / "data" / "obstacle2d"
 DOMAIN = get_domain("obstacle2d")
 SAMPLES = 2
@@ -417,3 +420,24 @@ def test_noise_in_perception_is_measured_in_the_world(tmp_path, monkeypatch):
         once, again = ((tmp_path / run / name).read_text() for run in ("once", "again"))
         assert once == again
     ET.fromstring((tmp_path / "once" / "perception_obstacle2d.svg").read_text())
+
+
+@pytest.mark.parametrize("path", sorted(PUBLISHED.glob("*.json")), ids=lambda path: path.stem)
+def test_published_data_is_as_studies_write_it(path):
+    text = path.read_text(encoding="utf-8")
+    assert results.pretty(json.loads(text)) + "\n" == text
+
+
+@pytest.mark.parametrize("path", sorted(PUBLISHED.glob("*_*.json")), ids=lambda path: path.stem)
+def test_published_data_can_be_made_again_by_its_command(path):
+    """The command line still has every option that the recorded command gives."""
+    data = json.loads(path.read_text(encoding="utf-8"))
+    assert {"study", "source", "domain", "command", "versions", "found"} <= set(data)
+    slap, study, name, *arguments = shlex.split(data["command"])
+    assert (slap, study, name) == ("slap", "study", data["study"])
+    command = get_command(app).commands[study].commands[name]
+    given = command.make_context(name, arguments).params
+    assert given["domain"] == data["domain"]
+    for setting in ("preset", "tasks", "seeds", "samples"):
+        if setting in data:
+            assert given[setting] == data[setting]
