@@ -24,7 +24,7 @@ class VisibleBody:
     triangles: tuple[tuple[float, float, float], ...] = ()
 
 
-# Writes states, one a control step, as a GIF or MP4; tells how many frames are done.
+# Writes states, one per control step, as a GIF or MP4; calls back with the frames done so far.
 Animate = Callable[[Path, Sequence[State], Callable[[int], None]], None]
 
 

@@ -141,7 +141,7 @@ class Domain:
         return ground_operators(self.operators, space)
 
     def make_vector_world(self, states: Sequence[State]) -> VectorWorld:
-        """VectorWorld of the same objects, one in each of these states."""
+        """Worlds of the same objects, one in each of these states, to be stepped together."""
         if self.learning is not None and self.learning.make_vector_world is not None:
             return self.learning.make_vector_world(states)
         return SyncVectorWorld(self.make_world, states)

@@ -36,7 +36,7 @@ class Environment(Protocol):
         ...
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """Act once."""
+        """Act for one control period."""
         ...
 
 
@@ -44,7 +44,12 @@ class GymnasiumWorld:
     """An environment that is reset to states and stepped; see ``slap_ros.core.World``."""
 
     def __init__(self, environment: Environment, state: State, actions: ActionSpace) -> None:
-        """Begin in ``state``; nobody else may use the environment.
+        """Begin in ``state``.
+
+        Args:
+            environment: What is stepped; nobody else may use it.
+            state: Where to begin.
+            actions: What the robot can do.
 
         Raises:
             InvalidDomainError: It does not keep to what this module asks for.
@@ -87,7 +92,7 @@ class GymnasiumWorld:
         self._state = state
 
     def step(self, action: Action) -> State:
-        """Act once.
+        """Act for one control period.
 
         Raises:
             InvalidCommandError: The action is not in the action space; nothing moved.

@@ -17,7 +17,7 @@ class Skill(Protocol):
     """The control side of an operator, given or learned, for any objects.
 
     Everything is a function of its arguments: the same state gives the same policy and the same
-    bounds, so that planning, execution and replay agree and roll-outs can be remembered.
+    bounds, so that planning, execution and replay agree and roll-outs can be cached.
     """
 
     @property
@@ -32,15 +32,32 @@ class Skill(Protocol):
 
     @property
     def least_steps(self) -> int:
-        """Environment steps that it takes at least, from any state."""
+        """Environment steps that it takes at least, from any state: a lower bound."""
         ...
 
     def lower_bound(self, state: State, objects: tuple[Object, ...]) -> int:
-        """Environment steps that it takes at least from this state. Never too many."""
+        """A lower bound of the environment steps that it takes from a state.
+
+        Lazy search finds a cheapest plan only if the bound never exceeds the true steps.
+
+        Args:
+            state: Where it would begin.
+            objects: What it is applied to.
+
+        Returns:
+            Environment steps, at least 0.
+        """
         ...
 
     def start(self, state: State, objects: tuple[Object, ...]) -> Policy:
-        """Begin in this state.
+        """Begin in a state.
+
+        Args:
+            state: Where it begins.
+            objects: What it is applied to.
+
+        Returns:
+            The policy, to be called once per environment step.
 
         Raises:
             SkillNotApplicableError: It cannot start here.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""VectorWorld: what can be reset to a state and stepped, alone or several at once."""
+"""Worlds: what can be reset to a state and stepped, alone or several at once."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class World(Protocol):
 
 
 class VectorWorld(Protocol):
-    """VectorWorld of the same objects, stepped together."""
+    """Several worlds with the same objects, stepped together."""
 
     @property
     def states(self) -> State:
@@ -42,11 +42,18 @@ class VectorWorld(Protocol):
         ...
 
     def reset(self, world: int, state: State) -> None:
-        """Let one of them continue from this state."""
+        """Let the one with index ``world`` continue from this state."""
         ...
 
     def step(self, actions: Array) -> State:
-        """Act in each of them for one control period; ``actions``: shape (worlds, axes)."""
+        """Act in each of them for one control period.
+
+        Args:
+            actions: One per world, shape (worlds, axes).
+
+        Returns:
+            Their states, a batch of shape (worlds, layout.size).
+        """
         ...
 
 

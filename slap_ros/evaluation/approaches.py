@@ -19,9 +19,9 @@ class Approach:
     """A way to plan.
 
     Args:
-        name: As reports have it.
+        name: In reports and results.
         shortcuts: What may be used besides the given options.
-        sampling: How they are tried out.
+        sampling: How shortcuts are tried out in the model.
     """
 
     name: str
@@ -29,7 +29,19 @@ class Approach:
     sampling: Sampling = DEFAULT
 
     def planner(self, name: str, domain: Domain, initial: State) -> Planner:
-        """The planner of that name, for tasks over the objects of ``initial``."""
+        """A planner that plans in this way.
+
+        Args:
+            name: One of :data:`slap_ros.planning.planner.PLANNERS`.
+            domain: For whose tasks.
+            initial: A state with the objects of the tasks.
+
+        Returns:
+            The planner, with a model of its own.
+
+        Raises:
+            InvalidParameterError: No planner of that name, or none that can use shortcuts.
+        """
         if not self.shortcuts:
             return make_planner(name, domain, initial)
         grounded = GroundedShortcuts(domain, self.shortcuts, initial, self.sampling)
@@ -40,7 +52,7 @@ PURE_PLANNING = Approach("pure_planning")
 
 
 def approaches(library: Library | None, sampling: Sampling) -> tuple[Approach, ...]:
-    """What to compare: the yardstick first, what matters most last."""
+    """What to compare: the baseline first, planning with all samples last."""
     if library is None:
         return (PURE_PLANNING,)
     return (

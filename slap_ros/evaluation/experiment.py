@@ -34,12 +34,31 @@ class Experiment:
         return self.tasks * self.seeds
 
     def run(self, seed: int, index: int, approach: Approach = PURE_PLANNING) -> EpisodeResult:
-        """Solve one task, in a world of its own."""
+        """Solve one task, in a world of its own.
+
+        Args:
+            seed: Of the task.
+            index: Of the task.
+            approach: How to plan.
+
+        Returns:
+            What happened.
+        """
         return solve(self.domain, self.domain.task(seed, index), approach, self.planner)
 
 
 def solve(domain: Domain, task: Task, approach: Approach, planner: str = "lazy") -> EpisodeResult:
-    """Plan for any task of a domain and execute the plan, in a world of its own."""
+    """Plan for any task of a domain and execute the plan, in a world of its own.
+
+    Args:
+        domain: Of the task.
+        task: What to solve.
+        approach: How to plan.
+        planner: One of :data:`slap_ros.planning.planner.PLANNERS`.
+
+    Returns:
+        What happened.
+    """
     space = domain.atom_space(task.initial_state)
     return Executor(
         domain,
@@ -53,20 +72,40 @@ def solve(domain: Domain, task: Task, approach: Approach, planner: str = "lazy")
 
 @dataclass(frozen=True)
 class Trial:
-    """What came of one task."""
+    """The figures of one task that was solved, or not.
+
+    Args:
+        seed: Of the task.
+        index: Of the task.
+        success: Whether the goal was reached.
+        plan_length: Environment steps executed.
+        shortcut_steps: Of them, those that shortcuts took.
+        planning_seconds: Of all plans together, s.
+        edges_rolled_out: Options simulated while planning.
+        reason: Why it failed; empty where it is a success.
+    """
 
     seed: int
     index: int
     success: bool
-    plan_length: int  # environment steps executed
-    shortcut_steps: int  # of them, those that shortcuts took
+    plan_length: int
+    shortcut_steps: int
     planning_seconds: float
     edges_rolled_out: int
-    reason: str  # why not, unless it is a success
+    reason: str
 
     @classmethod
     def of(cls, seed: int, index: int, episode: EpisodeResult) -> Trial:
-        """What an episode came to."""
+        """The figures of an episode.
+
+        Args:
+            seed: Of its task.
+            index: Of its task.
+            episode: What happened.
+
+        Returns:
+            The figures.
+        """
         return cls(
             seed,
             index,
@@ -80,10 +119,18 @@ class Trial:
 
 
 def run_all(experiment: Experiment, approach: Approach, jobs: int) -> Iterator[Trial]:
-    """Solve every task, ``jobs`` at a time, and tell of each as it ends.
+    """Solve every task of an experiment.
 
-    Every approach has processes of its own: what motion planning remembers of the same task under
+    Every approach has processes of its own: what motion planning has cached of the same task under
     another approach would make planning look faster than it is.
+
+    Args:
+        experiment: Which tasks.
+        approach: How to plan.
+        jobs: Tasks solved at a time, in as many processes.
+
+    Yields:
+        The figures of each task, as it ends.
     """
     domain = experiment.domain
     work = [
@@ -98,6 +145,6 @@ def run_all(experiment: Experiment, approach: Approach, jobs: int) -> Iterator[T
 def _try(
     domain: str, preset: str, planner: str, approach: Approach, seed: int, index: int
 ) -> Trial:
-    """One task; domains are made anew where this runs."""
+    """One task; its domain is made where this runs."""
     experiment = Experiment(get_domain(domain, preset), 1, 1, planner=planner)
     return Trial.of(seed, index, experiment.run(seed, index, approach))

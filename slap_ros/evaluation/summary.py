@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What experiments come to: one summary an approach, all over the same tasks."""
+"""The summaries of experiments: one per approach, all over the same tasks."""
 
 from __future__ import annotations
 
@@ -27,16 +27,28 @@ class Spread:
 
 @dataclass(frozen=True)
 class Summary:
-    """What an approach came to."""
+    """The figures of an approach over all tasks of an experiment.
+
+    Args:
+        experiment: Which tasks.
+        approach: Its name.
+        success_rate: Share of tasks that were solved.
+        plan_length: Environment steps executed, over solved tasks; None where there is none.
+        relative_length: Plan length over that of pure planning, on tasks that both solved; None
+            where there is none.
+        planning_seconds: Per task, s.
+        edges_rolled_out: Options simulated while planning, mean per task.
+        shortcut_share: Share of the environment steps executed that shortcuts took.
+    """
 
     experiment: Experiment
     approach: str
     success_rate: float
-    plan_length: Spread | None  # environment steps executed, over solved tasks; None: none solved
-    relative_length: float | None  # over tasks that pure planning solved, too; None: there is none
+    plan_length: Spread | None
+    relative_length: float | None
     planning_seconds: Spread
-    edges_rolled_out: float  # mean
-    shortcut_share: float  # of the environment steps executed
+    edges_rolled_out: float
+    shortcut_share: float
 
     @classmethod
     def of(
@@ -46,7 +58,17 @@ class Summary:
         trials: Sequence[Trial],
         baseline: Sequence[Trial],
     ) -> Summary:
-        """The summary of an approach, against the trials of pure planning in the same order."""
+        """Summarise an approach.
+
+        Args:
+            experiment: Which tasks.
+            approach: Its name.
+            trials: Of this approach.
+            baseline: Of pure planning, in the same order.
+
+        Returns:
+            The summary.
+        """
         lengths = [float(trial.plan_length) for trial in trials if trial.success]
         steps = sum(trial.plan_length for trial in trials)
         return cls(
@@ -61,7 +83,7 @@ class Summary:
         )
 
     def as_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """The JSON object of ``slap evaluate --json``."""
         length = self.plan_length
         return {
             "domain": self.experiment.domain.name,
@@ -83,7 +105,7 @@ class Summary:
         }
 
     def as_row(self) -> dict[str, Any]:
-        """Plain data of one of several approaches."""
+        """The JSON object of one of several approaches."""
         return self.as_json() | {"shortcut_share": self.shortcut_share}
 
 

@@ -8,12 +8,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from slap_ros.errors import PlanningLimitError, UnsolvableError
-from slap_ros.planning.hmax import HMax
+from slap_ros.planning.hmax import HMaxHeuristic
 from slap_ros.planning.options import Option
 from slap_ros.relational import GroundOperator
 
 MAX_NODES = 200_000  # abstract states after which the top level is given up
-MANY_NODES = 20_000  # after which it is looked at which of them are of use
+MANY_NODES = 20_000  # abstract states after which those too far from the goal are pruned
 
 
 @dataclass(frozen=True)
@@ -75,23 +75,26 @@ def build_abstract_graph(
         start: The abstract state to start from.
         goal: Mask of atoms that must hold.
         operators: Ground operators, each with the option that carries it out.
-        extra_depth: How many layers to go on after the first with a goal state.
+        extra_depth: How many layers to add after the first with a goal state.
         max_nodes: Abstract states after which to give up.
+
+    Returns:
+        The graph, with a goal node at least.
 
     Raises:
         UnsolvableError: The goal holds in no reachable abstract state.
         PlanningLimitError: More than ``max_nodes`` abstract states.
     """
     try:
-        growth = _Growth(goal, operators, min(max_nodes, MANY_NODES))
-        return _with_goal(growth.grow(start, extra_depth))
+        search = _BreadthFirstSearch(goal, operators, min(max_nodes, MANY_NODES))
+        return _require_goal(search.run(start, extra_depth))
     except PlanningLimitError:
         if max_nodes <= MANY_NODES:
             raise
-    return _goalward(start, goal, operators, extra_depth, max_nodes)
+    return _build_pruned(start, goal, operators, extra_depth, max_nodes)
 
 
-def _goalward(
+def _build_pruned(
     start: int,
     goal: int,
     operators: Sequence[tuple[GroundOperator, Option]],
@@ -99,20 +102,21 @@ def _goalward(
     max_nodes: int,
 ) -> AbstractGraph:
     """Only what may be on a way to the goal of so many operators, and of one more each time."""
-    distance = HMax(goal, [operator for operator, _ in operators])
-    reach = distance(start) or 0
+    heuristic = HMaxHeuristic(goal, [operator for operator, _ in operators])
+    length = heuristic(start) or 0
     while True:
-        growth = _Growth(goal, operators, max_nodes, distance, reach)
-        graph = growth.grow(start, 0)
+        search = _BreadthFirstSearch(goal, operators, max_nodes, heuristic, length)
+        graph = search.run(start, 0)
         if graph.goal_nodes and extra_depth:
-            reach += extra_depth
-            return _Growth(goal, operators, max_nodes, distance, reach).grow(start, extra_depth)
-        if graph.goal_nodes or not growth.left_out:
-            return _with_goal(graph)
-        reach += 1
+            length += extra_depth
+            search = _BreadthFirstSearch(goal, operators, max_nodes, heuristic, length)
+            return search.run(start, extra_depth)
+        if graph.goal_nodes or not search.pruned:
+            return _require_goal(graph)
+        length += 1
 
 
-def _with_goal(graph: AbstractGraph) -> AbstractGraph:
+def _require_goal(graph: AbstractGraph) -> AbstractGraph:
     if not graph.goal_nodes:
         raise UnsolvableError(
             f"the goal holds in none of the {len(graph.nodes)} abstract states that the "
@@ -121,24 +125,33 @@ def _with_goal(graph: AbstractGraph) -> AbstractGraph:
     return graph
 
 
-class _Growth:
-    """Layer by layer."""
+class _BreadthFirstSearch:
+    """Builds a graph layer by layer."""
 
     def __init__(
         self,
         goal: int,
         operators: Sequence[tuple[GroundOperator, Option]],
         max_nodes: int,
-        distance: HMax | None = None,
-        reach: int = 0,
+        heuristic: HMaxHeuristic | None = None,
+        length: int = 0,
     ) -> None:
-        """With a ``distance``, leave out what is not on a way of ``reach`` operators."""
-        self._goal, self._operators, self._max_nodes = goal, operators, max_nodes
-        self._distance, self._reach = distance, reach
-        self.left_out = False  # whether anything was
+        """Prepare a search.
 
-    def grow(self, start: int, extra_depth: int) -> AbstractGraph:
-        """Until so many layers after the first with a goal state, or until there is no more."""
+        Args:
+            goal: Mask of atoms that must hold.
+            operators: Ground operators, each with the option that carries it out.
+            max_nodes: Abstract states after which to give up.
+            heuristic: With one, abstract states are pruned that are on no plan of ``length``
+                operators.
+            length: See ``heuristic``.
+        """
+        self._goal, self._operators, self._max_nodes = goal, operators, max_nodes
+        self._heuristic, self._length = heuristic, length
+        self.pruned = False  # whether anything was
+
+    def run(self, start: int, extra_depth: int) -> AbstractGraph:
+        """Until ``extra_depth`` layers after the first with a goal state, or no more states."""
         graph = AbstractGraph(self._goal, [start], [0])
         index = {start: 0}
         layer, last = [0], None
@@ -170,7 +183,7 @@ class _Growth:
                 if successor == abstract:
                     continue
                 if successor not in index:
-                    if not self._may_reach(successor, depth):
+                    if not self._may_be_on_plan(successor, depth):
                         continue
                     index[successor] = len(graph.nodes)
                     following.append(len(graph.nodes))
@@ -182,10 +195,10 @@ class _Growth:
     def _is_goal(self, abstract: int) -> bool:
         return abstract & self._goal == self._goal
 
-    def _may_reach(self, abstract: int, depth: int) -> bool:
-        if self._distance is None:
+    def _may_be_on_plan(self, abstract: int, depth: int) -> bool:
+        if self._heuristic is None:
             return True
-        to_go = self._distance(abstract)
-        near = to_go is not None and depth + to_go <= self._reach
-        self.left_out |= not near and to_go is not None
+        to_go = self._heuristic(abstract)
+        near = to_go is not None and depth + to_go <= self._length
+        self.pruned |= not near and to_go is not None
         return near

@@ -32,12 +32,23 @@ FINAL = frozenset({ErrorCode.STEP_LIMIT, ErrorCode.NO_DETECTION})  # another pla
 
 @dataclass
 class EpisodeResult:
-    """What happened in one attempt at a task."""
+    """What happened in one episode: a task that was solved, or not.
+
+    Args:
+        success: Whether the goal was reached.
+        states: All of them, the first the initial one.
+        actions: All of them, one per environment step.
+        shortcut_steps: Environment steps executed that shortcuts took.
+        replans: Plans that replaced a diverged one.
+        planning_seconds: Of all plans together, s.
+        edges_rolled_out: Options simulated while planning.
+        error: Why it ended, unless it is a success.
+    """
 
     success: bool = False
-    states: list[State] = field(default_factory=list)  # the first is the initial one
+    states: list[State] = field(default_factory=list)
     actions: list[Action] = field(default_factory=list)
-    shortcut_steps: int = 0  # environment steps, of all executed, that shortcuts took
+    shortcut_steps: int = 0
     replans: int = 0
     planning_seconds: float = 0.0
     edges_rolled_out: int = 0
@@ -51,16 +62,17 @@ class EpisodeResult:
 
 @dataclass
 class Executor:
-    """Solves a task in a world: plan, execute, watch, replan on divergence.
+    """Solves a task in a world: plan, execute, monitor, replan on divergence.
 
     Args:
         domain: The task's domain.
         planner: Has a model of its own, not this world.
-        world: Where it counts.
+        world: Where environment steps count.
+        space: The task's atoms.
         goal: Mask of the atoms to reach.
         step_limit: Environment steps.
         max_replans: How often a diverged plan may be replaced.
-        perceiver: What is known of the world comes from it; without one, everything is.
+        perceiver: Gives what is known of the world; without one, everything is.
         patience: See :class:`OptionExecution`.
     """
 
@@ -73,35 +85,36 @@ class Executor:
     max_replans: int = MAX_REPLANS
     perceiver: Perceiver | None = None
     patience: int = 0
-    _known: Percept = field(init=False, repr=False)
+    _percept: Percept = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         self._perceiver = self.perceiver or ExactPerceiver(self.space)
-        self._known = self._perceiver.perceive(self.world.state)
+        self._percept = self._perceiver.perceive(self.world.state)
 
     def run(self) -> EpisodeResult:
-        """Solve from the world's current state, or say why not."""
+        """Solve from the world's current state; the result says why where it could not."""
         episode = EpisodeResult(states=[self.world.state])
         while True:
-            stopped, blind = self._attempt(episode)
-            if stopped.reached:
+            result, unplanned = self._plan_and_execute(episode)
+            if result.reached:
                 episode.success = True
                 return episode
-            if stopped.code in FINAL or (blind and self._known.exact):
-                episode.error = stopped
+            if result.code in FINAL or (unplanned and self._percept.exact):
+                episode.error = result
                 return episode
             if episode.replans == self.max_replans:
                 episode.error = OptionResult(
                     ErrorCode.REPLANS_EXHAUSTED,
-                    f"diverged again after {self.max_replans} replans: {stopped.reason}",
+                    f"diverged again after {self.max_replans} replans: {result.reason}",
                 )
                 return episode
             episode.replans += 1
-            if blind and episode.plan_length < self.step_limit:
-                self._act(np.zeros(len(self.domain.action_space.axes)), episode)  # and look again
+            if unplanned and episode.plan_length < self.step_limit:
+                # Another percept may be right where this one has no plan.
+                self._act(np.zeros(len(self.domain.action_space.axes)), episode)
 
-    def _attempt(self, episode: EpisodeResult) -> tuple[OptionResult, bool]:
-        """One plan, as far as it goes; second, whether there was none from what was seen."""
+    def _plan_and_execute(self, episode: EpisodeResult) -> tuple[OptionResult, bool]:
+        """One plan, up to its end or divergence; second, whether there was no plan."""
         try:
             plan = self._plan(episode)
         except (UnsolvableError, PlanningLimitError, InvalidStateError) as error:
@@ -111,7 +124,7 @@ class Executor:
     def _plan(self, episode: EpisodeResult) -> Plan:
         started = perf_counter()
         try:
-            result = self.planner.plan(self._known.state, self.goal)
+            result = self.planner.plan(self._percept.state, self.goal)
         finally:
             episode.planning_seconds += perf_counter() - started
         episode.edges_rolled_out += result.edges_rolled_out
@@ -119,9 +132,9 @@ class Executor:
 
     def _execute(self, plan: Plan, episode: EpisodeResult) -> OptionResult:
         for edge in plan.edges:
-            stopped = self._execute_edge(edge, episode)
-            if not stopped.reached:
-                return stopped
+            result = self._execute_edge(edge, episode)
+            if not result.reached:
+                return result
         return OptionResult(ErrorCode.NONE)
 
     def _execute_edge(self, edge: PlanEdge, episode: EpisodeResult) -> OptionResult:
@@ -130,14 +143,14 @@ class Executor:
                 edge.option,
                 edge.target,
                 self.domain.action_space,
-                self._known.state,
+                self._percept.state,
                 self.patience,
             )
         except SkillNotApplicableError as error:
             return OptionResult(error.code, str(error))
         while True:
-            known = self._known
-            action = execution.advance(known.state, known.abstract, known.missing)
+            percept = self._percept
+            action = execution.advance(percept.state, percept.abstract, percept.missing)
             if isinstance(action, OptionResult):
                 return action
             if episode.plan_length == self.step_limit:
@@ -150,4 +163,4 @@ class Executor:
     def _act(self, action: Action, episode: EpisodeResult) -> None:
         episode.actions.append(action)
         episode.states.append(self.world.step(action))
-        self._known = self._perceiver.perceive(episode.states[-1])
+        self._percept = self._perceiver.perceive(episode.states[-1])

@@ -15,7 +15,7 @@ estimate of the state before it, after all states that helpful operators led to.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 from slap_ros.errors import PlanningLimitError, UnsolvableError
@@ -50,10 +50,21 @@ def find_operator_sequence(
         UnsolvableError: No sequence leads to the goal.
         PlanningLimitError: None was found within ``max_expansions``.
     """
-    heuristic = _Heuristic(goal, operators)
+    heuristic = _FFHeuristic(goal, operators)
     if heuristic.relaxed_plan(start) is None:
         raise UnsolvableError("the goal is out of reach, even if operators deleted nothing")
-    barred = frozenset(forbidden)
+    return _best_first(start, goal, operators, heuristic, frozenset(forbidden), max_expansions)
+
+
+def _best_first(
+    start: int,
+    goal: int,
+    operators: Sequence[GroundOperator],
+    heuristic: _FFHeuristic,
+    forbidden: frozenset[tuple[int, int]],
+    max_expansions: int,
+) -> list[int]:
+    """Greedy best-first search with deferred evaluation; see :func:`find_operator_sequence`."""
     arrivals: dict[int, tuple[int, int] | None] = {start: None}  # previous state, operator
     queue = [(False, 0, 0, start)]  # unhelpful, estimate, order of discovery, state
     expansions = 0
@@ -70,22 +81,27 @@ def find_operator_sequence(
         plan = heuristic.relaxed_plan(state)
         if plan is None:
             continue
-        for index, operator in enumerate(operators):
-            if not operator.applicable(state):
-                continue
-            successor = operator.apply(state)
-            if successor in arrivals or (state, index) in barred:
-                continue
-            arrivals[successor] = state, index
-            unhelpful = not operator.add_effects & plan.subgoals
-            heapq.heappush(queue, (unhelpful, plan.length, len(arrivals), successor))
+        for index, operator, successor in _successors(state, operators, forbidden):
+            if successor not in arrivals:
+                arrivals[successor] = state, index
+                unhelpful = not operator.add_effects & plan.subgoals
+                heapq.heappush(queue, (unhelpful, plan.length, len(arrivals), successor))
     raise UnsolvableError(
         f"none of the {len(arrivals)} abstract states that can be reached leads to the goal"
     )
 
 
+def _successors(
+    state: int, operators: Sequence[GroundOperator], forbidden: Collection[tuple[int, int]]
+) -> Iterator[tuple[int, GroundOperator, int]]:
+    """The applicable operators, with their indices and the abstract states that they lead to."""
+    for index, operator in enumerate(operators):
+        if operator.applicable(state) and (state, index) not in forbidden:
+            yield index, operator, operator.apply(state)
+
+
 def _trace(arrivals: dict[int, tuple[int, int] | None], state: int) -> list[int]:
-    """The operators on the way to a state."""
+    """The operators on the way to a state, by index."""
     sequence = []
     while (arrival := arrivals[state]) is not None:
         state, index = arrival
@@ -95,13 +111,13 @@ def _trace(arrivals: dict[int, tuple[int, int] | None], state: int) -> list[int]
 
 @dataclass(frozen=True, slots=True)
 class _RelaxedPlan:
-    """What it takes to reach the goal when nothing is deleted."""
+    """A plan for the task in which operators delete nothing."""
 
     length: int  # operators
     subgoals: int  # mask: what it needs that one operator can add at once
 
 
-class _Heuristic:
+class _FFHeuristic:
     """The FF heuristic, on bit masks."""
 
     def __init__(self, goal: int, operators: Sequence[GroundOperator]) -> None:

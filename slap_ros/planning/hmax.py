@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How many operators it takes at least to reach a goal."""
+"""An admissible estimate of how many operators it takes to reach a goal."""
 
 from __future__ import annotations
 
@@ -9,34 +9,35 @@ from collections.abc import Sequence
 from slap_ros.relational import GroundOperator
 
 
-class HMax:
-    """Layers until the goal holds if operators deleted nothing, and all of a layer ran at once.
+class HMaxHeuristic:
+    """h_max with unit costs (Bonet and Geffner: Planning as heuristic search, AIJ 129, 2001).
 
-    That is h_max with unit costs (Bonet, Geffner: Planning as heuristic search, AIJ 129, 2001): it
-    never exceeds the operators that a plan has. Each abstract state is looked at once.
+    It is the number of layers until the goal holds if operators deleted nothing and all operators
+    of a layer were applied at once: never more than the operators of a plan. Each abstract state
+    is evaluated once.
     """
 
     def __init__(self, goal: int, operators: Sequence[GroundOperator]) -> None:
-        """``goal``: mask of atoms that must hold."""
+        """Start with an empty cache; ``goal`` is a mask of the atoms that must hold."""
         self._goal = goal
         self._operators = [(op.preconditions, op.add_effects) for op in operators]
-        self._known: dict[int, int | None] = {}
+        self._cache: dict[int, int | None] = {}
 
     def __call__(self, abstract: int) -> int | None:
-        """Operators from an abstract state at least; None where no plan leads to the goal."""
-        if abstract not in self._known:
-            self._known[abstract] = self._layers(abstract)
-        return self._known[abstract]
+        """At least so many operators from an abstract state; None where there is no plan."""
+        if abstract not in self._cache:
+            self._cache[abstract] = self._layers(abstract)
+        return self._cache[abstract]
 
     def _layers(self, reached: int) -> int | None:
         layers, waiting = 0, self._operators
         while self._goal & ~reached:
             following, later = reached, []
-            for operator in waiting:
-                if operator[0] & ~reached:
-                    later.append(operator)
+            for preconditions, add_effects in waiting:
+                if preconditions & ~reached:
+                    later.append((preconditions, add_effects))
                 else:
-                    following |= operator[1]
+                    following |= add_effects
             if following == reached:
                 return None
             reached, waiting, layers = following, later, layers + 1

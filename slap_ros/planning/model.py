@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The planner's model: options rolled out in a world of its own, and remembered."""
+"""The planner's model: options rolled out in a world of its own, and cached."""
 
 from __future__ import annotations
 
@@ -14,10 +14,16 @@ from slap_ros.relational import AtomSpace, State
 
 @dataclass(frozen=True)
 class Rollout:
-    """What came of an option in the model."""
+    """The outcome of an option in the model.
 
-    reached: bool  # the target abstract state
-    steps: int  # environment steps
+    Args:
+        reached: Whether it ended in its target abstract state.
+        steps: Environment steps taken.
+        final: The state in which it ended.
+    """
+
+    reached: bool
+    steps: int
     final: State
 
 
@@ -25,16 +31,22 @@ class Model:
     """The known transition function (the paper's f).
 
     A roll-out is a function of the option, its target and the state, bit for bit, so each is
-    done once.
+    made once and then cached.
     """
 
     def __init__(self, world: World, space: AtomSpace, actions: ActionSpace) -> None:
-        """Plan in ``world``, which nobody else may use."""
+        """Start with an empty cache.
+
+        Args:
+            world: In which options are rolled out; nobody else may use it.
+            space: The task's atoms.
+            actions: What the robot can do.
+        """
         self.space = space
-        self.executed = 0  # roll-outs done so far, remembered ones not counted
+        self.executed = 0  # roll-outs made so far; those from the cache do not count
         self._world = world
         self._actions = actions
-        self._memory: dict[tuple[Option, int, bytes], Rollout] = {}
+        self._cache: dict[tuple[Option, int, bytes], Rollout] = {}
 
     @classmethod
     def of(cls, domain: Domain, initial: State) -> Model:
@@ -42,12 +54,21 @@ class Model:
         return cls(domain.make_world(initial), domain.atom_space(initial), domain.action_space)
 
     def roll_out(self, option: Option, state: State, target: int) -> Rollout:
-        """Run an option until ``target``, an abstract state, is reached or it stops."""
+        """Execute an option until it reaches its target or ends otherwise.
+
+        Args:
+            option: What is executed.
+            state: Where it starts.
+            target: The abstract state to reach, a mask.
+
+        Returns:
+            The outcome; not reached in no steps where the skill cannot start in the state.
+        """
         key = (option, target, state.key)
-        if key not in self._memory:
+        if key not in self._cache:
             self.executed += 1
-            self._memory[key] = self._simulate(option, state, target)
-        return self._memory[key]
+            self._cache[key] = self._simulate(option, state, target)
+        return self._cache[key]
 
     def _simulate(self, option: Option, state: State, target: int) -> Rollout:
         self._world.reset(state)

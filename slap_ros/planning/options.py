@@ -43,10 +43,11 @@ class Option:
         skill: What controls the robot.
         objects: What it is applied to.
         accepts: Whether it may end in a state in which its target's atoms hold. A shortcut may
-            not while things still move or lie where the next option could not be executed.
-        attempt: Which of the ways in which the skill may do it, the shortest first.
-        another: The same, done in the next way; it fails where there is none.
-        given_up: Whether it need not be tried any more in this task: its like failed too often.
+            not while objects still move or lie where the next option could not be executed.
+        attempt: Which of the rollouts that its skill found it follows, the shortest first.
+        next_attempt: Gives the same option with the next rollout, which fails where there is
+            none; None for a skill that has one rollout alone.
+        given_up: Whether it is not tried any more in this task: its skill failed too often.
     """
 
     kind: OptionKind
@@ -63,6 +64,14 @@ class Option:
 
 def given_option(domain: Domain, name: str, objects: Sequence[Object]) -> Option:
     """The option that carries out a domain's operator on objects.
+
+    Args:
+        domain: Which has the operator and its skill.
+        name: Of the operator.
+        objects: For the operator's parameters, in order.
+
+    Returns:
+        The option.
 
     Raises:
         UnknownSkillError: There is no such operator, or not for such objects.
@@ -85,7 +94,7 @@ def given_option(domain: Domain, name: str, objects: Sequence[Object]) -> Option
 
 @dataclass(frozen=True)
 class HoldSkill:
-    """Stand still for a step: to look again where what was seen makes no sense."""
+    """Stand still for a step, to perceive again where no plan fits what was perceived."""
 
     axes: int  # of an action
     name: str = "Hold"
@@ -93,12 +102,12 @@ class HoldSkill:
     least_steps: int = 1
 
     def lower_bound(self, state: State, objects: tuple[Object, ...]) -> int:
-        """A step."""
+        """One environment step, from every state."""
         del state, objects
         return self.least_steps
 
     def start(self, state: State, objects: tuple[Object, ...]) -> Policy:
-        """Move nothing, whatever the state."""
+        """The policy that moves nothing, in any state."""
         del state, objects
         return lambda _: np.zeros(self.axes)
 
@@ -107,13 +116,18 @@ HOLD = HoldSkill.name
 
 
 def hold_option(actions: ActionSpace) -> Option:
-    """The option to stand still for a step; it leads nowhere, so it ends at its step limit."""
+    """The option to stand still for a step; it has no target, so it ends at its step limit."""
     return Option(OptionKind.OPERATOR, HoldSkill(len(actions.axes)), ())
 
 
 @dataclass(frozen=True)
 class OptionResult:
-    """Why an execution is over: NONE where the target was reached."""
+    """How the execution of an option or of a plan ended.
+
+    Args:
+        code: NONE where the target was reached.
+        reason: In words, why not.
+    """
 
     code: ErrorCode
     reason: str = ""
@@ -126,15 +140,16 @@ class OptionResult:
 
 @dataclass
 class OptionExecution:
-    """An option under way. The same code runs it in the planner's model and on the robot.
+    """An option that is being executed, in the planner's model or on the robot: the same code.
 
     Args:
-        option: What runs.
-        target: The abstract state in which it ends.
-        actions: What the robot can do; anything else that the policy wants stops the option.
+        option: What is executed.
+        target: The abstract state in which it ends, a mask.
+        actions: What the robot can do; any other action of the policy ends the option.
         state: Where it starts.
         patience: Environment steps for which to hold at its end where the target is not perceived
             yet, as debounced atoms are late.
+        steps: Environment steps commanded so far.
 
     Raises:
         SkillNotApplicableError: The skill cannot start in this state.
@@ -145,9 +160,9 @@ class OptionExecution:
     actions: ActionSpace
     state: State
     patience: int = 0
-    steps: int = 0  # environment steps commanded so far
+    steps: int = 0
     _policy: Policy = field(init=False, repr=False)
-    _waited: int = field(default=0, init=False)  # environment steps held at its end
+    _held_steps: int = field(default=0, init=False)  # at its end
 
     def __post_init__(self) -> None:
         self._policy = self.option.skill.start(self.state, self.option.objects)
@@ -155,17 +170,21 @@ class OptionExecution:
     def advance(
         self, state: State, abstract: int, missing: Collection[str] = ()
     ) -> Action | OptionResult:
-        """The next action from the newest state, or why there is none.
+        """The next action, or how the option ended.
 
         Args:
-            state: As perceived.
-            abstract: As perceived.
-            missing: Objects of which nobody knows where they are; those that it is about stop it.
+            state: The newest one, as perceived.
+            abstract: Its abstract state, as perceived.
+            missing: Names of objects that were not detected for too long; the option ends where it
+                is about one of them.
+
+        Returns:
+            An action within ``actions``, or the result.
         """
-        if lost := [obj.name for obj in self.option.objects if obj.name in missing]:
+        if unseen := [obj.name for obj in self.option.objects if obj.name in missing]:
             return OptionResult(
                 ErrorCode.NO_DETECTION,
-                f"{self.option}: not seen for too long: {', '.join(lost)}",
+                f"{self.option}: not seen for too long: {', '.join(unseen)}",
             )
         if abstract == self.target and self.steps > 0 and self.option.accepts(state):
             return OptionResult(ErrorCode.NONE)
@@ -188,9 +207,9 @@ class OptionExecution:
         return action
 
     def _next(self, state: State) -> Action | None:
-        """The policy's next action; at its end, hold for as long as patience lasts."""
-        action = self._policy(state) if self._waited == 0 else None
-        if action is None and self._waited < self.patience:
-            self._waited += 1
+        """The policy's next action; at its end, none after ``patience`` steps of holding."""
+        action = self._policy(state) if self._held_steps == 0 else None
+        if action is None and self._held_steps < self.patience:
+            self._held_steps += 1
             return np.zeros(len(self.actions.axes))
         return action

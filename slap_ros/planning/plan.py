@@ -35,9 +35,16 @@ class Plan:
 
 @dataclass(frozen=True)
 class PlanningResult:
-    """A plan and what it took to find it."""
+    """A plan and the effort of finding it.
+
+    Args:
+        plan: What was found.
+        graph_nodes: Abstract states in the graph.
+        graph_edges: Options in the graph.
+        edges_rolled_out: Options simulated in the model.
+    """
 
     plan: Plan
-    graph_nodes: int  # abstract states considered
+    graph_nodes: int
     graph_edges: int
-    edges_rolled_out: int  # options simulated
+    edges_rolled_out: int

@@ -25,7 +25,7 @@ class Planner(Protocol):
     """Plans for tasks over one set of objects."""
 
     def plan(self, state: State, goal: int) -> PlanningResult:
-        """A plan from ``state`` to where the atoms of ``goal``, a mask, hold.
+        """Plan from ``state`` to where the atoms of ``goal``, a mask, hold.
 
         Raises:
             UnsolvableError: There is no plan.
@@ -55,7 +55,7 @@ class Problem:
 
 
 class ShortcutSource(Protocol):
-    """Knows shortcuts between abstract states."""
+    """Gives shortcut edges for an abstract graph."""
 
     def edges(self, graph: AbstractGraph) -> Sequence[Edge]:
         """Edges to be added to a graph."""
@@ -66,14 +66,24 @@ class ShortcutSource(Protocol):
 class GraphPlanner:
     """The abstract planning graph, then a shortest path through it (SLAP §4.1, Alg. 2).
 
-    Shortcuts are edges like others: one that fails in the model is no way, and without any this
-    is pure planning. Where no path can be executed, the graph is deepened beyond the paper's: by
-    one layer, up to ``max_extra_depth``.
+    Shortcuts are edges like others: one that fails in the model leads nowhere, and without any
+    this is pure planning. Where no path can be executed, the graph is deepened beyond the paper's:
+    by one layer at a time, up to ``max_extra_depth``.
+
+    In the same graph, a plan with shortcuts is never longer in the model than one without; see
+    :mod:`slap_ros.planning.search`. A plan that shortcuts make possible in a shallower graph is
+    taken, though a deeper one might have a shorter plan.
+
+    Args:
+        problem: The model, and the ground operators with their options.
+        search: Lazy or exhaustive.
+        max_extra_depth: Layers, one per operator, by which the graph may be deepened.
+        shortcuts: Where shortcut edges come from.
     """
 
     problem: Problem
     search: Search = search_lazily
-    max_extra_depth: int = 2  # operators
+    max_extra_depth: int = 2
     shortcuts: ShortcutSource | None = None
 
     def plan(self, state: State, goal: int) -> PlanningResult:
@@ -99,10 +109,14 @@ class FFPlanner:
     """Greedy best-first search with the FF heuristic, then roll-outs (SLAP D.2).
 
     An edge that cannot be executed is forbidden and the search repeated.
+
+    Args:
+        problem: The model, and the ground operators with their options.
+        max_attempts: Abstract plans tried.
     """
 
     problem: Problem
-    max_attempts: int = 100  # abstract plans tried
+    max_attempts: int = 100
 
     def plan(self, state: State, goal: int) -> PlanningResult:
         """See :class:`Planner`."""
@@ -166,7 +180,16 @@ WITH_SHORTCUTS = ("lazy", "exhaustive")  # planners that can use them
 def make_planner(
     name: str, domain: Domain, initial: State, shortcuts: ShortcutSource | None = None
 ) -> Planner:
-    """A planner by name, for tasks over the objects of ``initial``.
+    """A planner by name.
+
+    Args:
+        name: One of ``PLANNERS``.
+        domain: For whose tasks.
+        initial: A state with the objects of the tasks.
+        shortcuts: Where shortcut edges come from; None for pure planning.
+
+    Returns:
+        The planner, with a model of its own.
 
     Raises:
         InvalidParameterError: No planner of that name, or none that can use shortcuts.

@@ -4,12 +4,26 @@
 
 What an option costs depends on the low-level state that it starts from, hence on the path so
 far. Vertices of the search are therefore (node, low-level state) pairs, and a node is expanded
-anew for each low-level state in which it is reached.
+again for each low-level state in which it is reached.
 
 :func:`search_exhaustively` rolls out every forward edge from every such vertex first and runs
-Dijkstra's algorithm on the result, as the paper does. :func:`search_lazily` rolls out an edge
-only when it lies on what is, by admissible lower bounds, the cheapest path. Both find the same
-cost.
+Dijkstra's algorithm on the result, as the paper does. :func:`search_lazily` is A* with lazy edge
+evaluation, as in Lazy Weighted A* (Cohen, Phillips and Likhachev: Planning single-arm
+manipulations with n-arm robots, RSS 2014) with weight 1; see LazySP (Dellin and Srinivasa: A
+unifying formalism for shortest path problems with expensive edge evaluations via lazy best-first
+search over paths with edge selectors, ICAPS 2016) for the family: an edge is rolled out only
+when it comes to the front of the queue, and until then counts with a lower bound.
+
+Both find the same cost *if bounds are admissible*, that is, if no option takes fewer steps than
+``Skill.least_steps`` and ``Skill.lower_bound`` say. The bounds of the given skills are checked by
+tests. The bound of a shortcut, half of its shortest success in training, is an assumption: where
+a rollout in the model is shorter than that, the lazy search may return a plan that is longer than
+the exhaustive one's, by at most the sum of what the bounds exceed the steps by on the best path.
+``test/shortcuts/test_bounds.py`` measures how often that happens with the shipped libraries.
+
+In the planner's model, a plan with shortcuts is never longer than one without, when both searches
+end with a plan at the same depth and bounds are admissible: shortcuts only add edges. Executing a
+plan is another matter: a world that is not the model may make it diverge, and it is replanned.
 """
 
 from __future__ import annotations
@@ -26,31 +40,45 @@ from slap_ros.planning.options import Option
 from slap_ros.planning.plan import Plan, PlanEdge
 from slap_ros.relational import State
 
+VertexKey = tuple[int, bytes]
+
 
 @dataclass(frozen=True)
 class Vertex:
-    """A node reached in a low-level state, and how."""
+    """A node reached in a low-level state.
+
+    Args:
+        node: Index of the abstract state.
+        state: The low-level state.
+        cost: Environment steps from the start.
+        parent: The vertex before it; None at the start.
+        edge: From the parent's node to this one; None at the start.
+    """
 
     node: int
     state: State
-    cost: int  # environment steps from the start
+    cost: int
     parent: Vertex | None = None
     edge: Edge | None = None
 
     @property
-    def key(self) -> tuple[int, bytes]:
+    def key(self) -> VertexKey:
         """Vertices with equal keys have equal futures."""
         return self.node, self.state.key
 
 
 @dataclass
 class LowLevelGraph:
-    """The bottom level: every way in which the forward edges can be run from the start."""
+    """The bottom level: every way in which the forward edges can be executed from the start.
+
+    Args:
+        start: The vertex to start from.
+        successors: Of each vertex: edge, environment steps, and the vertex reached, whose own
+            cost is not used.
+    """
 
     start: Vertex
-    successors: dict[tuple[int, bytes], list[tuple[Edge, int, Vertex]]] = field(
-        default_factory=dict
-    )  # of each vertex: edge, steps, and the vertex reached (its cost is not used)
+    successors: dict[VertexKey, list[tuple[Edge, int, Vertex]]] = field(default_factory=dict)
 
 
 def build_bottom_level(graph: AbstractGraph, state: State, model: Model) -> LowLevelGraph:
@@ -58,10 +86,18 @@ def build_bottom_level(graph: AbstractGraph, state: State, model: Model) -> LowL
 
     Nodes are taken in order of discovery, which forward edges follow, so that each node's
     low-level states are complete when its turn comes.
+
+    Args:
+        graph: The top level.
+        state: The low-level state to start from, in the graph's first node.
+        model: Rolls options out.
+
+    Returns:
+        The bottom level.
     """
     bottom = LowLevelGraph(Vertex(0, state, 0))
     forward, goals = graph.forward_edges(), set(graph.goal_nodes)
-    reached: list[dict[tuple[int, bytes], Vertex]] = [{} for _ in graph.nodes]
+    reached: list[dict[VertexKey, Vertex]] = [{} for _ in graph.nodes]
     reached[0][bottom.start.key] = bottom.start
     for node, vertices in enumerate(reached):
         if node in goals:
@@ -69,17 +105,17 @@ def build_bottom_level(graph: AbstractGraph, state: State, model: Model) -> LowL
         for vertex in vertices.values():
             found = bottom.successors.setdefault(vertex.key, [])
             for each in forward[node]:
-                for edge, rollout in _ways(each, vertex.state, graph, model):
+                for edge, rollout in _attempts(each, vertex.state, graph, model):
                     successor = Vertex(edge.target, rollout.final, 0)
                     reached[edge.target].setdefault(successor.key, successor)
                     found.append((edge, rollout.steps, successor))
     return bottom
 
 
-def _ways(
+def _attempts(
     edge: Edge, state: State, graph: AbstractGraph, model: Model
 ) -> Iterator[tuple[Edge, Rollout]]:
-    """All ways in which an edge can be run, the shortest first."""
+    """All rollouts of an edge's option that reach its target, the shortest first."""
     option: Option | None = edge.option
     while option is not None:
         rollout = model.roll_out(option, state, graph.nodes[edge.target])
@@ -92,13 +128,21 @@ def _ways(
 def search_exhaustively(graph: AbstractGraph, state: State, model: Model) -> Plan:
     """Build the whole bottom level, then Dijkstra; stop when the best goal vertex is closed.
 
+    Args:
+        graph: The top level.
+        state: The low-level state to start from, in the graph's first node.
+        model: Rolls options out.
+
+    Returns:
+        A plan of least cost.
+
     Raises:
         UnsolvableError: No path of the graph can be executed from ``state``.
     """
     bottom, goals = build_bottom_level(graph, state, model), set(graph.goal_nodes)
     tie = count()
     queue = [(0, next(tie), bottom.start)]
-    closed: set[tuple[int, bytes]] = set()
+    closed: set[VertexKey] = set()
     while queue:
         cost, _, vertex = heapq.heappop(queue)
         if vertex.node in goals:
@@ -113,14 +157,14 @@ def search_exhaustively(graph: AbstractGraph, state: State, model: Model) -> Pla
 
 
 @dataclass(order=True)
-class _Waiting:
-    """What may be looked at next: a vertex, or an edge out of it that was not rolled out yet."""
+class _QueueEntry:
+    """A vertex to be expanded, or an edge out of it that was not rolled out yet."""
 
     bound: int  # environment steps of any plan through it
     tie: int
     vertex: Vertex = field(compare=False)
     edge: Edge | None = field(compare=False)
-    least: int = field(compare=False)  # environment steps that the edge takes
+    least_steps: int = field(compare=False)  # environment steps that the edge takes
 
     @property
     def node(self) -> int:
@@ -129,82 +173,119 @@ class _Waiting:
 
 
 class _Frontier:
-    """What waits, best first by cost so far plus lower bounds of what is to come."""
+    """The queue of A*, best first by cost so far plus lower bounds of what is to come."""
 
     def __init__(self, graph: AbstractGraph) -> None:
         self._goals = graph.goal_nodes
-        self._keep(graph.forward_edges())
-        self._queue: list[_Waiting] = []
+        self._look_ahead(graph.forward_edges())
+        self._queue: list[_QueueEntry] = []
         self._tie = count()
 
-    def push(self, vertex: Vertex, edge: Edge | None = None, least: int = 0) -> None:
-        """Let something wait, if a goal can be reached through it."""
+    def push(self, vertex: Vertex, edge: Edge | None = None, least_steps: int = 0) -> None:
+        """Put a vertex or an edge into the queue, if a goal can be reached through it.
+
+        Args:
+            vertex: To be expanded.
+            edge: To be rolled out from the vertex instead.
+            least_steps: Lower bound of the environment steps that the edge takes.
+        """
         # Deeper first among equals: they are nearer to the goal.
-        self._put(_Waiting(0, -next(self._tie), vertex, edge, least))
+        self._put(_QueueEntry(0, -next(self._tie), vertex, edge, least_steps))
 
-    def _put(self, waiting: _Waiting) -> None:
-        rest = self._to_go[waiting.node]
+    def _put(self, entry: _QueueEntry) -> None:
+        rest = self._to_go[entry.node]
         if rest is not None:
-            waiting.bound = waiting.vertex.cost + waiting.least + rest
-            heapq.heappush(self._queue, waiting)
+            entry.bound = entry.vertex.cost + entry.least_steps + rest
+            heapq.heappush(self._queue, entry)
 
-    def pop(self) -> _Waiting | None:
-        """The best; None if nothing waits."""
+    def pop(self) -> _QueueEntry | None:
+        """The best entry; None if the queue is empty."""
         while self._queue:
             best = heapq.heappop(self._queue)
-            known = best.bound
             rest = self._to_go[best.node]
-            if rest is not None and best.vertex.cost + best.least + rest <= known:
+            if rest is not None and best.vertex.cost + best.least_steps + rest <= best.bound:
                 return best
             self._put(best)  # bounds rose since it was pushed
         return None
 
-    def give_up(self) -> None:
-        """Leave out the options that were given up: their bounds promise what they do not keep."""
-        self._keep([[e for e in out if not e.option.given_up()] for out in self.forward])
+    def drop_given_up(self) -> None:
+        """Drop the options that were given up, with the bounds that counted on them."""
+        self._look_ahead([[e for e in out if not e.option.given_up()] for out in self.forward])
 
-    def _keep(self, forward: list[list[Edge]]) -> None:
-        """Look ahead along these edges, and leave out those through which no goal is reached."""
+    def _look_ahead(self, forward: list[list[Edge]]) -> None:
+        """Keep the edges through which a goal can be reached, and the steps to go from each."""
         self._to_go = _steps_to_go(forward, self._goals)
         self.forward = [[e for e in out if self._to_go[e.target] is not None] for out in forward]
 
 
 def search_lazily(graph: AbstractGraph, state: State, model: Model) -> Plan:
-    """Best first, rolling out on demand: an edge when it comes to the front of what waits.
+    """A* with lazy edge evaluation: an edge is rolled out at the front of the queue.
 
-    Until then it counts with the bound of its skill from the state at its source. Bounds never
-    exceed the true steps, so the first goal vertex at the front is the cheapest.
+    Until then it counts with the bound of its skill from the state at its source. As long as
+    bounds never exceed the true steps, the first goal vertex at the front is the cheapest; the
+    module's text says when they may.
+
+    Args:
+        graph: The top level.
+        state: The low-level state to start from, in the graph's first node.
+        model: Rolls options out.
+
+    Returns:
+        A plan, of least cost where bounds are admissible.
 
     Raises:
         UnsolvableError: No path of the graph can be executed from ``state``.
     """
-    frontier, goals = _Frontier(graph), set(graph.goal_nodes)
-    start = Vertex(0, state, 0)
-    cheapest = {start.key: 0}
-    frontier.push(start)
-    while (best := frontier.pop()) is not None:
-        vertex, edge = best.vertex, best.edge
-        if edge is not None and not edge.option.given_up():
-            rollout = model.roll_out(edge.option, vertex.state, graph.nodes[edge.target])
-            if rollout.reached:
-                cost = vertex.cost + rollout.steps
-                reached = Vertex(edge.target, rollout.final, cost, vertex, edge)
-                if cost < cheapest.get(reached.key, cost + 1):
-                    cheapest[reached.key] = cost
-                    frontier.push(reached)
-                next_attempt = edge.option.next_attempt()
-                if next_attempt is not None:  # it takes longer, but what comes next may take less
-                    frontier.push(vertex, replace(edge, option=next_attempt), rollout.steps)
-            elif edge.option.given_up():
-                frontier.give_up()
-        elif edge is None and vertex.node in goals:
-            return _plan(graph, vertex)
-        elif edge is None and vertex.cost == cheapest[vertex.key]:
-            for out in frontier.forward[vertex.node]:
-                skill = out.option.skill
-                bound = skill.lower_bound(vertex.state, out.option.objects)
-                frontier.push(vertex, out, max(skill.least_steps, bound))
-    raise _infeasible(graph)
+    return _LazySearch(graph, state, model).run()
+
+
+class _LazySearch:
+    """One run of :func:`search_lazily`."""
+
+    def __init__(self, graph: AbstractGraph, state: State, model: Model) -> None:
+        """See :func:`search_lazily`."""
+        self._graph, self._model = graph, model
+        self._goals = set(graph.goal_nodes)
+        self._frontier = _Frontier(graph)
+        start = Vertex(0, state, 0)
+        self._cheapest = {start.key: 0}
+        self._frontier.push(start)
+
+    def run(self) -> Plan:
+        """Until the best entry of the queue is a goal vertex."""
+        while (best := self._frontier.pop()) is not None:
+            vertex, edge = best.vertex, best.edge
+            if edge is not None:
+                self._evaluate(vertex, edge)
+            elif vertex.node in self._goals:
+                return _plan(self._graph, vertex)
+            elif vertex.cost == self._cheapest[vertex.key]:
+                self._expand(vertex)
+        raise _infeasible(self._graph)
+
+    def _expand(self, vertex: Vertex) -> None:
+        """Queue the edges out of a vertex, each with its bound."""
+        for edge in self._frontier.forward[vertex.node]:
+            skill = edge.option.skill
+            bound = skill.lower_bound(vertex.state, edge.option.objects)
+            self._frontier.push(vertex, edge, max(skill.least_steps, bound))
+
+    def _evaluate(self, vertex: Vertex, edge: Edge) -> None:
+        """Roll an edge out, and queue where it leads and its next attempt."""
+        if edge.option.given_up():
+            return
+        rollout = self._model.roll_out(edge.option, vertex.state, self._graph.nodes[edge.target])
+        if rollout.reached:
+            cost = vertex.cost + rollout.steps
+            reached = Vertex(edge.target, rollout.final, cost, vertex, edge)
+            if cost < self._cheapest.get(reached.key, cost + 1):
+                self._cheapest[reached.key] = cost
+                self._frontier.push(reached)
+            following = edge.option.next_attempt()
+            if following is not None:  # it takes longer, but the next option may take less
+                self._frontier.push(vertex, replace(edge, option=following), rollout.steps)
+        elif edge.option.given_up():
+            self._frontier.drop_given_up()
 
 
 def _steps_to_go(forward: list[list[Edge]], goals: Sequence[int]) -> list[int | None]:

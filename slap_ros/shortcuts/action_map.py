@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""From what a policy says to what the robot does."""
+"""From a policy's actions to the robot's."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from slap_ros.relational.state import Array
 
 
 class ActionMap:
-    """The policy's actions, from -1 to 1, and the robot's."""
+    """Scales actions from [-1, 1] to the range of the learned axes of a domain."""
 
     def __init__(self, domain: Domain, gripper: bool) -> None:
+        """``gripper``: whether the policy has the gripper among its actions, as the last axis."""
         space = domain.learned_actions
         low, high = np.array(space.low), np.array(space.high)
         self._middle, self._half = (low + high) / 2, (high - low) / 2

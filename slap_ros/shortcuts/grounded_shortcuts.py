@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from slap_ros.core import Domain
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge
@@ -13,7 +13,7 @@ from slap_ros.relational import State
 from slap_ros.shortcuts.ground_shortcut import GroundShortcut
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder, learner_interface
 from slap_ros.shortcuts.shortcut import DEFAULT, Sampling, Shortcut
-from slap_ros.shortcuts.shortcut_rollouts import ShortcutRollouts
+from slap_ros.shortcuts.shortcut_rollouts import ShortcutRollout, ShortcutRollouts
 from slap_ros.shortcuts.signature import Change, concerned
 from slap_ros.shortcuts.signature_matcher import SignatureMatcher
 
@@ -74,6 +74,10 @@ class GroundedShortcuts:
             if shortcut.name == name and shortcut.signature.matches(change, self._space):
                 return self._option(shortcut, change, attempt)
         return None
+
+    def cached_rollouts(self) -> Iterator[tuple[str, tuple[ShortcutRollout, ...]]]:
+        """The name of each shortcut that was tried, and its successes, once for each state."""
+        return self._rollouts.cached()
 
     def _option(self, shortcut: Shortcut, change: Change, attempt: int = 0) -> Option:
         key = (shortcut.name, change)

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from time import process_time
 from typing import TYPE_CHECKING, Any
@@ -140,8 +140,6 @@ def learn(
         InvalidLibraryError: What was finished before is damaged.
         InvalidParameterError: A checkpoint is damaged.
     """
-    from slap_ros.shortcuts.ppo import Learner, normalisation_of  # torch, here alone
-
     work = ShortcutWorkFolder(Path(folder))
     if work.finished.exists():
         return load_shortcut(work.shortcut)
@@ -149,13 +147,32 @@ def learn(
         _parts(distribution, signature, starts, settings, stage)
         for stage in range(len(settings.stages))
     ]
-    rng = np.random.default_rng([distribution.seed, len(starts)])
-    normalisation = normalisation_of(specs[0][0].make(), rng, WARM_UP)
     recorder = ProgressRecorder(work)
+    learner = _learn_stages(specs, settings, distribution.seed, work, recorder, processes)
+    shortcut = Shortcut(signature, learner.policy(), learner.shortest, recorder.record())
+    save_shortcut(work.shortcut, shortcut)
+    work.finished.touch()
+    return shortcut
+
+
+def _learn_stages(
+    specs: Sequence[Sequence[VecEnvSpec]],
+    settings: TrainingSettings,
+    seed: int,
+    work: ShortcutWorkFolder,
+    recorder: ProgressRecorder,
+    processes: int,
+) -> Learner:
+    """Each stage begins with the weights of the one before it."""
+    from slap_ros.shortcuts.ppo import Learner, normalisation_of  # torch, here alone
+
+    first = specs[0][0]
+    rng = np.random.default_rng([seed, len(first.starts)])
+    normalisation = normalisation_of(first.make(), rng, WARM_UP)
     learner: Learner | None = None
     for stage, ppo in enumerate(settings.stages):
         with make_vec_env(specs[stage], processes) as env:
-            earlier, learner = learner, Learner(env, normalisation, ppo, distribution.seed)
+            earlier, learner = learner, Learner(env, normalisation, ppo, seed)
             if earlier is not None:
                 learner.initialise_from(earlier)
             if work.checkpoint(stage).exists():
@@ -163,10 +180,7 @@ def learn(
             learner.learn(recorder.of(stage, learner), work.path / "tensorboard")
             learner.save(work.checkpoint(stage))
     assert learner is not None  # there is one stage at least
-    shortcut = Shortcut(signature, learner.policy(), learner.shortest, recorder.record())
-    save_shortcut(work.shortcut, shortcut)
-    work.finished.touch()
-    return shortcut
+    return learner
 
 
 def _parts(

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Shortcut libraries on disk: a folder a shortcut, readable without torch, never a pickle.
+"""Shortcut libraries on disk: a folder per shortcut, readable without torch, never a pickle.
 
 ::
 
@@ -10,8 +10,8 @@
         shortcut.json            signature, shortest success, training record
         policy.safetensors       weights and normalisation
 
-What is damaged is not used: a shortcut that cannot be read is refused with a reason and the rest
-of the library serves without it. A library of another domain or of a newer format is refused as
+What is damaged is not used: a shortcut that cannot be read is refused with a reason, and the rest
+of the library is used without it. A library of another domain or of a newer format is refused as
 a whole.
 """
 
@@ -105,7 +105,7 @@ def load_library(path: Path, domain: Domain) -> Library:
     if about.get("format") != FORMAT:
         raise InvalidLibraryError(
             f"{path}: format {about.get('format')!r}, this version of slap_ros reads {FORMAT}; "
-            "train anew or use the version of slap_ros that made it"
+            "train again or use the version of slap_ros that made it"
         )
     if about.get("domain") != domain.name:
         raise InvalidLibraryError(
@@ -124,13 +124,13 @@ def load_library(path: Path, domain: Domain) -> Library:
 
 
 def _require_fit(shortcut: Shortcut, folder: Path, domain: Domain) -> None:
-    """Refuse a policy that sees or does something else than the domain's view has."""
-    seen = observation_size(domain, shortcut.signature)
+    """Refuse a policy whose observations or actions are not those of the domain."""
+    features = observation_size(domain, shortcut.signature)
     size = shortcut.policy.normalisation.mean.size
-    if seen is not None and seen != size:
+    if features is not None and features != size:
         raise InvalidLibraryError(
-            f"{folder}: the policy sees {size} features, the view of {domain.name} has {seen}: "
-            "learned with another version of slap_ros; train anew"
+            f"{folder}: the policy has {size} observed features, {domain.name} has {features}: "
+            "learned with another version of slap_ros; train again"
         )
     actions = make_action_map(domain, shortcut.signature).size
     if shortcut.policy.log_std.size != actions:
@@ -144,7 +144,7 @@ def _require_fit(shortcut: Shortcut, folder: Path, domain: Domain) -> None:
 
 
 def save_shortcut(folder: Path, shortcut: Shortcut) -> None:
-    """Write one shortcut into a new folder or over an older version of it."""
+    """Write one shortcut into a folder, which is made where there is none."""
     folder.mkdir(parents=True, exist_ok=True)
     tensors = save(_tensors(shortcut.policy))
     _write(

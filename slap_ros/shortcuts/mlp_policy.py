@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Policies as plain numpy: what is learned with torch is run without it."""
+"""Policies in numpy: what is learned with torch is executed without it."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-LEAST_DEVIATION = 0.3  # views are of magnitude 1 or so
-# Observations at once. Larger products OpenBLAS spreads over threads, which wait for one another
-# where cores are busy, and add up in another order where there are more of them.
+LEAST_DEVIATION = 0.3  # features are of magnitude 1 or so
+# Observations at once. OpenBLAS spreads larger products over threads, which wait for one another
+# where cores are busy, and whose number changes the order of summation.
 MAX_BATCH = 64
 Weights = NDArray[np.float32]
 
@@ -28,8 +28,8 @@ class Normalisation:
     def of(cls, observations: Weights) -> Normalisation:
         """From observations, shape (n, size).
 
-        What hardly varies at random, like the speed of a tower that is not hit, is not blown up:
-        it would drown everything else once it does.
+        The deviation is never below ``LEAST_DEVIATION``: a feature that hardly varies under random
+        actions, like the speed of a tower that is not hit, would outweigh all others once it does.
         """
         deviation = np.maximum(observations.std(axis=0), LEAST_DEVIATION)
         return cls(observations.mean(axis=0).astype(np.float32), deviation.astype(np.float32))
@@ -71,7 +71,16 @@ class MlpPolicy:
     def sample(
         self, observations: Weights, rng: np.random.Generator, temperature: float | Weights = 1.0
     ) -> Weights:
-        """Actions with noise; temperature, one or of shape (n, 1), 0 is none."""
+        """Actions with Gaussian noise.
+
+        Args:
+            observations: Shape (n, size).
+            rng: Draws the noise.
+            temperature: Scale of the noise, a number or of shape (n, 1); 0 is none.
+
+        Returns:
+            Shape (n, actions), not yet clipped to [-1, 1].
+        """
         mean = self.mean(observations)
         noise = rng.standard_normal(mean.shape, dtype=np.float32)
         actions = mean + temperature * np.exp(self.log_std) * noise

@@ -119,6 +119,9 @@ def normalisation_of(env: VecEnv, rng: np.random.Generator, steps: int) -> Norma
         env: Is stepped.
         rng: Draws the actions, each of which is repeated for a while.
         steps: In each environment.
+
+    Returns:
+        The normalisation.
     """
     observations = []
     for step in range(steps):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""PPO's hyper-parameters; apart from PPO, so that they can be read without torch."""
+"""PPO's hyper-parameters, in a module of their own that does not import torch."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class PpoSettings:
     """PPO's hyper-parameters, under their usual names."""
 
     environments: int = 16
-    parts: int = 1  # of the environments, that may be stepped side by side
+    parts: int = 1  # that the environments are divided into, for processes of their own
     rollout_steps: int = 64  # in each environment between updates
     batch_size: int = 256
     epochs: int = 10

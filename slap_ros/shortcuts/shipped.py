@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which shortcut library is used: the one that somebody chose, or the one shipped with a domain."""
+"""Which shortcut library is used: one that was chosen, or the one shipped with a domain."""
 
 from __future__ import annotations
 
@@ -37,13 +37,16 @@ def _roots() -> Iterator[Path]:
 
 
 def chosen_library(choice: str | None, domain: Domain, planner: str = "lazy") -> Library | None:
-    """The library that a choice stands for; None: plan without shortcuts.
+    """Load the library that was chosen.
 
     Args:
-        choice: A library's folder, ``none``, or nothing: the shipped one, if there is one and
+        choice: A library's folder; ``none``; or nothing, for the shipped one, if there is one and
             the planner can use it.
-        domain: What it is for.
+        domain: For which it was learned.
         planner: Its name.
+
+    Returns:
+        The library; None to plan without shortcuts.
 
     Raises:
         InvalidLibraryError: It cannot be used as a whole.
@@ -84,7 +87,7 @@ def require_usable(choice: str, planner: str = "lazy") -> None:
 
 
 def _domain_of(path: Path) -> str:
-    """Of which domain a library says that it is."""
+    """The name of the domain that a library says it is for."""
     try:
         return str(json.loads((path / LIBRARY).read_text(encoding="utf-8"))["domain"])
     except (OSError, ValueError, KeyError, TypeError) as error:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from hashlib import sha256
 
@@ -123,6 +123,11 @@ class ShortcutRollouts:
             self._cache[key] = self._sample(shortcut.policy, encoder, state, rng)
             self._failures[shortcut.name] += -MAX_NET_FAILURES if self._cache[key] else 1
         return self._cache[key]
+
+    def cached(self) -> Iterator[tuple[str, tuple[ShortcutRollout, ...]]]:
+        """The name of each shortcut that was tried, and its successes, once for each state."""
+        for (name, _, _), successes in self._cache.items():
+            yield name, successes
 
     def given_up(self, shortcut: Shortcut) -> bool:
         """Whether it failed so often in this task that it is not tried any more."""

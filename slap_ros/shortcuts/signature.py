@@ -21,7 +21,7 @@ from slap_ros.relational import AtomSpace, GroundAtom, Object, Predicate
 
 Kind = str
 Pattern = tuple[str, str, tuple[Kind, ...]]  # "+" or "-", predicate, kinds of its objects
-# Of spaces that are in use: one that is kept keeps every state that it has perceived.
+# Weak, since a space refers to every state that was perceived with it.
 _KINDS: WeakKeyDictionary[AtomSpace, Mapping[Object, Kind]] = WeakKeyDictionary()
 
 
@@ -52,13 +52,22 @@ class Change:
 def context_of(
     abstract: int, predicates: Collection[Predicate], space: AtomSpace
 ) -> frozenset[str]:
-    """The names of those predicates of which some atom holds in an abstract state."""
+    """Which predicates have an atom that holds in an abstract state.
+
+    Args:
+        abstract: The abstract state, a mask.
+        predicates: Those that are looked at.
+        space: The task's atoms.
+
+    Returns:
+        Names of predicates.
+    """
     holding = (atom.predicate for atom in space.decode(abstract & ~space.static))
     return frozenset(predicate.name for predicate in holding if predicate in predicates)
 
 
 def kinds(space: AtomSpace) -> Mapping[Object, Kind]:
-    """The kind of each object of a task; remembered as long as the space."""
+    """The kind of each object of a task; cached as long as the space exists."""
     known = _KINDS.get(space)
     if known is None:
         known = _KINDS[space] = _kinds(space)
@@ -106,14 +115,14 @@ def _depths(change: Change, space: AtomSpace, objects: set[Object]) -> dict[Obje
 
 @dataclass(frozen=True)
 class Signature:
-    """A lifted change, as one was trained on.
+    """A lifted change, as a shortcut was trained on.
 
     Args:
         roles: The kind of each role.
-        add: Atoms added: predicate and the roles that it is about.
-        delete: Atoms deleted.
-        context: What held where it was learned, of the predicates about what is held: a slap with
-            a block in the hand is another one than with the hand empty.
+        add: Atoms added: predicate and the roles that are its arguments.
+        delete: Atoms deleted, likewise.
+        context: Names of the predicates about what is held that hold where it was learned: a slap
+            with a block in the hand is another one than with the hand empty.
     """
 
     roles: tuple[Kind, ...]
@@ -125,7 +134,16 @@ class Signature:
     def of(
         cls, change: Change, space: AtomSpace, context: frozenset[str] = frozenset()
     ) -> Signature:
-        """Lift a change."""
+        """Lift a change.
+
+        Args:
+            change: Of abstract states of the task.
+            space: The task's atoms.
+            context: Names of predicates; see the class.
+
+        Returns:
+            The signature, in which objects are roles.
+        """
         objects, kind = concerned(change, space), kinds(space)
         number = {obj: i for i, obj in enumerate(objects)}
 
@@ -139,7 +157,7 @@ class Signature:
         return cls(roles, lifted(change.add), lifted(change.delete), context)
 
     def as_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """A JSON object."""
         return {
             "roles": list(self.roles),
             "add": [[predicate, list(roles)] for predicate, roles in sorted(self.add)],
@@ -168,7 +186,7 @@ class Signature:
 
     @cached_property
     def patterns(self) -> frozenset[Pattern]:
-        """What is changed, whatever the objects and however many they are."""
+        """The atoms changed, with kinds in place of objects, however many these are."""
         signed = [("+", *atom) for atom in self.add] + [("-", *atom) for atom in self.delete]
         return frozenset(
             (sign, predicate, tuple(self.roles[i] for i in arguments))
@@ -177,12 +195,12 @@ class Signature:
 
     @cached_property
     def slots(self) -> Mapping[Kind, int]:
-        """How many objects of each kind it has room for, kinds in order."""
+        """The number of roles of each kind, kinds in order."""
         return dict(sorted(Counter(self.roles).items()))
 
     @cached_property
     def name(self) -> str:
-        """A name that says what it adds, and is different for what is different."""
+        """The predicates that it adds, and a hash that tells different signatures apart."""
         parts = (self.roles, sorted(self.add), sorted(self.delete), sorted(self.context))
         text = repr(parts)
         words = "_".join(sorted({predicate for predicate, _ in self.add})) or "nothing"
@@ -193,9 +211,9 @@ class Signature:
 
         As in Alg. 3 the change may delete more atoms, but about these objects only, and, unlike
         there, it adds no others: nothing that was not to be achieved in training. Beyond it, the
-        number of objects is free: Alg. 3 wants each atom of the training's change, so that what
-        was learned on a tower of three is of no use for a tower of two. What was learned is
-        tried in the model anyway, before it is used.
+        number of objects is free: Alg. 3 asks for each atom of the training's change, so that
+        what was learned on a tower of three is of no use for a tower of two. A shortcut is tried
+        in the model anyway, before it is used.
         """
         kind = kinds(space)
         found: set[Pattern] = set()

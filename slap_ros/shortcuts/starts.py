@@ -117,21 +117,29 @@ def find_start(
         )
     except SlapError:  # a task that cannot be solved teaches nothing here
         return None
-    to_go = steps_to_goal(graph, operator_steps)
     matcher = SignatureMatcher(signature, space, learner_interface(domain).grasping)
-    choices = [
-        (to_go[j], path, j)
-        for path in _paths(graph, operator_path)
-        for j in matcher.targets(graph.nodes, path[-1].target if path else 0)
-        if np.isfinite(to_go[j])
-    ]
-    for _, path, j in sorted(choices, key=lambda choice: choice[0]):
+    to_go = steps_to_goal(graph, operator_steps)
+    for path, i, j in _nearest_to_goal_first(graph, operator_path, matcher, to_go):
         state = _execute(problem, graph, path, task.initial_state)
         if state is not None:
-            i = path[-1].target if path else 0
             change = Change.between(graph.nodes[i], graph.nodes[j])
             return StartRecord(seed, index, tuple(state.data), change.add, change.delete)
     return None
+
+
+def _nearest_to_goal_first(
+    graph: AbstractGraph,
+    operator_path: OperatorPath,
+    matcher: SignatureMatcher,
+    to_go: Sequence[float],
+) -> list[tuple[tuple[Edge, ...], int, int]]:
+    """Paths to where a shortcut may begin, with the nodes where it begins and ends."""
+    choices = []
+    for path in _paths(graph, operator_path):
+        source = path[-1].target if path else 0
+        targets = matcher.targets(graph.nodes, source)
+        choices += [(path, source, target) for target in targets if np.isfinite(to_go[target])]
+    return sorted(choices, key=lambda choice: to_go[choice[2]])
 
 
 def _paths(graph: AbstractGraph, operator_path: OperatorPath) -> Iterator[tuple[Edge, ...]]:

@@ -24,18 +24,26 @@ class Workers(Protocol):
 
     @property
     def processes(self) -> int:
-        """How many a job that runs alone may use."""
+        """The number of processes that a job may start where it is the only one."""
         ...
 
     def run(
         self, function: Callable[..., Result], jobs: Sequence[tuple[Any, ...]]
     ) -> Iterator[tuple[int, Result]]:
-        """Number and result of each job, as they end."""
+        """Run a function once per job.
+
+        Args:
+            function: What to run; importable by its name, for other processes.
+            jobs: Its arguments.
+
+        Yields:
+            The number and the result of each job, as they end.
+        """
         ...
 
 
 class SequentialWorkers:
-    """This process does everything itself, one job after the other."""
+    """Runs one job after the other in this process."""
 
     processes = 1
 
@@ -83,7 +91,7 @@ class RayWorkers:
 
 
 def exit_with_parent(parent: int) -> None:
-    """Let this process end when its parent is no more, however that came about."""
+    """Let this process end when its parent has, for whatever reason."""
 
     def watch() -> None:
         while os.getppid() == parent:
@@ -95,7 +103,7 @@ def exit_with_parent(parent: int) -> None:
 
 @contextmanager
 def local_workers(count: int) -> Iterator[LocalWorkers]:
-    """So many processes; those still running are not waited for after an error."""
+    """A pool of ``count`` processes; after an error, those still running are terminated."""
     # Spawned, not forked: physics clients and threads do not survive a fork.
     context = get_context("spawn")
     pool = ProcessPoolExecutor(

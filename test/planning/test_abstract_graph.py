@@ -8,7 +8,7 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.planning import abstract_graph
 from slap_ros.planning.abstract_graph import build_abstract_graph
-from slap_ros.planning.hmax import HMax
+from slap_ros.planning.hmax import HMaxHeuristic
 from slap_ros.planning.planner import Problem
 
 
@@ -52,7 +52,7 @@ def test_what_is_left_out_is_on_no_shortest_way(seed, extra_depth, monkeypatch):
 def test_the_distance_is_never_more_than_the_operators_left():
     start, goal, operators = top_level(3)
     graph = build_abstract_graph(start, goal, operators)
-    distance = HMax(goal, [operator for operator, _ in operators])
+    distance = HMaxHeuristic(goal, [operator for operator, _ in operators])
     depth = dict(zip(graph.nodes, graph.depth, strict=True))
     for node in on_shortest_ways(graph):
         assert distance(node) <= max(graph.depth) - depth[node]
