@@ -24,7 +24,7 @@ FLOORS = (
     ("drawing", "planning"),
     ("perception", "messages"),
     ("domains",),
-    ("motion", "physics"),
+    ("contact", "motion", "physics"),
     ("core",),
     ("relational", "meshes", "geometry"),
     ("versions", "errors", "slap_ros"),

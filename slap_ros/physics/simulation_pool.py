@@ -8,38 +8,72 @@ Using one again is safe because it keeps no state between control periods that a
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from threading import RLock
+from typing import Generic, Protocol, TypeVar
 
 from slap_ros.physics.scene import Scene
 from slap_ros.physics.simulation import Simulation, Stepping
 
 MAX_IDLE = 4  # simulations kept for later
 
-_idle: deque[Simulation] = deque()  # the one that waited longest first
-_lock = RLock()  # a world may be collected, and give back, while another is being made
+
+class Closable(Protocol):
+    """What holds a PyBullet client."""
+
+    def close(self) -> None:
+        """Give the client back."""
+        ...
+
+
+Key = TypeVar("Key")
+Pooled = TypeVar("Pooled", bound=Closable)
+
+
+class SimulationPool(Generic[Key, Pooled]):
+    """Simulations of one kind that no world uses, by what they are simulations of."""
+
+    def __init__(self, make: Callable[[Key], Pooled]) -> None:
+        """``make``: builds one where none is idle."""
+        self._make = make
+        self._idle: deque[tuple[Key, Pooled]] = deque()  # the one that waited longest first
+        self._lock = RLock()  # a world may be collected, and release, while another is being made
+
+    def acquire(self, key: Key) -> Pooled:
+        """A simulation of this that nobody else uses."""
+        with self._lock:
+            for _ in range(len(self._idle)):
+                known, simulation = self._idle.popleft()
+                if known == key:
+                    return simulation
+                self._idle.append((known, simulation))
+        return self._make(key)
+
+    def release(self, key: Key, simulation: Pooled) -> None:
+        """Keep it for the next world; close the one that waited longest if there are many."""
+        with self._lock:
+            self._idle.append((key, simulation))
+            if len(self._idle) > MAX_IDLE:
+                self._idle.popleft()[1].close()
+
+    def close_idle(self) -> None:
+        """Close all simulations that no world uses."""
+        with self._lock:
+            while self._idle:
+                self._idle.popleft()[1].close()
+
+
+_pool: SimulationPool[tuple[Scene, Stepping], Simulation] = SimulationPool(
+    lambda key: Simulation(*key)
+)
+close_idle = _pool.close_idle
 
 
 def acquire(scene: Scene, stepping: Stepping) -> Simulation:
     """A simulation of the scene that nobody else uses."""
-    with _lock:
-        for _ in range(len(_idle)):
-            simulation = _idle.popleft()
-            if (simulation.scene, simulation.stepping) == (scene, stepping):
-                return simulation
-            _idle.append(simulation)
-    return Simulation(scene, stepping)
+    return _pool.acquire((scene, stepping))
 
 
 def release(simulation: Simulation) -> None:
     """Keep a simulation for the next world; close the one that waited longest if there are many."""
-    with _lock:
-        _idle.append(simulation)
-        if len(_idle) > MAX_IDLE:
-            _idle.popleft().close()
-
-
-def close_idle() -> None:
-    """Close all simulations that no world uses."""
-    with _lock:
-        while _idle:
-            _idle.popleft().close()
+    _pool.release((simulation.scene, simulation.stepping), simulation)

@@ -1,0 +1,270 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a control period makes of hand and bodies, and how much of it has to be computed.
+
+Bodies that rest and that nothing moving can reach are left out and stay as they are, to the bit.
+Where nothing is left, the hand goes its own way.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+from slap_ros.contact.arm import CONTROL_PERIOD_S
+from slap_ros.contact.contacts import (
+    THE_HAND,
+    ContactPoint,
+    Side,
+    Surface,
+    grasped,
+    groups,
+)
+from slap_ros.contact.hand import HandState, own_way
+from slap_ros.contact.involved import (
+    Bounds,
+    Involved,
+    Mover,
+    clusters,
+    hand_bounds,
+    jointed_bounds,
+    part_bounds,
+    rigid_bounds,
+    touched,
+)
+from slap_ros.contact.scene import ContactScene
+from slap_ros.contact.simulation import GRAVITY, ContactSimulation, Outcome
+from slap_ros.contact.snapshot import ContactSnapshot, Opening, Placement
+from slap_ros.geometry.pose import Pose
+from slap_ros.physics.snapshot import BodyState
+
+# What moved less than this in a control period, and is slower than this after it, is at rest.
+REST_SPEED = 0.02  # m/s and rad/s, along each axis
+REST_SHIFT = 2e-4  # m, along each axis
+REST_TURN = 1e-3  # 1, of each component of the quaternion; rad, of a joint
+FALL = 0.5 * GRAVITY * CONTROL_PERIOD_S**2  # m, from rest in a period
+SWING = 0.1  # m, from the grasp point to what moves furthest when the hand turns
+MOST_REMEMBERED = 256  # arrangements of bodies known to stand or not
+
+Moving = BodyState | Opening
+Contacts = tuple[ContactPoint, ...]
+
+
+class ContactDynamics:
+    """The dynamics of a scene; it remembers nothing that matters but where fixed bodies stand."""
+
+    def __init__(self, scene: ContactScene, simulation: ContactSimulation) -> None:
+        self._scene, self._simulation = scene, simulation
+        self._count = len(scene.free) + len(scene.jointed)
+        self._standing: dict[object, bool] = {}
+        self._quiet: object = None
+        self._bounded: list[tuple[Moving, Bounds] | None] = [None] * self._count
+
+    def place(self, placement: Placement) -> None:
+        """Let the bodies that do not move stand there."""
+        self._simulation.place(placement)
+        self._placement = placement
+        self._fixed = [
+            bounds
+            for body, pose in zip(self._scene.fixed, placement.fixed, strict=True)
+            if body.solid
+            for bounds in part_bounds(body, pose)
+        ]
+        self._standing.clear()
+        self._quiet = None
+        self._bounded = [None] * self._count
+
+    def after(self, now: ContactSnapshot, pull: Pose) -> tuple[ContactSnapshot, Contacts]:
+        """How everything is after a control period, and what touches what.
+
+        Args:
+            now: How everything is, with what the hand was told now.
+            pull: Where the hand is pulled in this period.
+        """
+        alone = own_way(now.hand, pull, self._scene.forces)
+        sweep = _sweep(now.hand, alone)
+        involved = self._involved(now, sweep)
+        while involved.hand or involved.bodies:
+            outcome = self._simulation.run(now, pull, involved)
+            if not involved.hand:
+                outcome = replace(outcome, hand=alone)
+            wider = self._widened(now, involved, outcome)
+            if wider == involved:
+                return self._taken_over(now, involved, outcome), outcome.contacts
+            involved = wider
+        return replace(now, hand=alone, held=None), ()
+
+    # -- what is involved -----------------------------------------------------------------------
+
+    def _involved(self, now: ContactSnapshot, sweep: Mover) -> Involved:
+        moving = _all(now)
+        bounds = [self._bounds(i, motion) for i, motion in enumerate(moving)]
+        resting: list[Bounds | None] = [
+            box if motion.still else None for motion, box in zip(moving, bounds, strict=True)
+        ]
+        movers = {
+            i: Mover((box,), self._travel(motion, box))
+            for i, (motion, box) in enumerate(zip(moving, bounds, strict=True))
+            if not motion.still
+        }
+        movers |= touched([sweep, *movers.values()], resting)
+        left = [None if i in movers else box for i, box in enumerate(resting)]
+        for i in self._unsupported(now, left):
+            box = bounds[i]
+            movers[i] = Mover((box,), FALL)
+            left[i] = None
+        movers |= touched(list(movers.values()), left)
+        met = any(space.meets(box) for space in sweep.within for box in self._fixed) or any(
+            space.meets(box)
+            for space in sweep.within
+            for mover in movers.values()
+            for box in mover.within
+        )
+        return Involved(tuple(sorted(movers)), met)
+
+    def _unsupported(self, now: ContactSnapshot, left: Sequence[Bounds | None]) -> list[int]:
+        """Those of the bodies that would not stay where they are by themselves."""
+        moving = _all(now)
+        quiet = tuple(motion for motion, box in zip(moving, left, strict=True) if box is not None)
+        key = (quiet, tuple(box is not None for box in left))
+        if key == self._quiet:
+            return []
+        falling = [
+            i for members in clusters(left) if not self._stand(now, members) for i in members
+        ]
+        if not falling:
+            self._quiet = key
+        return falling
+
+    def _stand(self, now: ContactSnapshot, members: tuple[int, ...]) -> bool:
+        """Whether bodies without velocity would stay where they are if there were no hand.
+
+        So they do where they came to rest by themselves. They do not in mid-air, over an edge,
+        or where they leaned on the hand.
+        """
+        moving = _all(now)
+        key = (members, tuple(moving[i] for i in members))
+        stands = self._standing.get(key)
+        if stands is None:
+            outcome = self._simulation.run(now, now.hand.pose, Involved(members, hand=False))
+            after = self._results(outcome)
+            stands = all(_rests(moving[i], after[i]) for i in members)
+            if len(self._standing) == MOST_REMEMBERED:
+                self._standing.clear()
+            self._standing[key] = stands
+        return stands
+
+    def _widened(self, now: ContactSnapshot, involved: Involved, outcome: Outcome) -> Involved:
+        """With what was reached although it was not expected to be."""
+        if involved.hand and len(involved.bodies) == self._count:
+            return involved
+        moving, after = _all(now), self._results(outcome)
+        ways = [
+            self._bounds(i, moving[i]).hull(self._new_bounds(i, after[i])) for i in involved.bodies
+        ]
+        hand = _sweep(now.hand, outcome.hand).bounds
+        spaces = [*ways, *hand] if involved.hand else ways
+        others = [
+            i
+            for i in range(self._count)
+            if i not in after and any(space.meets(self._bounds(i, moving[i])) for space in spaces)
+        ]
+        met = involved.hand or any(way.meets(space) for way in ways for space in hand)
+        return Involved(tuple(sorted([*involved.bodies, *others])), met)
+
+    # -- what came of it ------------------------------------------------------------------------
+
+    def _taken_over(
+        self, now: ContactSnapshot, involved: Involved, outcome: Outcome
+    ) -> ContactSnapshot:
+        """The outcome, with what came to rest put to rest."""
+        moving, after = _all(now), self._results(outcome)
+        surfaces = {self._surface(i): i for i in involved.bodies}
+        for group in groups(outcome.contacts, [*surfaces, THE_HAND]):
+            if THE_HAND in group:
+                continue
+            members = [surfaces[surface] for surface in group]
+            if all(_rests(moving[i], after[i]) for i in members):
+                for i in members:
+                    after[i] = _stopped(moving[i])
+        bodies, openings = list(now.bodies), list(now.openings)
+        for i, motion in after.items():
+            if isinstance(motion, BodyState):
+                bodies[i] = motion
+            else:
+                openings[i - len(bodies)] = motion
+        held = grasped(outcome.contacts, outcome.hand.pose) if involved.hand else None
+        return replace(
+            now, hand=outcome.hand, bodies=tuple(bodies), openings=tuple(openings), held=held
+        )
+
+    def _results(self, outcome: Outcome) -> dict[int, Moving]:
+        count = len(self._scene.free)
+        jointed = {count + i: opening for i, opening in outcome.openings.items()}
+        return {**outcome.bodies, **jointed}
+
+    def _surface(self, i: int) -> Surface:
+        count = len(self._scene.free)
+        return Surface(Side.FREE, i) if i < count else Surface(Side.MOVING, i - count)
+
+    # -- where it is ----------------------------------------------------------------------------
+
+    def _bounds(self, i: int, motion: Moving) -> Bounds:
+        """The bounds of a body where it is; worked out again when it moved."""
+        known = self._bounded[i]
+        if known is None or known[0] is not motion:
+            known = self._bounded[i] = (motion, self._new_bounds(i, motion))
+        return known[1]
+
+    def _new_bounds(self, i: int, motion: Moving) -> Bounds:
+        if isinstance(motion, BodyState):
+            return rigid_bounds(self._scene.free[i], motion.pose)
+        i -= len(self._scene.free)
+        return jointed_bounds(self._scene.jointed[i], self._placement.jointed[i], motion.position)
+
+    def _travel(self, motion: Moving, bounds: Bounds) -> float:
+        """How far any point of a body is expected to go in a period, m."""
+        size = math.dist(*bounds)
+        if isinstance(motion, Opening):
+            return abs(motion.velocity) * max(1.0, size) * CONTROL_PERIOD_S + FALL
+        speed = math.hypot(*motion.velocity) + 0.5 * size * math.hypot(*motion.angular_velocity)
+        return speed * CONTROL_PERIOD_S + FALL
+
+
+def _all(now: ContactSnapshot) -> tuple[Moving, ...]:
+    """What moves, by number."""
+    return (*now.bodies, *now.openings)
+
+
+def _sweep(start: HandState, end: HandState) -> Mover:
+    """Where the hand passes."""
+    before, after = hand_bounds(start), hand_bounds(end)
+    spaces = tuple(a.hull(b) for a, b in zip(before, after, strict=True))
+    turn = start.pose.angle_to(end.pose)
+    return Mover(spaces, math.dist(start.pose.position, end.pose.position) + SWING * turn)
+
+
+def _rests(before: Moving, after: Moving) -> bool:
+    """Whether a body hardly moved in a control period and hardly moves now."""
+    if isinstance(before, Opening) or isinstance(after, Opening):
+        assert isinstance(before, Opening) and isinstance(after, Opening)
+        shift = abs(after.position - before.position)
+        return abs(after.velocity) < REST_SPEED and shift < REST_SHIFT
+    (position, quaternion), (old_position, old_quaternion) = after.pose, before.pose
+    return (
+        all(abs(v) < REST_SPEED for v in (*after.velocity, *after.angular_velocity))
+        and _near(position, old_position, REST_SHIFT)
+        and _near(quaternion, old_quaternion, REST_TURN)
+    )
+
+
+def _near(some: Iterable[float], others: Iterable[float], distance: float) -> bool:
+    return all(abs(a - b) < distance for a, b in zip(some, others, strict=True))
+
+
+def _stopped(motion: Moving) -> Moving:
+    """Where it was, without velocity."""
+    if motion.still:
+        return motion
+    return Opening(motion.position) if isinstance(motion, Opening) else BodyState(motion.pose)

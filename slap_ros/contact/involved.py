@@ -1,0 +1,169 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a control period involves: which bodies can be touched in it, by what can move.
+
+Everything is judged by boxes along the axes of the base, which is quick and never misses a touch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from slap_ros.contact.hand import PAD, PALM, STEM, HandState
+from slap_ros.contact.scene import Compound, JointedBody
+from slap_ros.geometry.oriented_box import OrientedBox
+from slap_ros.geometry.pose import Pose, Quaternion, Vector
+
+TOUCH = 0.002  # m: what is nearer than this may touch already
+
+
+class Involved(NamedTuple):
+    """What is computed: bodies by number, the scene's free ones first, then the jointed ones."""
+
+    bodies: tuple[int, ...] = ()  # ascending
+    hand: bool = True
+
+
+class Bounds(NamedTuple):
+    """A box along the axes of the base."""
+
+    low: Vector  # m
+    high: Vector
+
+    def grown(self, margin: float) -> Bounds:
+        """With a layer of ``margin`` m around it."""
+        (a, b, c), (d, e, f) = self
+        return Bounds((a - margin, b - margin, c - margin), (d + margin, e + margin, f + margin))
+
+    def hull(self, other: Bounds) -> Bounds:
+        """The box around both."""
+        (a, b, c), (d, e, f) = self
+        (u, v, w), (x, y, z) = other
+        return Bounds((min(a, u), min(b, v), min(c, w)), (max(d, x), max(e, y), max(f, z)))
+
+    def meets(self, other: Bounds) -> bool:
+        """Whether the two share a point."""
+        (a, b, c), (d, e, f) = self
+        (u, v, w), (x, y, z) = other
+        return a <= x and u <= d and b <= y and v <= e and c <= z and w <= f
+
+
+def bounds_of(box: OrientedBox) -> Bounds:
+    """The bounds of an oriented box."""
+    (x, y, z), quaternion = box.pose
+    u, v, w = _world_extents(quaternion, box.half)
+    return Bounds((x - u, y - v, z - w), (x + u, y + v, z + w))
+
+
+def hull_of(boxes: Iterable[OrientedBox]) -> Bounds:
+    """The bounds of several; at least one."""
+    first, *others = (bounds_of(box) for box in boxes)
+    for other in others:
+        first = first.hull(other)
+    return first
+
+
+def rigid_bounds(body: Compound, pose: Pose) -> Bounds:
+    """The bounds of a rigid body at a pose."""
+    return bounds_of(body.at(pose))
+
+
+def part_bounds(body: Compound, pose: Pose) -> list[Bounds]:
+    """The bounds of each part of a rigid body: of a wall with a hole, not the hole."""
+    boxes = (part.bounding_box for part in body.parts)
+    return [bounds_of(OrientedBox(pose.compose(box.pose), box.half)) for box in boxes]
+
+
+def jointed_bounds(body: JointedBody, pose: Pose, opening: float) -> Bounds:
+    """The bounds of frame and moving part."""
+    moving = body.moving_pose(pose, opening)
+    placed = [(part.bounding_box, pose) for part in body.frame]
+    placed += [(part.bounding_box, moving) for part in body.moving]
+    return hull_of(OrientedBox(at.compose(box.pose), box.half) for box, at in placed)
+
+
+# Both fingers in one box, at finger position 0: how far they reach in the hand's frame.
+_FINGERS_ASIDE = STEM.pose.position[1] + STEM.half_extents_m[1]  # m
+_FINGERS_WIDE = max(PAD.half_extents_m[0], STEM.half_extents_m[0])
+_FINGERS_TIP = PAD.pose.position[2] + PAD.half_extents_m[2]
+_FINGERS_ROOT = STEM.pose.position[2] - STEM.half_extents_m[2]
+
+
+def hand_bounds(hand: HandState) -> tuple[Bounds, Bounds]:
+    """The bounds of the palm, and of both fingers together."""
+    left, right = hand.fingers
+    middle = Pose((0.0, 0.5 * (left - right), 0.5 * (_FINGERS_TIP + _FINGERS_ROOT)))
+    half = (
+        _FINGERS_WIDE,
+        _FINGERS_ASIDE + 0.5 * (left + right),
+        0.5 * (_FINGERS_TIP - _FINGERS_ROOT),
+    )
+    return (
+        bounds_of(OrientedBox(hand.pose.compose(PALM.pose), PALM.half_extents_m)),
+        bounds_of(OrientedBox(hand.pose.compose(middle), half)),
+    )
+
+
+class Mover(NamedTuple):
+    """Something that can move in a period."""
+
+    bounds: tuple[Bounds, ...]  # where it begins
+    travel: float  # m, how far it is expected to go
+
+    @property
+    def within(self) -> tuple[Bounds, ...]:
+        """Where it is expected to touch something."""
+        margin = self.travel + TOUCH
+        return tuple(bounds.grown(margin) for bounds in self.bounds)
+
+
+def touched(movers: Sequence[Mover], resting: Sequence[Bounds | None]) -> dict[int, Mover]:
+    """The resting bodies that movers can touch, or bodies that these push.
+
+    Args:
+        movers: What moves.
+        resting: The bodies that rest, None for those that do not.
+
+    Returns:
+        Each that can be touched, by its index, as far moved as what touches it.
+    """
+    found: dict[int, Mover] = {}
+    queue = list(movers)
+    while queue:
+        mover = queue.pop()
+        within = mover.within
+        for i, bounds in enumerate(resting):
+            if bounds is None or i in found:
+                continue
+            if any(space.meets(bounds) for space in within):
+                found[i] = Mover((bounds,), mover.travel)
+                queue.append(found[i])
+    return found
+
+
+def clusters(bounds: Sequence[Bounds | None]) -> list[tuple[int, ...]]:
+    """Bodies, by number, that may touch one another, directly or by others; None is no body."""
+    left, found = list(bounds), []
+    for i, box in enumerate(bounds):
+        if box is None or left[i] is None:
+            continue
+        left[i] = None
+        members = touched([Mover((box,), 0.0)], left)
+        for j in members:
+            left[j] = None
+        found.append(tuple(sorted([i, *members])))
+    return found
+
+
+def _world_extents(q: Quaternion, half: Vector) -> Vector:
+    """How far a box of that orientation reaches along each axis of the base."""
+    x, y, z, w = q
+    a, b, c = half
+    xx, yy, zz, xy, xz, yz = x * x, y * y, z * z, x * y, x * z, y * z
+    wx, wy, wz = w * x, w * y, w * z
+    return (
+        abs(1.0 - 2.0 * (yy + zz)) * a + 2.0 * abs(xy - wz) * b + 2.0 * abs(xz + wy) * c,
+        2.0 * abs(xy + wz) * a + abs(1.0 - 2.0 * (xx + zz)) * b + 2.0 * abs(yz - wx) * c,
+        2.0 * abs(xz - wy) * a + 2.0 * abs(yz + wx) * b + abs(1.0 - 2.0 * (xx + yy)) * c,
+    )

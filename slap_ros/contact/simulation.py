@@ -1,0 +1,395 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""One control period of a hand among bodies in PyBullet, as a pure function.
+
+What comes out depends on what goes in, to the bit: not on earlier calls, not on the process.
+That takes the simple broadphase, substeps that are a power of two, and a *prime* before every
+period: everything is parked apart for a moment, then set (``docs/contact.md``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from slap_ros.contact.arm import CONTROL_PERIOD_S
+from slap_ros.contact.contacts import ContactPoint, Side, Surface
+from slap_ros.contact.hand import FINGER_SPEED, MASS, SHARE, SUBSTEPS, HandState
+from slap_ros.contact.involved import Involved
+from slap_ros.contact.scene import (
+    BoxPart,
+    Compound,
+    ContactScene,
+    CylinderPart,
+    JointedBody,
+    Part,
+)
+from slap_ros.contact.snapshot import ContactSnapshot, Opening, Placement
+from slap_ros.contact.urdf import LEFT, MOVING, RIGHT, hand_urdf, jointed_urdf
+from slap_ros.geometry.pose import NO_ROTATION, ORIGIN, Pose, Vector
+from slap_ros.physics.bullet import pybullet
+from slap_ros.physics.panda import FINGER_CLOSED, FINGER_OPEN
+from slap_ros.physics.snapshot import BodyState
+
+GRAVITY = 9.81  # m/s², downwards
+LIFT = (0.0, 0.0, GRAVITY * MASS)  # N, cancels the hand's weight
+PALM_FRICTION = 0.9  # 1
+FINGER_FRICTION = 2.0  # 1, of rubber
+COUPLING_N = 50.0  # with which the fingers are kept at the same distance from the middle
+COUPLING_SHARE = 0.1  # of their difference, made up for in a substep
+ITERATIONS = 50  # of the contact solver
+FASTEST = 2.0  # m/s, of any point of a jointed body, about: jammed, it would be flung
+FINGERS = (LEFT, RIGHT)
+BASE = -1  # PyBullet's number of a body's first link
+
+# Columns of a contact point that PyBullet reports.
+BODIES, LINKS, POSITION, NORMAL, DISTANCE, FORCE = slice(1, 3), slice(3, 5), 6, 7, 8, 9
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How what was computed is after a control period."""
+
+    hand: HandState
+    bodies: Mapping[int, BodyState]  # by index among the free bodies
+    openings: Mapping[int, Opening]  # by index among the jointed bodies
+    contacts: tuple[ContactPoint, ...]
+
+
+def _parking(index: int) -> Vector:
+    """A place of its own for each body, far away from everything, in m."""
+    return (100.0 + 5.0 * index, 100.0, 1.0)
+
+
+class ContactSimulation:
+    """A PyBullet client with the hand and the bodies of a scene.
+
+    It remembers nothing that matters between calls but where the fixed bodies stand.
+    """
+
+    def __init__(self, scene: ContactScene) -> None:
+        self.scene = scene
+        self.client: int = pybullet.connect(pybullet.DIRECT)
+        pybullet.resetSimulation(pybullet.RESET_USE_SIMPLE_BROADPHASE, self.client)
+        pybullet.setGravity(0.0, 0.0, -GRAVITY, self.client)
+        pybullet.setPhysicsEngineParameter(
+            fixedTimeStep=CONTROL_PERIOD_S,
+            numSubSteps=SUBSTEPS,  # before any force: PyBullet makes impulses of them at once
+            numSolverIterations=ITERATIONS,
+            deterministicOverlappingPairs=1,
+            useSplitImpulse=0,  # with it, a joint far beyond its end is not brought back
+            physicsClientId=self.client,
+        )
+        self._parked = 0
+        self._places: dict[int, Vector] = {}
+        self._sides: dict[tuple[int, int], Surface] = {}
+        self._placement = Placement((), ())
+        self._hand = self._add_hand()
+        self._pull = self._add_pull()
+        self._fixed = [self._add_fixed(i, body) for i, body in enumerate(scene.fixed)]
+        self._free = [self._add_free(i, body) for i, body in enumerate(scene.free)]
+        self._jointed = [self._add_jointed(i, body) for i, body in enumerate(scene.jointed)]
+
+    def close(self) -> None:
+        """Give the client back."""
+        pybullet.disconnect(self.client)
+
+    def place(self, placement: Placement) -> None:
+        """Let the bodies that do not move stand there."""
+        if placement == self._placement:
+            return
+        self._placement = placement
+        for body, pose in zip(self._fixed, placement.fixed, strict=True):
+            if body is not None:
+                pybullet.resetBasePositionAndOrientation(body, *pose, self.client)
+
+    def run(self, now: ContactSnapshot, pull: Pose, involved: Involved) -> Outcome:
+        """One control period.
+
+        Args:
+            now: How everything is.
+            pull: Where the hand is pulled.
+            involved: What is computed; all else is as if it were not there.
+        """
+        self._prime(now)
+        free = [i for i in involved.bodies if i < len(self._free)]
+        jointed = [i - len(self._free) for i in involved.bodies[len(free) :]]
+        if involved.hand:
+            self._set_hand(now.hand, pull)
+        for i in free:
+            body, motion = self._free[i], now.bodies[i]
+            pybullet.resetBasePositionAndOrientation(body, *motion.pose, self.client)
+            pybullet.resetBaseVelocity(body, motion.velocity, motion.angular_velocity, self.client)
+        for i in jointed:
+            body, pose, opening = self._jointed[i], self._placement.jointed[i], now.openings[i]
+            pybullet.resetBasePositionAndOrientation(body, *pose, self.client)
+            pybullet.resetJointState(body, MOVING, *opening, self.client)
+        pybullet.stepSimulation(self.client)
+        return Outcome(
+            self._hand_state(now.hand) if involved.hand else now.hand,
+            {i: self._motion(self._free[i]) for i in free},
+            {i: self._opening(i) for i in jointed},
+            tuple(self._contact_points()),
+        )
+
+    def _prime(self, now: ContactSnapshot) -> None:
+        """Forget: park everything apart for a moment, oriented as it will be.
+
+        Contacts and their impulses go with the pairs, and what setting a pose leaves as it was
+        (the inertia in world axes) becomes a function of the orientation.
+        """
+        client = self.client
+        self._park(self._hand, now.hand.pose.quaternion)
+        pybullet.resetBaseVelocity(self._hand, ORIGIN, ORIGIN, client)
+        pybullet.changeConstraint(
+            self._pull,
+            self._places[self._hand],
+            now.hand.pose.quaternion,
+            maxForce=0.0,
+            physicsClientId=client,
+        )
+        for finger, position in zip(FINGERS, now.hand.fingers, strict=True):
+            pybullet.resetJointState(self._hand, finger, position, 0.0, client)
+        for body, opening in zip(self._jointed, now.openings, strict=True):
+            self._park(body, NO_ROTATION)
+            pybullet.resetJointState(body, MOVING, opening.position, 0.0, client)
+        for body, motion in zip(self._free, now.bodies, strict=True):
+            self._park(body, motion.pose.quaternion)
+            pybullet.resetBaseVelocity(body, ORIGIN, ORIGIN, client)
+        # All at once; forces that are set while there are no substeps would be many times as large.
+        pybullet.setPhysicsEngineParameter(numSubSteps=0, physicsClientId=client)
+        pybullet.stepSimulation(client)
+        pybullet.setPhysicsEngineParameter(numSubSteps=SUBSTEPS, physicsClientId=client)
+
+    def _park(self, body: int, quaternion: tuple[float, float, float, float]) -> None:
+        pybullet.resetBasePositionAndOrientation(body, self._places[body], quaternion, self.client)
+
+    # -- the hand -------------------------------------------------------------------------------
+
+    def _set_hand(self, hand: HandState, pull: Pose) -> None:
+        client, forces = self.client, self.scene.forces
+        pybullet.resetBasePositionAndOrientation(self._hand, *hand.pose, client)
+        pybullet.resetBaseVelocity(self._hand, hand.velocity, hand.angular_velocity, client)
+        pybullet.changeConstraint(self._pull, *pull, maxForce=forces.pull_n, physicsClientId=client)
+        # It lasts through all substeps.
+        pybullet.applyExternalForce(
+            self._hand, BASE, LIFT, hand.pose.position, pybullet.WORLD_FRAME, client
+        )
+        wanted = FINGER_CLOSED if hand.closing else FINGER_OPEN
+        for finger, position, velocity in zip(
+            FINGERS, hand.fingers, hand.finger_velocities, strict=True
+        ):
+            pybullet.resetJointState(self._hand, finger, position, velocity, client)
+            pybullet.setJointMotorControl2(
+                self._hand,
+                finger,
+                pybullet.POSITION_CONTROL,
+                targetPosition=wanted,
+                force=forces.grip_n / SUBSTEPS,  # PyBullet takes a period's impulse in each substep
+                positionGain=SHARE,
+                velocityGain=1.0,
+                maxVelocity=FINGER_SPEED,
+                physicsClientId=client,
+            )
+
+    def _hand_state(self, before: HandState) -> HandState:
+        pose = pybullet.getBasePositionAndOrientation(self._hand, self.client)
+        velocity, angular_velocity = pybullet.getBaseVelocity(self._hand, self.client)
+        fingers = [
+            _stopped(position, velocity, FINGER_OPEN)
+            for position, velocity, *_ in pybullet.getJointStates(self._hand, FINGERS, self.client)
+        ]
+        return before._replace(
+            pose=Pose(*pose),
+            velocity=velocity,
+            angular_velocity=angular_velocity,
+            fingers=(fingers[0][0], fingers[1][0]),
+            finger_velocities=(fingers[0][1], fingers[1][1]),
+        )
+
+    def _add_hand(self) -> int:
+        hand = self._load(hand_urdf(), fixed=False)
+        self._places[hand] = self._next_parking()
+        for link, side in ((BASE, Side.PALM), (LEFT, Side.LEFT_FINGER), (RIGHT, Side.RIGHT_FINGER)):
+            friction = PALM_FRICTION if side is Side.PALM else FINGER_FRICTION
+            self._touchable(hand, link, Surface(side), friction)
+            pybullet.changeDynamics(hand, link, jointDamping=0.0, physicsClientId=self.client)
+        coupling = pybullet.createConstraint(
+            hand,
+            LEFT,
+            hand,
+            RIGHT,
+            pybullet.JOINT_GEAR,
+            (0.0, 1.0, 0.0),
+            ORIGIN,
+            ORIGIN,
+            physicsClientId=self.client,
+        )
+        pybullet.changeConstraint(
+            coupling,
+            gearRatio=-1.0,
+            erp=COUPLING_SHARE,
+            maxForce=COUPLING_N,
+            physicsClientId=self.client,
+        )
+        return hand
+
+    def _add_pull(self) -> int:
+        """What pulls the hand: a constraint to a pose in the world, of limited force."""
+        pull: int = pybullet.createConstraint(
+            self._hand,
+            BASE,
+            -1,
+            -1,
+            pybullet.JOINT_FIXED,
+            ORIGIN,
+            ORIGIN,
+            self._places[self._hand],
+            physicsClientId=self.client,
+        )
+        return pull
+
+    # -- bodies ---------------------------------------------------------------------------------
+
+    def _motion(self, body: int) -> BodyState:
+        pose = pybullet.getBasePositionAndOrientation(body, self.client)
+        velocity, angular_velocity = pybullet.getBaseVelocity(body, self.client)
+        return BodyState(Pose(*pose), velocity, angular_velocity)
+
+    def _opening(self, index: int) -> Opening:
+        position, velocity, *_ = pybullet.getJointState(self._jointed[index], MOVING, self.client)
+        return Opening(*_stopped(position, velocity, self.scene.jointed[index].joint.high))
+
+    def _contact_points(self) -> Iterable[ContactPoint]:
+        for point in pybullet.getContactPoints(physicsClientId=self.client):
+            (first, second), (link, other) = point[BODIES], point[LINKS]
+            yield ContactPoint(
+                self._sides[first, link],
+                self._sides[second, other],
+                point[POSITION],
+                point[NORMAL],
+                point[DISTANCE],
+                point[FORCE] * SUBSTEPS,  # PyBullet spreads an impulse over the period
+            )
+
+    def _add_fixed(self, index: int, body: Compound) -> int | None:
+        if not body.solid:
+            return None
+        return self._add_rigid(body, Surface(Side.FIXED, index))
+
+    def _add_free(self, index: int, body: Compound) -> int:
+        added = self._add_rigid(body, Surface(Side.FREE, index))
+        # Inertia and mass in one call: alone, the inertia makes the body massless.
+        pybullet.changeDynamics(
+            added,
+            BASE,
+            mass=body.mass_kg,
+            localInertiaDiagonal=body.inertia,
+            physicsClientId=self.client,
+        )
+        return added
+
+    def _add_rigid(self, body: Compound, surface: Surface) -> int:
+        place = self._next_parking()
+        added: int = pybullet.createMultiBody(
+            body.mass_kg,
+            self._shape(body.parts),
+            -1,
+            place,
+            useMaximalCoordinates=True,
+            physicsClientId=self.client,
+        )
+        self._places[added] = place
+        self._touchable(added, BASE, surface, body.friction)
+        return added
+
+    def _add_jointed(self, index: int, body: JointedBody) -> int:
+        added = self._load(jointed_urdf(body), fixed=True)
+        self._places[added] = self._next_parking()
+        self._touchable(added, BASE, Surface(Side.FRAME, index), body.friction)
+        self._touchable(added, MOVING, Surface(Side.MOVING, index), body.friction)
+        pybullet.changeDynamics(
+            added,
+            BASE,
+            maxJointVelocity=FASTEST / body.lever_m,
+            physicsClientId=self.client,
+        )
+        pybullet.setJointMotorControl2(
+            added,
+            MOVING,
+            pybullet.VELOCITY_CONTROL,
+            targetVelocity=0.0,
+            force=body.joint.dry_friction / SUBSTEPS,  # as for the fingers
+            physicsClientId=self.client,
+        )
+        return added
+
+    def _touchable(self, body: int, link: int, surface: Surface, friction: float) -> None:
+        self._sides[body, link] = surface
+        damping = {} if surface.side is Side.FREE else {"linearDamping": 0.0, "angularDamping": 0.0}
+        pybullet.changeDynamics(
+            body,
+            link,
+            lateralFriction=friction,
+            activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING,
+            physicsClientId=self.client,
+            **damping,
+        )
+
+    def _load(self, text: str, fixed: bool) -> int:
+        """A body from URDF, which PyBullet reads from files only."""
+        with TemporaryDirectory() as folder:
+            file = Path(folder) / "body.urdf"
+            file.write_text(text, encoding="utf-8")
+            body: int = pybullet.loadURDF(
+                str(file),
+                useFixedBase=fixed,
+                flags=pybullet.URDF_USE_IMPLICIT_CYLINDER,
+                physicsClientId=self.client,
+            )
+        return body
+
+    def _shape(self, parts: Sequence[Part]) -> int:
+        if len(parts) == 1 and parts[0].pose == Pose():
+            shape: int = pybullet.createCollisionShape(
+                physicsClientId=self.client, **_geometry(parts[0])
+            )
+            return shape
+        sizes = [_geometry(part) for part in parts]
+        compound: int = pybullet.createCollisionShapeArray(
+            shapeTypes=[size["shapeType"] for size in sizes],
+            halfExtents=[size.get("halfExtents", ORIGIN) for size in sizes],
+            radii=[size.get("radius", 0.0) for size in sizes],
+            lengths=[size.get("height", 0.0) for size in sizes],
+            collisionFramePositions=[part.pose.position for part in parts],
+            collisionFrameOrientations=[part.pose.quaternion for part in parts],
+            physicsClientId=self.client,
+        )
+        return compound
+
+    def _next_parking(self) -> Vector:
+        self._parked += 1
+        return _parking(self._parked)
+
+
+def _geometry(part: Part) -> dict[str, Any]:
+    if isinstance(part, CylinderPart):
+        return {
+            "shapeType": pybullet.GEOM_CYLINDER,
+            "radius": part.radius_m,
+            "height": part.length_m,
+        }
+    assert isinstance(part, BoxPart)
+    return {"shapeType": pybullet.GEOM_BOX, "halfExtents": part.half_extents_m}
+
+
+def _stopped(position: float, velocity: float, high: float) -> tuple[float, float]:
+    """A joint's position and velocity, stopped at its ends, which PyBullet lets it overrun."""
+    if position < 0.0:
+        return 0.0, max(velocity, 0.0)
+    if position > high:
+        return high, min(velocity, 0.0)
+    return position, velocity

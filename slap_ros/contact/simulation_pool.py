@@ -1,0 +1,18 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Contact simulations lent to worlds and used again."""
+
+from __future__ import annotations
+
+from slap_ros.contact.scene import ContactScene
+from slap_ros.contact.simulation import ContactSimulation
+from slap_ros.physics.simulation_pool import SimulationPool
+
+_pool: SimulationPool[ContactScene, ContactSimulation] = SimulationPool(ContactSimulation)
+acquire = _pool.acquire
+close_idle = _pool.close_idle
+
+
+def release(simulation: ContactSimulation) -> None:
+    """Keep it for the next world."""
+    _pool.release(simulation.scene, simulation)

@@ -1,0 +1,187 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Scenes that cannot be."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from slap_ros.contact.arm import arm_joints
+from slap_ros.contact.hand import LEASH, PAD, YAW_LEASH, HandState, rotation_between, wrapped
+from slap_ros.contact.scene import ContactScene, JointKind
+from slap_ros.contact.snapshot import ContactSnapshot, Placement
+from slap_ros.errors import InvalidStateError
+from slap_ros.geometry.oriented_box import OrientedBox
+from slap_ros.geometry.pose import Pose
+from slap_ros.physics.panda import FINGER_CLOSED, FINGER_OPEN, JOINT_HIGH, JOINT_LOW, grasp_pose
+
+# Pressed together, bodies overlap by a few millimetres; what overlaps by more was put there.
+OVERLAP = 0.01  # m
+UNIT_TOLERANCE = 1e-6  # 1, of a quaternion's length
+LIMIT_TOLERANCE = 1e-9  # rad
+ARM_TOLERANCE = 0.02  # m, how far the arm may lag behind a hand that was shoved
+ARM_TURN_TOLERANCE = 0.15  # rad, the same of its turn
+TARGET_TOLERANCE = 2.0  # times the leash
+TILTED = 0.5  # rad, from pointing straight down
+FAR = 50.0  # m, from the base: nothing gets there
+FAST = 20.0  # m/s: nothing becomes that fast
+FAST_SPIN = 500.0  # rad/s
+GRASP_GAP = 0.003  # m, at most, between a pad and what is held
+
+
+def require_possible(
+    scene: ContactScene, snapshot: ContactSnapshot, placement: Placement, gripper: float
+) -> None:
+    """Refuse scenes that cannot be.
+
+    Args:
+        scene: What there is.
+        snapshot: How it is; finite.
+        placement: Where the bodies stand that do not move.
+        gripper: What the state says that the gripper was told.
+
+    Raises:
+        InvalidStateError: Names the value that is wrong, and what would be right.
+    """
+    _require_rotations(scene, snapshot, placement)
+    _require_near_and_slow(scene, snapshot, placement)
+    _require_hand(snapshot.hand, gripper)
+    _require_arm(snapshot)
+    for body, opening in zip(scene.jointed, snapshot.openings, strict=True):
+        high = body.joint.high
+        if not 0.0 <= opening.position <= high:
+            raise InvalidStateError(
+                f"the opening of {body.name} is {opening.position}, not within [0, {high}]"
+            )
+    _require_apart(scene, snapshot, placement)
+    _require_held(scene, snapshot)
+
+
+def _require_rotations(
+    scene: ContactScene, snapshot: ContactSnapshot, placement: Placement
+) -> None:
+    for name, pose in _poses(scene, snapshot, placement):
+        length = math.hypot(*pose.quaternion)
+        if abs(length - 1.0) > UNIT_TOLERANCE:
+            raise InvalidStateError(f"the quaternion of {name} has length {length}, not 1")
+
+
+def _require_near_and_slow(
+    scene: ContactScene, snapshot: ContactSnapshot, placement: Placement
+) -> None:
+    for name, pose in _poses(scene, snapshot, placement):
+        away = max(abs(x) for x in pose.position)
+        if away > FAR:
+            raise InvalidStateError(f"{name} is {away} m away, further than {FAR} m")
+    hand = snapshot.hand
+    moving: list[tuple[str, Sequence[float], Sequence[float]]] = [
+        ("the hand", hand.velocity, hand.angular_velocity),
+        ("a finger", hand.finger_velocities, ()),
+    ]
+    for body, motion in zip(scene.free, snapshot.bodies, strict=True):
+        moving.append((body.name, motion.velocity, motion.angular_velocity))
+    for jointed, opening in zip(scene.jointed, snapshot.openings, strict=True):
+        slides, rate = jointed.joint.kind is JointKind.SLIDE, (opening.velocity,)
+        moving.append((jointed.name, rate if slides else (), () if slides else rate))
+    for name, velocity, spin in moving:
+        for values, unit, limit in ((velocity, "m/s", FAST), (spin, "rad/s", FAST_SPIN)):
+            fastest = max((abs(value) for value in values), default=0.0)
+            if fastest > limit:
+                raise InvalidStateError(
+                    f"{name} moves at {fastest} {unit}, more than {limit}, which nothing does"
+                )
+
+
+def _require_hand(hand: HandState, gripper: float) -> None:
+    for name, finger in zip(("left", "right"), hand.fingers, strict=True):
+        if not FINGER_CLOSED <= finger <= FINGER_OPEN:
+            raise InvalidStateError(
+                f"the {name} finger is at {finger} m, not within [{FINGER_CLOSED}, {FINGER_OPEN}]"
+            )
+    if gripper not in (-1.0, 1.0):
+        raise InvalidStateError(f"gripper = {gripper}, must be 1 (closes) or -1 (opens)")
+    upright = Pose(quaternion=hand.target_pose.quaternion)
+    tilt_x, tilt_y, _ = rotation_between(upright, hand.pose)
+    tilt = math.hypot(tilt_x, tilt_y)
+    if tilt > TILTED:
+        raise InvalidStateError(f"the hand is tilted by {tilt} rad; it points down")
+    lead = max(abs(t - x) for t, x in zip(hand.target, hand.pose.position, strict=True))
+    if lead > TARGET_TOLERANCE * LEASH:
+        raise InvalidStateError(f"the hand's target is {lead} m away from it, leash {LEASH} m")
+    turn = abs(wrapped(hand.target_yaw - hand.yaw))
+    if turn > TARGET_TOLERANCE * YAW_LEASH:
+        raise InvalidStateError(f"the hand's target is {turn} rad off, leash {YAW_LEASH} rad")
+
+
+def _require_arm(snapshot: ContactSnapshot) -> None:
+    for i, (low, q, high) in enumerate(zip(JOINT_LOW, snapshot.joints, JOINT_HIGH, strict=True)):
+        if not low - LIMIT_TOLERANCE <= q <= high + LIMIT_TOLERANCE:
+            raise InvalidStateError(f"joint {i + 1} = {q} rad is not within [{low}, {high}]")
+    hand = snapshot.hand
+    if arm_joints(hand.pose) is None:
+        raise InvalidStateError(f"the arm cannot have its hand at {hand.pose.position} m")
+    at = grasp_pose(snapshot.joints)
+    off, turn = math.dist(at.position, hand.pose.position), at.angle_to(hand.pose)
+    if off > ARM_TOLERANCE or turn > ARM_TURN_TOLERANCE:
+        raise InvalidStateError(
+            f"the hand is {off} m and {turn} rad off from where the arm's joints have it"
+        )
+
+
+def _require_apart(scene: ContactScene, snapshot: ContactSnapshot, placement: Placement) -> None:
+    """Refuse what is inside something else; a jointed body may be inside itself."""
+    movable = [
+        (body.name, body.cores(motion.pose))
+        for body, motion in zip(scene.free, snapshot.bodies, strict=True)
+    ]
+    movable += [
+        (body.name, body.cores(pose, opening.position))
+        for body, pose, opening in zip(
+            scene.jointed, placement.jointed, snapshot.openings, strict=True
+        )
+    ]
+    movable.append(("the hand", snapshot.hand.boxes()))
+    fixed = [
+        (body.name, body.cores(pose))
+        for body, pose in zip(scene.fixed, placement.fixed, strict=True)
+        if body.solid
+    ]
+    placed = [(name, [box.shrunk(OVERLAP / 2) for box in boxes]) for name, boxes in fixed]
+    for name, boxes in movable:
+        cores = [box.shrunk(OVERLAP / 2) for box in boxes]
+        for other, others in placed:
+            if _share_space(cores, others):
+                raise InvalidStateError(f"{name} and {other} are inside one another")
+        placed.append((name, cores))
+
+
+def _require_held(scene: ContactScene, snapshot: ContactSnapshot) -> None:
+    """Refuse that a body is held which the pads do not touch."""
+    if snapshot.held is None:
+        return
+    body, motion = scene.free[snapshot.held], snapshot.bodies[snapshot.held]
+    parts = [
+        OrientedBox(motion.pose.compose(part.bounding_box.pose), part.bounding_box.half)
+        for part in body.parts
+    ]
+    for pad in (box for box in snapshot.hand.boxes() if box.half == PAD.half_extents_m):
+        if not _share_space([pad.grown(GRASP_GAP)], parts):
+            raise InvalidStateError(f"{body.name} is held, but not between the fingers")
+
+
+def _poses(
+    scene: ContactScene, snapshot: ContactSnapshot, placement: Placement
+) -> list[tuple[str, Pose]]:
+    free = [(b.name, motion.pose) for b, motion in zip(scene.free, snapshot.bodies, strict=True)]
+    fixed = [(b.name, pose) for b, pose in zip(scene.fixed, placement.fixed, strict=True)]
+    jointed = [(b.name, pose) for b, pose in zip(scene.jointed, placement.jointed, strict=True)]
+    return [("the hand", snapshot.hand.pose), *free, *fixed, *jointed]
+
+
+def _share_space(some: Sequence[OrientedBox], others: Sequence[OrientedBox]) -> bool:
+    return any(
+        other.near(box.pose.position, box.radius) and other.overlaps(box)
+        for box in some
+        for other in others
+    )

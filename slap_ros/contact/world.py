@@ -1,0 +1,173 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A hand that acts by forces, as a world to be stepped.
+
+A control step moves the hand's target, and says whether the fingers close; the hand is pulled to
+its target for one control period. The next state is a function of the state and the action, bit
+for bit (``docs/contact.md`` says how, and what it costs).
+"""
+
+from __future__ import annotations
+
+import weakref
+from dataclasses import replace
+from types import TracebackType
+
+from slap_ros.contact.arm import arm_joints, follow, share_in_time
+from slap_ros.contact.contacts import ContactPoint
+from slap_ros.contact.dynamics import ContactDynamics
+from slap_ros.contact.features import GRIPPER, ROBOT
+from slap_ros.contact.hand import LEASH, YAW_LEASH, HandState, rotation_between
+from slap_ros.contact.scene import ContactScene
+from slap_ros.contact.simulation_pool import acquire, release
+from slap_ros.contact.snapshot import ContactSnapshot, StateIndex
+from slap_ros.contact.validation import require_possible
+from slap_ros.core import Action, ActionSpace
+from slap_ros.errors import InvalidStateError
+from slap_ros.geometry.pose import Pose, from_rotation_vector, multiply
+from slap_ros.relational import Feature, State
+
+MAX_SHIFT = 0.02  # m along each axis in a control step: 0.4 m/s
+MAX_TURN = 0.15  # rad about the vertical: 3 rad/s
+ACTION_SPACE = ActionSpace(
+    axes=(
+        *(Feature(axis, "m") for axis in ("x", "y", "z")),
+        Feature("yaw", "rad"),
+        Feature("gripper", "1"),
+    ),
+    low=(-MAX_SHIFT, -MAX_SHIFT, -MAX_SHIFT, -MAX_TURN, -1.0),
+    high=(MAX_SHIFT, MAX_SHIFT, MAX_SHIFT, MAX_TURN, 1.0),
+)
+ACTING = 0.5  # 1, beyond which the gripper is told something new
+
+
+class ContactWorld:
+    """One world. Closed, or no longer referred to, it gives its PyBullet client back."""
+
+    def __init__(self, scene: ContactScene, state: State) -> None:
+        """Begin in ``state``.
+
+        Args:
+            scene: What there is.
+            state: How it is: one robot, and an object for each free or jointed body of the scene.
+
+        Raises:
+            InvalidStateError: A scene that cannot be.
+        """
+        self._scene = scene
+        self._index = StateIndex.of(scene, state.layout)
+        (robot,) = state.layout.of_type(ROBOT)
+        self._gripper = state.layout.column(robot, GRIPPER.name)
+        self._require_possible(state)
+        simulation = acquire(scene)
+        self._closing = weakref.finalize(self, release, simulation)
+        self._dynamics = ContactDynamics(scene, simulation)
+        self._adopt(state)
+
+    def __enter__(self) -> ContactWorld:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Give the client back; the world cannot be stepped any more."""
+        self._closing()
+
+    @property
+    def scene(self) -> ContactScene:
+        """What there is."""
+        return self._scene
+
+    @property
+    def state(self) -> State:
+        """The current state."""
+        return self._state
+
+    @property
+    def contacts(self) -> tuple[ContactPoint, ...]:
+        """What touched what at the end of the latest step, of what had to be computed."""
+        return self._contacts
+
+    def reset(self, state: State) -> None:
+        """Continue from ``state``.
+
+        Raises:
+            InvalidStateError: A scene that cannot be, or other objects; the world stays as it is.
+        """
+        if state.layout is not self._index.layout and state.layout != self._index.layout:
+            raise InvalidStateError("a world is reset to states of its own objects only")
+        self._require_possible(state)
+        self._adopt(state)
+
+    def _require_possible(self, state: State) -> None:
+        state.require_finite()
+        snapshot = self._index.read(state)
+        placement = self._index.placement(self._scene, state)
+        require_possible(self._scene, snapshot, placement, float(state.data[self._gripper]))
+
+    def _adopt(self, state: State) -> None:
+        self._dynamics.place(self._index.placement(self._scene, state))
+        self._state, self._snapshot = state, self._index.read(state)
+        self._contacts: tuple[ContactPoint, ...] = ()
+
+    def step(self, action: Action) -> State:
+        """Act for one control period.
+
+        A target that the arm cannot reach is refused: the old one stays. Where the arm could not
+        be in time, the hand is pulled only part of the way in this period.
+
+        Raises:
+            InvalidCommandError: The action is not in the action space; nothing moved.
+            ValueError: The world is closed.
+        """
+        if not self._closing.alive:
+            raise ValueError("this world is closed")
+        ACTION_SPACE.check(action)
+        now = self._snapshot
+        told = _told(now.hand, action.tolist())
+        joints = arm_joints(told.target_pose)
+        if joints is None:
+            told = now.hand._replace(closing=told.closing)
+            joints = arm_joints(told.target_pose)
+        pull = told.pose
+        if joints is not None:
+            pull = _part_way(told.pose, told.target_pose, share_in_time(now.joints, joints))
+        after, self._contacts = self._dynamics.after(replace(now, hand=told), pull)
+        self._snapshot = replace(after, joints=_followed(now, after))
+        self._state = self._index.write(self._state, self._snapshot)
+        return self._state
+
+
+def _told(hand: HandState, action: list[float]) -> HandState:
+    """The hand with its target moved, no further than its leash, and its gripper told."""
+    *shift, turn, gripper = action
+    x, y, z = (
+        min(max(t + d, p - LEASH), p + LEASH)
+        for t, d, p in zip(hand.target, shift, hand.pose.position, strict=True)
+    )
+    yaw = min(max(hand.target_yaw + turn, hand.yaw - YAW_LEASH), hand.yaw + YAW_LEASH)
+    closing = gripper > ACTING or (hand.closing and gripper >= -ACTING)
+    return hand._replace(target=(x, y, z), target_yaw=yaw, closing=closing)
+
+
+def _part_way(start: Pose, goal: Pose, share: float) -> Pose:
+    """The pose after a share, up to 1, of the way."""
+    if share == 1.0:
+        return goal
+    x, y, z = (a + share * (b - a) for a, b in zip(start.position, goal.position, strict=True))
+    u, v, w = (share * r for r in rotation_between(start, goal))
+    return Pose((x, y, z), multiply(from_rotation_vector((u, v, w)), start.quaternion))
+
+
+def _followed(before: ContactSnapshot, after: ContactSnapshot) -> tuple[float, ...]:
+    """The arm's joints with the hand where it is now; as they were if the arm cannot be there."""
+    if after.hand.pose == before.hand.pose:
+        return before.joints
+    joints = arm_joints(after.hand.pose)
+    return before.joints if joints is None else follow(before.joints, joints)

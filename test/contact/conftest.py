@@ -1,0 +1,24 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A hand among the things of the workbench."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE), str(HERE.parent.parent)]  # the helpers of these tests; benchmarks
+
+
+@pytest.fixture
+def world():
+    """The bench, with the hand above it."""
+    from workbench import BENCH, start
+
+    from slap_ros.contact.world import ContactWorld
+
+    with ContactWorld(BENCH, start()) as world:
+        yield world
