@@ -31,6 +31,7 @@ COPIED = {
 }
 RESULTS = ROOT / "docs" / "results"
 LINK = re.compile(r"\]\((?P<target>[^)#:]+)(?P<anchor>#[^)]*)?\)")
+QUOTATION = re.compile(r'(title="[\w/.]+): [\w., ]+"')  # see tools.quotations
 SECTION = re.compile(r"^---\s*$", re.MULTILINE)
 FIELD = re.compile(r"^(?P<type>\S+)\s+(?P<name>\w+)(=(?P<value>\S+))?\s*(#\s*(?P<comment>.*))?$")
 
@@ -58,7 +59,10 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Any, config: Any, **_: Any) -> str:
-    """Show what a link to a source file points to, as that is not part of the site."""
+    """Show what a link to a source file points to, as that is not part of the site.
+
+    Quotations have the name of their file alone above them.
+    """
     folder = (Path(config.docs_dir) / page.file.src_uri).parent
     up = "../" * page.file.src_uri.count("/")
     pages = {ROOT / source: page for page, source in COPIED.items()}
@@ -71,7 +75,7 @@ def on_page_markdown(markdown: str, page: Any, config: Any, **_: Any) -> str:
             return match[0]
         return f"] (`{target.relative_to(ROOT)}`)"
 
-    return LINK.sub(shown, markdown)
+    return LINK.sub(shown, QUOTATION.sub(r'\1"', markdown))
 
 
 def copied(source: str) -> str:

@@ -22,8 +22,9 @@ the exhaustive one's, by at most the sum of what the bounds exceed the steps by 
 ``test/shortcuts/test_bounds.py`` measures how often that happens with the shipped libraries.
 
 In the planner's model, a plan with shortcuts is never longer than one without, when both searches
-end with a plan at the same depth and bounds are admissible: shortcuts only add edges. Executing a
-plan is another matter: a world that is not the model may make it diverge, and it is replanned.
+end with a plan at the same depth and the bounds of the given skills are admissible: shortcuts only
+add edges, and their own bounds, right or wrong, never delay the given skills' best plan. To execute
+a plan is another matter: a world that is not the model may make it diverge, and it is replanned.
 """
 
 from __future__ import annotations

@@ -102,6 +102,31 @@ def test_lazy_and_exhaustive_agree_on_made_up_graphs(graph):
     assert cost_or_none(search_lazily, graph) == cost_or_none(search_exhaustively, graph)
 
 
+@dataclass(frozen=True)
+class WronglyBoundedSkill(MadeUpSkill):
+    """Its bounds may be above its true costs, as a shortcut's may."""
+
+    def lower_bound(self, state, objects):
+        return max(self.least_steps, int(self.tightness * self.true_cost(state)))
+
+
+@settings(max_examples=400, deadline=None)
+@given(
+    made_up_graphs(),
+    st.lists(st.tuples(st.integers(0, 8), st.integers(0, 8), st.integers(0, 10**6)), max_size=10),
+    st.integers(1, 60),
+    st.floats(0.0, 5.0),
+)
+def test_shortcuts_never_make_a_plan_longer_whatever_their_bounds(graph, ends, least, tightness):
+    without = cost_or_none(search_lazily, graph)
+    for number, (i, j, seed) in enumerate(ends):
+        if max(i, j) < len(graph.nodes) and i not in graph.goal_nodes:
+            skill = WronglyBoundedSkill(f"x{number}", seed, tightness, least_steps=least)
+            graph.edges.append(Edge(i, j, in_ways(skill, 2)))
+    cost = cost_or_none(search_lazily, graph)
+    assert without is None or (cost is not None and cost <= without)
+
+
 class DeadEnd(MadeUpSkill):
     """Leads nowhere: how long it takes need not be known."""
 
