@@ -13,7 +13,7 @@ from slap_ros.domains import get_domain
 from slap_ros.domains.cluttered_drawer.blocking import SIDES, FingerClearance
 from slap_ros.domains.cluttered_drawer.features import BLOCK
 from slap_ros.domains.cluttered_drawer.scene import BOTTOM, FRONT, HALF_WIDTH, MIDDLE
-from slap_ros.domains.cluttered_drawer.skills import FRONT_BACK, LEFT_RIGHT, _way_to_grasp
+from slap_ros.domains.cluttered_drawer.skills import FRONT_BACK, LEFT_RIGHT, _transit_to_grasp
 from slap_ros.domains.cluttered_drawer.tasks import (
     NEIGHBOUR,
     DrawerArrangement,
@@ -222,7 +222,7 @@ def test_a_hand_fits_where_sides_are_clear_and_not_where_blockers_stand(turns):
         target = state.layout.object("block1")
         clear = {f"{side}Clear(block1)" for side in wanted} <= atoms(state)
         try:
-            _way_to_grasp(state, target, turns).pieces()
+            _transit_to_grasp(state, target, turns).paths()
             fitted = True
         except SkillNotApplicableError:
             fitted = False

@@ -31,8 +31,8 @@ def beside_the_tower(gap, blocks_up):
 
 def rise(state):
     """How far it goes up before it goes elsewhere, m."""
-    (descent,) = Transit(PLANNING_SCENE, state, [ELSEWHERE], ()).descents
-    before, after = grasp_pose(joints_of(state)), grasp_pose(descent.up[-1])
+    (candidate,) = Transit(PLANNING_SCENE, state, [ELSEWHERE], ()).candidates
+    before, after = grasp_pose(joints_of(state)), grasp_pose(candidate.retreat[-1])
     return after.position[2] - before.position[2]
 
 

@@ -20,7 +20,13 @@ from slap_ros.domains.tabletop import observation
 from slap_ros.domains.tabletop.grasps import from_above
 from slap_ros.domains.tabletop.placements import Placement, free_placements
 from slap_ros.domains.tabletop.planning_scene import CARRYING
-from slap_ros.domains.tabletop.skills import GRIP, RELEASE, STEP_LIMIT, TrajectoryFollower
+from slap_ros.domains.tabletop.skills import (
+    GRIP,
+    RELEASE,
+    STEP_LIMIT,
+    Trajectory,
+    TrajectoryFollower,
+)
 from slap_ros.domains.tabletop.state_access import (
     JOINT_NAMES,
     box_of,
@@ -32,7 +38,7 @@ from slap_ros.domains.tabletop.timing import Timing
 from slap_ros.domains.tabletop.transit import CLEARANCE, PLANS, SEED, memoized
 from slap_ros.errors import SkillNotApplicableError
 from slap_ros.geometry.oriented_box import OrientedBox
-from slap_ros.geometry.pose import Pose, Vector, conjugate, rotate
+from slap_ros.geometry.pose import Pose, rotate
 from slap_ros.motion import (
     Free,
     Joints,
@@ -54,8 +60,8 @@ FINGER_ROOM = 0.005  # m, on each side of a block between the open fingers
 UNDER = 0.016  # m, from the table to the grasp point at least, for the fingers' ends
 HIGHER = 0.008  # m, of a grasp whose palm stays above what stands beside a block
 PALM = 0.036  # m, from the grasp point to a block's top at most
-LIFT_SLACK = 0.02  # m, by which a lifted block is higher than it need be
-READY_SLACK = 0.005  # m, the same of the hand where it lets go
+LIFT_MARGIN = 0.02  # m, by which a lifted block is higher than it need be
+READY_MARGIN = 0.005  # m, the same of the hand where it lets go
 INSIDE = 0.02  # m, between a block and the walls of the bin it is dropped into
 PLACES = 3  # in the bin, the nearest, that are looked at together
 ROUNDING = 1e-9  # m
@@ -65,50 +71,57 @@ GAP = 0.1  # m, between what is dropped and what lies there, where there is room
 # -- motions --------------------------------------------------------------------------------------
 
 
-class MotionPlan(NamedTuple):
+class MotionPaths(NamedTuple):
     """Paths of the arm one after the other, in rad, shape (k, 7)."""
 
-    pieces: Sequence[Path]
+    paths: Sequence[Path]
     free: Free  # where corners may be cut
 
 
 def _across(
-    state: State, ends: Sequence[Pose], accepts: Callable[[Pose, Joints], bool]
-) -> MotionPlan:
+    state: State, goals: Sequence[Pose], accepts: Callable[[Pose, Joints], bool]
+) -> MotionPaths:
     """To the nearest of some poses of the grasp point that will do, on a planned path.
 
     Args:
         state: Where it begins.
-        ends: Poses.
+        goals: Poses of the grasp point.
         accepts: Whether one will do in a configuration.
 
     Raises:
         SkillNotApplicableError: None of them can be reached.
     """
     q, free = joints_of(state), PLANNING_SCENE.checker(state, held_margin=CARRYING)
-    goals = nearest_configurations(ends, q, free=free) if ends else []
-    ways = [
-        (np.stack([q, goal]), end)
-        for end, goal in zip(ends, goals, strict=True)
-        if goal is not None
+    nearest = nearest_configurations(goals, q, free=free) if goals else []
+    candidates = [
+        (np.stack([q, end]), goal)
+        for goal, end in zip(goals, nearest, strict=True)
+        if end is not None
     ]
-    for (_, goal), end in sorted(ways, key=lambda way: path_steps(way[0])):
-        if not accepts(end, goal):
+    for (_, end), goal in sorted(candidates, key=lambda candidate: path_steps(candidate[0])):
+        if not accepts(goal, end):
             continue
         try:
-            return MotionPlan(
-                [q[None], PLANS.plan_path(q, goal, free, seed=SEED), goal[None]], free
-            )
+            return MotionPaths([q[None], PLANS.plan_path(q, end, free, seed=SEED), end[None]], free)
         except MotionPlanningError:
             continue
-    raise SkillNotApplicableError(f"none of {len(ends)} poses can be reached from here")
+    raise SkillNotApplicableError(f"none of {len(goals)} poses can be reached from here")
 
 
 # -- grasps and places ----------------------------------------------------------------------------
 
 
 def grasps(state: State, block: Object, table: Object) -> list[Pose]:
-    """Poses of the grasp point from above, where the fingers fit around a block."""
+    """Poses of the grasp point from above, where the fingers fit around a block.
+
+    Args:
+        state: Where everything is.
+        block: What is to be grasped.
+        table: What it stands on.
+
+    Returns:
+        Poses in the base's frame, the deepest grasps first.
+    """
     frame, half = carried(state, block)
     box = OrientedBox(pose_of(state, block).compose(frame), half)
     x, y, z = pose_of(state, block).position
@@ -134,13 +147,7 @@ def _fits(box: OrientedBox, grasp: Pose) -> bool:
     """Whether the fingers, opened wide, go down at both sides of a box."""
     along = rotate(grasp.quaternion, (0.0, 1.0, 0.0))  # the way the fingers move
     off = sum(a * (b - c) for a, b, c in zip(along, box.pose.position, grasp.position, strict=True))
-    return abs(off) + _reach(box, along) <= FINGER_OPEN - FINGER_ROOM
-
-
-def _reach(box: OrientedBox, axis: Vector) -> float:
-    """How far a box reaches from its middle along an axis, m."""
-    seen = rotate(conjugate(box.pose.quaternion), axis)
-    return sum(abs(a) * half for a, half in zip(seen, box.half, strict=True))
+    return abs(off) + box.half_extent(along) <= FINGER_OPEN - FINGER_ROOM
 
 
 def _drops(state: State, block: Object, drawer: Object) -> Iterator[list[Pose]]:
@@ -148,7 +155,7 @@ def _drops(state: State, block: Object, drawer: Object) -> Iterator[list[Pose]]:
     x, y, _ = pose_of(state, block).position
     hand, space = grasp_pose(joints_of(state)), box_of(state, drawer)
     height = max(
-        hand.position[2], float(cleanup_relations(state).highest) + HAND_CLEAR + TIP + READY_SLACK
+        hand.position[2], float(cleanup_relations(state).highest) + HAND_CLEAR + TIP + READY_MARGIN
     )
     (mx, my, _), (half_x, half_y, _) = space.pose.position, space.half
     others = [other for other in state.layout.of_type(BLOCK) if other != block]
@@ -177,7 +184,7 @@ def _over(
         hand = from_above((*place, height), yaw + 2.0 * math.pi * k / YAWS)
         box = OrientedBox(hand.compose(grasp).compose(frame), half)
         if all(
-            abs(box.pose.position[i] - space.pose.position[i]) + _reach(box, axis)
+            abs(box.pose.position[i] - space.pose.position[i]) + box.half_extent(axis)
             <= space.half[i] - WALL - INSIDE
             for i, axis in enumerate(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
         ):
@@ -188,7 +195,7 @@ def _over(
 # -- ways -----------------------------------------------------------------------------------------
 
 
-def _to_over(state: State, block: Object, table: Object) -> MotionPlan:
+def _to_over(state: State, block: Object, table: Object) -> MotionPaths:
     """Over a block, where the hand can go straight down to grasp it."""
     touching = PLANNING_SCENE.checker(state, (block,))
     height = pose_of(state, block).position[2] + OVER
@@ -202,36 +209,36 @@ def _to_over(state: State, block: Object, table: Object) -> MotionPlan:
     return _across(state, list(below), comes_down)
 
 
-def _down(state: State, block: Object, table: Object) -> MotionPlan:
+def _down(state: State, block: Object, table: Object) -> MotionPaths:
     """Down to the grasp that takes the least turning."""
     q, touching = joints_of(state), PLANNING_SCENE.checker(state, (block,))
     for grasp in sorted(grasps(state, block, table), key=grasp_pose(q).angle_to):
         down = linear_motion(q, grasp, free=touching)
         if down is not None:
-            return MotionPlan([q[None], down], touching)
+            return MotionPaths([q[None], down], touching)
     raise SkillNotApplicableError(f"the hand cannot go straight down to {block}")
 
 
-def _up(state: State, block: Object, table: Object) -> MotionPlan:
+def _up(state: State, block: Object, table: Object) -> MotionPaths:
     """Up until what is held is above everything, 5 cm after 5 cm."""
     touching = PLANNING_SCENE.checker(state, (table,))
-    rise = LIFT_SLACK - _above(state, block)
-    stages = max(1, math.ceil(rise / CLEARANCE))
-    q, pieces = joints_of(state), []
+    height = LIFT_MARGIN - _above(state, block)
+    stages = max(1, math.ceil(height / CLEARANCE))
+    q, paths = joints_of(state), []
     for _ in range(stages):
-        up = linear_motion(q, shifted(grasp_pose(q), (0.0, 0.0, rise / stages)), free=touching)
+        up = linear_motion(q, shifted(grasp_pose(q), (0.0, 0.0, height / stages)), free=touching)
         if up is None:
             raise SkillNotApplicableError(f"the arm cannot lift {block}")
-        pieces.append(up[[0, -1]])
+        paths.append(up[[0, -1]])
         q = up[-1]
-    return MotionPlan(pieces, touching)
+    return MotionPaths(paths, touching)
 
 
-def _to_bin(state: State, block: Object, drawer: Object) -> MotionPlan:
+def _to_bin(state: State, block: Object, drawer: Object) -> MotionPaths:
     """Over one of the nearest places in the bin that can be reached."""
-    for ends in _drops(state, block, drawer):
+    for goals in _drops(state, block, drawer):
         try:
-            return _across(state, ends, lambda *_: True)
+            return _across(state, goals, lambda *_: True)
         except SkillNotApplicableError:
             continue
     raise SkillNotApplicableError(f"there is no place in {drawer} over which {block} can be held")
@@ -259,8 +266,8 @@ def _is_over(state: State, block: Object, positions: Joints) -> Bools:
 def _is_lifted(state: State, block: Object, positions: Joints) -> Bools:
     """Whether a block that is lifted without being turned is above everything."""
     before = observation.grasp_points(joints_of(state))[..., 2]
-    rise = observation.grasp_points(positions)[:, 2] - before
-    lifted: Bools = rise + _above(state, block) > ROUNDING
+    lift = observation.grasp_points(positions)[:, 2] - before
+    lifted: Bools = lift + _above(state, block) > ROUNDING
     return lifted
 
 
@@ -297,7 +304,7 @@ class WaitForOutcome:
 
 @dataclass(frozen=True)
 class MotionSkill:
-    """Go; then grip or let go, if need be. How long that takes is known once it is planned.
+    """Move; then grip or let go, if need be. How long that takes is known once it is planned.
 
     Args:
         name: The operator's.
@@ -310,20 +317,20 @@ class MotionSkill:
 
     name: str
     timing: Timing
-    motion: Callable[[State, Object, Object], MotionPlan]
+    motion: Callable[[State, Object, Object], MotionPaths]
     until: Until | None = None
     grip: tuple[float, ...] = ()
     step_limit: int = STEP_LIMIT
 
     @property
     def least_steps(self) -> int:
-        """There, and the gripper."""
+        """One step to get there, and one for each gripper command."""
         return 1 + len(self.grip)
 
     def lower_bound(self, state: State, objects: tuple[Object, ...]) -> int:
-        """As many as it takes; what cannot be gone is never too short."""
+        """As many as it takes; where it cannot be planned, any bound is admissible."""
         try:
-            return max(1, len(_script(self, state, objects)))
+            return max(1, len(_trajectory(self, state, objects)))
         except SkillNotApplicableError:
             return self.step_limit
 
@@ -333,21 +340,19 @@ class MotionSkill:
         Raises:
             SkillNotApplicableError: There is no way for the arm.
         """
-        return TrajectoryFollower(_script(self, state, objects), self.timing.step)
+        return TrajectoryFollower(_trajectory(self, state, objects), self.timing.max_step)
 
 
 @memoized
-def _script(
-    skill: MotionSkill, state: State, objects: tuple[Object, ...]
-) -> Sequence[tuple[Joints, float]]:
+def _trajectory(skill: MotionSkill, state: State, objects: tuple[Object, ...]) -> Trajectory:
     """Positions with gripper commands.
 
     Raises:
         SkillNotApplicableError: There is no way for the arm.
     """
     _, block, surface = objects
-    pieces, free = skill.motion(state, block, surface)
-    positions = skill.timing.positions(pieces, free)
+    paths, free = skill.motion(state, block, surface)
+    positions = skill.timing.positions(paths, free)
     if skill.until is not None:
         there = skill.until(state, block, positions)
         if not there.any():
@@ -362,7 +367,7 @@ class DropSkill(MotionSkill):
     """Let go over the bin, and wait for what falls."""
 
     def start(self, state: State, objects: tuple[Object, ...]) -> Policy:
-        """See :class:`MotionSkill`."""
+        """Plan the motion, and wait after it; see :class:`MotionSkill`."""
         _, block, drawer = objects
         policy = super().start(state, objects)
         return WaitForOutcome(policy, lambda now: _landed(now, block, drawer))

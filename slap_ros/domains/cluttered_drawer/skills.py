@@ -52,7 +52,7 @@ def _least_turned(yaw: float) -> float:
 
 
 @memoized
-def _way_to_grasp(state: State, block: Object, turns: Sequence[float]) -> Transit:
+def _transit_to_grasp(state: State, block: Object, turns: Sequence[float]) -> Transit:
     pose = pose_of(state, block)
     yaw = _least_turned(yaw_of(pose))
     grasps = [from_above(pose.position, yaw + turn) for turn in turns]
@@ -62,27 +62,27 @@ def _way_to_grasp(state: State, block: Object, turns: Sequence[float]) -> Transi
 def _to_block(turns: Sequence[float]) -> Transits:
     """To a grasp of the block, the hand turned so against it."""
 
-    def ways(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:
-        yield _way_to_grasp(state, objects[1], turns)
+    def transits(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:
+        yield _transit_to_grasp(state, objects[1], turns)
 
-    return ways
+    return transits
 
 
 def _over_block(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:
     """Over a grasp of the block; where it is hemmed in, the fingers over the gaps at its edges."""
     for turns in (ANY, DIAGONALLY):
-        yield _way_to_grasp(state, objects[1], turns)
+        yield _transit_to_grasp(state, objects[1], turns)
 
 
 @memoized
-def _way_to_place(state: State, place: tuple[float, float], surface: Object) -> Transit:
-    """The way on which the held block comes to stand on a surface at a place, turned as it is."""
+def _transit_to_placement(state: State, place: tuple[float, float], surface: Object) -> Transit:
+    """The transit after which the held block stands on a surface at a place, turned as it is."""
     block = held_body(state)
     if block is None:
         raise SkillNotApplicableError("nothing is held")
     top, yaws = box_of(state, surface).top, quarter_turns(yaw_of(pose_of(state, block)))
-    ends = grasps_to_stand(state, box_of(state, block), place, top, yaws)
-    return Transit(PLANNING_SCENE, state, ends, touched=(surface,))
+    goals = grasps_to_stand(state, box_of(state, block), place, top, yaws)
+    return Transit(PLANNING_SCENE, state, goals, touched=(surface,))
 
 
 def _onto_surface(state: State, block: Object, surface: Object, margin: float) -> Iterator[Transit]:
@@ -96,7 +96,7 @@ def _onto_surface(state: State, block: Object, surface: Object, margin: float) -
     half_x, half_y, _ = board.half
     halves = (half_x - margin, half_y - margin)
     for place in free_placements(near, board.pose.position[:2], halves, taken, SPACING):
-        yield _way_to_place(state, place, surface)
+        yield _transit_to_placement(state, place, surface)
 
 
 def _into_drawer(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:

@@ -41,35 +41,35 @@ PLANNING_SCENE = PlanningScene(
 
 
 @memoized
-def _way_to_grasp(state: State, block: Object) -> Transit:
+def _transit_to_grasp(state: State, block: Object) -> Transit:
     return Transit(
         PLANNING_SCENE, state, grasps_along_faces(pose_of(state, block)), touched=(block,)
     )
 
 
 @memoized
-def _way_to_place(state: State, place: Placement, yaw: float, thing: Object) -> Transit:
-    """The way on which the held block comes to stand on a thing at a place."""
+def _transit_to_placement(state: State, place: Placement, yaw: float, thing: Object) -> Transit:
+    """The transit after which the held block stands on a thing at a place."""
     block = held_body(state)
     if block is None:
         raise SkillNotApplicableError("nothing is held")
     top = box_of(state, thing).top
     yaws = quarter_turns(yaw)
-    ends = grasps_to_stand(state, box_of(state, block), place, top, yaws)
-    return Transit(PLANNING_SCENE, state, ends, touched=(thing,))
+    goals = grasps_to_stand(state, box_of(state, block), place, top, yaws)
+    return Transit(PLANNING_SCENE, state, goals, touched=(thing,))
 
 
 def _to_block(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:
     """To a grasp of the block."""
     _, block, _ = objects
-    yield _way_to_grasp(state, block)
+    yield _transit_to_grasp(state, block)
 
 
 def _onto_middle(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:
     """Onto the middle of the target or of another block."""
     _, _, thing = objects
     x, y, _ = pose_of(state, thing).position
-    yield _way_to_place(state, (x, y), yaw_of(pose_of(state, thing)), thing)
+    yield _transit_to_placement(state, (x, y), yaw_of(pose_of(state, thing)), thing)
 
 
 def _onto_table(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:
@@ -82,7 +82,7 @@ def _onto_table(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:
     half_x, half_y, _ = board.half
     margins = half_x - TABLE_MARGIN, half_y - TABLE_MARGIN
     for place in free_placements(pose.position[:2], board.pose.position[:2], margins, taken):
-        yield _way_to_place(state, place, yaw_of(pose), table)
+        yield _transit_to_placement(state, place, yaw_of(pose), table)
 
 
 def skills(timing: Timing) -> dict[str, Skill]:

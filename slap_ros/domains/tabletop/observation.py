@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a learner sees of a Panda among bodies: joints, and everything else from the hand."""
+"""What a learner observes of a Panda among bodies: joints, and all else relative to the hand."""
 
 from __future__ import annotations
 
@@ -37,35 +37,44 @@ _GRASP_OFFSET = np.array([0.0, 0.0, GRASP_POINT])
 
 def hand_frame(state: State) -> Array:
     """Frame of the point between the fingertips, shape (n, 4, 4)."""
-    frame: Array = arm_frames(_joints(state))[:, -1] @ _GRASP_FRAME
-    return frame
+    return _hand_frame(arm_frames(_joints(state)))
 
 
 def hand_frame_and_velocities(state: State) -> Array:
     """Beside its frame how far each joint moves the hand in a control step at full speed, m.
 
-    Shape (n, 4, 4 + joints), the last row of what is beside the frame 0.
+    Returns:
+        Shape (n, 4, 4 + joints): the frame, then a column for each joint whose last row is 0.
     """
     links = arm_frames(_joints(state))
-    frame = links[:, -1] @ _GRASP_FRAME
+    frame = _hand_frame(links)
     levers = frame[:, None, :3, 3] - links[:, :, :3, 3]
     moves = np.cross(links[:, :, :3, 2], levers) * np.array(MAX_STEP)[:, None]
     beside = np.pad(moves, ((0, 0), (0, 0), (0, 1))).swapaxes(1, 2)
     return np.concatenate([frame, beside], axis=-1)
 
 
-def joint_contributions(hand: Array, ways: Array) -> Array:
-    """How far each joint takes a moving hand along some ways, in SWIFT, (n, ways, joints).
+def _hand_frame(links: Array) -> Array:
+    """The frame of the grasp point for those of the links, (n, 7, 4, 4) to (n, 4, 4)."""
+    frame: Array = links[:, -1] @ _GRASP_FRAME
+    return frame
 
-    What it takes to go somewhere differs with the arm's configuration; a small network that is
-    shown joints and places would have to learn the arm's kinematics first.
+
+def joint_contributions(hand: Array, displacements: Array) -> Array:
+    """How far each joint at full speed takes the hand along some displacements, in STEP_SCALE.
+
+    What it takes to go somewhere differs with the arm's configuration; a small network that
+    observes joints and positions only would have to learn the arm's kinematics first.
 
     Args:
         hand: What :func:`hand_frame_and_velocities` gives.
-        ways: m, shape (n, ways, 3).
+        displacements: m, shape (n, displacements, 3).
+
+    Returns:
+        Shape (n, displacements, joints).
     """
-    lengths = np.sqrt(np.square(ways).sum(axis=-1, keepdims=True))
-    directions = ways / np.maximum(lengths, DIRECTION_THRESHOLD)
+    lengths = np.sqrt(np.square(displacements).sum(axis=-1, keepdims=True))
+    directions = displacements / np.maximum(lengths, DIRECTION_THRESHOLD)
     far: Array = directions @ hand[:, :3, 4:] / STEP_SCALE
     return far
 
@@ -91,7 +100,7 @@ def robot(state: State, hand: Array) -> Array:
 
 
 def joint_limit_penalty(state: State) -> Array:
-    """How far joints are beyond where they are at ease, 1 for each at its limit, shape (n,)."""
+    """How far joints are beyond COMFORTABLE_RANGE, squared, 1 for each at its limit: shape (n,)."""
     beyond = np.maximum(np.abs(_over_ranges(state)) - COMFORTABLE_RANGE, 0.0) / (
         1.0 - COMFORTABLE_RANGE
     )
@@ -100,52 +109,99 @@ def joint_limit_penalty(state: State) -> Array:
 
 
 def scaled_displacements(state: State, hand: Array, column: Column) -> Array:
-    """Where things are from the hand, along the base's axes, shape (n, objects, 3)."""
-    seen: Array = displacements(state, hand, column) / DISTANCE_SCALE
-    return seen
+    """Displacements from the hand to objects, divided by DISTANCE_SCALE.
+
+    Args:
+        state: A batch of n states.
+        hand: What :func:`hand_frame` gives, or more columns.
+        column: The objects.
+
+    Returns:
+        Along the base's axes, shape (n, objects, 3).
+    """
+    scaled: Array = displacements(state, hand, column) / DISTANCE_SCALE
+    return scaled
 
 
 def scaled_velocities(state: State, column: Column) -> Array:
-    """How fast bodies move, shape (n, objects, 3)."""
+    """Velocities of bodies divided by SPEED_SCALE, clipped to 3, shape (n, objects, 3)."""
     return np.clip(state.gather(column, VELOCITY) / SPEED_SCALE, -3, 3)
 
 
 def no_features(state: State, column: Column) -> Array:
-    """No features, shape (n, objects, 0): of the robot, which is seen already."""
+    """No features, shape (n, objects, 0): of the robot, which is observed already."""
     return np.zeros((*state.data.shape[:-1], len(column.objects), 0))
 
 
 def unreachable(state: State, column: Column) -> Array:
-    """Distances to what there is no point in going to, m, shape (n, objects)."""
+    """Infinite distances to what there is no point in going to, shape (n, objects)."""
     return np.full((*state.data.shape[:-1], len(column.objects)), np.inf)
 
 
 def distances_above(state: State, hand: Array, column: Column, height: float) -> Array:
-    """From the hand to ``height`` m over the middles of things, m, shape (n, objects)."""
-    ways = displacements_above(state, hand, column, height)
-    distance: Array = np.sqrt(np.square(ways).sum(axis=-1))
-    return distance
+    """Distances from the hand to points above the middles of objects.
+
+    Args:
+        state: A batch of n states.
+        hand: What :func:`hand_frame` gives, or more columns.
+        column: The objects.
+        height: Of the points above the middles, m.
+
+    Returns:
+        m, shape (n, objects).
+    """
+    above = displacements_above(state, hand, column, height)
+    distances: Array = np.sqrt(np.square(above).sum(axis=-1))
+    return distances
 
 
 def displacements_above(state: State, hand: Array, column: Column, height: float) -> Array:
-    """The ways from the hand to ``height`` m over the middles of things, m, (n, objects, 3)."""
-    ways: Array = displacements(state, hand, column) + np.array([0.0, 0.0, height])
-    return ways
+    """Displacements from the hand to points above the middles of objects.
+
+    Args:
+        state: A batch of n states.
+        hand: What :func:`hand_frame` gives, or more columns.
+        column: The objects.
+        height: Of the points above the middles, m.
+
+    Returns:
+        Along the base's axes, m, shape (n, objects, 3).
+    """
+    above: Array = displacements(state, hand, column) + np.array([0.0, 0.0, height])
+    return above
 
 
 def displacements(state: State, hand: Array, column: Column) -> Array:
-    """Positions less that of the hand, m, shape (n, objects, 3)."""
+    """Displacements from the hand to the middles of objects.
+
+    Args:
+        state: A batch of n states.
+        hand: What :func:`hand_frame` gives, or more columns.
+        column: The objects.
+
+    Returns:
+        Along the base's axes, m, shape (n, objects, 3).
+    """
     seen: Array = state.gather(column, POSITION) - hand[:, None, :3, 3]
     return seen
 
 
 def separations(state: State, thing: Object, column: Column) -> Array:
-    """From middle to middle, or from the robot's hand, m, shape (n, objects)."""
+    """Distances between middles; for the robot, from its hand.
+
+    Args:
+        state: A batch of n states.
+        thing: From where.
+        column: The objects to which.
+
+    Returns:
+        m, shape (n, objects).
+    """
     if thing.type.is_a(ROBOT):
         return distances_above(state, hand_frame(state), column, 0.0)
-    way = state.gather(column, POSITION) - state.gather(single(thing), POSITION)
-    distance: Array = np.sqrt(np.square(way).sum(axis=-1))
-    return distance
+    between = state.gather(column, POSITION) - state.gather(single(thing), POSITION)
+    distances: Array = np.sqrt(np.square(between).sum(axis=-1))
+    return distances
 
 
 def at_rest(state: State) -> Bools:

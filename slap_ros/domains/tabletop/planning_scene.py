@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the arm keeps clear of, and what it carries, as a domain says."""
+"""The planning scene: what the arm keeps clear of and what it carries, as a domain says."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.motion import CollisionChecker
 from slap_ros.relational import Object, State
 
-# Distances in m that a held body keeps from others: so far away it may be turned as one likes,
-# on its way across, and when it is set down between others.
-AT_EASE, CARRYING, SETTING_DOWN = 0.02, 0.005, -0.001
+# Distances in m that a held body keeps from others.
+RELAXED = 0.02  # so far away it may be turned as one likes
+CARRYING = 0.005  # while crossing
+PLACING = -0.001  # while it is set down between others
 
 
 @dataclass(frozen=True)
 class PlanningScene:
-    """What is around the arm.
+    """The collision geometry of a domain's states.
 
     Args:
         solid: The boxes that things fill in a state, base frame, each with the object that it is
@@ -32,7 +33,7 @@ class PlanningScene:
     carried: Callable[[State, Object], OrientedBox]
 
     def checker(
-        self, state: State, touched: tuple[Object, ...] = (), held_margin: float = SETTING_DOWN
+        self, state: State, touched: tuple[Object, ...] = (), held_margin: float = PLACING
     ) -> CollisionChecker:
         """What is free of collisions in a state.
 
@@ -40,6 +41,9 @@ class PlanningScene:
             state: Where everything is.
             touched: What the arm, or what it holds, may touch.
             held_margin: Distance that a held body keeps from the rest, m.
+
+        Returns:
+            A checker with the held body in the hand and the fingers where they are.
         """
         held = held_body(state)
         obstacles = [

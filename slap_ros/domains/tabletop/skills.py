@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Skills that go one of several ways, then grip or let go, then lift."""
+"""Skills that follow one of several transits, then grip or let go, then lift."""
 
 from __future__ import annotations
 
@@ -25,32 +25,33 @@ GRIP, RELEASE = 1.0, -1.0  # gripper commands
 LAG = 0.005  # rad, by which an arm may be late without being waited for
 TRIES = 3  # for a position
 
-# To where it may go from a state, in the order in which it is tried.
+# The transits of a skill from a state, in the order in which they are tried.
 Transits = Callable[[State, tuple[Object, ...]], Iterable[Transit]]
+Trajectory = Sequence[tuple[Joints, float]]  # joint positions, rad, each with a gripper command
 
 
 class TrajectoryFollower:
-    """Go to positions one after the other, giving a gripper command with each.
+    """A policy that goes to waypoints one after the other, with a gripper command at each.
 
-    Closed loop: each step is what is missing from where the arm is. A real arm lags behind: what is
-    missing may then be more than a step may be, and is gone as far as one may, in a straight line.
-    Where that leaves a good deal, the same position is tried again, a few times at most, as an arm
-    that is held up never gets there.
+    Closed loop: each action is the difference from where the arm is. A real arm lags behind; where
+    the difference is more than a step may be, the action is as far in that direction as it may be.
+    If that leaves more than LAG, the same waypoint is tried again, a few times at most, as an arm
+    that is blocked never gets there.
     """
 
-    def __init__(self, script: Sequence[tuple[Joints, float]], step: Sequence[float]) -> None:
-        """``script``: positions in rad with gripper commands; ``step``: rad, the most in a step."""
-        self._script = deque(script)
-        self._step = np.array(step)
+    def __init__(self, trajectory: Trajectory, max_step: Sequence[float]) -> None:
+        """``trajectory``: see :data:`Trajectory`; ``max_step``: of each joint in a step, rad."""
+        self._trajectory = deque(trajectory)
+        self._max_step = np.array(max_step)
         self._tries = TRIES
 
     def __call__(self, state: State) -> Action | None:
-        """The next action; None at the end of the script."""
-        if not self._script:
+        """The next action; None at the end of the trajectory."""
+        if not self._trajectory:
             return None
-        position, gripper = self._script[0]
+        position, gripper = self._trajectory[0]
         missing = position - joints_of(state)
-        excess = float((np.abs(missing) / self._step).max())
+        excess = float((np.abs(missing) / self._max_step).max())
         if excess <= 1.0 + ROUNDING:
             self._next()
             return np.array([*missing, gripper])
@@ -62,94 +63,95 @@ class TrajectoryFollower:
         return np.array([*(missing / excess), gripper])
 
     def _next(self) -> None:
-        self._script.popleft()
+        self._trajectory.popleft()
         self._tries = TRIES
 
 
 @dataclass(frozen=True)
 class TransitSkill:
-    """Go the first way that can be gone; then grip or let go; then lift.
+    """Follow the first transit that can be planned; then grip or let go; then lift.
 
     Args:
         name: The operator's.
         timing: How fast.
-        ways: Where to; see :data:`Transits`.
-        gripper: The gripper command at the end of the way.
+        transits: Where to; see :data:`Transits`.
+        gripper: The gripper command at the goal.
         lift: How far to go up after it, m.
         step_limit: Environment steps.
     """
 
     name: str
     timing: Timing
-    ways: Transits
+    transits: Transits
     gripper: float
     lift: float = 0.0
     step_limit: int = STEP_LIMIT
 
     @property
     def least_steps(self) -> int:
-        """There, grip, up."""
+        """One step to the goal, one for the gripper, one to lift."""
         return 1 + self._after
 
     def lower_bound(self, state: State, objects: tuple[Object, ...]) -> int:
-        """The shortest of the ways that it may be, and what comes after it."""
+        """The bound of the shortest transit that may be followed, and what comes after it."""
         least, before = math.inf, None
-        for way in self.ways(state, objects):
+        for transit in self.transits(state, objects):
             if before is not None and before.is_open:
                 break
-            least, before = min(least, way.least_steps(self.timing)), way
-        # What cannot be gone is never too short.
+            least, before = min(least, transit.least_steps(self.timing)), transit
+        # Without a transit there is no roll-out, so that any bound is admissible.
         return self.step_limit if math.isinf(least) else int(least) + self._after
 
     def start(self, state: State, objects: tuple[Object, ...]) -> Policy:
         """Plan the motion.
 
         Raises:
-            SkillNotApplicableError: None of the ways can be gone.
+            SkillNotApplicableError: None of the transits can be planned.
         """
-        for way in self.ways(state, objects):
+        for transit in self.transits(state, objects):
             try:
-                return TrajectoryFollower(self._script(way), self.timing.step)
+                return TrajectoryFollower(self._trajectory(transit), self.timing.max_step)
             except SkillNotApplicableError:
                 continue
-        raise _no_way(self.name, objects)
+        raise _no_transit(self.name, objects)
 
     @property
     def _after(self) -> int:
         return 2 if self.lift > 0.0 else 1
 
-    def _script(self, way: Transit) -> list[tuple[Joints, float]]:
-        pieces = way.pieces()
-        end = pieces[-1][-1]
-        script = [(position, 0.0) for position in self.timing.positions(pieces, way.touching)]
-        script.append((end, self.gripper))
+    def _trajectory(self, transit: Transit) -> Trajectory:
+        paths = transit.paths()
+        end = paths[-1][-1]
+        positions = self.timing.positions(paths, transit.touching)
+        trajectory = [*((position, 0.0) for position in positions), (end, self.gripper)]
         if self.lift > 0.0:
             up = linear_motion(end, shifted(grasp_pose(end), (0.0, 0.0, self.lift)))
             if up is None:
                 raise SkillNotApplicableError("the arm cannot lift from the grasp")
-            script += [(position, 0.0) for position in self.timing.positions([up], way.touching)]
-        return script
+            lift = self.timing.positions([up], transit.touching)
+            trajectory += [(position, 0.0) for position in lift]
+        return trajectory
 
 
 @dataclass(frozen=True)
 class ReachSkill:
     """Go over what could be grasped, and stay there.
 
-    Where none of its ways can be gone to the end, it goes over the ends of the last one: there the
-    domain says how to look at what cannot be grasped.
+    Where no transit has an approach, it goes over the goals of the last one: there the domain says
+    where the hand is to be over something that cannot be grasped.
 
-    It is at its end as soon as it is over it as far as the domain cares, which may be some steps
-    before the end of its way: so that bounds its steps by little.
+    It ends as soon as the domain's predicate holds, which may be some steps before the end of its
+    path: so it has no better lower bound than one step.
     """
 
     name: str
     timing: Timing
-    ways: Transits
+    transits: Transits
     step_limit: int = STEP_LIMIT
     least_steps: int = 1
 
     def lower_bound(self, state: State, objects: tuple[Object, ...]) -> int:
-        """A step."""
+        """One step, whatever the state; see the class."""
         del state, objects
         return self.least_steps
 
@@ -157,18 +159,19 @@ class ReachSkill:
         """Plan the motion.
 
         Raises:
-            SkillNotApplicableError: There is no way over it.
+            SkillNotApplicableError: No transit leads over it.
         """
-        ways = list(self.ways(state, objects))
-        for way, can_end in [*((way, True) for way in ways), (ways[-1], False)]:
+        transits = list(self.transits(state, objects))
+        for transit, approachable in [*((t, True) for t in transits), (transits[-1], False)]:
             try:
-                positions = self.timing.positions(way.pieces_over(can_end), way.free)
+                positions = self.timing.positions(transit.paths_over(approachable), transit.free)
             except SkillNotApplicableError:
                 continue
-            return TrajectoryFollower([(position, 0.0) for position in positions], self.timing.step)
-        raise _no_way(self.name, objects)
+            trajectory = [(position, 0.0) for position in positions]
+            return TrajectoryFollower(trajectory, self.timing.max_step)
+        raise _no_transit(self.name, objects)
 
 
-def _no_way(name: str, objects: tuple[Object, ...]) -> SkillNotApplicableError:
+def _no_transit(name: str, objects: tuple[Object, ...]) -> SkillNotApplicableError:
     named = ", ".join(obj.name for obj in objects)
     return SkillNotApplicableError(f"{name}({named}): there is no way for the arm")

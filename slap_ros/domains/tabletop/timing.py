@@ -20,47 +20,47 @@ class Timing(Protocol):
     """How paths become positions, one a control step."""
 
     @property
-    def step(self) -> Sequence[float]:
-        """How far joints may go in a step, rad."""
+    def max_step(self) -> Sequence[float]:
+        """How far each joint may go in a control step, rad."""
         ...
 
     def positions(self, pieces: Sequence[Path], free: Free) -> Joints:
-        """Positions in rad, shape (n, 7), without the start; corners may be cut where free."""
+        """Joint positions, rad, shape (n, 7), without the start; corners may be cut where free."""
         ...
 
     def least_steps(self, pieces: Sequence[Path]) -> int:
-        """Positions that pieces take at least, be they straight or bent between the same ends."""
+        """Fewest positions for pieces with the same ends, be they straight or bent."""
         ...
 
 
 class SpeedLimitTiming:
     """As fast as the joints may move, without stopping in between."""
 
-    step: Sequence[float] = MAX_STEP
+    max_step: Sequence[float] = MAX_STEP
 
     def positions(self, pieces: Sequence[Path], free: Free) -> Joints:
-        """See :class:`Timing`."""
+        """All pieces as one path, retimed; see :class:`Timing`."""
         path = np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])])
         return retime(path, free=free)
 
     def least_steps(self, pieces: Sequence[Path]) -> int:
-        """See :class:`Timing`. What is bent is longer, and a stop at a corner costs more."""
+        """The pieces at full speed: bent ones are longer, and stops at corners cost more."""
         return math.ceil(sum(path_steps(piece) for piece in pieces) - ROUNDING)
 
 
 class FixedStepTiming:
     """The paper's timing: ten steps up, ten down, ten for each straight piece across."""
 
-    step: Sequence[float] = (math.pi,) * JOINTS
+    max_step: Sequence[float] = (math.pi,) * JOINTS
 
     def positions(self, pieces: Sequence[Path], free: Free) -> Joints:
-        """See :class:`Timing`."""
+        """Ten positions for each piece, without cutting corners; see :class:`Timing`."""
         del free  # corners are not cut
         up, *across, down = (*pieces, pieces[-1][-1:]) if len(pieces) == 1 else pieces
         return np.concatenate([retime_fixed_steps(p) for p in (_ends(up), *across, _ends(down))])
 
     def least_steps(self, pieces: Sequence[Path]) -> int:
-        """See :class:`Timing`."""
+        """Ten for each piece that has a length; see :class:`Timing`."""
         return sum(len(retime_fixed_steps(_ends(piece))) for piece in pieces)
 
 
