@@ -90,7 +90,17 @@ class RunClient(Node):
         max_replans: int,
         episode: int = 0,
     ) -> Future:
-        """Ask for the task to be solved; the future's result is the goal handle."""
+        """Ask for the task to be solved.
+
+        Args:
+            goal: Atoms to reach; empty for the task's own.
+            step_limit: Environment steps; 0 for the task's own limit.
+            max_replans: Plans after the first.
+            episode: Whose task; 0 for the current episode's.
+
+        Returns:
+            A future whose result is the goal handle.
+        """
         request = SolveTask.Goal(
             episode=episode,
             goal=encode.goal(goal),

@@ -64,7 +64,7 @@ def key_values(values: Mapping[str, object]) -> list[KeyValue]:
 
 
 def state(value: State, episode: int, step: int, stamp: Time) -> msgs.ObjectCentricState:
-    """A state.
+    """The message of a state.
 
     Args:
         value: The state.
@@ -195,7 +195,7 @@ def plan(
     stamp: Time,
     provenance: Mapping[str, str | int],
 ) -> msgs.Plan:
-    """A plan.
+    """The message of a plan.
 
     Args:
         value: The plan.

@@ -26,7 +26,7 @@ class StateSynchronizer:
         on_observation: Callable[[Observation], None],
         on_episode: Callable[[Episode], None] = lambda _: None,
     ) -> None:
-        """Subscribe.
+        """Subscribe to task, state and atoms.
 
         Args:
             node: Who subscribes.

@@ -68,9 +68,17 @@ class PlannerParameters(ShortcutParameters):
 
 
 class PlannerNode(Node):
-    """The planner."""
+    """Plans and executes tasks: the server of ``solve_task``."""
 
     def __init__(self, **kwargs: Any) -> None:
+        """Serve the action ``solve_task``.
+
+        Args:
+            kwargs: The node's.
+
+        Raises:
+            InvalidParameterError: There is no planner of the name that is given.
+        """
         super().__init__("planner_node", **kwargs)
         self._settings = read_parameters(self, PlannerParameters)
         if self._settings.planner not in PLANNERS:

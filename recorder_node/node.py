@@ -61,7 +61,7 @@ class Record:
 
 
 class RecorderNode(Node):
-    """The recorder."""
+    """Records every topic of an ensemble into a bag."""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("recorder_node", **kwargs)

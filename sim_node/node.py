@@ -53,7 +53,7 @@ class SimParameters(WorldParameters):
 
 
 class SimNode(LockstepWorld[SimParameters]):
-    """The simulator."""
+    """Simulates a task in lock-step: one step per command, one state after it."""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("sim_node", SimParameters, (), **kwargs)

@@ -83,7 +83,6 @@ def test_contributing_lists_the_same_floors():
     assert listed == [["nodes"], *(list(floor) for floor in FLOORS[1:])]
 
 
-@pytest.mark.xfail(reason="being parted")
 def test_no_class_name_means_two_things():
     """A reader who searches for a name finds one class."""
     defined = {}

@@ -33,7 +33,8 @@ def replay_on_robot(options: ReplayOptions) -> int:
     """Check the motion, and unless that is all, execute it; the exit code.
 
     Raises:
-        SlapError: It must not be executed, or failed; a robot then holds.
+        TaskCanceledError: Nobody at the terminal said that the arm may move.
+        SlapError: The motion must not be executed, or failed; a robot then holds.
     """
     parameters = PlayerParameters(**parse_parameters(options.robot, PlayerParameters, "robot"))
     recorded = read_recorded_motion(options.bag)

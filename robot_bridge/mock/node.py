@@ -60,6 +60,14 @@ class MockRobot(Node):
     """The mock robot."""
 
     def __init__(self, **kwargs: Any) -> None:
+        """Start controllers and detections of a simulated robot.
+
+        Args:
+            kwargs: The node's.
+
+        Raises:
+            InvalidParameterError: A parameter has a value that it cannot have.
+        """
         super().__init__("mock_robot", **kwargs)
         settings = read_parameters(self, MockRobotParameters)
         if settings.fault not in FAULTS:

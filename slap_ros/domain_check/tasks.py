@@ -18,7 +18,13 @@ SHOWN = 3  # reasons for failures that are told
 
 
 def different(domain: Domain, seed: int, count: int) -> Check:
-    """Whether the same seed gives the same task, other seeds other tasks, and goals lie ahead."""
+    """Whether the same seed gives the same task, other seeds other tasks, and goals lie ahead.
+
+    Args:
+        domain: To be checked.
+        seed: Of the tasks.
+        count: How many tasks are sampled.
+    """
     name = "tasks"
     samples = [domain.task(seed, index) for index in range(count)]
     again = [domain.task(seed, index) for index in range(count)]

@@ -13,27 +13,27 @@ from typing import Protocol
 
 
 class Time(Protocol):
-    """``builtin_interfaces/Time``."""
+    """Fields of ``builtin_interfaces/Time``."""
 
     sec: int
     nanosec: int
 
 
 class Header(Protocol):
-    """``std_msgs/Header``."""
+    """Fields of ``std_msgs/Header``."""
 
     stamp: Time
 
 
 class GroundAtomMessage(Protocol):
-    """``slap_msgs/GroundAtom``."""
+    """Fields of ``slap_msgs/GroundAtom``."""
 
     predicate: str
     objects: Sequence[str]
 
 
 class ObjectStateMessage(Protocol):
-    """``slap_msgs/ObjectState``."""
+    """Fields of ``slap_msgs/ObjectState``."""
 
     name: str
     type: str
@@ -41,7 +41,7 @@ class ObjectStateMessage(Protocol):
 
 
 class StateMessage(Protocol):
-    """``slap_msgs/ObjectCentricState``."""
+    """Fields of ``slap_msgs/ObjectCentricState``."""
 
     header: Header
     episode: int
@@ -50,7 +50,7 @@ class StateMessage(Protocol):
 
 
 class AtomsMessage(Protocol):
-    """``slap_msgs/AbstractState``."""
+    """Fields of ``slap_msgs/AbstractState``."""
 
     header: Header
     episode: int
@@ -62,7 +62,7 @@ class AtomsMessage(Protocol):
 
 
 class CommandMessage(Protocol):
-    """``slap_msgs/RobotCommand``."""
+    """Fields of ``slap_msgs/RobotCommand``."""
 
     header: Header
     episode: int
@@ -72,7 +72,7 @@ class CommandMessage(Protocol):
 
 
 class TypeInfoMessage(Protocol):
-    """``slap_msgs/TypeInfo``."""
+    """Fields of ``slap_msgs/TypeInfo``."""
 
     name: str
     parent: str
@@ -81,14 +81,14 @@ class TypeInfoMessage(Protocol):
 
 
 class KeyValueMessage(Protocol):
-    """``diagnostic_msgs/KeyValue``."""
+    """Fields of ``diagnostic_msgs/KeyValue``."""
 
     key: str
     value: str
 
 
 class DomainInfoMessage(Protocol):
-    """``slap_msgs/DomainInfo``."""
+    """Fields of ``slap_msgs/DomainInfo``."""
 
     header: Header
     name: str
@@ -100,7 +100,7 @@ class DomainInfoMessage(Protocol):
 
 
 class TaskMessage(Protocol):
-    """``slap_msgs/Task``."""
+    """Fields of ``slap_msgs/Task``."""
 
     header: Header
     episode: int
@@ -113,7 +113,7 @@ class TaskMessage(Protocol):
 
 
 class PlanEdgeMessage(Protocol):
-    """``slap_msgs/PlanEdge``."""
+    """Fields of ``slap_msgs/PlanEdge``."""
 
     kind: int
     name: str
@@ -123,7 +123,7 @@ class PlanEdgeMessage(Protocol):
 
 
 class PlanMessage(Protocol):
-    """``slap_msgs/Plan``."""
+    """Fields of ``slap_msgs/Plan``."""
 
     header: Header
     episode: int
@@ -137,7 +137,7 @@ class PlanMessage(Protocol):
 
 
 class PlanEventMessage(Protocol):
-    """``slap_msgs/PlanEvent``."""
+    """Fields of ``slap_msgs/PlanEvent``."""
 
     header: Header
     episode: int
@@ -151,7 +151,7 @@ class PlanEventMessage(Protocol):
 
 
 class SkillEventMessage(Protocol):
-    """``slap_msgs/SkillEvent``."""
+    """Fields of ``slap_msgs/SkillEvent``."""
 
     header: Header
     episode: int
@@ -170,20 +170,20 @@ class PointMessage(Protocol):
 
 
 class QuaternionMessage(PointMessage, Protocol):
-    """``geometry_msgs/Quaternion``."""
+    """Fields of ``geometry_msgs/Quaternion``."""
 
     w: float
 
 
 class PoseMessage(Protocol):
-    """``geometry_msgs/Pose``."""
+    """Fields of ``geometry_msgs/Pose``."""
 
     position: PointMessage
     orientation: QuaternionMessage
 
 
 class ColourMessage(Protocol):
-    """``std_msgs/ColorRGBA``."""
+    """Fields of ``std_msgs/ColorRGBA``."""
 
     r: float
     g: float
@@ -192,7 +192,7 @@ class ColourMessage(Protocol):
 
 
 class MarkerMessage(Protocol):
-    """``visualization_msgs/Marker``."""
+    """Fields of ``visualization_msgs/Marker``."""
 
     header: Header
     ns: str
@@ -204,6 +204,6 @@ class MarkerMessage(Protocol):
 
 
 class MarkersMessage(Protocol):
-    """``visualization_msgs/MarkerArray``."""
+    """Fields of ``visualization_msgs/MarkerArray``."""
 
     markers: Sequence[MarkerMessage]

@@ -61,7 +61,7 @@ class RigidBody:
 
 @dataclass(frozen=True)
 class Box(RigidBody):
-    """A cuboid.
+    """A body in the shape of a cuboid.
 
     Args:
         half_extents_m: Half its edges along x, y, z of its own frame.

@@ -28,7 +28,7 @@ class GroundedShortcuts:
         initial: State,
         sampling: Sampling = DEFAULT,
     ) -> None:
-        """Ground shortcuts.
+        """Ground shortcuts over the objects of a task.
 
         Args:
             domain: For which they were learned.

@@ -32,7 +32,7 @@ from safetensors.numpy import load, save
 
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidLibraryError
-from slap_ros.shortcuts.mlp_policy import MlpPolicy, Normalisation, Weights
+from slap_ros.shortcuts.mlp_policy import MlpPolicy, ObservationNormalisation, Weights
 from slap_ros.shortcuts.observation_encoder import make_action_map, observation_size
 from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.signature import Signature
@@ -203,7 +203,9 @@ def _load_policy(path: Path, checksum: str) -> MlpPolicy:
     try:
         count = sum(name.endswith(".weights") for name in tensors)
         policy = MlpPolicy(
-            Normalisation(tensors["normalisation.mean"], tensors["normalisation.deviation"]),
+            ObservationNormalisation(
+                tensors["normalisation.mean"], tensors["normalisation.deviation"]
+            ),
             tuple((tensors[f"layer{i}.weights"], tensors[f"layer{i}.bias"]) for i in range(count)),
             tensors["log_std"],
         )

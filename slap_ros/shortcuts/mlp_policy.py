@@ -17,7 +17,7 @@ Weights = NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False)
-class Normalisation:
+class ObservationNormalisation:
     """Makes each observed feature one of mean 0 and deviation 1 or so."""
 
     mean: Weights  # (size,)
@@ -25,7 +25,7 @@ class Normalisation:
     clip: float = 10.0
 
     @classmethod
-    def of(cls, observations: Weights) -> Normalisation:
+    def of(cls, observations: Weights) -> ObservationNormalisation:
         """From observations, shape (n, size).
 
         The deviation is never below ``LEAST_DEVIATION``: a feature that hardly varies under random
@@ -51,7 +51,7 @@ class MlpPolicy:
         log_std: Of each action, shape (actions,).
     """
 
-    normalisation: Normalisation
+    normalisation: ObservationNormalisation
     layers: tuple[tuple[Weights, Weights], ...]
     log_std: Weights
 

@@ -21,7 +21,7 @@ from stable_baselines3.common.logger import configure
 from stable_baselines3.common.vec_env import VecEnv as Sb3VecEnv
 
 from slap_ros.errors import InvalidParameterError
-from slap_ros.shortcuts.mlp_policy import MlpPolicy, Normalisation
+from slap_ros.shortcuts.mlp_policy import MlpPolicy, ObservationNormalisation
 from slap_ros.shortcuts.ppo_settings import PpoSettings
 from slap_ros.shortcuts.progress import Progress
 from slap_ros.shortcuts.vec_env import VecEnv, VecEnvStep
@@ -33,7 +33,7 @@ ACTION_REPEAT = 8  # steps for which a random action is repeated before normalis
 class _NormalisedVecEnv(Sb3VecEnv):
     """A vectorised environment as stable-baselines3 wants it, with statistics of its episodes."""
 
-    def __init__(self, env: VecEnv, normalisation: Normalisation) -> None:
+    def __init__(self, env: VecEnv, normalisation: ObservationNormalisation) -> None:
         self.env, self.normalisation = env, normalisation
         self.history: deque[tuple[bool, int, bool]] = deque(maxlen=RECENT)
         self.episodes = 0
@@ -112,7 +112,7 @@ class _ProgressCallback(BaseCallback):
         return self._go_on
 
 
-def normalisation_of(env: VecEnv, rng: np.random.Generator, steps: int) -> Normalisation:
+def normalisation_of(env: VecEnv, rng: np.random.Generator, steps: int) -> ObservationNormalisation:
     """Mean and deviation of what random actions lead to.
 
     Args:
@@ -128,14 +128,14 @@ def normalisation_of(env: VecEnv, rng: np.random.Generator, steps: int) -> Norma
         if step % ACTION_REPEAT == 0:
             actions = rng.uniform(-1.0, 1.0, (env.num_envs, env.action_map.size))
         observations.append(env.step(actions).observations)
-    return Normalisation.of(np.concatenate(observations))
+    return ObservationNormalisation.of(np.concatenate(observations))
 
 
 class Learner:
     """PPO on the environments of one shortcut."""
 
     def __init__(
-        self, env: VecEnv, normalisation: Normalisation, settings: PpoSettings, seed: int
+        self, env: VecEnv, normalisation: ObservationNormalisation, settings: PpoSettings, seed: int
     ) -> None:
         """Begin with random weights.
 

@@ -40,7 +40,7 @@ class ShortcutRollout:
 
     @property
     def steps(self) -> int:
-        """Environment steps."""
+        """The number of environment steps."""
         return len(self.actions)
 
 

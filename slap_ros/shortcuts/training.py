@@ -147,7 +147,7 @@ class Training:
         self._work = WorkFolder(self.folder)
 
     def run(self) -> Library:
-        """Train.
+        """Train until the budget is spent, or go on where an earlier run ended.
 
         Raises:
             ChildProcessError: A process that stepped environments has ended.

@@ -13,7 +13,7 @@ from slap_ros.evaluation.experiment import Experiment
 from slap_ros.planning.abstract_graph import build_abstract_graph
 from slap_ros.planning.planner import Problem
 from slap_ros.shortcuts.library import load_library
-from slap_ros.shortcuts.mlp_policy import MlpPolicy, Normalisation
+from slap_ros.shortcuts.mlp_policy import MlpPolicy, ObservationNormalisation
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.shortcut import Sampling, Shortcut
 from slap_ros.shortcuts.shortcut_rollouts import MAX_NET_FAILURES
@@ -31,7 +31,9 @@ def always(domain, space, signature, change, initial, value):
     zeros, ones = np.zeros(seen, np.float32), np.ones(seen, np.float32)
     layer = np.zeros((axes, seen), np.float32), np.full(axes, value, np.float32)
     quiet = np.full(axes, -30.0, np.float32)
-    return Shortcut(signature, MlpPolicy(Normalisation(zeros, ones), (layer,), quiet), shortest=1)
+    return Shortcut(
+        signature, MlpPolicy(ObservationNormalisation(zeros, ones), (layer,), quiet), shortest=1
+    )
 
 
 def hostile(domain, seed, value, count):
