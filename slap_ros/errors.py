@@ -75,6 +75,15 @@ class ErrorCode(IntEnum):
     NOT_READY = 112
     ALREADY_RUNNING = 113
 
+    # 130-149: acquisition; from 140 on, proposals and language models
+    PROPOSAL_REJECTED = 140
+    MALFORMED_ANSWER = 141
+    CASSETTE_MISS = 142
+    INVALID_CASSETTE = 143
+    LANGUAGE_OFF = 144
+    LANGUAGE_UNAVAILABLE = 145
+    LANGUAGE_REFUSED = 146
+
 
 class SlapError(Exception):
     """Base of all errors; its message says what was wrong, where, and what to do."""
@@ -331,3 +340,45 @@ class AlreadyRunningError(SlapError):
     """Another ensemble uses the same domain id and namespace."""
 
     code = ErrorCode.ALREADY_RUNNING
+
+
+class ProposalRejectedError(SlapError):
+    """No proposal passed the checks within the budget; the message has the last complaints."""
+
+    code = ErrorCode.PROPOSAL_REJECTED
+
+
+class MalformedAnswerError(SlapError):
+    """A text that should be operators, rewards or a decomposition, and cannot be read as such."""
+
+    code = ErrorCode.MALFORMED_ANSWER
+
+
+class CassetteMissError(SlapError):
+    """A recording of a language model does not have what is asked."""
+
+    code = ErrorCode.CASSETTE_MISS
+
+
+class InvalidCassetteError(SlapError):
+    """A recording of a language model that is missing, damaged or would be overwritten."""
+
+    code = ErrorCode.INVALID_CASSETTE
+
+
+class LanguageOffError(SlapError):
+    """A language model was to be asked, and must not be."""
+
+    code = ErrorCode.LANGUAGE_OFF
+
+
+class LanguageUnavailableError(SlapError):
+    """A language model cannot be asked, or did not answer in time."""
+
+    code = ErrorCode.LANGUAGE_UNAVAILABLE
+
+
+class LanguageRefusedError(SlapError):
+    """The server of a language model does not accept the key, the model or the request."""
+
+    code = ErrorCode.LANGUAGE_REFUSED

@@ -35,6 +35,7 @@ class Normalisation:
 
     formula: str  # of the metric d, as prompts show it
     apply: Callable[[Array], Array] = field(compare=False, repr=False)
+    rising: bool  # whether a larger metric is better
 
     @classmethod
     def closeness(cls, scale: float) -> Normalisation:
@@ -48,7 +49,7 @@ class Normalisation:
             near: Array = 1.0 - np.tanh(scale * np.abs(values))
             return near
 
-        return cls(f"1 - tanh({scale:g} |d|)", closeness)
+        return cls(f"1 - tanh({scale:g} |d|)", closeness, rising=False)
 
     @classmethod
     def fraction(cls, full: float) -> Normalisation:
@@ -61,7 +62,7 @@ class Normalisation:
         def fraction(values: Array) -> Array:
             return np.clip(values / full, 0.0, 1.0)
 
-        return cls(f"d / {full:g}, kept within [0, 1]", fraction)
+        return cls(f"d / {full:g}, kept within [0, 1]", fraction, rising=True)
 
     @classmethod
     def truth(cls) -> Normalisation:
@@ -70,7 +71,7 @@ class Normalisation:
         def truth(values: Array) -> Array:
             return values
 
-        return cls("d", truth)
+        return cls("d", truth, rising=True)
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,7 @@ class Metric:
     value: Value = field(compare=False, repr=False)
     scalar: Scalar = field(compare=False, repr=False)
     normalisation: Normalisation
+    of_hand: bool = False  # whether the hand is one end of what is measured: it is no argument then
 
     def normalised(self, state: State, *columns: Column) -> Array:
         """The metric in [0, 1].
@@ -181,6 +183,13 @@ class Condition:
         values = self.metric.value(state, *(columns[i] for i in self.arguments))
         inside: Array = np.minimum(values - self.lower, self.upper - values) / self._unit
         return inside
+
+    @property
+    def rewarded(self) -> bool:
+        """Whether the normalised metric grows towards the condition, and not away from it."""
+        if self.metric.normalisation.rising:
+            return math.isinf(self.upper)
+        return self.lower <= 0.0 <= self.upper
 
     def text(self, names: Sequence[str]) -> str:
         """The condition in words, as in ``radial_dis(?peg, ?hole) <= 0.01 m``.

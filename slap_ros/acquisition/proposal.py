@@ -1,0 +1,148 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A proposal: operators, a reward template for each, a plan, and where it all comes from."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from slap_ros.acquisition.problem import AcquisitionProblem
+from slap_ros.relational import LiftedAtom, LiftedOperator, Metric, Variable
+from slap_ros.relational.pddl import write_domain, write_problem
+
+VERSION = 1
+
+
+@dataclass(frozen=True)
+class RewardTerm:
+    """A weighted metric of the operator's parameters."""
+
+    metric: Metric
+    arguments: tuple[Variable, ...]  # one per type of the metric
+    weight: float  # in [0, 1]
+
+    def __str__(self) -> str:
+        names = ", ".join(variable.name for variable in self.arguments)
+        return f"{self.weight:g} {self.metric.name}({names})"
+
+
+@dataclass(frozen=True)
+class RewardTemplate:
+    """The dense part of an operator's reward, for all its groundings: Σ weight · normalised metric.
+
+    The sparse part is no template's: 1 where all of EFF+ hold and none of EFF- (LG-SAIL Eq. 4).
+    """
+
+    operator: str
+    terms: tuple[RewardTerm, ...]
+
+    def __str__(self) -> str:
+        return f"{self.operator}: {' + '.join(map(str, self.terms))}"
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where a proposal comes from.
+
+    Args:
+        proposer: By name: manual, induced, language.
+        rewarder: By name: manual, composed, language; empty while there are no rewards.
+        source: What was asked: the address of a server, the folders of demonstrations, a file.
+        model: As it was asked for; empty where none was.
+        requests: The sha256 of the requests whose answers are in the proposal.
+        attempts: Answers that it took.
+        tokens: That it took.
+    """
+
+    proposer: str
+    rewarder: str = ""
+    source: str = ""
+    model: str = ""
+    requests: tuple[str, ...] = ()
+    attempts: int = 0
+    tokens: int = 0
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """Operators for a problem, with everything that learning their skills takes.
+
+    Args:
+        problem: The domain's name.
+        operators: In the order of the decomposition.
+        plan: The ground operators of a shortest plan, as text; None where none was looked for.
+        provenance: Where it comes from.
+        rewards: By operator name.
+        remarks: What people should know: warnings of the checks, preconditions seen only once.
+    """
+
+    problem: str
+    operators: tuple[LiftedOperator, ...]
+    plan: tuple[str, ...] | None
+    provenance: Provenance
+    rewards: Mapping[str, RewardTemplate] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+
+    def to_json(self) -> str:
+        """JSON, the same bytes for the same proposal."""
+        data = {
+            "format": "slap_ros proposal",
+            "version": VERSION,
+            "problem": self.problem,
+            "operators": [_operator_data(operator) for operator in self.operators],
+            "rewards": [
+                _template_data(self.rewards[operator.name])
+                for operator in self.operators
+                if operator.name in self.rewards
+            ],
+            "plan": None if self.plan is None else list(self.plan),
+            "remarks": list(self.remarks),
+            "provenance": asdict(self.provenance),
+        }
+        return json.dumps(data, indent=2, ensure_ascii=True, allow_nan=False) + "\n"
+
+    def to_pddl(self, problem: AcquisitionProblem) -> tuple[str, str]:
+        """Domain and problem, readable by ``slap plan``.
+
+        Raises:
+            MalformedPddlError: A name that PDDL cannot hold, as an object's may be.
+        """
+        domain = write_domain(self.problem, problem.types, problem.predicates, self.operators)
+        init = sorted(problem.init, key=str)
+        task = write_problem("task", self.problem, problem.layout.objects, init, problem.goal)
+        return domain, task
+
+
+def _operator_data(operator: LiftedOperator) -> dict[str, Any]:
+    return {
+        "name": operator.name,
+        "parameters": [{"name": v.name, "type": v.type.name} for v in operator.parameters],
+        "preconditions": _atoms_data(operator.preconditions),
+        "delete_effects": _atoms_data(operator.delete_effects),
+        "add_effects": _atoms_data(operator.add_effects),
+    }
+
+
+def _atoms_data(atoms: frozenset[LiftedAtom]) -> list[dict[str, Any]]:
+    """Atoms in alphabetic order, since sets have none."""
+    return [
+        {"predicate": atom.predicate.name, "arguments": [v.name for v in atom.variables]}
+        for atom in sorted(atoms, key=str)
+    ]
+
+
+def _template_data(template: RewardTemplate) -> dict[str, Any]:
+    return {
+        "operator": template.operator,
+        "terms": [
+            {
+                "metric": term.metric.name,
+                "arguments": [variable.name for variable in term.arguments],
+                "weight": term.weight,
+            }
+            for term in template.terms
+        ],
+    }

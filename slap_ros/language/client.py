@@ -1,0 +1,336 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A server with the OpenAI-compatible interface, by way of the ``openai`` package.
+
+Whatever the server says is data: it is bounded in size and time, checked, and freed of the key
+before anything else sees it.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import logging
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from email.utils import parsedate_to_datetime
+from types import ModuleType
+from typing import Any
+
+from slap_ros.errors import LanguageRefusedError, LanguageUnavailableError
+from slap_ros.language.request import OutputDegree, Reply, Request, replace_unprintable
+from slap_ros.language.settings import KEY_VARIABLE, OPENAI_URL, LanguageSettings
+
+logger = logging.getLogger(__name__)
+
+MAX_BODY_BYTES = 16_000_000
+MAX_SERVER_WORDS = 300  # characters of a server's error message that are passed on
+CHARACTERS_PER_TOKEN = 4  # where a server does not count
+SHORTEST_SECRET = 8  # characters; shorter keys are placeholders for servers that want none
+NO_KEY = "none"
+SCRIPTED = "scripted"  # a server's fingerprint that says that no model answers
+REFUSED = {401: "the key", 403: "the key", 404: "the model or the address"}
+BAD_REQUEST = (400, 422)
+BUSY = (408, 409, 425, 429)
+
+
+@dataclass(frozen=True)
+class _Failure:
+    """Why a try gave no answer."""
+
+    words: str
+    status: int | None = None  # of HTTP; None where there was no answer at all
+    retry_after: float | None = None  # s, if the server says so
+
+    @property
+    def passing(self) -> bool:
+        """Whether it may be otherwise the next time."""
+        return self.status is None or self.status in BUSY or self.status >= 500
+
+
+class OpenAIClient:
+    """Asks a server; again, after growing pauses, where it is busy or gone."""
+
+    def __init__(
+        self,
+        settings: LanguageSettings,
+        environment: Mapping[str, str] | None = None,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        """Prepare to ask; nothing is sent yet.
+
+        Args:
+            settings: Which model, where, how.
+            environment: Where the key is; the process's own if left out.
+            sleep: How to pause, s.
+
+        Raises:
+            LanguageUnavailableError: No model is named, no key is there where one must be, or the
+                ``openai`` package is missing.
+        """
+        key = (os.environ if environment is None else environment).get(KEY_VARIABLE, "")
+        if not settings.model:
+            raise LanguageUnavailableError(
+                "no language model is named; give --model or set SLAP_LANGUAGE_MODEL"
+            )
+        if not key and settings.base_url == OPENAI_URL:
+            raise LanguageUnavailableError(
+                f"{OPENAI_URL} wants a key: set {KEY_VARIABLE}, or name another server by "
+                "--base-url (docs/language.md has recipes for local ones)"
+            )
+        self._openai = _import_openai()
+        self._lost = _connection_errors(self._openai)
+        self._settings = settings
+        self._secret = key if len(key) >= SHORTEST_SECRET else None
+        self._sleep = sleep
+        self._degree = settings.degree
+        self._client = self._openai.OpenAI(
+            api_key=key or NO_KEY,
+            base_url=settings.base_url,
+            max_retries=0,
+            # A key goes nowhere but to the address given: redirections are not followed. So a plain
+            # http address never comes to TLS, and reading the certificates for it is left out.
+            http_client=self._openai.DefaultHttpxClient(
+                follow_redirects=False, verify=not settings.base_url.startswith("http://")
+            ),
+        )
+
+    @property
+    def source(self) -> str:
+        """The server's address; settings refuse one with anything secret in it."""
+        return self._settings.base_url
+
+    @property
+    def degree(self) -> OutputDegree:
+        """To which degree this server is asked for structure by now."""
+        return self._degree
+
+    def close(self) -> None:
+        """Close connections."""
+        self._client.close()
+
+    def complete(self, request: Request, seconds_left: float) -> Reply:
+        """The answer to a request; see :class:`~.request.Client`."""
+        began = time.monotonic()
+        deadline = began + min(seconds_left, self._settings.answer_seconds)
+        degree: OutputDegree | None = self._degree
+        refusals: list[str] = []
+        while degree is not None:
+            outcome = self._ask(request, degree, deadline)
+            if isinstance(outcome, _Failure):
+                refusals.append(f"{degree}: {outcome.words}")
+                degree = degree.next
+                continue
+            self._remember(degree, refusals)
+            return self._reply(outcome, request, degree, time.monotonic() - began)
+        raise LanguageRefusedError(
+            f"{self.source} does not accept the request, however it is asked: {refusals[-1]}"
+        )
+
+    def _remember(self, degree: OutputDegree, refusals: list[str]) -> None:
+        if degree != self._degree:
+            logger.warning(
+                "%s refused %s; from now on it is asked for %s",
+                self.source, "; ".join(refusals), degree,
+            )  # fmt: skip
+            self._degree = degree
+
+    def _ask(
+        self, request: Request, degree: OutputDegree, deadline: float
+    ) -> dict[str, Any] | _Failure:
+        """The server's answer; a failure only where it does not accept the request as such."""
+        failures = 0
+        while True:
+            outcome = self._try(request, degree, deadline - time.monotonic())
+            if not isinstance(outcome, _Failure) or outcome.status in BAD_REQUEST:
+                return outcome
+            failures += 1
+            if not outcome.passing:
+                at_fault = REFUSED.get(outcome.status or 0, "the request")
+                raise LanguageRefusedError(
+                    f"{self.source} refused {at_fault} (model {request.model!r}): {outcome.words}"
+                )
+            self._wait(outcome, failures, deadline)
+
+    def _wait(self, failure: _Failure, failures: int, deadline: float) -> None:
+        retry = self._settings.retry
+        pause = max(retry.pause(failures), failure.retry_after or 0.0)
+        left = deadline - time.monotonic()
+        if failures >= retry.tries or pause >= left:
+            raise LanguageUnavailableError(
+                f"no answer from {self.source} after {failures} tries: {failure.words}; "
+                f"{max(left, 0.0):.0f} s were left to wait"
+                + (f", and it asked for {pause:.0f} s" if failure.retry_after else "")
+            )
+        logger.info("%s: %s; asking again in %.1f s", self.source, failure.words, pause)
+        self._sleep(pause)
+
+    def _try(
+        self, request: Request, degree: OutputDegree, seconds: float
+    ) -> dict[str, Any] | _Failure:
+        if seconds <= 0:
+            return _Failure("the time for an answer is over")
+        try:
+            body = self._receive(self._body(request, degree), seconds)
+        except self._openai.APIStatusError as error:
+            return _Failure(
+                f"HTTP {error.status_code}: {self._clean(_server_words(error.body))}",
+                error.status_code,
+                _retry_after(error.response.headers),
+            )
+        except self._lost as error:
+            return _Failure(self._clean(f"{type(error).__name__}: {error}"))
+        return _read_envelope(body)
+
+    def _receive(self, fields: dict[str, Any], seconds: float) -> bytes:
+        """The answer's bytes; as they come, since a time limit for each says nothing about all."""
+        deadline = time.monotonic() + seconds
+        parts, size = [], 0
+        completions = self._client.chat.completions.with_streaming_response
+        with _quiet(), completions.create(**fields, timeout=seconds) as response:
+            for part in response.iter_bytes():
+                size += len(part)
+                if size > MAX_BODY_BYTES:
+                    return b""
+                if time.monotonic() > deadline:
+                    raise TimeoutError("the answer came too slowly")
+                parts.append(part)
+        return b"".join(parts)
+
+    def _body(self, request: Request, degree: OutputDegree) -> dict[str, Any]:
+        messages = [{"role": m.role, "content": m.content} for m in request.messages]
+        schema = request.schema
+        body: dict[str, Any] = {"model": request.model, "messages": messages}
+        if degree is OutputDegree.JSON_SCHEMA:
+            described = {"name": schema.name, "strict": True, "schema": schema.definition}
+            body["response_format"] = {"type": "json_schema", "json_schema": described}
+        elif degree is OutputDegree.JSON_OBJECT:
+            body["response_format"] = {"type": "json_object"}
+            messages[-1]["content"] += (
+                "\n\nAnswer with one JSON object and nothing else. It must conform to this JSON "
+                f"schema:\n{json.dumps(schema.definition)}"
+            )
+        else:
+            messages[-1]["content"] += f"\n\n{schema.text_format}"
+        # After the package's own checks of arguments, so that any server's fields will do.
+        return body | {"extra_body": dict(request.sampling)}
+
+    def _reply(
+        self, envelope: dict[str, Any], request: Request, degree: OutputDegree, seconds: float
+    ) -> Reply:
+        choice = envelope["choices"][0]
+        message = choice["message"]
+        text = self._redact(replace_unprintable(_text(message.get("content"))))
+        refusal = message.get("refusal")
+        asked = sum(len(m.content) for m in request.messages)
+        return Reply(
+            text,
+            self._clean(refusal) if isinstance(refusal, str) and refusal else None,
+            self._clean(str(choice.get("finish_reason"))),
+            _count(envelope, "prompt_tokens", asked),
+            _count(envelope, "completion_tokens", len(text)),
+            self._clean(str(envelope.get("model", request.model))),
+            degree,
+            round(seconds, 3),
+            envelope.get("system_fingerprint") == SCRIPTED,
+        )
+
+    def _redact(self, text: str) -> str:
+        """Text without the key, which some servers repeat in their messages."""
+        return text.replace(self._secret, "[key]") if self._secret else text
+
+    def _clean(self, text: str) -> str:
+        """A server's words for logs and errors: short, on one line, without the key."""
+        line = " ".join(replace_unprintable(self._redact(text)).split())
+        return line if len(line) <= MAX_SERVER_WORDS else f"{line[:MAX_SERVER_WORDS]}…"
+
+
+def _import_openai() -> ModuleType:
+    try:
+        return importlib.import_module("openai")
+    except ImportError as error:
+        raise LanguageUnavailableError(
+            "asking a language model takes the openai package: pip install -e '.[language]'"
+        ) from error
+
+
+def _connection_errors(openai: ModuleType) -> tuple[type[Exception], ...]:
+    """What is raised for lost connections: by the package, and, in a body's middle, below it.
+
+    Which library is below depends on the package's version; it is the client's base class's.
+    """
+    roots = {base.__module__.partition(".")[0] for base in openai.DefaultHttpxClient.__mro__}
+    below = [importlib.import_module(root) for root in sorted(roots) if root.startswith("httpx")]
+    errors = (library.HTTPError for library in below)
+    return (openai.APIConnectionError, openai.APIResponseValidationError, TimeoutError, *errors)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Without the package's own debugging lines, which may show a request's headers."""
+    names = ("openai", "httpx", "httpx2", "httpcore", "httpcore2")
+    loggers = [logging.getLogger(name) for name in names]
+    levels = [entry.level for entry in loggers]
+    for entry in loggers:
+        entry.setLevel(max(entry.level, logging.WARNING))
+    try:
+        yield
+    finally:
+        for entry, level in zip(loggers, levels, strict=True):
+            entry.setLevel(level)
+
+
+def _read_envelope(body: bytes) -> dict[str, Any] | _Failure:
+    """The server's JSON around the answer, as far as it is needed."""
+    try:
+        envelope = json.loads(body)
+        message = envelope["choices"][0]["message"]
+        if not isinstance(message, dict):
+            raise TypeError("no message")
+    except (ValueError, TypeError, KeyError, IndexError, RecursionError):
+        return _Failure(f"an answer of {len(body)} bytes that is no chat completion")
+    return dict(envelope)
+
+
+def _text(content: Any) -> str:
+    """The answer's text; some servers give it in parts."""
+    if isinstance(content, list):
+        parts = (part.get("text") for part in content if isinstance(part, dict))
+        return "".join(part for part in parts if isinstance(part, str))
+    return content if isinstance(content, str) else ""
+
+
+def _count(envelope: dict[str, Any], name: str, characters: int) -> int:
+    usage = envelope.get("usage")
+    count = usage.get(name) if isinstance(usage, dict) else None
+    if isinstance(count, int) and not isinstance(count, bool) and count >= 0:
+        return count
+    return -(-characters // CHARACTERS_PER_TOKEN)
+
+
+def _server_words(body: object) -> str:
+    """The message within a server's error, however it is wrapped."""
+    for _ in range(3):
+        if not isinstance(body, dict):
+            break
+        body = body.get("error") or body.get("message") or body.get("detail") or str(body)
+    return str(body) if body else "no explanation"
+
+
+def _retry_after(headers: Mapping[str, str]) -> float | None:
+    """Seconds that a server asks to wait, given as a number or as a date."""
+    value = headers.get("retry-after", "")
+    try:
+        return max(0.0, float(value))
+    except ValueError:
+        pass
+    try:
+        moment = parsedate_to_datetime(value)
+    except ValueError:
+        return None
+    aware = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
+    return max(0.0, (aware - datetime.now(UTC)).total_seconds())

@@ -1,0 +1,19 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The scripted server and the paper's problems; and no key of the machine in any test."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE), str(HERE.parent / "acquisition")]
+
+
+@pytest.fixture(autouse=True)
+def no_settings_of_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("OPENAI_API_KEY", "SLAP_LANGUAGE_BASE_URL", "SLAP_LANGUAGE_MODEL"):
+        monkeypatch.delenv(name, raising=False)
