@@ -46,6 +46,7 @@ TRAIN = ["torch>=2.4", "stable-baselines3>=2.3", "tensorboard>=2.15"]
 RAY = ["ray>=2.40"]
 STUDIES = ["matplotlib>=3.8"]
 LIVE = ["foxglove-sdk>=0.30,<1"]  # serves `slap run --live` to Foxglove; MIT
+LANGUAGE = ["openai>=1.60"]  # asks a language model, by any server with that interface
 DOCS = [
     "mkdocs>=1.6,<2",
     "mkdocs-material>=9.7,<10",
@@ -67,6 +68,7 @@ TEST = [
     *DECOMPOSITION,
     *DOCS,
     *LIVE,
+    *LANGUAGE,
     "websocket-client>=1.8",  # watches a live run as Foxglove does
     "unified-planning>=1.1",
     "up-aries>=0.4",
@@ -131,6 +133,7 @@ setup(
             "py.typed",
             "domains/cleanup_table/shapes/*.obj",
             "domains/cleanup_table/shapes/NOTICE",
+            "language/prompts/*.jinja",
             "report/page.css",
             "report/page.html.j2",
             "report/page.js",
@@ -152,6 +155,7 @@ setup(
         "studies": STUDIES,
         "docs": DOCS,
         "live": LIVE,
+        "language": LANGUAGE,
         "meshes": MESHES,
         "test": TEST,
     },

@@ -20,7 +20,8 @@ FLOORS = (
     ("cli", "domain_check", "doctor"),
     ("report", "studies"),
     ("robot", "bags", "evaluation"),
-    ("shortcuts",),
+    ("acquisition", "shortcuts"),
+    ("language",),
     ("drawing", "planning"),
     ("perception", "messages"),
     ("domains",),
@@ -56,6 +57,15 @@ def test_imports_run_down(imports):
         or {i.importer, i.imported} <= set(NODES)
     ]
     assert not up, "\n".join(up)
+
+
+def test_who_never_imports_whom(imports):
+    """The two learners stand beside each other; a model is asked in relational words."""
+    pairs = {(i.importer, i.imported) for i in inside(imports)}
+    assert ("acquisition", "shortcuts") not in pairs
+    assert ("shortcuts", "acquisition") not in pairs
+    asking = {imported for importer, imported in pairs if importer == "language"}
+    assert asking <= {"relational", "errors"}
 
 
 def test_no_circle_of_packages_at_run_time(imports):

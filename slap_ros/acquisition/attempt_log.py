@@ -26,7 +26,7 @@ class AttemptLog:
     def __init__(
         self, path: Path | None = None, show: Callable[[Entry], None] | None = None
     ) -> None:
-        """Begin.
+        """Begin without lines.
 
         Args:
             path: A file of JSON lines, which is replaced; none if left out.

@@ -57,6 +57,9 @@ def propose(
         problem: What they are for.
         proposer: Of operators.
         rewarder: Of rewards; none where no skill is to be learned.
+
+    Returns:
+        The proposal, its provenance naming both.
     """
     proposal = proposer.operators(problem)
     if rewarder is None:
@@ -72,7 +75,7 @@ class ManualProposer:
     name = "manual"
 
     def __init__(self, operators: Sequence[LiftedOperator], source: str = "") -> None:
-        """Propose these.
+        """Propose these operators.
 
         Args:
             operators: Of the domain.
@@ -99,7 +102,7 @@ class ManualRewarder:
     name = "manual"
 
     def __init__(self, templates: Templates) -> None:
-        """Propose these, by operator name."""
+        """Propose these templates, by operator name."""
         self._templates = templates
 
     def rewards(
