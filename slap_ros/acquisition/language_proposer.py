@@ -15,7 +15,7 @@ from functools import partial
 from slap_ros.acquisition.drafts import DECOMPOSITION, check_decomposition, check_operator
 from slap_ros.acquisition.inquiry import Answer, Inquiry, Question, Rejected
 from slap_ros.acquisition.problem import AcquisitionProblem
-from slap_ros.acquisition.proposal import Proposal, Provenance, RewardTemplate
+from slap_ros.acquisition.proposal import Proposal, ProposalProvenance, RewardTemplate
 from slap_ros.acquisition.proposers import Templates
 from slap_ros.acquisition.rewards import check_rewards
 from slap_ros.acquisition.verification import Verification, verify
@@ -123,7 +123,7 @@ class LanguageProposer:
         assert verification.plan is not None
         requests = [answer.request for answer in answers.values()]
         warnings = [c for answer in answers.values() for c in answer.warnings]
-        provenance = Provenance(
+        provenance = ProposalProvenance(
             self.name,
             source=self._inquiry.client.source,
             model=self._inquiry.settings.model,

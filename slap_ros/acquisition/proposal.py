@@ -44,7 +44,7 @@ class RewardTemplate:
 
 
 @dataclass(frozen=True)
-class Provenance:
+class ProposalProvenance:
     """Where a proposal comes from.
 
     Args:
@@ -82,7 +82,7 @@ class Proposal:
     problem: str
     operators: tuple[LiftedOperator, ...]
     plan: tuple[str, ...] | None
-    provenance: Provenance
+    provenance: ProposalProvenance
     rewards: Mapping[str, RewardTemplate] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
 

@@ -10,7 +10,7 @@ from typing import Protocol
 
 from slap_ros.acquisition.complaints import serious
 from slap_ros.acquisition.problem import AcquisitionProblem
-from slap_ros.acquisition.proposal import Proposal, Provenance, RewardTemplate
+from slap_ros.acquisition.proposal import Proposal, ProposalProvenance, RewardTemplate
 from slap_ros.acquisition.rewards import compose_reward
 from slap_ros.acquisition.verification import verify
 from slap_ros.errors import InvalidDomainError, ProposalRejectedError
@@ -93,7 +93,7 @@ class ManualProposer:
 
     def operators(self, problem: AcquisitionProblem) -> Proposal:
         """The operators, checked."""
-        return checked(self._operators, problem, Provenance(self.name, source=self._source))
+        return checked(self._operators, problem, ProposalProvenance(self.name, source=self._source))
 
 
 class ManualRewarder:
@@ -135,7 +135,9 @@ class ComposedRewarder:
 
 
 def checked(
-    operators: tuple[LiftedOperator, ...], problem: AcquisitionProblem, provenance: Provenance
+    operators: tuple[LiftedOperator, ...],
+    problem: AcquisitionProblem,
+    provenance: ProposalProvenance,
 ) -> Proposal:
     """A proposal of operators that no model will be asked about again.
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Shortest sequences of operators: A* over abstract states with the heuristic h_max.
 
-A* is that of Hart, Nilsson and Raphael (1968); the heuristic, :class:`~.hmax.HMax`, is
+A* is that of Hart, Nilsson and Raphael (1968); the heuristic, :class:`~.hmax.HMaxHeuristic`, is
 consistent, so that an abstract state's first expansion is on a shortest way to it, and the sequence
 has as few operators as any. Where :mod:`~.ff` finds some sequence fast, this finds a shortest one,
 and a proof that there is none. Of several shortest sequences it always finds the same: of abstract
@@ -16,7 +16,7 @@ import heapq
 from collections.abc import Sequence
 
 from slap_ros.errors import PlanningLimitError, UnsolvableError
-from slap_ros.planning.hmax import HMax
+from slap_ros.planning.hmax import HMaxHeuristic
 from slap_ros.relational import GroundOperator
 
 MAX_EXPANSIONS = 100_000  # abstract states; some ten seconds with fifty operators
@@ -43,7 +43,7 @@ def find_shortest_sequence(
         UnsolvableError: No sequence leads to the goal.
         PlanningLimitError: None was found within ``max_expansions``.
     """
-    distance = HMax(goal, operators)
+    distance = HMaxHeuristic(goal, operators)
     at_least = distance(start)
     if at_least is None:
         raise UnsolvableError("the goal is out of reach, even if operators deleted nothing")

@@ -4,7 +4,7 @@
 
 from slap_ros.relational.atom_space import AtomSpace
 from slap_ros.relational.grounding import ground_operators
-from slap_ros.relational.metrics import Condition, Metric, Normalisation
+from slap_ros.relational.metrics import Condition, Metric, NormalisedForm
 from slap_ros.relational.objects import Column, Feature, Object, Type
 from slap_ros.relational.operators import (
     GroundOperator,
@@ -27,7 +27,7 @@ __all__ = [
     "LiftedAtom",
     "LiftedOperator",
     "Metric",
-    "Normalisation",
+    "NormalisedForm",
     "Object",
     "Predicate",
     "State",

@@ -30,7 +30,7 @@ TRUTH = "1"  # the unit of metrics that are 1 where something holds and 0 where 
 
 
 @dataclass(frozen=True)
-class Normalisation:
+class NormalisedForm:
     """How a metric becomes a number in [0, 1] that a reward can weigh: 1 is best."""
 
     formula: str  # of the metric d, as prompts show it
@@ -38,7 +38,7 @@ class Normalisation:
     rising: bool  # whether a larger metric is better
 
     @classmethod
-    def closeness(cls, scale: float) -> Normalisation:
+    def closeness(cls, scale: float) -> NormalisedForm:
         """1 - tanh(scale |d|): 1 at zero, falling with the distance or angle.
 
         Args:
@@ -52,7 +52,7 @@ class Normalisation:
         return cls(f"1 - tanh({scale:g} |d|)", closeness, rising=False)
 
     @classmethod
-    def fraction(cls, full: float) -> Normalisation:
+    def fraction(cls, full: float) -> NormalisedForm:
         """The share of the way that is done: d / full, kept within [0, 1].
 
         Args:
@@ -65,7 +65,7 @@ class Normalisation:
         return cls(f"d / {full:g}, kept within [0, 1]", fraction, rising=True)
 
     @classmethod
-    def truth(cls) -> Normalisation:
+    def truth(cls) -> NormalisedForm:
         """The metric itself, which is 0 or 1."""
 
         def truth(values: Array) -> Array:
@@ -90,7 +90,7 @@ class Metric:
     description: str  # one sentence, for people and for prompts
     value: Value = field(compare=False, repr=False)
     scalar: Scalar = field(compare=False, repr=False)
-    normalisation: Normalisation
+    form: NormalisedForm
     of_hand: bool = False  # whether the hand is one end of what is measured: it is no argument then
 
     def normalised(self, state: State, *columns: Column) -> Array:
@@ -103,7 +103,7 @@ class Metric:
         Returns:
             Shape (..., atoms).
         """
-        return self.normalisation.apply(self.value(state, *columns))
+        return self.form.apply(self.value(state, *columns))
 
     def of(self, state: State, *objects: Object) -> float:
         """Its value in a single state, in its unit, by the vectorised definition."""
@@ -187,7 +187,7 @@ class Condition:
     @property
     def rewarded(self) -> bool:
         """Whether the normalised metric grows towards the condition, and not away from it."""
-        if self.metric.normalisation.rising:
+        if self.metric.form.rising:
             return math.isinf(self.upper)
         return self.lower <= 0.0 <= self.upper
 

@@ -22,7 +22,7 @@ from slap_ros.relational import (
     LiftedAtom,
     LiftedOperator,
     Metric,
-    Normalisation,
+    NormalisedForm,
     Object,
     Predicate,
     State,
@@ -90,12 +90,12 @@ def opening_of_all(state: State, things: Column) -> Array:
     return state.stack(things, "opening")
 
 
-CLOSE = Normalisation.closeness(10.0)
-TURNED = Normalisation.closeness(4.0)
+CLOSE = NormalisedForm.closeness(10.0)
+TURNED = NormalisedForm.closeness(4.0)
 ONE, TWO = (THING,), (THING, THING)
 IS_GRASPED = Metric(
     "is_grasped", ONE, TRUTH, "Both fingers hold it.", is_grasped_of_all, is_grasped,
-    Normalisation.truth(), of_hand=True,
+    NormalisedForm.truth(), of_hand=True,
 )  # fmt: skip
 DIS_TO_OBJ = Metric(
     "dis_to_obj", ONE, "m", "Hand to thing.", dis_to_obj_of_all, dis_to_obj, CLOSE, of_hand=True
@@ -109,7 +109,7 @@ PERPENDICULAR = Metric(
 ANGLE = Metric("norm_angle", TWO, "rad", "Turned.", norm_angle_of_all, norm_angle, TURNED)
 OPENING = Metric(
     "joint_dis", ONE, "m", "How far it is open.", opening_of_all, opening,
-    Normalisation.fraction(0.16),
+    NormalisedForm.fraction(0.16),
 )  # fmt: skip
 CLOSURE = Metric("closure", ONE, "m", "How far it is open.", opening_of_all, opening, CLOSE)
 METRICS = (IS_GRASPED, DIS_TO_OBJ, PARALLEL, PERPENDICULAR, ANGLE, OPENING, CLOSURE)

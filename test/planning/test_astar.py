@@ -13,7 +13,7 @@ import pytest
 
 from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.planning.astar import find_shortest_sequence
-from slap_ros.planning.hmax import HMax
+from slap_ros.planning.hmax import HMaxHeuristic
 from slap_ros.relational import GroundOperator, LiftedOperator
 
 NOTHING: frozenset[Any] = frozenset()
@@ -63,7 +63,7 @@ def test_plans_are_as_short_as_breadth_first_search_finds() -> None:
         sequence = find_shortest_sequence(start, goal, operators)
         assert len(sequence) == expected
         assert sequence == find_shortest_sequence(start, goal, operators)
-        bound = HMax(goal, operators)(start)
+        bound = HMaxHeuristic(goal, operators)(start)
         assert bound is not None and bound <= expected
         state = start
         for index in sequence:

@@ -16,7 +16,7 @@ from slap_ros.relational import (
     Column,
     Feature,
     Metric,
-    Normalisation,
+    NormalisedForm,
     Object,
     Predicate,
     State,
@@ -59,7 +59,7 @@ def is_grasped_of_all(state: State, hands: Column, pegs: Column) -> Array:
     return np.where(near, state.stack(hands, "grasps"), 0.0)
 
 
-CLOSE = Normalisation.closeness(10.0)
+CLOSE = NormalisedForm.closeness(10.0)
 TO_PEG = Metric("xy_dis", (HAND, PEG), "m", "Hand to peg.", xy_dis_of_all, xy_dis, CLOSE)
 APART = Metric("peg_dis", (PEG, PEG), "m", "Peg to peg.", xy_dis_of_all, xy_dis, CLOSE)
 GRASPED = Metric(
@@ -69,7 +69,7 @@ GRASPED = Metric(
     "The hand holds it.",
     is_grasped_of_all,
     is_grasped,
-    Normalisation.truth(),
+    NormalisedForm.truth(),
 )
 NEAR = Predicate.of("Near", (PEG, HAND), [at_most(TO_PEG, 0.05, 1, 0)])
 
@@ -129,7 +129,7 @@ def is_true_of_hand() -> Condition:
     def held_of_all(state: State, pegs: Column) -> Array:
         return is_grasped_of_all(state, Column((hand,) * len(pegs.objects)), pegs)
 
-    truth = Normalisation.truth()
+    truth = NormalisedForm.truth()
     return is_true(Metric("held", (PEG,), TRUTH, "Held.", held_of_all, held, truth))
 
 
@@ -154,7 +154,8 @@ def test_texts_are_generated_from_conditions() -> None:
 @pytest.mark.parametrize("values", [[0.0, 0.01, 0.3], [0.3, 2.0, 900.0]])
 def test_normalised_forms_are_monotone_and_within_one(values: list[float]) -> None:
     array = np.array(values)
-    close, far = Normalisation.closeness(4.0).apply(array), Normalisation.fraction(0.3).apply(array)
+    close = NormalisedForm.closeness(4.0).apply(array)
+    far = NormalisedForm.fraction(0.3).apply(array)
     assert (np.diff(close) <= 0).all() and (close >= 0).all() and (close <= 1).all()
     assert (np.diff(far) >= 0).all() and (far >= 0).all() and (far <= 1).all()
 
