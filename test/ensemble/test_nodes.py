@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -43,13 +44,20 @@ def parameters(record=None, seed=3, pace=0.0):
     )
 
 
-def start(name, *arguments):
-    return subprocess.Popen(
+@contextmanager
+def started(name, *arguments):
+    """A node as a process, which does not outlive the test, however that ends."""
+    process = subprocess.Popen(
         [sys.executable, "-m", name, "--ros-args", "--log-level", "warn", *arguments],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
     )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
 
 
 def solve(client, spinner, episode=0, **limits):
@@ -89,12 +97,12 @@ def test_any_order_of_start_gives_the_same_complete_bag(network, tmp_path, order
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
 def test_a_node_stops_cleanly(network, tmp_path, name, stop):
     bag = ["-p", f"bag:={tmp_path / 'bag'}"] if name == "recorder_node" else []
-    process = start(name, *bag)
-    with temporary_node(Listener) as (client, spinner):
-        assert spinner.spin_until(lambda: name in client.other_nodes(), LIMIT)
-        time.sleep(0.2)
-    process.send_signal(stop)
-    out, err = process.communicate(timeout=LIMIT)
+    with started(name, *bag) as process:
+        with temporary_node(Listener) as (client, spinner):
+            assert spinner.spin_until(lambda: name in client.other_nodes(), LIMIT)
+            time.sleep(0.2)
+        process.send_signal(stop)
+        out, err = process.communicate(timeout=LIMIT)
     assert process.returncode == 0, err
     assert "Traceback" not in out + err
 
@@ -300,8 +308,8 @@ def test_a_full_disk_ends_the_run_and_keeps_what_was_recorded(network, tmp_path)
     ],
 )
 def test_a_wrong_parameter_is_refused_in_one_line(network, arguments, code, words):
-    process = start(*arguments)
-    _, err = process.communicate(timeout=LIMIT)
+    with started(*arguments) as process:
+        _, err = process.communicate(timeout=LIMIT)
     assert process.returncode == code, err
     (line,) = err.strip().splitlines()
     assert line.startswith(f"{arguments[0]}: ")
