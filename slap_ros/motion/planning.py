@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Collision-free paths. Budgets are counts and a seed fixes the result, on any machine's load."""
+"""Collision-free paths. Budgets are counts and a seed fixes the result, whatever the load."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from slap_ros.motion.via_point import via_point_path
 
 ATTEMPTS = 4  # paths, of which the one of fewest control steps is kept
 MAX_SAMPLES = 500  # of the joint space, an attempt
-SHORTCUTS = 20  # tries to shorten a path
+SHORTENING_TRIES = 20  # tries to shorten a path
 GOOD_ENOUGH = 1.05  # control steps over those of the straight way, at which no more paths are tried
 
 
@@ -39,21 +39,21 @@ def plan_path(
     seed: int | Sequence[int],
     attempts: int = ATTEMPTS,
     max_samples: int = MAX_SAMPLES,
-    shortcuts: int = SHORTCUTS,
+    shortening_tries: int = SHORTENING_TRIES,
     resolution: float = RESOLUTION,
 ) -> Path:
-    """A collision-free path: straight, or with a bend, or else the best of a few random ones.
+    """A collision-free path: straight, over a via point, or else the best of a few random ones.
 
-    Bent and random paths are then shortened.
+    Paths over a via point and random paths are then shortened.
 
     Args:
         start: rad, shape (7,).
         goal: rad, shape (7,).
         free: Which configurations are free of collisions.
         seed: Fixes the result.
-        attempts: Random paths to find if one bend will not do; fewer if one is nearly straight.
+        attempts: Random paths to find if a via point will not do; fewer if one is nearly straight.
         max_samples: Samples of the joint space after which an attempt fails.
-        shortcuts: Tries to shorten each path.
+        shortening_tries: Pairs of points to try to join, for each path.
         resolution: Control steps between checked configurations.
 
     Returns:
@@ -75,30 +75,44 @@ def plan_path(
     rng = np.random.default_rng(seed)
 
     def shortened(path: Path) -> Path:
-        shorter = shorten(path, free, rng, tries=shortcuts, resolution=resolution)
+        shorter = shorten(path, free, rng, tries=shortening_tries, resolution=resolution)
         shorter = straighten(shorter, free, resolution=resolution)
-        # What is left of a piece is looked at in other places than the whole of it was.
+        # A piece of a piece is checked at other configurations than the whole of it was.
         return shorter if free(path_configurations(shorter, resolution)).all() else path
+
+    def random_path() -> Path | None:
+        found = rrt_connect(start, goal, free, rng, max_samples=max_samples, resolution=resolution)
+        return found if found is None else shortened(straighten(found, free, resolution=resolution))
 
     bent = via_point_path(start, goal, free, rng, resolution=resolution)
     if bent is not None:
         return shortened(bent)
-    enough = GOOD_ENOUGH * float(control_steps(start, goal))
-    best: Path | None = None
-    for _ in range(attempts):
-        found = rrt_connect(start, goal, free, rng, max_samples=max_samples, resolution=resolution)
-        if found is None:
-            break
-        found = shortened(straighten(found, free, resolution=resolution))
-        if best is None or path_steps(found) < path_steps(best):
-            best = found
-        if path_steps(best) <= enough:
-            break
+    best = _shortest(random_path, attempts, GOOD_ENOUGH * float(control_steps(start, goal)))
     if best is None:
         raise MotionPlanningError(
             f"no collision-free path after {max_samples} samples; the goal may be out of reach "
             "behind obstacles, or takes more samples"
         )
+    return best
+
+
+def _shortest(make_path: Callable[[], Path | None], attempts: int, enough: float) -> Path | None:
+    """The shortest of some paths; no more are made after a failure, or once one is good enough.
+
+    Args:
+        make_path: Another path, or None if there was none.
+        attempts: Paths at most.
+        enough: Control steps of a path that is good enough.
+    """
+    best: Path | None = None
+    for _ in range(attempts):
+        found = make_path()
+        if found is None:
+            break
+        if best is None or path_steps(found) < path_steps(best):
+            best = found
+        if path_steps(best) <= enough:
+            break
     return best
 
 

@@ -161,7 +161,7 @@ class GraspKinematics:
         self.grasp = self._links[-1].compose(_HAND_FRAME).compose(_GRASP_FRAME)
 
     def jacobian(self) -> NDArray[np.float64]:
-        """See :func:`jacobian`."""
+        """The Jacobian of this configuration; see :func:`jacobian`."""
         gx, gy, gz = self.grasp.position
         columns = []
         for link in self._links[1:]:

@@ -84,7 +84,7 @@ def _solid(shape: Shape) -> Solid:
 class Simulation:
     """A PyBullet client with the bodies of a scene.
 
-    It remembers nothing that matters between calls but where the fixed bodies are and what the
+    It keeps nothing that matters between calls but where the fixed bodies are and what the
     free ones are made of.
     """
 

@@ -237,7 +237,7 @@ class PandaWorld:
     def _stable(self, now: Snapshot, loose: list[int]) -> bool:
         """Whether bodies without velocity would stay where they are if there were no arm.
 
-        So they do where they came to rest by themselves. They do not in mid-air, over an edge,
+        They stay where they came to rest by themselves, but not in mid-air, over an edge,
         or where they came to rest leaning on the arm.
         """
         poses = tuple(now.bodies[i].pose for i in loose)

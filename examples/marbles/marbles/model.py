@@ -78,7 +78,7 @@ OPERATORS = _operators()
 
 
 def all_in_the_gutter(state: State) -> frozenset[GroundAtom]:
-    """The goal."""
+    """The goal: every marble is in the gutter."""
     return frozenset(IN_GUTTER(marble) for marble in state.layout.of_type(MARBLE_TYPE))
 
 
@@ -91,7 +91,7 @@ class Tasks:
     y: tuple[float, float] = (0.3, 0.7)
 
     def sample(self, rng: np.random.Generator) -> Task:
-        """A task."""
+        """A task with so many marbles, anywhere within the ranges."""
         count = int(rng.integers(self.marbles[0], self.marbles[1] + 1))
         places = [(rng.uniform(*self.x), rng.uniform(*self.y)) for _ in range(count)]
         return _task(places)
@@ -102,7 +102,7 @@ class Row:
     """Three marbles in a row, always the same."""
 
     def sample(self, _: np.random.Generator) -> Task:
-        """That task."""
+        """The task with the row."""
         return _task([(0.5, 0.4), (0.5, 0.5), (0.5, 0.6)])
 
 

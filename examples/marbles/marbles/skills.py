@@ -26,6 +26,13 @@ class Waypoints:
     """Visit points, then act with the fan once."""
 
     def __init__(self, hand: Object, points: Sequence[Point], gripper: float) -> None:
+        """Begin at the first point.
+
+        Args:
+            hand: The robot.
+            points: Positions of the hand, m.
+            gripper: The gripper command after the last point.
+        """
         self._hand, self._points, self._gripper = hand, list(points), [gripper]
 
     def __call__(self, state: State) -> Action | None:
@@ -53,12 +60,12 @@ class Take:
         return int(np.ceil((away - ARRIVED) / MAX_STEP)) + 1
 
     def start(self, state: State, objects: tuple[Object, ...]) -> Policy:
-        """See above."""
+        """Up if need be, over the marble, down, then close."""
         hand, marble = objects
         x, y = state[marble][:2].tolist()
         hand_x, hand_y, hand_z = state[hand].tolist()
-        rise = [(hand_x, hand_y, HIGH)] if hand_z < HIGH else []
-        return Waypoints(hand, [*rise, (x, y, HIGH), (x, y, 0.0)], GRIP)
+        up = [(hand_x, hand_y, HIGH)] if hand_z < HIGH else []
+        return Waypoints(hand, [*up, (x, y, HIGH), (x, y, 0.0)], GRIP)
 
 
 @dataclass(frozen=True)
@@ -76,7 +83,7 @@ class Drop:
         return max(0, int(np.ceil((away - ARRIVED) / MAX_STEP))) + 1
 
     def start(self, state: State, objects: tuple[Object, ...]) -> Policy:
-        """See above."""
+        """Straight over the gutter, then open."""
         hand, _ = objects
         return Waypoints(hand, [(IN_GUTTER, float(state.get(hand, "y")), HIGH)], RELEASE)
 

@@ -48,6 +48,12 @@ def make(
         changes: Settings of the preset to change.
         shapes: Other toys by kind, and the ``wiper``; those that are shipped, if None. Any mesh
             will do (``slap_ros.meshes``) that the fingers fit around from above.
+
+    Returns:
+        The domain.
+
+    Raises:
+        InvalidParameterError: No such setting, or it cannot have that value.
     """
     shapes = shipped() if shapes is None else shapes
     settings, actions = varied(SETTINGS[preset], changes), ACTION_SPACES[preset]

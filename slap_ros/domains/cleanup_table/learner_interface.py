@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Cleanup Table as a learner sees it: joints, and everything else from the hand and the bin."""
+"""Cleanup Table as a learner observes it: joints, and everything else from the hand and the bin."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ from slap_ros.physics.scene import Material
 from slap_ros.relational import GroundAtom, Object, State
 
 STEP_LIMIT = 600  # environment steps
-TRIES = 1_000  # places drawn for a toy before all are drawn anew
+TRIES = 1_000  # places drawn for a toy before all are drawn again
 ROUNDS = 100  # before there is said to be no room
 
 
@@ -50,6 +50,9 @@ def make_task(
         places: Where each block stands, by its name.
         shapes: What each kind of block looks like.
         material: Of all blocks.
+
+    Returns:
+        A task whose goal is that all of them are in the bin.
     """
     features: dict[Object, Mapping[str, float]] = {ROBOT("robot"): robot_features(HOME)}
     for name, place in places.items():
@@ -104,7 +107,7 @@ class RandomCleanupTasks(TaskSettings):
         return make_task({**places, WIPER: (x, y, yaw)}, shapes, material)
 
     def _apart(self, rng: np.random.Generator, count: int) -> list[PlanarPose]:
-        """Places that keep their distance, drawn anew where the last toys find none."""
+        """Places that keep their distance, drawn again where the last toys find none."""
         for _ in range(ROUNDS):
             placed: list[PlanarPose] = []
             for _ in range(TRIES):
@@ -124,7 +127,7 @@ class PaperCleanupTasks(TaskSettings):
     wiper: PlanarPose = (0.5, -0.12, 0.0)
 
     def sample(self, _: np.random.Generator, shapes: Mapping[str, Solid]) -> Task:
-        """That state."""
+        """The task of the single start state."""
         names = _names(shapes, len(self.toys))
         return make_task({**dict(zip(names, self.toys, strict=True)), WIPER: self.wiper}, shapes)
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Cluttered Drawer as a learner sees it: joints, and everything else from the hand."""
+"""Cluttered Drawer as a learner observes it: joints, and everything else from the hand."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def _target(state: State) -> Column:
     return observation.single(state.layout.of_type(TARGET)[0])
 
 
-def _slack(atom: GroundAtom) -> float:
+def _success_tolerance(atom: GroundAtom) -> float:
     return FINGER_ROOM if atom.predicate.name in CLEAR else 0.0
 
 
@@ -73,7 +73,7 @@ LEARNER_INTERFACE = LearnerInterface(
     at_rest=observation.at_rest,
     failed=observation.fallen_below(BOTTOM),
     joint_limit_penalty=observation.joint_limit_penalty,
-    success_tolerance=_slack,
+    success_tolerance=_success_tolerance,
     grasping=GRASPING,
     length_m=0.05,
 )

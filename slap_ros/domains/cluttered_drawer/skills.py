@@ -69,7 +69,7 @@ def _to_block(turns: Sequence[float]) -> Transits:
 
 
 def _over_block(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:
-    """Over a grasp of the block; where it is hemmed in, the fingers over the gaps at its edges."""
+    """Over a grasp of the block; between other blocks, the fingers over the gaps at its edges."""
     for turns in (ANY, DIAGONALLY):
         yield _transit_to_grasp(state, objects[1], turns)
 

@@ -34,9 +34,9 @@ from slap_ros.relational import GroundAtom, Object, State
 STEP_LIMIT = 500  # environment steps (SLAP Table 8)
 TRIES = 10_000  # arrangements drawn before there is said to be no room
 NEIGHBOUR = 0.0675  # between the middles of the target block and of a blocker (reference)
-APART = 0.15  # from the target block to a block that does not hem it in
+APART = 0.15  # from the target block to a block that blocks no side of it
 WALL_GAP = 0.04  # between a wall and a block's middle
-ENDS = 0.06  # along y: of the drawer's two ends, where blocks stand about that hem nothing in
+ENDS = 0.06  # along y: of the drawer's two ends, where the blocks stand that block no side
 
 Range = tuple[float, float]
 PlanarPose = tuple[float, float, float]  # x, y, yaw in rad
@@ -89,9 +89,9 @@ TOWARDS: tuple[complex, ...] = tuple(blocking.TOWARDS.tolist())
 
 @dataclass(frozen=True)
 class RandomDrawerTasks(TaskSettings):
-    """Everything sampled anew for each task. Lengths in m, angles in rad, masses in kg."""
+    """Everything is sampled for each task. Lengths in m, angles in rad, masses in kg."""
 
-    obstacles: tuple[int, int] = (4, 6)  # inclusive: four hem the target in, others stand about
+    obstacles: tuple[int, int] = (4, 6)  # inclusive: up to four surround the target
     target_x: Range = (MIDDLE - 0.01, MIDDLE + 0.01)
     target_y: Range = (-0.04, 0.04)
     yaw: Range = (-0.35, 0.35)
@@ -106,7 +106,11 @@ class RandomDrawerTasks(TaskSettings):
     half_width: float = FingerClearance.half_width
 
     def sample(self, rng: np.random.Generator) -> Task:
-        """A task."""
+        """A task in which every blocker blocks exactly one side.
+
+        Raises:
+            InvalidParameterError: There is no room for so many obstacles.
+        """
         obstacles = int(rng.integers(self.obstacles[0], self.obstacles[1] + 1))
         for _ in range(TRIES):
             arrangement = self._draw(rng, obstacles)
@@ -118,8 +122,8 @@ class RandomDrawerTasks(TaskSettings):
         """An arrangement; None where a block does not stand as it should."""
         x, y, yaw = (float(rng.uniform(*r)) for r in (self.target_x, self.target_y, self.yaw))
         target = (x, y, yaw)
-        hemming = min(obstacles, len(SIDES))
-        sides = sorted(rng.permutation(len(SIDES))[:hemming].tolist())
+        blocking_count = min(obstacles, len(SIDES))
+        sides = sorted(rng.permutation(len(SIDES))[:blocking_count].tolist())
         blockers = tuple(
             _neighbour(
                 target,
@@ -131,7 +135,7 @@ class RandomDrawerTasks(TaskSettings):
             for side in sides
         )
         others: list[PlanarPose] = []
-        for _ in range(obstacles - hemming):
+        for _ in range(obstacles - blocking_count):
             other = (
                 MIDDLE + float(rng.uniform(-1, 1)) * (OPENING / 2 - WALL_GAP),
                 float(rng.choice([-1, 1]) * (HALF_WIDTH - WALL_GAP - rng.uniform(0, ENDS))),
@@ -164,7 +168,7 @@ class PaperDrawerTasks(TaskSettings):
     half_width: float = FingerClearance.half_width
 
     def sample(self, _: np.random.Generator) -> Task:
-        """That state."""
+        """The task of the single start state."""
         return self.scenery.task()
 
 

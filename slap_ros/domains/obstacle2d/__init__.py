@@ -18,8 +18,8 @@ from slap_ros.domains.obstacle2d.bodies import visible_bodies
 from slap_ros.domains.obstacle2d.dynamics import (
     ACTION_SPACE,
     CONTROL_PERIOD,
+    Obstacle2DVectorWorld,
     Obstacle2DWorld,
-    Obstacle2DWorlds,
     settle,
 )
 from slap_ros.domains.obstacle2d.learner_interface import LEARNER_INTERFACE
@@ -51,7 +51,7 @@ def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Doma
         ),
         learning=Learning(
             interface=LEARNER_INTERFACE,
-            make_vector_world=Obstacle2DWorlds,
+            make_vector_world=Obstacle2DVectorWorld,
         ),
         configuration=settings.as_configuration(),
     )

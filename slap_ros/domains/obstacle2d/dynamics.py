@@ -152,7 +152,7 @@ def _push(x: Array, pushable: NDArray[np.bool_], pusher: Array) -> Array:
 
 
 def require_valid(state: State) -> None:
-    """Refuse scenes that cannot be.
+    """Refuse states that no scene can be in.
 
     Raises:
         InvalidStateError: Not one robot, no block, two blocks held, bodies outside the unit
@@ -198,7 +198,7 @@ def _apart(places: Array) -> Array:
     return apart
 
 
-class Obstacle2DWorlds:
+class Obstacle2DVectorWorld:
     """Many worlds of the same objects."""
 
     def __init__(self, states: Sequence[State]) -> None:
@@ -241,11 +241,11 @@ class Obstacle2DWorld:
 
     @property
     def state(self) -> State:
-        """The current state."""
+        """The current state, all that the next step depends on."""
         return self._state
 
     def reset(self, state: State) -> None:
-        """Continue from ``state``."""
+        """Continue from ``state``, which is taken to be valid."""
         self._state = state
 
     def step(self, action: Action) -> State:

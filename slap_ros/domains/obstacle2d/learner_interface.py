@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Obstacle 2D as a learner sees it. Lengths in m, divided by a block's size or the reach."""
+"""Obstacle 2D as a learner observes it. Lengths in m, divided by a block's size or the reach."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ def _reach(state: State, block: Column, surface: Column) -> Array:
 def _rest_margin(state: State, block: Column) -> Array:
     """Positive where the block lies on the table: not held, bottom at the table's top.
 
-    It rises so steeply that the margin of a block at rest is that of the distances sideways.
+    It increases so steeply that the margin of a block at rest is that of the distances sideways.
     """
     height = np.where(state.stack(block, "held") > 0.5, BLOCK_SIZE, state.stack(block, "y"))
     margin = RESTING_TOLERANCE - height
@@ -74,12 +74,12 @@ def _overlap_margin(state: State, block: Column, surface: Column) -> Array:
 
 def _inside_margin(state: State, block: Column, surface: Column) -> Array:
     distance = np.abs(state.stack(block, "x") - state.stack(surface, "x"))
-    slack = (state.stack(surface, "width") - BLOCK_SIZE) / 2 + INSIDE_TOLERANCE
-    return _both(_rest_margin(state, block), slack - distance)
+    room = (state.stack(surface, "width") - BLOCK_SIZE) / 2 + INSIDE_TOLERANCE
+    return _both(_rest_margin(state, block), room - distance)
 
 
 def _both(one: Array, other: Array) -> Array:
-    """The lesser where both are met, else what is missing of either: both are to be made good."""
+    """The lesser where both are met, else the sum of what is missing of each."""
     missing = np.minimum(one, 0.0) + np.minimum(other, 0.0)
     return np.where(missing < 0.0, missing, np.minimum(one, other))
 

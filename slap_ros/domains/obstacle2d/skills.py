@@ -27,7 +27,13 @@ class WaypointPolicy:
     """Visit points with the gripper, then give a gripper command once."""
 
     def __init__(self, robot: Object, waypoints: Sequence[Point], gripper: float) -> None:
-        """``waypoints`` are gripper positions in m."""
+        """Begin at the first waypoint.
+
+        Args:
+            robot: Whose gripper it is.
+            waypoints: Gripper positions, m.
+            gripper: The gripper command after the last waypoint.
+        """
         self._robot = robot
         self._waypoints = list(waypoints)
         self._gripper = gripper
@@ -70,12 +76,12 @@ class PickSkill:
         return _steps_between(_position(state, robot), _grasp(state, block)) + 1
 
     def start(self, state: State, objects: tuple[Object, ...]) -> Policy:
-        """Rise over the blocks if need be, cross, grasp."""
+        """Move up over the blocks if need be, cross, grasp."""
         robot, block, _ = objects
         x, y = _position(state, robot)
         grasp = _grasp(state, block)
-        rise = [(x, grasp[1])] if y < grasp[1] - CONTACT else []
-        return WaypointPolicy(robot, [*rise, grasp], GRIP)
+        up = [(x, grasp[1])] if y < grasp[1] - CONTACT else []
+        return WaypointPolicy(robot, [*up, grasp], GRIP)
 
 
 def _grasp(state: State, block: Object) -> Point:

@@ -40,7 +40,7 @@ def target_block_in_target_area(state: State) -> frozenset[GroundAtom]:
 
 @dataclass(frozen=True)
 class RandomObstacle2DTasks(TaskSettings):
-    """Everything sampled anew for each task. Lengths in m."""
+    """Everything is sampled for each task. Lengths in m."""
 
     bystanders: tuple[int, int] = (0, 2)  # how many blocks stand about besides, inclusive
     robot_x: Range = (0.0, 1.0)
@@ -101,7 +101,16 @@ SETTINGS: Mapping[str, RandomObstacle2DTasks | PaperObstacle2DTasks] = {
 
 
 def make_task(robot: tuple[float, float], target_x: float, blocks_x: list[float]) -> Task:
-    """A task from positions in m; the first block is the one to go into the target area."""
+    """A task from positions.
+
+    Args:
+        robot: x and y, m.
+        target_x: Of the middle of the target area, m.
+        blocks_x: Of the blocks on the table, m; the first is to go into the target area.
+
+    Returns:
+        The task.
+    """
     features: dict[Object, dict[str, float]] = {ROBOT("robot"): {"x": robot[0], "y": robot[1]}}
     for i, x in enumerate(blocks_x, start=1):
         features[BLOCK(f"block{i}")] = {"x": x, "y": 0.0, "held": 0.0}

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Obstacle Tower as a learner sees it: joints, and everything else from the hand."""
+"""Obstacle Tower as a learner observes it: joints, and everything else from the hand."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def _target(state: State) -> Column:
 def _distance(state: State, hand: Array, column: Column) -> Array:
     """From the hand to blocks and targets: so high that the table is not in the way.
 
-    Who is where a block should not be keeps it from coming to lie there.
+    A hand that is where a block should go keeps the block from coming to lie there.
     """
     thing = column.objects[0].type
     if thing.is_a(ROBOT):
@@ -92,7 +92,7 @@ def _distance(state: State, hand: Array, column: Column) -> Array:
     return np.where(state.stack(column, "is_target") > 0.5, distance, np.inf)
 
 
-def _slack(atom: GroundAtom) -> float:
+def _success_tolerance(atom: GroundAtom) -> float:
     """Fingers need room around the target; blocks may lie as they like."""
     frees_target = atom.predicate == NOTHING_ON and atom.objects[0].type.is_a(SURFACE)
     return FINGER_ROOM if frees_target else 0.0
@@ -107,6 +107,6 @@ LEARNER_INTERFACE = LearnerInterface(
     at_rest=observation.at_rest,
     failed=observation.fallen_below(FALLEN),
     joint_limit_penalty=observation.joint_limit_penalty,
-    success_tolerance=_slack,
+    success_tolerance=_success_tolerance,
     grasping=frozenset({HOLDING, NOT_HOLDING, GRIPPER_EMPTY}),
 )

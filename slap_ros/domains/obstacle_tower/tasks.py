@@ -76,7 +76,7 @@ def target_block_on_target(state: State) -> frozenset[GroundAtom]:
 
 @dataclass(frozen=True)
 class RandomTowerTasks(TaskSettings):
-    """Everything sampled anew for each task. Lengths in m, angles in rad, masses in kg."""
+    """Everything is sampled for each task. Lengths in m, angles in rad, masses in kg."""
 
     obstacles: tuple[int, int] = (3, 3)  # blocks of the tower, inclusive
     distractors: tuple[int, int] = (0, 2)  # blocks that stand about besides, inclusive
@@ -92,7 +92,11 @@ class RandomTowerTasks(TaskSettings):
     friction: Range = (CUBE_MATERIAL.friction, CUBE_MATERIAL.friction)
 
     def sample(self, rng: np.random.Generator) -> Task:
-        """A task."""
+        """A task with a tower on the target.
+
+        Raises:
+            InvalidParameterError: There is no room for so many distractors.
+        """
         obstacles = int(rng.integers(self.obstacles[0], self.obstacles[1] + 1))
         distractors = int(rng.integers(self.distractors[0], self.distractors[1] + 1))
         target = tuple(rng.uniform(*r) for r in (self.target_x, self.target_y, self.yaw))
@@ -140,7 +144,7 @@ class PaperTowerTasks(TaskSettings):
     )
 
     def sample(self, _: np.random.Generator) -> Task:
-        """That state."""
+        """The task of the single start state."""
         return self.arrangement.task()
 
     def as_configuration(self) -> Mapping[str, str]:

@@ -46,7 +46,10 @@ def grasps_to_stand(
         body: That body; only how high it is matters.
         place: Of its middle: x, y in m.
         height: Of what it is to stand on, m.
-        yaws: Of its faces, rad: one pose for each.
+        yaws: Of its faces, rad.
+
+    Returns:
+        A pose of the grasp point for each yaw, base's frame.
     """
     grasp = grasp_of(state)
     in_hand = yaw_of(from_above(ORIGIN, 0.0).compose(grasp))

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Places on a level rectangle at which something can be put down. Lengths in m."""
+"""Placements: where on a level rectangle something can be put down. Lengths in m."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Iterable
 
 GAP = 0.1  # between the middles of things that stand apart at least, so that fingers fit between
 SPACING = 0.05  # of the grid of places
-MOST = 40  # places, tried in order of distance
+MAX_PLACEMENTS = 40  # tried in order of distance
 
 Placement = tuple[float, float]  # x, y
 
@@ -28,7 +28,10 @@ def free_placements(
         middle: Of the rectangle, a place of the grid.
         half: Half the edges of the rectangle that the places are in.
         taken: Middles of what stands there, and the distance from each at least.
-        spacing: Of the grid.
+        spacing: Of the grid, m.
+
+    Returns:
+        At most MAX_PLACEMENTS, nearest first.
     """
     (x, y), standing = near, list(taken)
     places = [
@@ -37,7 +40,9 @@ def free_placements(
         for py in _grid(middle[1], half[1], spacing)
         if all(math.hypot(px - tx, py - ty) >= gap for (tx, ty), gap in standing)
     ]
-    return sorted(places, key=lambda place: (math.hypot(place[0] - x, place[1] - y), place))[:MOST]
+    return sorted(places, key=lambda place: (math.hypot(place[0] - x, place[1] - y), place))[
+        :MAX_PLACEMENTS
+    ]
 
 
 def _grid(middle: float, half: float, spacing: float) -> list[float]:

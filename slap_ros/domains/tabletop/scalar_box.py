@@ -31,6 +31,7 @@ class ScalarBox:
         b: float,
         c: float,
     ) -> None:
+        """Compute its heights; see the class for the arguments."""
         self.x, self.y = x, y
         self._q, self._half = (qw, qz, qx, qy), (a, b, c)
         self._up = qw * qw + qz * qz - qx * qx - qy * qy  # how high its z axis points, -1 to 1

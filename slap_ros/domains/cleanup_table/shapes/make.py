@@ -135,7 +135,7 @@ SHAPES: Mapping[str, list[ConvexPiece]] = {
 
 
 def main() -> None:
-    """Write them."""
+    """Write every shape to a file beside this one."""
     for name, pieces in SHAPES.items():
         Path(__file__).with_name(f"{name}.obj").write_text(to_obj(pieces), encoding="utf-8")
 
