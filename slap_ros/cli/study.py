@@ -21,6 +21,7 @@ from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.approaches import approaches
 from slap_ros.shortcuts.settings import ExplorationSettings, training_settings
 from slap_ros.shortcuts.shipped import shipped_library
+from slap_ros.shortcuts.task_distribution import TaskDistribution
 from slap_ros.studies import dynamics, generalisation, perception, planning_time, pruning
 from slap_ros.studies import goals as sampled
 from slap_ros.studies.comparison import Comparison
@@ -228,10 +229,10 @@ def _given(options: ComparisonOptions, settings: Data) -> Data:
 def _explore(
     domain: str, options: TaskOptions, how: ExplorationSettings
 ) -> tuple[pruning.PrunedCandidates, ...]:
+    preset, seeds = options.preset, range(options.seeds)
+    trainings = [TaskDistribution(domain, preset, seed) for seed in seeds]
     with _StudyBars() as bars:
-        return pruning.explore(
-            domain, options.preset, options.seeds, options.tasks, how, options.jobs, bars
-        )
+        return pruning.explore(trainings, options.tasks, how, options.jobs, bars)
 
 
 def _trainings(folders: Sequence[TrainingFolder]) -> Data:

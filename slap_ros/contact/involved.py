@@ -76,7 +76,13 @@ def part_bounds(body: Compound, pose: Pose) -> list[Bounds]:
 
 
 def jointed_bounds(body: JointedBody, pose: Pose, opening: float) -> Bounds:
-    """The bounds of frame and moving part."""
+    """The bounds of frame and moving part.
+
+    Args:
+        body: Whose.
+        pose: Of its frame.
+        opening: Of its joint, in rad or m.
+    """
     moving = body.moving_pose(pose, opening)
     placed = [(part.bounding_box, pose) for part in body.frame]
     placed += [(part.bounding_box, moving) for part in body.moving]

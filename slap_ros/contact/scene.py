@@ -300,7 +300,17 @@ def box(
     pose: Pose = IDENTITY,
     solid: bool = True,
 ) -> Compound:
-    """A body that is one cuboid; see :class:`Compound` and :class:`BoxPart`."""
+    """A body that is one cuboid; see :class:`Compound` and :class:`BoxPart`.
+
+    Args:
+        name: The body's.
+        half_extents_m: Half its edges along its own axes.
+        mass_kg: 0 for a body that never moves.
+        friction: Coefficient of its surface.
+        colour: Red, green, blue, alpha, each from 0 to 1.
+        pose: Where a body without mass stands.
+        solid: Whether others collide with it.
+    """
     return Compound(
         name,
         (BoxPart(half_extents_m),),
@@ -323,7 +333,18 @@ def cylinder(
     pose: Pose = IDENTITY,
     solid: bool = True,
 ) -> Compound:
-    """A body that is one cylinder about its own z; see :class:`Compound`."""
+    """A body that is one cylinder about its own z; see :class:`Compound`.
+
+    Args:
+        name: The body's.
+        radius_m: Of the cylinder.
+        length_m: Along its own z.
+        mass_kg: 0 for a body that never moves.
+        friction: Coefficient of its surface.
+        colour: Red, green, blue, alpha, each from 0 to 1.
+        pose: Where a body without mass stands.
+        solid: Whether others collide with it.
+    """
     return Compound(
         name,
         (CylinderPart(radius_m, length_m),),

@@ -17,7 +17,7 @@ import numpy as np
 
 from slap_ros.evaluation.summary import Spread
 from slap_ros.perception import NoisyPerceiver, Quality
-from slap_ros.planning.execution import Executor
+from slap_ros.planning.execution import EpisodeResult, Executor
 from slap_ros.studies.comparison import (
     Comparison,
     PlanningSetup,
@@ -229,7 +229,11 @@ def solve_perceived(
         NoisyPerceiver.of(chosen, space, initial, quality, rng),
         quality.debounce_delay_steps,
     ).run()
-    holds = space.abstract(world.state) & goal == goal
+    return _trial(seed, index, episode, space.abstract(world.state) & goal == goal)
+
+
+def _trial(seed: int, index: int, episode: EpisodeResult, holds: bool) -> NoisyTrial:
+    """What came of an episode, at whose end the goal holds in the world or does not."""
     reason = episode.error.reason or ("" if holds else "solved, as far as was seen, and is not")
     return NoisyTrial(
         seed,

@@ -75,20 +75,16 @@ class PrunedCandidates:
 
 
 def explore(
-    domain: str,
-    preset: str,
-    seeds: int,
+    trainings: Sequence[TaskDistribution],
     tasks: int,
     settings: ExplorationSettings,
     jobs: int,
     progress: StudyProgress,
 ) -> tuple[PrunedCandidates, ...]:
-    """Explore the first tasks of trainings with seeds from 0 on, as training does.
+    """Explore the first tasks of trainings, as these do.
 
     Args:
-        domain: Name of the domain.
-        preset: Of the domain.
-        seeds: Number of trainings.
+        trainings: The tasks that each draws; all of one domain.
         tasks: Number of tasks per training.
         settings: How to explore.
         jobs: Number of processes.
@@ -100,21 +96,17 @@ def explore(
     Raises:
         UnsolvableError: No task can be planned for, so none can be explored.
     """
-    work = [
-        (TaskDistribution(domain, preset, seed), index, settings)
-        for seed in range(seeds)
-        for index in range(tasks)
-    ]
+    work = [(training, index, settings) for training in trainings for index in range(tasks)]
     ended = []
-    progress.begin(f"exploring {domain}", len(work))
+    progress.begin(f"exploring {trainings[0].domain}", len(work))
     with local_workers(jobs) as workers:
         for number, outcome in workers.run(_explore, work):
             ended.append((number, outcome))
             progress.advance()
             if isinstance(outcome, str):
-                distribution, index, _ = work[number]
-                seed = distribution.seed
-                progress.report_failure(f"seed {seed}, task {index} not explored: {outcome}")
+                training, index, _ = work[number]
+                where = f"seed {training.seed}, task {index}"
+                progress.report_failure(f"{where} not explored: {outcome}")
     explored = [outcome for outcome in in_order(ended) if isinstance(outcome, PrunedCandidates)]
     if not explored:
         raise UnsolvableError(f"none of the {len(work)} tasks could be explored")

@@ -314,11 +314,9 @@ def test_pruning_counts_what_a_training_has_explored(tmp_path, training):
     for row in data["found"]["thresholds"]:
         assert row["remaining"] == sum(hit >= row["k"] for hit in hits)
     assert data["found"]["thresholds"][0]["remaining"] == len(hits) > 0
-    fresh = pruning.explore("obstacle2d", "fair", 1, 1, how, 1, SilentProgress())
-    assert (
-        fresh[0].explored.pairs
-        == jobs.explore(TaskDistribution("obstacle2d", "fair", 0), 0, how)["candidates"]
-    )
+    other = TaskDistribution("obstacle2d", "fair", 0)
+    fresh = pruning.explore([other], 1, how, 1, SilentProgress())
+    assert fresh[0].explored.pairs == jobs.explore(other, 0, how)["candidates"]
 
 
 class SilentProgress:

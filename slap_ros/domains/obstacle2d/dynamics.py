@@ -228,7 +228,7 @@ class Obstacle2DVectorWorld:
 
 
 class Obstacle2DWorld:
-    """One world."""
+    """A world in one state, stepped by itself; :func:`step` steps many at once."""
 
     def __init__(self, state: State) -> None:
         """Begin in ``state``.
@@ -249,7 +249,7 @@ class Obstacle2DWorld:
         self._state = state
 
     def step(self, action: Action) -> State:
-        """Act once.
+        """Act for one control step.
 
         Raises:
             InvalidCommandError: The action is not in the action space; nothing moved.

@@ -21,7 +21,7 @@ def free_placements(
     taken: Iterable[tuple[Placement, float]],
     spacing: float = SPACING,
 ) -> list[Placement]:
-    """Places of a grid that are free, the nearest first.
+    """The free places of a grid, the nearest first.
 
     Args:
         near: What they are to be near to.

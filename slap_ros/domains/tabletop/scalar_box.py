@@ -12,7 +12,7 @@ class ScalarBox:
 
     Args:
         x, y, z: Its middle, m.
-        qw, qz, qx, qy: Its quaternion, in the order of :data:`lying.PARTS`.
+        qw, qz, qx, qy: Its quaternion, in the order of :data:`footprints.PARTS`.
         a, b, c: Half its edges, m.
     """
 
