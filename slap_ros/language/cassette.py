@@ -39,7 +39,7 @@ def open_client(
     settings: LanguageSettings,
     make_client: Callable[[LanguageSettings], Client] = OpenAIClient,
 ) -> Client:
-    """Whoever answers, by the mode of the cassette.
+    """The client that answers, by the mode of the cassette.
 
     Args:
         cassette: ``live``, ``off``, ``record:FILE`` or ``replay:FILE``.
@@ -100,7 +100,7 @@ class OffClient:
     source = "off"
 
     def complete(self, request: Request, seconds_left: float) -> Reply:
-        """Refuse.
+        """Refuse every request.
 
         Raises:
             LanguageOffError: Always.
@@ -142,7 +142,7 @@ class RecordingClient:
 
     @property
     def source(self) -> str:
-        """What answers."""
+        """The model or server that answers."""
         return self._client.source
 
     def complete(self, request: Request, seconds_left: float) -> Reply:

@@ -110,11 +110,15 @@ class OpenAIClient:
         return self._degree
 
     def close(self) -> None:
-        """Close connections."""
+        """Close the connections to the server."""
         self._client.close()
 
     def complete(self, request: Request, seconds_left: float) -> Reply:
-        """The answer to a request; see :class:`~.request.Client`."""
+        """The answer to a request; see :class:`~.request.Client`.
+
+        Raises:
+            LanguageRefusedError: The server refuses the request in every form of output.
+        """
         began = time.monotonic()
         deadline = began + min(seconds_left, self._settings.answer_seconds)
         degree: OutputDegree | None = self._degree

@@ -88,7 +88,7 @@ def read_settings(
     base_url: str | None = None,
     environment: Mapping[str, str] | None = None,
 ) -> LanguageSettings:
-    """Settings from a file, the environment and the command line; the later ones win.
+    """The settings of a file, the environment and the command line; the later ones win.
 
     Args:
         file: JSON with the fields of :class:`LanguageSettings`; ``retry`` is an object of its own.
