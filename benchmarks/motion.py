@@ -3,7 +3,7 @@
 """Motion around a tower of three blocks: ``python -m benchmarks.motion [--queries N] [--json]``.
 
 Lengths are control steps; ``straight`` is the bound that the joint limits set, obstacles or not,
-and ``in tens`` the timing of the preset ``paper`` on the same paths.
+and ``ten a piece`` the timing of the preset ``paper`` on the same paths.
 """
 
 from __future__ import annotations
@@ -51,12 +51,25 @@ class Scene(NamedTuple):
 
 
 def block(x: float, y: float, z: float = ON_TABLE) -> OrientedBox:
-    """A block, its centre in m."""
+    """A block.
+
+    Args:
+        x: Of its centre, m.
+        y: Of its centre, m.
+        z: Of its centre, m.
+    """
     return OrientedBox(Pose((x, y, z)), HALF)
 
 
 def top_down(x: float, y: float, z: float, yaw: float = 0.0) -> Pose:
-    """A grasp from above."""
+    """A grasp from above.
+
+    Args:
+        x: Of the grasp point, m.
+        y: Of the grasp point, m.
+        z: Of the grasp point, m.
+        yaw: Of the hand, rad.
+    """
     return Pose((x, y, z), (math.cos(yaw / 2), math.sin(yaw / 2), 0.0, 0.0))
 
 
@@ -157,7 +170,7 @@ def _plan(
             "ms": (perf_counter() - start) * 1e3,
             "steps": len(motion),
             "straight": math.ceil(control_steps(q, goal) - 1e-9),
-            "in tens": len(retime_fixed_steps(path)),
+            "ten a piece": len(retime_fixed_steps(path)),
         }
     )
     return goal
@@ -174,7 +187,7 @@ def _approach(rows: list[dict[str, float]], q: Joints, free: CollisionChecker) -
             "ms": (perf_counter() - start) * 1e3,
             "steps": len(retime(path)),
             "straight": math.ceil(control_steps(path[0], path[-1]) - 1e-9),
-            "in tens": len(retime_fixed_steps(path[[0, -1]])),
+            "ten a piece": len(retime_fixed_steps(path[[0, -1]])),
         }
     )
     return np.asarray(path[-1])
@@ -186,13 +199,13 @@ def _summary(rows: list[dict[str, float]]) -> dict[str, float]:
     times = [row["ms"] for row in rows]
     lengths = {
         name: float(np.mean([row[name] for row in rows]))
-        for name in ("steps", "straight", "in tens")
+        for name in ("steps", "straight", "ten a piece")
     }
     return {"median_ms": float(np.median(times)), "most_ms": max(times), **lengths}
 
 
 def main() -> None:
-    """Print the figures."""
+    """Measure and print the figures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--queries", type=int, default=100)
     parser.add_argument("--json", action="store_true")

@@ -126,7 +126,16 @@ def _push(rng: np.random.Generator) -> Push | None:
 
 
 def reach(point: Array, yaw: float, joints: Array) -> Array | None:
-    """Joint positions near ``joints`` with the grasp point there, the hand pointing down."""
+    """Joint positions with the grasp point somewhere, the hand pointing down.
+
+    Args:
+        point: Where, m, shape (3,).
+        yaw: Of the hand, rad.
+        joints: Joint positions to begin the search at, rad, shape (7,).
+
+    Returns:
+        rad, shape (7,); None where none are found within the limits.
+    """
     down = (math.cos(yaw / 2), math.sin(yaw / 2), 0.0, 0.0)
     for _ in range(60):
         position, quaternion = grasp_pose(joints)
@@ -151,7 +160,7 @@ class Stepped(Protocol):
         """The tower as it was, the arm there."""
 
     def step(self, action: Array) -> None:
-        """One control step."""
+        """Act for one control step."""
 
     def blocks(self) -> Array:
         """Position, quaternion, velocity and spin of each block, (4, 13)."""
@@ -170,7 +179,7 @@ class Ours:
         self.world.reset(with_joints(self._start, joints))
 
     def step(self, action: Array) -> None:
-        """One control step."""
+        """Act for one control step."""
         self.world.step(action)
 
     def blocks(self) -> Array:
@@ -191,7 +200,7 @@ class Fine:
         self._bodies, self._joints = self._start, np.array(joints)
 
     def step(self, action: Array) -> None:
-        """One control step."""
+        """Act for one control step."""
         after = np.clip(self._joints + action[:JOINTS], JOINT_LOW, JOINT_HIGH)
         start, end = (Arm.at(q.tolist(), FINGER_OPEN) for q in (self._joints, after))
         drives = [Drive.between(a, b) for a, b in zip(start.links, end.links, strict=True)]
@@ -277,7 +286,7 @@ class Plain:
             pybullet.resetJointState(self._robot, i, FINGER_OPEN, 0.0, self._client)
 
     def step(self, action: Array) -> None:
-        """One control step."""
+        """Act for one control step."""
         self._joints = np.clip(self._joints + action[:JOINTS], JOINT_LOW, JOINT_HIGH)
         self._place()
         for _ in range(self.SUBSTEPS):
@@ -378,7 +387,16 @@ def outcomes(world: Stepped, script: list[Push]) -> Iterator[tuple[bool, Array]]
 
 
 def truth(count: int, seed: int = 11, plot: Path | None = None) -> dict[str, float]:
-    """How plain stepping and ours agree with the fine reference on scripted pushes."""
+    """How plain stepping and ours agree with the fine reference on scripted pushes.
+
+    Args:
+        count: Pushes.
+        seed: Of the pushes.
+        plot: A folder for the plot, if there is to be one.
+
+    Returns:
+        The figures by name, lengths in cm.
+    """
     script = pushes(count, seed)
     results = {
         name: list(outcomes(world, script))
@@ -399,7 +417,13 @@ def truth(count: int, seed: int = 11, plot: Path | None = None) -> dict[str, flo
 
 
 def draw(moved: dict[str, Array], figures: dict[str, float], folder: Path) -> None:
-    """Plot how far the bottom block was pushed, in cm, against the reference."""
+    """Plot how far the bottom block was pushed, against the reference.
+
+    Args:
+        moved: How far, cm, shape (pushes,), by kind of stepping.
+        figures: What :func:`truth` gives.
+        folder: Where the plot is written.
+    """
     from matplotlib import pyplot  # type: ignore  # only to make the picture
 
     figure, panels = pyplot.subplots(1, 2, figsize=(8, 4.2), sharex=True, sharey=True)
@@ -461,7 +485,7 @@ def purity(count: int) -> dict[str, float]:
 
 
 def main() -> None:
-    """Print the figures."""
+    """Measure and print the figures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--pushes", type=int, default=0, metavar="N", help="compare N pushes too")
     parser.add_argument("--json", action="store_true")

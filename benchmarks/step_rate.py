@@ -164,7 +164,7 @@ BENCHMARKS: Mapping[str, Callable[[], dict[str, Any]]] = {
 
 
 def main() -> None:
-    """Print the figures."""
+    """Measure and print the figures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("domain", choices=list(BENCHMARKS))
     parser.add_argument("--json", action="store_true")

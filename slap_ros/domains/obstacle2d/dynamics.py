@@ -199,7 +199,7 @@ def _apart(places: Array) -> Array:
 
 
 class Obstacle2DVectorWorld:
-    """Many worlds of the same objects."""
+    """Many worlds of the same objects, stepped by one computation."""
 
     def __init__(self, states: Sequence[State]) -> None:
         """Begin in ``states``.

@@ -8,13 +8,7 @@ Vector2 = tuple[float, float]
 
 
 class ScalarBox:
-    """What is asked of a box, computed when it is asked for.
-
-    Args:
-        x, y, z: Its middle, m.
-        qw, qz, qx, qy: Its quaternion, in the order of :data:`footprints.PARTS`.
-        a, b, c: Half its edges, m.
-    """
+    """A box, its heights, and what it covers; each number is computed when it is asked for."""
 
     __slots__ = ("_frame", "_half", "_q", "_up", "bottom", "top", "x", "y")
 
@@ -31,7 +25,20 @@ class ScalarBox:
         b: float,
         c: float,
     ) -> None:
-        """Compute its heights; see the class for the arguments."""
+        """Take a pose in the base's frame, and compute the heights.
+
+        Args:
+            x: Of its middle, m.
+            y: Of its middle, m.
+            z: Of its middle, m.
+            qw: Parts of its quaternion, in the order of ``footprints.PARTS``.
+            qz: See ``qw``.
+            qx: See ``qw``.
+            qy: See ``qw``.
+            a: Half its edge along its own x, m.
+            b: Half its edge along its own y, m.
+            c: Half its edge along its own z, m.
+        """
         self.x, self.y = x, y
         self._q, self._half = (qw, qz, qx, qy), (a, b, c)
         self._up = qw * qw + qz * qz - qx * qx - qy * qy  # how high its z axis points, -1 to 1
@@ -62,7 +69,7 @@ class ScalarBox:
         return ahead + more_ahead >= 0.0 and aside + more_aside >= 0.0
 
     def _find_frame(self) -> tuple[Vector2, Vector2]:
-        """Cosine and sine of its yaw (see :func:`lying.turned_back`), and its reach along that."""
+        """Cosine and sine of its yaw (see ``footprints.turned_back``), and its reach along it."""
         w, z, x, y = self._q
         a, b = (w, z) if self._up > 0.0 else (x, y)
         scale = 1.0 / (a * a + b * b)
