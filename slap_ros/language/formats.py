@@ -28,7 +28,7 @@ OPERATOR_KEYS = ("name", "parameters", "preconditions", "delete_effects", "add_e
 LABELS = ("PAR", "PRE", "EFF-", "EFF+")
 NOTHING = frozenset({"", "none", "∅"})
 
-_JSON_START = re.compile(r'\{\s*["}]')
+_JSON_START = re.compile(r'\{\s*"')  # empty braces are the plain text's
 _LABEL = re.compile(r"\b(PAR|PRE|EFF ?[-−–⁻+⁺])[*_`]{0,3} ?[:=][*_`]{0,3}")
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 _LIST = re.compile(r"\[[^\[\]]*\]")

@@ -199,7 +199,7 @@ def make(
     words = Words.of(predicates, objects)
     first, length = next(iter(goals.values()))
     problem = AcquisitionProblem(
-        name, types, predicates, METRICS, frozenset(), Layout.of(objects),
+        name, (THING, *types), predicates, METRICS, frozenset(), Layout.of(objects),
         words.ground(init), words.ground(first),
     )  # fmt: skip
     built = tuple(words.operator(*parts) for parts in operators)
