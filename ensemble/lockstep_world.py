@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import Counter
-from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 from builtin_interfaces.msg import Time
@@ -22,7 +21,8 @@ from slap_msgs.srv import ResetTask
 from ensemble import encode
 from ensemble.diagnostics import DiagnosticsPublisher
 from ensemble.interfaces import COMMAND, DOMAIN, RESET_TASK, STATE, TASK, VOLATILE
-from ensemble.parameters import parameter, read_parameters
+from ensemble.parameters import read_parameters
+from ensemble.world_parameters import WorldParameters
 from slap_ros.core import Action, Task
 from slap_ros.domains import get_domain
 from slap_ros.errors import (
@@ -41,16 +41,6 @@ REFUSALS = {  # what is counted, by the error that refuses a command
     InvalidCommandError: "invalid_commands",
     UnsafeCommandError: "unsafe_commands",
 }
-
-
-@dataclass(frozen=True)
-class WorldParameters:
-    """Which domain runs, and its first task."""
-
-    domain: str = parameter("obstacle2d", "which domain")
-    preset: str = parameter("fair", "fair: random tasks; paper: the paper's start states")
-    seed: int = parameter(0, "samples the first task")
-    index: int = parameter(0, "which of the seed's tasks")
 
 
 P = TypeVar("P", bound=WorldParameters)

@@ -4,9 +4,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from ensemble.parameters import parameter, parse_parameters
+from ensemble.world_parameters import WorldParameters
 from slap_ros.errors import InvalidParameterError
 from slap_ros.physics.panda import JOINTS
 from slap_ros.robot.limits import Limits, Workspace, arm_limits
@@ -16,7 +17,7 @@ from slap_ros.robot.tracking import TrackingSettings
 TRAJECTORY_ACTION = "ARM_arm_controller/follow_joint_trajectory"
 GRIPPER_ACTION = "franka_gripper/gripper_action"
 WORKSPACE = (*Workspace().low, *Workspace().high)
-GIVEN_WITH_THE_RUN = frozenset({"domain", "preset", "seed", "index"})
+GIVEN_WITH_THE_RUN = frozenset(item.name for item in fields(WorldParameters))
 
 
 def action_name(name: str, arm: str) -> str:
@@ -79,6 +80,17 @@ class RobotParameters:
 
 
 @dataclass(frozen=True)
+class RobotBridgeParameters(RobotParameters, WorldParameters):
+    """Those of a robot, and how long robot_bridge waits: see the docstring of its node."""
+
+    domain: str = parameter("obstacle_tower", "which domain")
+    preset: str = parameter("fair", "one that obeys the joints' speed limit")
+    settle_time: float = parameter(1.5, "s to wait for what moves to come to rest")
+    detection_timeout: float = parameter(2.0, "s without a measured state until the robot holds")
+    hold_after: float = parameter(0.5, "s without a command after which it says that it holds")
+
+
+@dataclass(frozen=True)
 class PlayerParameters(RobotParameters):
     """Those of a robot, and how far from where the recording begins things may be."""
 
@@ -88,13 +100,12 @@ class PlayerParameters(RobotParameters):
 
 
 @dataclass(frozen=True)
-class MockRobotParameters:
+class MockRobotParameters(WorldParameters):
     """What a mock robot is: see the docstring of ``robot_bridge.mock.node``."""
 
     domain: str = parameter("obstacle_tower", "which domain")
     preset: str = parameter("fair", "as the bridge's")
     seed: int = parameter(0, "samples the task")
-    index: int = parameter(0, "which of the seed's tasks")
     arm: str = parameter("panda", "prefix of joints and frames")
     trajectory_action: str = parameter(TRAJECTORY_ACTION, "the arm's controller")
     gripper_action: str = parameter(GRIPPER_ACTION, "the gripper's controller")

@@ -67,7 +67,7 @@ def run(request: RunRequest, on_message: OnMessage) -> RunMetrics:
         KeyboardInterrupt: After the robot holds and the bag is closed.
     """
     with temporary_node(lambda: RunClient(on_message, request.shown)) as (client, spinner):
-        _refuse_company(client, spinner)
+        _require_alone(client, spinner)
         with _launcher(request, spinner.executor) as launcher:
             return _drive(request, client, spinner, launcher)
 
@@ -77,7 +77,7 @@ def _launcher(request: RunRequest, executor: Executor) -> NodeLauncher:
     return InProcessLauncher(nodes, executor) if request.in_process else ProcessLauncher(nodes)
 
 
-def _refuse_company(client: RunClient, spinner: Spinner) -> None:
+def _require_alone(client: RunClient, spinner: Spinner) -> None:
     if spinner.spin_until(lambda: bool(client.other_nodes()), DISCOVERY):
         found = ", ".join(sorted(client.other_nodes()))
         raise AlreadyRunningError(

@@ -20,14 +20,14 @@ class RunStatistics:
     planning_ns: int = 0
     edges_rolled_out: int = 0
 
-    def result(self, last_step: int, stopped: OptionResult) -> SolveTask.Result:
+    def result(self, last_step: int, outcome: OptionResult) -> SolveTask.Result:
         """The action's result."""
         return SolveTask.Result(
-            success=stopped.reached,
+            success=outcome.reached,
             plan_length=last_step - self.first_step,
             replans=max(self.plans - 1, 0),
             planning_seconds=self.planning_ns / 1e9,
             edges_rolled_out=self.edges_rolled_out,
-            error_code=int(stopped.code),
-            error_msg=stopped.reason,
+            error_code=int(outcome.code),
+            error_msg=outcome.reason,
         )

@@ -104,38 +104,38 @@ class TaskExecution:
         """Solve the task; every outcome is published as an event, too."""
         while True:
             try:
-                stopped = await self._plan_and_execute()
+                outcome = await self._plan_and_execute()
             except SlapError as error:
-                stopped = OptionResult(error.code, str(error))
-            blind = stopped.code in UNPLANNED and not self._latest.exact
-            if not blind and stopped.code not in DIVERGENCES:
+                outcome = OptionResult(error.code, str(error))
+            misperceived = outcome.code in UNPLANNED and not self._latest.exact
+            if not misperceived and outcome.code not in DIVERGENCES:
                 break
             if self._statistics.plans > self.goal.request.max_replans:
                 limit = f"diverged again after {self.goal.request.max_replans} replans"
-                stopped = OptionResult(ErrorCode.REPLANS_EXHAUSTED, f"{limit}: {stopped.reason}")
+                outcome = OptionResult(ErrorCode.REPLANS_EXHAUSTED, f"{limit}: {outcome.reason}")
                 break
-            if blind:
-                perceived = await self._perceive_again()
-                if perceived.code is not ErrorCode.SKILL_STEP_LIMIT:  # as it ends
-                    stopped = perceived
+            if misperceived:
+                held = await self._perceive_again()
+                if held.code is not ErrorCode.SKILL_STEP_LIMIT:  # with which a hold ends
+                    outcome = held
                     break
-        if stopped.reached:
+        if outcome.reached:
             self._event(PlanEvent.SOLVED)
         else:
-            self._event(PlanEvent.FAILED, error_code=int(stopped.code), error_msg=stopped.reason)
-        return self._statistics.result(self._last_step, stopped)
+            self._event(PlanEvent.FAILED, error_code=int(outcome.code), error_msg=outcome.reason)
+        return self._statistics.result(self._last_step, outcome)
 
     async def _plan_and_execute(self) -> OptionResult:
         """Make one plan and execute it, up to its first edge that fails."""
         plan = await self._plan()
         for number, edge in enumerate(plan.edges):
             self._event(PlanEvent.EDGE_STARTED, edge=number)
-            stopped = await self._execute(edge)
-            if not stopped.reached:
-                if stopped.code in DIVERGENCES:
-                    code, reason = int(stopped.code), stopped.reason
+            outcome = await self._execute(edge)
+            if not outcome.reached:
+                if outcome.code in DIVERGENCES:
+                    code, reason = int(outcome.code), outcome.reason
                     self._event(PlanEvent.DIVERGED, edge=number, error_code=code, error_msg=reason)
-                return stopped
+                return outcome
             self._event(PlanEvent.EDGE_REACHED, edge=number)
         return OptionResult(ErrorCode.NONE)
 
@@ -240,6 +240,11 @@ class TaskExecution:
         condition: Callable[[], bool] = lambda: False,
     ) -> bool:
         """Wait for a future or a condition unless the run is over before.
+
+        Args:
+            future: What to wait for.
+            timeout_s: For how long; s, the node's time.
+            condition: What else to wait for.
 
         Returns:
             Whether it came before the time was up.

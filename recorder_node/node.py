@@ -70,7 +70,7 @@ class RecorderNode(Node):
         self._early: list[Record] = []  # before domain and task are known
         self._writer: BagWriter | None = None
         self._closed = False
-        self._heard_ns = 0
+        self._newest_ns = 0
         self._written = 0  # messages
         for topic in RECORDED:
             self._subscribe(topic)
@@ -99,7 +99,7 @@ class RecorderNode(Node):
             return
         now_ns = self.get_clock().now().nanoseconds
         if topic is not DIAGNOSTICS:  # these never stop
-            self._heard_ns = now_ns
+            self._newest_ns = now_ns
         record = Record(name, topic.type_name, now_ns, bytes(raw))
         if self._writer is not None:
             self._write(record)
@@ -125,7 +125,7 @@ class RecorderNode(Node):
 
     async def _on_close(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         await wait_until(
-            self, lambda: self.get_clock().now().nanoseconds - self._heard_ns > QUIET_NS
+            self, lambda: self.get_clock().now().nanoseconds - self._newest_ns > QUIET_NS
         )
         response.success = self._writer is not None
         response.message = str(self._path) if response.success else "nothing was recorded"

@@ -57,7 +57,6 @@ Action clients:
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
@@ -67,9 +66,8 @@ from slap_msgs.srv import ResetTask
 from ensemble.entry_point import run_node
 from ensemble.futures import node_time_s
 from ensemble.interfaces import MARKERS
-from ensemble.lockstep_world import UNSAMPLED, LockstepWorld, WorldParameters
-from ensemble.parameters import parameter
-from ensemble.robot_parameters import RobotParameters
+from ensemble.lockstep_world import UNSAMPLED, LockstepWorld
+from ensemble.robot_parameters import RobotBridgeParameters
 from ensemble.visualization import markers
 from robot_bridge.robot import Robot
 from robot_bridge.step_measurement import StepMeasurement
@@ -86,17 +84,6 @@ from slap_ros.relational import GroundAtom, State
 from slap_ros.robot.robot_world import SafeCommand
 
 POLL_PERIOD = 0.02  # s, between two looks at what is measured
-
-
-@dataclass(frozen=True)
-class RobotBridgeParameters(RobotParameters, WorldParameters):
-    """See the module's docstring."""
-
-    domain: str = parameter("obstacle_tower", "which domain")
-    preset: str = parameter("fair", "one that obeys the joints' speed limit")
-    settle_time: float = parameter(1.5, "s to wait for what moves to come to rest")
-    detection_timeout: float = parameter(2.0, "s without a measured state until the robot holds")
-    hold_after: float = parameter(0.5, "s without a command after which it says that it holds")
 
 
 class Phase(Enum):

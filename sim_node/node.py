@@ -36,9 +36,10 @@ from rclpy.timer import Timer
 from slap_msgs.srv import ResetTask
 
 from ensemble.entry_point import run_node
-from ensemble.lockstep_world import UNSAMPLED, LockstepWorld, WorldParameters
+from ensemble.lockstep_world import UNSAMPLED, LockstepWorld
 from ensemble.parameters import parameter
 from ensemble.visualization import Visualizer
+from ensemble.world_parameters import WorldParameters
 from slap_ros.core import Action, Task, World
 from slap_ros.messages.decode import decode_goal, decode_state
 from slap_ros.relational import State

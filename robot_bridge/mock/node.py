@@ -93,7 +93,7 @@ class MockRobot(Node):
 
     def _idle(self) -> None:
         """Let time pass for objects that still move; a goal under way lets it pass by itself."""
-        if not self._controllers.busy and not self._plant.still:
+        if not self._controllers.busy and not self._plant.at_rest:
             self._plant.idle()
 
 

@@ -48,7 +48,7 @@ class Plant:
         return 0.0 if self._shut else 2.0 * FINGER_OPEN
 
     @property
-    def still(self) -> bool:
+    def at_rest(self) -> bool:
         """Whether no object moves."""
         state = self._world.state
         return all(

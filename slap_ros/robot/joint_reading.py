@@ -33,6 +33,6 @@ class JointReading:
             raise InvalidMeasurementError(f"joint positions {self.joints} are not {JOINTS} numbers")
 
     @property
-    def still(self) -> bool:
+    def at_rest(self) -> bool:
         """Whether the arm stands, as far as velocities are measured."""
         return all(abs(v) <= STANDS for v in self.velocities)

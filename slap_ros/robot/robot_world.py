@@ -84,9 +84,9 @@ class RobotWorld:
             raise InvalidParameterError(f"the world of {self.domain.name} has no Panda")
         self._model = world  # where commands are tried, and states checked
         self._bodies = [template.layout.object(body.name) for body in world.scene.free]
-        self._tracks = {obj: Track(self.tracking) for obj in self.scene_config.seen}
+        self._tracks = {obj: Track(self.tracking) for obj in self.scene_config.detected}
         self._assembler = StateAssembler(template, world.scene)
-        self._frames = {how.frame: (obj, how) for obj, how in self.scene_config.seen.items()}
+        self._frames = {how.frame: (obj, how) for obj, how in self.scene_config.detected.items()}
         self._reading: JointReading | None = None
         self._grasp: Grasp | None = None
         self._candidate: Grasp | None = None  # what the gripper is to close around
@@ -156,7 +156,7 @@ class RobotWorld:
             InvalidStateError: What is measured cannot be; better measurements may follow.
         """
         reading = self._reading
-        if reading is None or reading.stamp_s <= since_s or not reading.still:
+        if reading is None or reading.stamp_s <= since_s or not reading.at_rest:
             return None
         estimates = {obj: track.estimate(since_s) for obj, track in self._tracks.items()}
         self._detect_grasp_loss(reading, estimates)
@@ -164,7 +164,7 @@ class RobotWorld:
         known = {o: s for o, s in estimates.items() if s is not None and o != held}
         if len(known) < len(self._tracks) - (held is not None):
             return None
-        if not moving and not all(s.steady for s in known.values()):
+        if not moving and not all(s.at_rest for s in known.values()):
             return None
         state = self._assembler.assemble(reading, known, self._grasp)
         self._model.reset(state)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What there is around a real robot: which objects, seen as which TF frame or standing where.
+"""What there is around a real robot: which objects, detected as which TF frame or standing where.
 
 A scene file is YAML, in the order in which the domain wants its objects (in Obstacle Tower the
 first block is the target block)::
@@ -50,7 +50,7 @@ class DetectedFrame:
     """How an object is detected."""
 
     frame: str  # child frame in TF
-    offset: Pose = IDENTITY  # of the object's middle, seen from the detected frame
+    offset: Pose = IDENTITY  # of the object's middle, in the detected frame
 
 
 @dataclass(frozen=True)
@@ -58,22 +58,22 @@ class SceneConfig:
     """The objects, what is known of them beforehand, and how the others are detected.
 
     Args:
-        template: A state of the objects; where detected ones are in it means nothing.
-        seen: The objects that are detected.
+        template: A state of the objects; poses of detected ones in it have no meaning.
+        detected: The objects that are detected, and how.
     """
 
     template: State
-    seen: Mapping[Object, DetectedFrame]
+    detected: Mapping[Object, DetectedFrame]
 
 
 def sampled_scene_config(initial: State) -> SceneConfig:
-    """That of a sampled task: what can move is detected, the rest stands where the task says."""
+    """The scene of a sampled task: what can move is detected, the rest is where the task has it."""
     movable = [o for o in initial.objects if "held" in {f.name for f in o.type.features}]
     return SceneConfig(initial, {o: DetectedFrame(f"{DETECTED}{o.name}") for o in movable})
 
 
 def read_scene_config(path: Path, domain: Domain) -> SceneConfig:
-    """The workplace that a scene file describes.
+    """The scene that a scene file describes.
 
     Raises:
         InvalidSceneError: It is missing or malformed, or its objects are not the domain's.
@@ -85,7 +85,7 @@ def read_scene_config(path: Path, domain: Domain) -> SceneConfig:
     if not isinstance(content, dict) or not isinstance(content.get("objects"), dict):
         raise InvalidSceneError(f"scene file {path} has no mapping `objects`")
     features: dict[Object, Mapping[str, float]] = {ROBOT("robot"): robot_features(HOME)}
-    seen: dict[Object, DetectedFrame] = {}
+    detected: dict[Object, DetectedFrame] = {}
     for name, entry in content["objects"].items():
         parked = Pose((PARKED + len(features), 0.0, 0.0))
         try:
@@ -94,9 +94,9 @@ def read_scene_config(path: Path, domain: Domain) -> SceneConfig:
             raise InvalidSceneError(f"scene file {path}, object {name}: {error}") from error
         features[obj] = given
         if how is not None:
-            seen[obj] = how
+            detected[obj] = how
     try:
-        return SceneConfig(State.build(features), seen)
+        return SceneConfig(State.build(features), detected)
     except InvalidStateError as error:
         raise InvalidSceneError(f"scene file {path}: {error}") from error
 

@@ -89,7 +89,7 @@ class StateAssembler:
             if body.solid
         ]
         steady = {
-            i: known[o].pose for i, o in enumerate(self._bodies) if o in known and known[o].steady
+            i: known[o].pose for i, o in enumerate(self._bodies) if o in known and known[o].at_rest
         }
         return resting_poses(steady, self._scene.free, fixed)
 

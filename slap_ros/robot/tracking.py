@@ -55,7 +55,7 @@ class PoseEstimate(NamedTuple):
     pose: Pose
     velocity: Vector  # m/s
     spin: Vector  # rad/s
-    steady: bool  # lies still
+    at_rest: bool
     weight: int  # detections behind the pose
 
 
@@ -81,7 +81,7 @@ class Track:
     def __init__(self, settings: TrackingSettings) -> None:
         self._settings = settings
         self._detections: deque[Detection] = deque(maxlen=LONGEST)
-        self._known: PoseEstimate | None = None  # where it lies still
+        self._known: PoseEstimate | None = None  # its pose at rest
 
     def add(self, detection: Detection) -> None:
         """Take a detection.
@@ -102,7 +102,7 @@ class Track:
         return self._detections[-1].stamp_s if self._detections else -math.inf
 
     def estimate(self, since_s: float) -> PoseEstimate | None:
-        """What the detections since then say; None if they are too few."""
+        """The pose and its motion from detections since then; None if they are too few."""
         fresh = [d for d in self._detections if d.stamp_s > since_s]
         few = fresh[-self._settings.confirmations :]
         if len(few) < self._settings.confirmations:
@@ -117,11 +117,11 @@ class Track:
         return _standing(many) if self._agree(many) else _moving(many)
 
     def remember(self, estimate: PoseEstimate) -> None:
-        """Remember where the object lies still, if it does."""
-        self._known = estimate if estimate.steady else None
+        """Keep a pose at rest, against which later detections are compared."""
+        self._known = estimate if estimate.at_rest else None
 
     def forget(self) -> None:
-        """It was moved on purpose: where it lay says nothing any more."""
+        """Drop the pose at rest: the object was moved on purpose."""
         self._known = None
 
     def _agree(self, detections: Sequence[Detection]) -> bool:
@@ -170,7 +170,7 @@ def _standing(detections: Sequence[Detection]) -> PoseEstimate:
 
 
 def _still(pose: Pose, weight: int) -> PoseEstimate:
-    return PoseEstimate(pose, ORIGIN, ORIGIN, steady=True, weight=weight)
+    return PoseEstimate(pose, ORIGIN, ORIGIN, at_rest=True, weight=weight)
 
 
 def _moving(detections: Sequence[Detection]) -> PoseEstimate:

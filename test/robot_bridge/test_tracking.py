@@ -28,7 +28,7 @@ def test_what_lies_still_is_averaged_and_then_stays_the_same_to_the_bit():
     rng, track = np.random.default_rng(0), Track(SENSING)
     feed(track, (0.5, 0.1, 0.1), 0.0, 10, rng)
     first = track.estimate(0.0)
-    assert first.steady
+    assert first.at_rest
     assert first.velocity == (0.0, 0.0, 0.0)
     assert math.dist(first.pose.position, (0.5, 0.1, 0.1)) < 0.003
     track.remember(first)
@@ -48,7 +48,7 @@ def test_what_was_pushed_is_averaged_anew():
     assert track.estimate(1.0) is None  # moved, but not yet known where to
     feed(track, (0.52, 0.1, 0.1), 1.2, 10, rng)
     estimate = track.estimate(1.0)
-    assert estimate.steady
+    assert estimate.at_rest
     assert abs(estimate.pose.position[0] - 0.52) < 0.003
 
 
@@ -56,7 +56,7 @@ def test_what_moves_has_a_velocity():
     rng, track = np.random.default_rng(2), Track(SENSING)
     feed(track, (0.5, 0.1, 0.1), 0.0, 10, rng, velocity=(0.0, 0.4, 0.0))
     estimate = track.estimate(0.0)
-    assert not estimate.steady
+    assert not estimate.at_rest
     assert estimate.velocity[1] == pytest.approx(0.4, abs=0.15)
 
 

@@ -1,0 +1,19 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The ROS parameters of every node in the world's place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ensemble.parameters import parameter
+
+
+@dataclass(frozen=True)
+class WorldParameters:
+    """Which domain runs, and its first task."""
+
+    domain: str = parameter("obstacle2d", "which domain")
+    preset: str = parameter("fair", "fair: random tasks; paper: the paper's start states")
+    seed: int = parameter(0, "samples the first task")
+    index: int = parameter(0, "which of the seed's tasks")
