@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import ctypes
+import json
 import signal
 import subprocess
 import sys
@@ -101,12 +102,20 @@ class ProcessLauncher:
 def _start(name: str, parameters: Mapping[str, str | int | float]) -> subprocess.Popen[bytes]:
     command = [sys.executable, "-m", name, "--ros-args", "--log-level", "warn"]
     for key, value in parameters.items():
-        command += ["-p", f"{key}:={value}"]
+        command += ["-p", f"{key}:={_as_yaml(value)}"]
     # A session of its own keeps the terminal's Ctrl-C from the nodes, which are to be stopped in
     # order. The parent's death signal keeps them from outliving a killed parent.
     return subprocess.Popen(
         command, stdout=sys.stderr, start_new_session=True, preexec_fn=_die_with_parent
     )
+
+
+def _as_yaml(value: str | int | float) -> str:
+    """A parameter's value as ROS reads it: texts quoted, or ``2024`` and ``x #y`` are others."""
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    text = str(value)
+    return text if "." in text else text.replace("e", ".0e")  # 1e-12 is a text in YAML
 
 
 def _die_with_parent() -> None:

@@ -17,6 +17,11 @@ class ErrorCode(IntEnum):
     NONE = 0
     UNKNOWN = 1
 
+    # 3-9: what no command foresaw; 2 is wrong usage of the command line
+    INTERNAL_ERROR = 3
+    OUT_OF_MEMORY = 4
+    INPUT_OUTPUT = 5
+
     # 10-29: input, refused at the door
     UNKNOWN_DOMAIN = 10
     INVALID_DOMAIN = 11

@@ -7,7 +7,7 @@ from __future__ import annotations
 from ensemble.cli.commands import replay, run
 from slap_ros.cli import app
 from slap_ros.cli.bag import app as bag_app
-from slap_ros.cli.console import exits
+from slap_ros.cli.console import exits, open_closed_streams
 from slap_ros.cli.options import flat_options
 
 app.command("run")(exits(flat_options(run)))
@@ -17,4 +17,5 @@ bag_app.command("replay")(exits(flat_options(replay)))
 
 def main() -> None:
     """Run a command of ``slap``."""
+    open_closed_streams()
     app()

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from slap_ros.cli.console import console
+from slap_ros.cli.console import console, styled
 from slap_ros.messages.events import PlanEventKind, SkillEventKind
 from slap_ros.messages.interfaces import PLAN, PLAN_EVENT, SKILL_EVENT
 
@@ -27,9 +27,9 @@ class EventPrinter:
         elif type_name == SKILL_EVENT:
             self._skill(message)
         elif type_name == PLAN_EVENT and message.kind == PlanEventKind.DIVERGED:
-            console.print(f"[yellow]diverged[/]: {message.error_msg}", highlight=False)
+            console.print(styled("diverged", "yellow", f": {message.error_msg}"))
         elif type_name == PLAN_EVENT and message.kind == PlanEventKind.FAILED:
-            console.print(f"[red]failed[/]: {message.error_msg}", highlight=False)
+            console.print(styled("failed", "red", f": {message.error_msg}"))
 
     def _skill(self, message: Any) -> None:
         if message.kind == SkillEventKind.STARTED:
@@ -38,4 +38,4 @@ class EventPrinter:
         name = f"{message.skill}({', '.join(message.objects)})"
         outcome = SkillEventKind(message.kind).name.lower()
         steps = message.step - self._started
-        console.print(f"{message.step:5d}  {name}: {outcome} after {steps} steps", highlight=False)
+        console.print(f"{message.step:5d}  {name}: {outcome} after {steps} steps")

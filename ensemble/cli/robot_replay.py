@@ -44,7 +44,7 @@ def replay_on_robot(options: ReplayOptions) -> int:
     else:
         console.print(_table(recorded, checked, parameters.arm))
     for step, reason in checked.violations:
-        console.print(f"step {step}: {reason}", highlight=False, markup=False)
+        console.print(f"step {step}: {reason}")
     if options.dry_run:
         return int(ErrorCode.UNSAFE_COMMAND) if checked.violations else 0
     checked.require_safe()

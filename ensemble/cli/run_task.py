@@ -23,7 +23,7 @@ from ensemble.perception_parameters import PerceptionParameters
 from ensemble.robot_parameters import parse_mock_robot
 from ensemble.run import RunRequest
 from ensemble.run import run as run_ensemble
-from slap_ros.cli.console import console, print_json
+from slap_ros.cli.console import console, print_json, styled
 from slap_ros.cli.render import check_renderable
 from slap_ros.cli.render import render as write_animation
 from slap_ros.cli.report import write_report
@@ -157,11 +157,11 @@ def _foxglove(options: RunOptions) -> Iterator[FoxgloveServer | None]:
         yield None
         return
     if options.foxglove_is_optional and not foxglove_installed():
-        console.print("not shown to Foxglove: pip install 'slap_ros[live]'", markup=False)
+        console.print("not shown to Foxglove: pip install 'slap_ros[live]'")
         yield None
         return
     with FoxgloveServer(options.live_port) as server:
-        console.print(f"open in Foxglove: {server.url}", highlight=False)
+        console.print(f"open in Foxglove: {server.url}")
         while options.watched and not server.has_viewers:
             sleep(LOOK_S)
         yield server
@@ -177,14 +177,17 @@ def _event_view(live: bool) -> AbstractContextManager[OnMessage]:
 def _conclude(metrics: RunMetrics, record: Path | None) -> None:
     if metrics.success:
         console.print(
-            f"[bold green]solved[/] in {metrics.plan_length} steps, "
-            f"{known(metrics.shortcut_steps)} of them in shortcuts, "
-            f"{known(metrics.replans)} replans, "
-            f"{known(metrics.planning_seconds, '.3f')} s of planning, "
-            f"{known(metrics.edges_rolled_out)} edges rolled out",
-            highlight=False,
+            styled(
+                "solved",
+                "bold green",
+                f" in {metrics.plan_length} steps, "
+                f"{known(metrics.shortcut_steps)} of them in shortcuts, "
+                f"{known(metrics.replans)} replans, "
+                f"{known(metrics.planning_seconds, '.3f')} s of planning, "
+                f"{known(metrics.edges_rolled_out)} edges rolled out",
+            )
         )
     else:
-        console.print(f"[bold red]not solved[/]: {metrics.error_msg}", highlight=False)
+        console.print(styled("not solved", "bold red", f": {metrics.error_msg}"))
     if record is not None:
-        console.print(f"bag: {record}", highlight=False)
+        console.print(f"bag: {record}")

@@ -16,7 +16,7 @@ from rich.table import Table
 
 from slap_ros.bags import BagEvaluation, bag_info, evaluate_bag, read_bag, replay_bag
 from slap_ros.bags.recording import Recording
-from slap_ros.cli.console import console, exits, print_json
+from slap_ros.cli.console import console, exits, print_json, styled
 from slap_ros.cli.options import Json
 from slap_ros.cli.render import check_renderable
 from slap_ros.cli.render import render as write_animation
@@ -44,7 +44,7 @@ def info(bag: BagPath, json: Json = False) -> int:
             table.add_row(topic.name, topic.type_name, str(topic.message_count))
         console.print(table)
         for key, value in found.metadata.items():
-            console.print(f"{key}: {value}", highlight=False)
+            console.print(f"{key}: {value}")
     return _warn(found.damage)
 
 
@@ -57,8 +57,6 @@ def evaluate(bag: BagPath, json: Json = False) -> int:
         console.print(
             f"episode {mismatch.episode}, step {mismatch.step}: "
             f"missing {list(mismatch.missing)}, extra {list(mismatch.extra)}",
-            highlight=False,
-            markup=False,
         )
     if json:
         runs = [run.as_json() | _perception(found) for run in found.runs]
@@ -136,7 +134,6 @@ def replay_in_world(bag: Path, json: bool) -> int:
             console.print(
                 f"first: episode {first.episode}, step {first.step}, {first.object}."
                 f"{first.feature}: recorded {first.recorded!r}, replayed {first.replayed!r}",
-                highlight=False,
             )
     code = _warn(result.damage)
     return code if result.identical else int(ErrorCode.REPLAY_MISMATCH)
@@ -146,5 +143,5 @@ def _warn(damage: str | None) -> int:
     """Say where reading ended; the exit code."""
     if damage is None:
         return 0
-    console.print(f"[yellow]damaged[/]: {damage}", highlight=False)
+    console.print(styled("damaged", "yellow", f": {damage}"))
     return int(ErrorCode.DAMAGED_BAG)

@@ -8,9 +8,8 @@ from dataclasses import asdict
 from typing import Annotated
 
 import typer
-from rich.markup import escape
 
-from slap_ros.cli.console import console, print_json
+from slap_ros.cli.console import console, print_json, styled
 from slap_ros.cli.doctor import STYLE
 from slap_ros.cli.options import DomainName, Json, Preset, Seed
 from slap_ros.domain_check import check_domain
@@ -35,13 +34,10 @@ def check(
             findings.append(found)
             status.update(f"checking {domain}: {found.name} done")
             if not json:
-                console.print(
-                    f"[{STYLE[found.status]}]{found.status:8}[/]{found.name}: "
-                    f"{escape(found.found)}",
-                    highlight=False,
-                )
+                label = f"{found.status:8} "
+                console.print(styled(label, STYLE[found.status], f"{found.name}: {found.found}"))
                 if found.advice:
-                    console.print(f"        {escape(found.advice)}", highlight=False)
+                    console.print(f"         {found.advice}")
     if json:
         print_json([asdict(found) for found in findings])
     problem = any(found.status == "problem" for found in findings)

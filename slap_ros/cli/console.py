@@ -1,18 +1,27 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Messages for people go to stderr, data goes to stdout."""
+"""Where words for people go: stderr. Where data goes: stdout. How every command ends.
+
+Texts from bags, files and command lines are data: nothing in them is taken for markup, and
+whatever would control the terminal is shown instead of sent.
+"""
 
 from __future__ import annotations
 
 import json
+import os
 import sys
-from collections.abc import Callable
+import tempfile
+import traceback
+import unicodedata
+from collections.abc import Callable, Iterable
+from concurrent.futures.process import BrokenProcessPool
 from functools import wraps
-from typing import Any, ParamSpec
+from pathlib import Path
+from typing import Any, NoReturn, ParamSpec
 
 import typer
-from rich.console import Console
-from rich.markup import escape
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -20,14 +29,79 @@ from rich.progress import (
     TextColumn,
     TimeRemainingColumn,
 )
+from rich.segment import Segment
+from rich.text import Text
 
-from slap_ros.errors import SlapError
+from slap_ros.errors import ErrorCode, SlapError
 
 P = ParamSpec("P")
 INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 FILE_WIDTH = 120  # columns, where stderr is no terminal: tables must not be cut there
+# Controls, invisible formatting (it reverses the writing direction), halves of characters.
+HIDDEN_CATEGORIES = ("Cc", "Cf", "Cs", "Zl", "Zp")
 
-console = Console(stderr=True, soft_wrap=True, width=None if sys.stderr.isatty() else FILE_WIDTH)
+
+def visible(text: str) -> str:
+    """The text with whatever does not show itself written out: an escape character as its code."""
+    return "".join(
+        repr(char)[1:-1]
+        if unicodedata.category(char) in HIDDEN_CATEGORIES and char not in "\n\t"
+        else char
+        for char in text
+    )
+
+
+class PlainConsole(Console):
+    """A console on which texts are data; style comes from :func:`styled` alone."""
+
+    def __init__(self) -> None:
+        at_a_terminal = sys.stderr is not None and sys.stderr.isatty()
+        width = None if at_a_terminal else FILE_WIDTH
+        super().__init__(
+            stderr=True, soft_wrap=True, width=width, markup=False, highlight=False, emoji=False
+        )
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        """A text as data; made visible here already, before its width is measured."""
+        return super().render_str(visible(text), **options)
+
+    def render(
+        self, renderable: RenderableType, options: ConsoleOptions | None = None
+    ) -> Iterable[Segment]:
+        """What is printed, in segments; those of text made visible."""
+        for segment in super().render(renderable, options):
+            if segment.control is None and not segment.text.isprintable():
+                segment = segment._replace(text=visible(segment.text))
+            yield segment
+
+
+console = PlainConsole()
+
+
+def styled(label: str, style: str, rest: str = "") -> Text:
+    """A word with a style before a text without.
+
+    Args:
+        label: The word.
+        style: As rich names it, ``bold red``.
+        rest: The text.
+
+    Returns:
+        Both, to be printed.
+    """
+    return Text.assemble((visible(label), style), visible(rest))
+
+
+def open_closed_streams() -> None:
+    """Give a process that was started without stdout or stderr something in their place.
+
+    Python has None there, which every library trips over. What is written to a closed stdout
+    fails as on a full disk; what is said to a closed stderr is for nobody.
+    """
+    if sys.stdout is None:
+        sys.stdout = os.fdopen(os.open("/dev/full", os.O_WRONLY), "w", encoding="utf-8")
+    if sys.stderr is None:
+        sys.stderr = os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8")
 
 
 def exits(command: Callable[P, int | None]) -> Callable[P, None]:
@@ -37,20 +111,68 @@ def exits(command: Callable[P, int | None]) -> Callable[P, None]:
     def run(*args: P.args, **kwargs: P.kwargs) -> None:
         try:
             code = command(*args, **kwargs)
+            sys.stdout.flush()
         except SlapError as error:
-            message = escape(" ".join(str(error).split()))
-            console.print(f"[bold red]error[/] {message}", highlight=False)
-            raise typer.Exit(int(error.code)) from error
+            _fail(error.code, " ".join(str(error).split()), error)
         except KeyboardInterrupt:
-            console.print("interrupted")
+            _say("interrupted")
             raise typer.Exit(INTERRUPTED) from None
+        except BrokenPipeError as error:  # whoever read stdout has seen enough
+            _silence_stdout()
+            raise typer.Exit(int(ErrorCode.INPUT_OUTPUT)) from error
+        except BrokenProcessPool as error:
+            advice = "a worker was killed; short of memory? the same command goes on"
+            _fail(ErrorCode.OUT_OF_MEMORY, advice, error)
+        except MemoryError as error:
+            advice = "out of memory; fewer jobs or tasks at once need less"
+            _fail(ErrorCode.OUT_OF_MEMORY, advice, error)
+        except OSError as error:
+            if error.filename is None:
+                _silence_stdout()  # it may be what failed; else nothing is lost
+            _fail(ErrorCode.INPUT_OUTPUT, _os_complaint(error), error)
+        except (typer.Exit, typer.Abort):
+            raise
+        except Exception as error:
+            _fail(ErrorCode.INTERNAL_ERROR, _internal_complaint(error), error)
         raise typer.Exit(code or 0)
 
     return run
 
 
+def _fail(code: ErrorCode, message: str, error: BaseException) -> NoReturn:
+    _say(styled("error", "bold red", f" {message}"))
+    raise typer.Exit(int(code)) from error
+
+
+def _say(text: str | Text) -> None:
+    """Print on stderr; where that is closed or full, the exit code has to do."""
+    try:
+        console.print(text)
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stderr.fileno())
+
+
+def _silence_stdout() -> None:
+    """Let what is still buffered for stdout go nowhere: at exit it would fail again."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _os_complaint(error: OSError) -> str:
+    what = error.strerror or str(error)
+    path = os.fsdecode(error.filename) if isinstance(error.filename, str | bytes) else ""
+    where = path if len(path) <= 120 else f"{path[:100]}… ({len(path)} characters)"
+    return f"{what}: {where}; check the path, and the disk" if path else f"{what} (stdout?)"
+
+
+def _internal_complaint(error: Exception) -> str:
+    """What happened, in a line; the rest is kept in a file, which is named."""
+    with tempfile.NamedTemporaryFile("w", prefix="slap-", suffix=".log", delete=False) as log:
+        traceback.print_exception(error, file=log)
+    return f"this is a fault of slap: {error!r}; please report it with {Path(log.name)}"
+
+
 def print_json(data: Any) -> None:
-    """Write data as one line of JSON to stdout."""
+    """Data on stdout."""
     sys.stdout.write(json.dumps(data, allow_nan=False) + "\n")
     sys.stdout.flush()
 
@@ -58,7 +180,7 @@ def print_json(data: Any) -> None:
 def progress() -> Progress:
     """A progress bar on stderr that goes away when it is done."""
     return Progress(
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeRemainingColumn(),

@@ -6,10 +6,9 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from rich.markup import escape
 from rich.table import Table
 
-from slap_ros.cli.console import console, print_json
+from slap_ros.cli.console import console, print_json, styled
 from slap_ros.cli.options import Json
 from slap_ros.doctor import diagnose
 from slap_ros.errors import ErrorCode
@@ -26,8 +25,8 @@ def doctor(json: Json = False) -> int:
     else:
         table = Table("check", "", "found", "what to do")
         for check in checks:
-            status = f"[{STYLE[check.status]}]{check.status}[/]"
-            table.add_row(check.name, status, escape(check.found), escape(check.advice))
+            status = styled(check.status, STYLE[check.status])
+            table.add_row(check.name, status, check.found, check.advice)
         console.print(table)
     problem = any(check.status == "problem" for check in checks)
     return int(ErrorCode.UNKNOWN) if problem else 0

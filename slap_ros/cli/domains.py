@@ -21,7 +21,7 @@ def _available() -> Iterator[Domain]:
         try:
             yield from [get_domain(name, preset) for preset in PRESETS]
         except InvalidDomainError as error:
-            console.print(str(error), highlight=False, markup=False)
+            console.print(str(error))
 
 
 def domains(json: Json = False) -> None:

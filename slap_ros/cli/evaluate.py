@@ -70,7 +70,7 @@ def _run(experiment: Experiment, compared: Sequence[Approach], jobs: int) -> lis
                 trials.append(trial)
                 bar.advance(watched)
                 if not trial.success:
-                    console.print(_complaint(approach, trial), highlight=False, markup=False)
+                    console.print(_complaint(approach, trial))
             trials.sort(key=lambda trial: (trial.seed, trial.index))
             yardstick = yardstick or trials
             summaries.append(Summary.of(experiment, approach.name, trials, yardstick))

@@ -82,11 +82,10 @@ def _show(result: PlanningResult, json: bool) -> None:
         )
         return
     for option, steps in edges:
-        console.print(f"{steps:5d}  {option}", highlight=False)
+        console.print(f"{steps:5d}  {option}")
     console.print(
         f"{result.plan.predicted_steps:5d}  steps predicted; {result.graph_nodes} abstract states, "
         f"{result.graph_edges} edges, {result.edges_rolled_out} rolled out",
-        highlight=False,
     )
 
 
@@ -107,7 +106,7 @@ def _write(
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in files.items():
             (folder / name).write_text(text, encoding="utf-8")
-            console.print(f"wrote {folder / name}", highlight=False)
+            console.print(f"wrote {folder / name}")
     except OSError as error:
         raise StorageFullError(f"cannot write to {folder}: {error.strerror}") from error
 
@@ -132,7 +131,7 @@ def _plan_pddl(domain_file: Path, problem_file: Path, json: bool) -> None:
         print_json({"plan": names})
         return
     for name in names:
-        console.print(name, highlight=False)
+        console.print(name)
     console.print(f"{len(names)} operators")
 
 

@@ -49,4 +49,4 @@ def render(domain: Domain, states: Sequence[State], path: Path) -> None:
             domain.display.animate(path, states, lambda done: bar.update(task, completed=done))
         except OSError as error:
             raise StorageFullError(f"cannot write {path}: {error.strerror or error}") from error
-    console.print(f"animation: {path}", highlight=False)
+    console.print(f"animation: {path}")

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from slap_ros.cli.console import console
+from slap_ros.cli.console import console, styled
 from slap_ros.errors import ErrorCode
 from slap_ros.report import check_output, read_report, render, write_page
 
@@ -36,10 +36,10 @@ def write_report(bags: Sequence[Path], output: Path) -> int:
     with console.status("writing the report"):
         found = [read_report(bag) for bag in bags]
         write_page(output, render(found))
-    console.print(f"report: {output}", highlight=False)
+    console.print(f"report: {output}")
     for bag in found:
         if bag.evaluation.damage is not None:
-            console.print(f"[yellow]damaged[/]: {bag.evaluation.damage}", highlight=False)
+            console.print(styled("damaged", "yellow", f": {bag.evaluation.damage}"))
     if any(bag.evaluation.mismatches for bag in found):
         return int(ErrorCode.REPLAY_MISMATCH)
     return int(ErrorCode.DAMAGED_BAG) if any(bag.evaluation.damage for bag in found) else 0

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from slap_ros.cli.console import console
+from slap_ros.cli.console import console, styled
 from slap_ros.core import Domain
 from slap_ros.shortcuts.library import Library
 from slap_ros.shortcuts.shipped import chosen_library
@@ -40,8 +40,7 @@ def choose(choice: str | None, domain: Domain, planner: str) -> Library | None:
     """
     library = chosen_library(choice, domain, planner)
     for reason in library.refused if library is not None else ():
-        console.print("[yellow]warning[/]", end=" ")
-        console.print(f"a shortcut is left out: {reason}", highlight=False, markup=False)
+        console.print(styled("warning", "yellow", f" a shortcut is left out: {reason}"))
     return library
 
 

@@ -253,7 +253,7 @@ def _command(study: str, domain: str, **options: Any) -> str:
 
 def _write(output: Path, report: StudyReport, origin: Provenance) -> None:
     paths = write(output, report, origin)
-    console.print(f"{report.title}: {', '.join(map(str, paths))}", highlight=False, markup=False)
+    console.print(f"{report.title}: {', '.join(map(str, paths))}")
 
 
 class _StudyBars:
@@ -283,4 +283,4 @@ class _StudyBars:
 
     def report_failure(self, complaint: str) -> None:
         """A task was not solved, and why."""
-        console.print(complaint, highlight=False, markup=False)
+        console.print(complaint)

@@ -108,7 +108,6 @@ def train(options: TrainOptions) -> int:
     console.print(
         f"{len(library.shortcuts)} shortcuts in {folder}, {seconds:.0f} s; see what they are worth "
         f"with `slap evaluate {options.domain} --shortcuts {folder}`",
-        highlight=False,
     )
     return 0
 
@@ -131,9 +130,9 @@ class _TrainingBars:
 
     def __init__(self) -> None:
         self._bars = Progress(
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(),
-            TextColumn("{task.fields[detail]}"),
+            TextColumn("{task.fields[detail]}", markup=False),
             TimeRemainingColumn(),
             console=console,
             transient=True,
@@ -160,13 +159,12 @@ class _TrainingBars:
 
     def on_ranked(self, ranked: Sequence[CandidateGroup]) -> None:
         """What was found worth learning."""
-        console.print(f"{len(ranked)} candidates; the most promising:", highlight=False)
+        console.print(f"{len(ranked)} candidates; the most promising:")
         for group in ranked[:5]:
             after = ", ".join(group.operator_path) or "the start"
             console.print(
                 f"  {group.signature.name} after {after}: {group.relative_saving:.0%} of a plan, "
                 f"found in {group.tasks} tasks",
-                highlight=False,
             )
 
     def on_learning(self, name: str, folder: Path, total_steps: int) -> None:
@@ -201,7 +199,6 @@ class _TrainingBars:
         """What it is worth."""
         console.print(
             f"{name}: plans of {before:.1f} steps become {after:.1f}{'' if kept else '; not kept'}",
-            highlight=False,
         )
 
 
