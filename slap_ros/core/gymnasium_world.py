@@ -74,7 +74,7 @@ class GymnasiumWorld:
         """Continue from ``state``.
 
         Raises:
-            InvalidDomainError: The environment does not begin where it was told to.
+            InvalidDomainError: The environment does not begin in that state.
             InvalidStateError: It refuses the state, by a ``ValueError``.
         """
         state.require_finite()

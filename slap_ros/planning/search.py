@@ -14,17 +14,20 @@ unifying formalism for shortest path problems with expensive edge evaluations vi
 search over paths with edge selectors, ICAPS 2016) for the family: an edge is rolled out only
 when it comes to the front of the queue, and until then counts with a lower bound.
 
-Both find the same cost *if bounds are admissible*, that is, if no option takes fewer steps than
-``Skill.least_steps`` and ``Skill.lower_bound`` say. The bounds of the given skills are checked by
-tests. The bound of a shortcut, half of its shortest success in training, is an assumption: where
-a rollout in the model is shorter than that, the lazy search may return a plan that is longer than
-the exhaustive one's, by at most the sum of what the bounds exceed the steps by on the best path.
-``test/shortcuts/test_bounds.py`` measures how often that happens with the shipped libraries.
+Both find the same cost *if bounds are admissible* (no option takes fewer steps than
+``Skill.least_steps`` and ``Skill.lower_bound`` say) and no shortcut is given up on the way, which
+depends on the order of roll-outs. Tests check the bounds of given skills. The bound of a shortcut,
+half of its shortest success in training, is an assumption. Where a roll-out takes less, the lazy
+search may return a plan that is longer than the cheapest: by no more than the bounds exceed the
+steps along the cheapest path. With the shipped libraries that never happened in 190 states of 250
+tasks of the four domains (``python -m benchmarks.shortcut_bounds``), where no roll-out was even
+shorter than the shortest success in training.
 
-In the planner's model, a plan with shortcuts is never longer than one without, when both searches
-end with a plan at the same depth and the bounds of the given skills are admissible: shortcuts only
-add edges, and their own bounds, right or wrong, never delay the given skills' best plan. To execute
-a plan is another matter: a world that is not the model may make it diverge, and it is replanned.
+In the planner's model, a plan with shortcuts is never longer than one without when both searches
+end with a plan in the same graph and the bounds of the given skills are admissible: shortcuts only
+add edges, and their own bounds, right or wrong, never raise the estimate of a path without them.
+Executing a plan is another matter: in a world that is not the model it may diverge, and is then
+replaced.
 """
 
 from __future__ import annotations

@@ -57,7 +57,7 @@ class ProgressRecorder:
         self._latest: dict[int, Progress] = {}
 
     def of(self, stage: int, learner: Checkpointed) -> Callable[[Progress], bool]:
-        """What is called after each rollout of a stage; it answers that learning goes on."""
+        """What is called after each rollout of a stage; it answers yes: learning continues."""
 
         def report(progress: Progress) -> bool:
             self._latest[stage] = progress

@@ -25,7 +25,7 @@ class Rewards:
             for ever.
         shaping: Weight of the difference of the potential.
         discount: Per step; here, for what ``step`` comes to for ever.
-        scale: Of the whole, so that returns have a magnitude that suits the critic.
+        scale: Of the whole, which gives returns a magnitude that critics learn well.
     """
 
     step: float = 0.0

@@ -30,7 +30,7 @@ from slap_ros.versions import versions
 
 
 class TrainingCallback(Protocol):
-    """Is called as a training goes on."""
+    """Receives the events of a training."""
 
     def on_progress(self, what: str, done: int, total: int) -> None:
         """Some of a step's jobs are done.
@@ -133,7 +133,7 @@ class Training:
         settings: All hyper-parameters.
         folder: Its work folder; see :mod:`slap_ros.shortcuts.work_folder`.
         workers: Where jobs run.
-        callback: Is called as it goes on.
+        callback: Receives its events.
     """
 
     distribution: TaskDistribution

@@ -73,6 +73,6 @@ class VecEnv(Protocol):
             actions: The policy's, from -1 to 1, shape (n, action_map.size).
 
         Returns:
-            What came of it.
+            The outcome.
         """
         ...

@@ -26,7 +26,7 @@ TASK = DOMAIN.task(0)
 
 
 class Drifting(MarblesEnv):
-    """Begins beside where it is told to."""
+    """Begins elsewhere than where it is reset to."""
 
     def reset(self, **arguments):
         observation, info = super().reset(**arguments)
@@ -134,7 +134,7 @@ def test_once_installed_the_example_is_a_domain_like_others(tmp_path):
     environment = os.environ | {"PYTHONPATH": str(tmp_path)}
     command = [sys.executable, "-m", "ensemble.cli", "evaluate", "marbles", "--tasks", "2"]
     command += ["--seeds", "1", "--jobs", "1", "--shortcuts", "none", "--json"]
-    told = subprocess.run(
+    output = subprocess.run(
         command, check=True, timeout=200, capture_output=True, text=True, env=environment
     )
-    assert json.loads(told.stdout)["success_rate"] == 1.0
+    assert json.loads(output.stdout)["success_rate"] == 1.0

@@ -244,3 +244,34 @@ def test_a_goal_that_already_holds_needs_no_plan():
     for name in ("lazy", "exhaustive", "ff"):
         result = make_planner(name, domain, task.initial_state).plan(task.initial_state, goal)
         assert result.plan.edges == ()
+
+
+@st.composite
+def graphs_with_shortcuts(draw):
+    """Options with admissible bounds, and shortcuts whose bounds may exceed what they take."""
+    graph = draw(made_up_graphs())
+    size = len(graph.nodes)
+    sources = [i for i in range(size) if i not in graph.goal_nodes]
+    pairs = st.tuples(st.sampled_from(sources), st.integers(1, size - 1))
+    for number, (i, j) in enumerate(draw(st.lists(pairs, max_size=8))):
+        tightness = draw(st.sampled_from([0.5, 1.0, 2.0, 5.0]))
+        skill = MadeUpSkill(f"shortcut{number}", draw(st.integers(0, 10**6)), tightness)
+        graph.edges.append(Edge(i, j, in_ways(skill, draw(st.integers(1, 3)))))
+    return graph
+
+
+@settings(max_examples=200, deadline=None)
+@given(graphs_with_shortcuts())
+def test_a_plan_is_too_long_by_no_more_than_bounds_are_too_high(graph):
+    state, model = State(LAYOUT, [0.0]), MadeUpModel()
+    try:
+        best = search_exhaustively(graph, state, model)
+    except UnsolvableError:
+        return
+    lazy = search_lazily(graph, state, model)
+    excess = 0
+    for edge in best.edges:
+        rollout = model.roll_out(edge.option, state, edge.target)
+        excess += max(0, edge.option.skill.lower_bound(state, ()) - rollout.steps)
+        state = rollout.final
+    assert best.predicted_steps <= lazy.predicted_steps <= best.predicted_steps + excess

@@ -50,10 +50,8 @@ def main() -> None:
     starts = [found for index in range(TASKS) if (found := start(index)) is not None]
     signature = Signature.of(starts[0].change, starts[0].space, frozenset({"Holding"}))
     rng, settings = np.random.default_rng(0), PpoSettings(total_steps=STEPS)
-    practice = ShortcutVecEnv(
-        DOMAIN, signature, starts, settings.environments, HORIZON, Rewards(), rng
-    )
-    learner = Learner(practice, normalisation_of(practice, rng, 64), settings, seed=0)
+    env = ShortcutVecEnv(DOMAIN, signature, starts, settings.environments, HORIZON, Rewards(), rng)
+    learner = Learner(env, normalisation_of(env, rng, 64), settings, seed=0)
     last = Progress(0, 0, 0.0, 0.0, 0.0, HORIZON)
 
     def report(progress: Progress) -> bool:

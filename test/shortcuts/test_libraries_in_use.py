@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Libraries that are there, are not, are damaged; and that what is rehearsed is reproducible."""
+"""Libraries that are there, are not, are damaged; and that rollouts are reproducible."""
 
 import json
 import shutil
@@ -192,7 +192,7 @@ def test_a_checkout_ships_what_is_in_its_models():
 
 # -- the same everywhere ------------------------------------------------------------------------
 
-REHEARSE = """
+ROLL_OUT = """
 import sys
 from pathlib import Path
 from hashlib import sha256
@@ -227,14 +227,14 @@ assert "torch" not in sys.modules, "torch was imported"
 """
 
 
-def test_a_rollouts_is_the_same_in_every_process_and_needs_no_torch():
-    command = [sys.executable, "-c", REHEARSE, str(DATA)]
-    told = [
+def test_a_rollout_is_the_same_in_every_process_and_needs_no_torch():
+    command = [sys.executable, "-c", ROLL_OUT, str(DATA)]
+    outputs = [
         subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
         for _ in range(2)
     ]
-    assert told[0] == told[1]
-    assert told[0][1] == "True"  # something was rehearsed
+    assert outputs[0] == outputs[1]
+    assert outputs[0][1] == "True"  # something was rolled out
 
 
 def test_the_shipped_shortcut_halves_what_the_drawer_takes():

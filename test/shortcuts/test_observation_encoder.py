@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What learners are told of a Panda's joints."""
+"""What learners observe of a Panda's joints."""
 
 import numpy as np
 import pytest
@@ -52,7 +52,7 @@ def test_a_joint_close_to_its_limit_costs(encoder, share, penalty, side):
     assert less == pytest.approx(JOINT_LIMIT_WEIGHT * penalty, abs=1e-9)
 
 
-def test_a_batch_is_strained_like_its_states(encoder):
+def test_a_batch_is_penalised_like_its_states(encoder):
     state = TOWER.task(0).initial_state
     rng = np.random.default_rng(0)
     rows = np.tile(state.data, (20, 1))

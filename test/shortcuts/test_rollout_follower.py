@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A rehearsed shortcut in a world that is not quite the model."""
+"""A shortcut that was tried out in the model, in a world that is not quite the model."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ TASK = DOMAIN.task(1)
 
 
 @pytest.fixture(scope="module")
-def rehearsed():
+def shortcut_of_plan():
     """The shortcut of a plan, as an option, and where it starts."""
     space = DOMAIN.atom_space(TASK.initial_state)
     approach = approaches(load_library(DATA, DOMAIN), Sampling(samples=4))[-1]
@@ -44,26 +44,26 @@ def attempt(option, start):
     return ground.rollouts.successes(ground.shortcut, ground.encoder, start)[option.attempt]
 
 
-def test_it_is_kept_to_where_things_are_a_little_elsewhere(rehearsed):
-    shortcut, start = rehearsed
+def test_the_rollout_is_followed_where_objects_are_a_little_elsewhere(shortcut_of_plan):
+    shortcut, start = shortcut_of_plan
     follow = shortcut.skill.start(start, shortcut.objects)
-    foreseen = attempt(shortcut, start)
-    for state, choice in zip(foreseen.states, foreseen.actions, strict=True):
+    predicted = attempt(shortcut, start)
+    for state, choice in zip(predicted.states, predicted.actions, strict=True):
         action = follow(moved(state, "block", 0.003))
         assert (action == shortcut.skill.command(choice)).all()
 
 
-def test_it_is_left_where_the_robot_is_elsewhere(rehearsed):
-    shortcut, start = rehearsed
+def test_the_rollout_is_left_where_the_robot_is_elsewhere(shortcut_of_plan):
+    shortcut, start = shortcut_of_plan
     follow = shortcut.skill.start(start, shortcut.objects)
-    foreseen = attempt(shortcut, start)
-    follow(foreseen.states[0])
-    off = moved(foreseen.states[1], "robot", 0.05)
+    predicted = attempt(shortcut, start)
+    follow(predicted.states[0])
+    off = moved(predicted.states[1], "robot", 0.05)
     seen = shortcut.skill.encoder.encode(off.alone()).observations
     bare = shortcut.skill.command(shortcut.skill.shortcut.policy.mean(seen)[0])
     assert np.array_equal(follow(off), bare)
-    again = follow(foreseen.states[2])  # and not taken up again
-    seen = shortcut.skill.encoder.encode(foreseen.states[2].alone()).observations
+    again = follow(predicted.states[2])  # and not taken up again
+    seen = shortcut.skill.encoder.encode(predicted.states[2].alone()).observations
     assert np.array_equal(
         again, shortcut.skill.command(shortcut.skill.shortcut.policy.mean(seen)[0])
     )

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Attempts in a crowd of worlds are those that one world alone would have made."""
+"""Rollouts in a batch of worlds are those that one world alone would have made."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +22,7 @@ SAMPLING = Sampling(samples=4, batch=8)
 
 
 def situations(count=6):
-    """Holding the target block, about to push the obstacle aside: senses and state."""
+    """Holding the target block, about to push the obstacle aside: encoder and state."""
     for index in range(count):
         task = DOMAIN.task(21, index)
         problem = Problem.of(DOMAIN, task.initial_state)
@@ -37,18 +37,18 @@ def situations(count=6):
         yield ObservationEncoder(DOMAIN, space, SHORTCUT.signature, change), state
 
 
-def attempts(domain, sampling, encoder, state):
+def successes(domain, sampling, encoder, state):
     return ShortcutRollouts(domain, state, sampling).successes(SHORTCUT, encoder, state)
 
 
-def test_each_attempt_does_in_a_world_of_its_own_what_it_says():
+def test_each_rollout_does_in_a_world_of_its_own_what_it_says():
     seen = 0
     for encoder, state in situations():
-        for attempt in attempts(DOMAIN, SAMPLING, encoder, state):
+        for rollout in successes(DOMAIN, SAMPLING, encoder, state):
             world = DOMAIN.make_world(state)
-            for choice, foreseen in zip(attempt.actions, attempt.states, strict=True):
-                assert np.array_equal(world.state.data, foreseen.data)
-                world.step(encoder.action_map(choice.astype(np.float64)))
+            for action, predicted in zip(rollout.actions, rollout.states, strict=True):
+                assert np.array_equal(world.state.data, predicted.data)
+                world.step(encoder.action_map(action.astype(np.float64)))
             goal = encoder.change.apply(encoder.space.abstract(state))
             assert encoder.space.abstract(world.state) == goal
             seen += 1
@@ -56,11 +56,11 @@ def test_each_attempt_does_in_a_world_of_its_own_what_it_says():
 
 
 def test_worlds_that_cannot_be_stepped_together_try_one_after_the_other():
-    """Without noise a crowd has nothing to add: both find the same."""
+    """Without noise a batch has nothing to add: both find the same."""
     apart = replace(DOMAIN, learning=replace(DOMAIN.learning, make_vector_world=None))
     for encoder, state in situations():
         alone = Sampling(samples=1, refinements=0)
-        one, many = (attempts(domain, alone, encoder, state) for domain in (apart, DOMAIN))
+        one, many = (successes(domain, alone, encoder, state) for domain in (apart, DOMAIN))
         assert [a.steps for a in one] == [a.steps for a in many]
         assert len(one) <= 1
 
@@ -69,16 +69,16 @@ def test_worlds_that_cannot_be_stepped_together_try_one_after_the_other():
 def test_the_shortest_come_first_and_no_more_than_wanted(batch):
     sampling = replace(SAMPLING, batch=batch)
     for encoder, state in situations():
-        steps = [attempt.steps for attempt in attempts(DOMAIN, sampling, encoder, state)]
+        steps = [rollout.steps for rollout in successes(DOMAIN, sampling, encoder, state)]
         assert steps == sorted(steps)
         assert len(steps) <= sampling.alternatives + 1
 
 
-def test_a_crowd_finds_at_least_as_short_a_way():
+def test_a_batch_finds_a_way_at_least_as_short():
     few, many = (replace(SAMPLING, batch=batch) for batch in (1, 64))
     sums = [
         sum(
-            found[0].steps if (found := attempts(DOMAIN, sampling, encoder, state)) else 40
+            found[0].steps if (found := successes(DOMAIN, sampling, encoder, state)) else 40
             for encoder, state in situations()
         )
         for sampling in (few, many)

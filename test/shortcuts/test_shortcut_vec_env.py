@@ -21,33 +21,33 @@ def make_env(num_envs=24, horizon=25, rewards=OURS, seed=3):
     return ShortcutVecEnv(DOMAIN, SIGNATURE, STARTS, num_envs, horizon, rewards, rng)
 
 
-def random_steps(run, count, seed=5):
+def random_steps(env, count, seed=5):
     rng = np.random.default_rng(seed)
     for step in range(count):
         if step % 4 == 0:
-            actions = rng.uniform(-1, 1, (run.num_envs, run.action_map.size))
-        yield run.step(actions)
+            actions = rng.uniform(-1, 1, (env.num_envs, env.action_map.size))
+        yield env.step(actions)
 
 
-def test_tasks_with_different_objects_practise_side_by_side():
+def test_tasks_with_different_objects_are_stepped_together():
     assert len({len(start.state.objects) for start in STARTS}) > 1
-    run = make_env()
-    assert run.num_envs == 24
-    assert run.observations.shape[0] == 24
+    env = make_env()
+    assert env.num_envs == 24
+    assert env.observations.shape[0] == 24
 
 
-def test_it_is_done_exactly_where_the_target_abstract_state_is_reached():
-    run = make_env(num_envs=16)
+def test_it_succeeds_exactly_where_the_target_abstract_state_is_reached():
+    env = make_env(num_envs=16)
     done = 0
     for _ in range(200):
-        targets = [list(group._targets) for group in run._groups]
-        (steps,) = random_steps(run, 1, seed=_)
+        targets = [list(group._targets) for group in env._groups]
+        (steps,) = random_steps(env, 1, seed=_)
         first = 0
-        for group, wanted in zip(run._groups, targets, strict=True):
+        for group, wanted in zip(env._groups, targets, strict=True):
             ended = steps.dones[first : first + group.size]
             states = group._worlds.states
             for i in range(group.size):
-                if not ended[i]:  # else the world has begun anew
+                if not ended[i]:  # else the world was reset
                     state = State(states.layout, states.data[i])
                     assert group.encoder.space.abstract(state) != wanted[i]
             first += group.size
@@ -56,8 +56,8 @@ def test_it_is_done_exactly_where_the_target_abstract_state_is_reached():
 
 
 def test_the_horizon_is_told_apart_from_an_end():
-    run = make_env(horizon=3)
-    ends = list(random_steps(run, 6))
+    env = make_env(horizon=3)
+    ends = list(random_steps(env, 6))
     assert not ends[1].truncated.any()
     assert (
         ends[2].truncated.sum() + ends[2].success.sum()
@@ -69,12 +69,12 @@ def test_the_horizon_is_told_apart_from_an_end():
 def test_shaping_telescopes():
     """Undiscounted, the rewards of a success differ by the potential at the start alone."""
     plain, shaped = Rewards(shaping=0.0), Rewards(shaping=1.0)
-    runs = [make_env(rewards=rewards) for rewards in (plain, shaped)]
-    potential = np.concatenate([group._potential for group in runs[1]._groups])
+    envs = [make_env(rewards=rewards) for rewards in (plain, shaped)]
+    potential = np.concatenate([group._potential for group in envs[1]._groups])
     sums = np.zeros((2, 24))
     alive = np.ones(24, dtype=bool)
     ended = np.zeros(24, dtype=bool)
-    for pair in zip(*(random_steps(run, 25) for run in runs), strict=True):
+    for pair in zip(*(random_steps(env, 25) for env in envs), strict=True):
         for i, steps in enumerate(pair):
             sums[i] += np.where(alive, steps.rewards, 0.0)
         ended |= alive & pair[0].success
@@ -85,9 +85,9 @@ def test_shaping_telescopes():
 
 def test_standing_still_is_worth_the_same_everywhere():
     """Else a critic that has learned the potential would find nothing worth while."""
-    rewards, run = Rewards(), make_env(horizon=50)
-    random_steps(run, 10)
-    still = [run.step(np.zeros((24, run.action_map.size))) for _ in range(5)]
+    rewards, env = Rewards(), make_env(horizon=50)
+    random_steps(env, 10)
+    still = [env.step(np.zeros((24, env.action_map.size))) for _ in range(5)]
     for steps in still:
         going = ~steps.dones
         assert going.any()
@@ -112,10 +112,10 @@ def test_what_is_let_go_of_elsewhere_is_out_of_hand():
     change = Change(add, start.space.mask([held, overlap(start.space)]))
     encoder = ObservationEncoder(DOMAIN, start.space, Signature.of(change, start.space), change)
     world = DOMAIN.make_world(start.state)
-    looks = [encoder.encode(start.state.alone())]
-    looks += [encoder.encode(world.step(np.array([0.0, 0.0, -1.0])).alone())]
-    assert [bool(encode.failure[0]) for encode in looks] == [False, True]
-    assert not looks[1].achieved[0]
+    encodings = [encoder.encode(start.state.alone())]
+    encodings += [encoder.encode(world.step(np.array([0.0, 0.0, -1.0])).alone())]
+    assert [bool(encode.failure[0]) for encode in encodings] == [False, True]
+    assert not encodings[1].achieved[0]
     there = moved_there(start.state, world.state)
     assert not encoder.encode(there.alone()).failure[0]
     assert encoder.encode(there.alone()).achieved[0]
@@ -144,7 +144,7 @@ def test_the_way_to_the_target_counts_while_a_block_is_held():
     assert (np.diff(encoder.encode(State(layout, data)).potential) > 0.0).all()
 
 
-def test_same_seed_same_practice():
+def test_same_seed_same_episodes():
     first, second = (list(random_steps(make_env(), 40)) for _ in range(2))
     for a, b in zip(first, second, strict=True):
         assert a.observations.tobytes() == b.observations.tobytes()

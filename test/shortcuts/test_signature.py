@@ -74,13 +74,13 @@ def test_a_table_and_a_target_are_different_roles():
 
 
 @pytest.mark.parametrize("obstacles", [2, 3, 4, 6])
-def test_what_was_learned_on_three_suits_other_towers(obstacles):
+def test_what_was_learned_on_three_matches_other_towers(obstacles):
     learned = Signature.of(*reversed(tower(3)))
     space, change = tower(obstacles)
     assert learned.matches(change, space)
 
 
-def test_it_does_not_suit_another_change():
+def test_it_does_not_match_another_change():
     space, change = tower(3)
     learned = Signature.of(change, space)
     half = Change(change.add & -change.add, 0)
@@ -112,7 +112,7 @@ def test_what_is_held_is_part_of_what_was_learned():
 
 
 def test_all_of_it_or_nothing():
-    """Of a higher tower, a part falling over is also a change that suits: it is left out."""
+    """Of a higher tower, a part falling over is also a change that matches: it is left out."""
     space, change = tower(3)
     grasping = make("fair").learning.interface.grasping
     source = change.delete
@@ -148,7 +148,7 @@ def test_a_signature_survives_json():
         Signature.from_json(broken)
 
 
-def test_reach_finds_exactly_the_pairs_that_suit():
+def test_the_matcher_finds_exactly_the_pairs_that_match():
     domain = get_domain("obstacle2d", "fair")
     from slap_ros.planning.abstract_graph import build_abstract_graph
     from slap_ros.planning.planner import Problem
@@ -170,9 +170,9 @@ def test_reach_finds_exactly_the_pairs_that_suit():
         assert len(signatures) > 3
         for signature in signatures:
             slowly = {p for p, c in changes.items() if signature.matches(c, space)}
-            reach = SignatureMatcher(signature, space, grasping)
-            quickly = {(i, j) for i, js in reach._by_source(graph.nodes) for j in js}
-            begins = {i for i in range(len(graph.nodes)) if reach._may_begin(graph.nodes[i])}
+            matcher = SignatureMatcher(signature, space, grasping)
+            quickly = {(i, j) for i, js in matcher._by_source(graph.nodes) for j in js}
+            begins = {i for i in range(len(graph.nodes)) if matcher._may_begin(graph.nodes[i])}
             assert {(i, j) for i, j in slowly if i in begins} == quickly & set(pairs)
 
 

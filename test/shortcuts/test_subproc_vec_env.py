@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Practice in several processes, against the same in one."""
+"""Environments in several processes, against the same in one."""
 
 from dataclasses import fields, replace
 from multiprocessing import active_children

@@ -1,0 +1,133 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Files of version 0.1.0 are read as before: work folders of trainings, settings, libraries.
+
+``data/training_of_0_1_0`` was written by that version: one training that was finished, the same
+one killed after its second rollout, the record of its library, and all named settings.
+"""
+
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from slap_ros.domains import get_domain
+from slap_ros.shortcuts.library import load_library, save_library
+from slap_ros.shortcuts.settings import SETTINGS, ExplorationSettings, training_settings
+from slap_ros.shortcuts.shipped import shipped_library
+from slap_ros.shortcuts.task_distribution import TaskDistribution
+from slap_ros.shortcuts.training import Training
+from slap_ros.shortcuts.workers import SequentialWorkers
+from slap_ros.studies.trainings import TrainingFolder
+
+DATA = Path(__file__).parent / "data" / "training_of_0_1_0"
+NAME = "Clear_On-e41568a9"
+OURS = training_settings("ours", "obstacle2d")
+THEN = replace(  # as the training was started then
+    OURS,
+    exploration=ExplorationSettings(tasks=2, rollouts=60, length=30, action_repeat=4),
+    ppo=replace(OURS.ppo, environments=32, hidden=(16, 16), total_steps=3_000),
+    starts=24,
+    validation=3,
+    shortcuts=1,
+)
+# They change only where a library is trained again.
+SHIPPED = {
+    "obstacle2d": "adcfeac1f9a39f82",
+    "obstacle_tower": "9d0737ba67ae3d53",
+    "cluttered_drawer": "acfa279422f2e792",
+    "cleanup_table": "51de94fd3e2bb078",
+}
+
+
+class Steps:
+    """Notes what is computed rather than read."""
+
+    def __init__(self):
+        self.computed, self.learned = set(), []
+
+    def on_progress(self, what, done, total):
+        self.computed.add(what)
+
+    def on_ranked(self, ranked):
+        self.ranked = ranked
+
+    def on_learning(self, name, folder, total_steps):
+        self.learned.append(name)
+
+    def on_validated(self, name, before, after, kept):
+        self.verdict = (name, before, after, kept)
+
+
+@pytest.fixture
+def work(tmp_path, request):
+    return shutil.copytree(DATA / request.param, tmp_path / "work")
+
+
+def train(work):
+    steps = Steps()
+    tasks = TaskDistribution("obstacle2d", "fair", 5)
+    return Training(tasks, THEN, work, SequentialWorkers(), steps).run(), steps
+
+
+@pytest.mark.parametrize("work", ["finished"], indirect=True)
+def test_a_finished_training_is_read_with_nothing_computed_again(work, tmp_path):
+    library, steps = train(work)
+    assert not steps.computed
+    assert steps.ranked[0].relative_saving > 0.1
+    assert steps.verdict == (NAME, 28.0 + 2 / 3, 17.0, True)
+    assert library.digest == "91342b8647ebf39f"
+    save_library(tmp_path / "library", library)
+    now, then = (json.loads((f / "library.json").read_text()) for f in (tmp_path / "library", DATA))
+    assert list(now) == list(then)
+    assert now | {"versions": None} == then | {"versions": None}
+
+
+@pytest.mark.parametrize("work", ["interrupted"], indirect=True)
+def test_a_killed_training_continues_from_its_checkpoint(work):
+    kept = {path: path.read_bytes() for path in work.rglob("*.json")}
+    library, steps = train(work)
+    assert steps.computed == {"planning"}  # with the shortcut: all before was done
+    assert {path: path.read_bytes() for path in kept} == kept
+    assert [shortcut.name for shortcut in library.shortcuts] == [NAME]
+    lines = [json.loads(line) for line in (work / NAME / "progress.jsonl").open()]
+    assert [line["steps"] for line in lines] == [1024, 2048, 3072]
+    assert [set(line) for line in lines] == [set(lines[0])] * 3
+    assert lines[-1]["shortest"] <= lines[0]["shortest"]
+
+
+def test_studies_read_an_old_work_folder():
+    folder = TrainingFolder(DATA / "finished")
+    assert folder.distribution() == {"domain": "obstacle2d", "preset": "fair", "seed": 5}
+    assert folder.exploration() == THEN.exploration
+    stored = json.loads((DATA / "finished" / "explored.json").read_text())
+    explored = folder.explored()
+    assert [one.pairs for one in explored] == [task["candidates"] for task in stored]
+    for one, task in zip(explored, stored, strict=True):
+        assert one.as_json() == {key: value for key, value in task.items() if key != "cpu_s"}
+        assert [c.expected_saving for c in one.candidates] == [f["promise"] for f in task["finds"]]
+    (curve,) = folder.curves()
+    assert [point.steps for point in curve.points] == [1024, 2048, 3072]
+
+
+def test_all_named_settings_are_written_as_they_were():
+    then = json.loads((DATA / "settings_by_name.json").read_text())
+    now = {
+        name: {domain: settings.as_json() for domain, settings in kinds.items()}
+        for name, kinds in SETTINGS.items()
+    }
+    assert json.loads(json.dumps(now)) == then
+    for name, kinds in then.items():
+        for domain, settings in kinds.items():
+            assert list(now[name][domain]) == list(settings)  # in this order, too
+            read = ExplorationSettings.from_json(settings["exploration"])
+            assert read == SETTINGS[name][domain].exploration
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_shipped_libraries_load_as_they_were(name):
+    library = load_library(shipped_library(name), get_domain(name))
+    assert not library.refused
+    assert library.digest == SHIPPED[name]
