@@ -34,7 +34,18 @@ OnMessage = Callable[[str, Any], None]  # message type, message
 
 
 class RunClient(Node):
-    """Follows a run; ``log`` has its metrics."""
+    """Follows a run; ``log`` has its metrics.
+
+    Subscribers:
+        every topic of ``FOLLOWED``, and those asked for.
+
+    Action clients:
+        slap/solve_task (slap_msgs/SolveTask): the task.
+        slap/execute_skill (slap_msgs/ExecuteSkill): only to see whether its server is there.
+
+    Service clients:
+        slap/close_bag (std_srvs/Trigger): finish the bag.
+    """
 
     def __init__(self, on_message: OnMessage, shown: Collection[Topic] = (), **kwargs: Any) -> None:
         """Follow a run.

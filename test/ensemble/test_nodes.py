@@ -332,7 +332,7 @@ def test_a_thousand_steps_are_answered_one_by_one(network):
     assert len(milliseconds) == 1000
 
 
-def test_observer_ignores_states_of_an_episode_that_is_over(network):
+def test_states_of_an_episode_that_is_over_are_ignored(network):
     """A message of the old episode that comes late must not look like news."""
     with (
         temporary_node(Listener) as (client, spinner),
@@ -341,9 +341,9 @@ def test_observer_ignores_states_of_an_episode_that_is_over(network):
         ),
     ):
         observations = []
-        observer = StateSynchronizer(client, observations.append)
-        assert spinner.spin_until(lambda: observer.latest is not None, LIMIT)
+        synchronizer = StateSynchronizer(client, observations.append)
+        assert spinner.spin_until(lambda: synchronizer.latest is not None, LIMIT)
         reset(client, spinner, seed=8)
-        assert spinner.spin_until(lambda: observer.latest.episode.number == 2, LIMIT)
+        assert spinner.spin_until(lambda: synchronizer.latest.episode.number == 2, LIMIT)
         assert [o.episode.number for o in observations] == [1, 2]
-        assert observer.latest.step == 0
+        assert synchronizer.latest.step == 0

@@ -149,7 +149,7 @@ def observed():
     return Observation(episode, 6, state, start), target
 
 
-def repertoires(observation, choice=DATA):
+def provider(observation, choice=DATA):
     node = SimpleNamespace(get_logger=lambda: None)
     made = ShortcutProvider(node, ShortcutParameters(shortcuts=str(choice)))
     made.load(observation.episode)
@@ -170,10 +170,10 @@ def goal(observation, target, name=SHORTCUT, objects=("block2", "target", "table
 
 def test_a_fitting_request_is_the_shortcut_itself(observed):
     observation, target = observed
-    shelf = repertoires(observation)
-    option, wanted = requested_option(goal(observation, target), observation, shelf)
+    shortcuts = provider(observation)
+    option, wanted = requested_option(goal(observation, target), observation, shortcuts)
     assert (option.kind, option.skill.name, wanted) == (OptionKind.SHORTCUT, SHORTCUT, target)
-    again, _ = requested_option(goal(observation, target), observation, shelf)
+    again, _ = requested_option(goal(observation, target), observation, shortcuts)
     assert again == option
     actions = observation.episode.domain.action_space
     execution = OptionExecution(option, target, actions, observation.state)
@@ -186,7 +186,7 @@ def test_the_attempt_that_was_planned_is_the_one_that_runs(observed):
     model, rollouts = Model.of(observation.episode.domain, observation.state), []
     for attempt in range(3):
         asked = goal(observation, target, attempt=attempt)
-        option, _ = requested_option(asked, observation, repertoires(observation))
+        option, _ = requested_option(asked, observation, provider(observation))
         rollouts.append(model.roll_out(option, observation.state, target))
     assert all(rollout.reached for rollout in rollouts)
     assert len({rollout.final.key for rollout in rollouts}) == 3
@@ -197,14 +197,14 @@ def test_the_attempt_that_was_planned_is_the_one_that_runs(observed):
 def test_an_attempt_that_never_was_is_refused(observed):
     observation, target = observed
     asked = goal(observation, target, attempt=50)
-    option, _ = requested_option(asked, observation, repertoires(observation))
+    option, _ = requested_option(asked, observation, provider(observation))
     with pytest.raises(SkillNotApplicableError, match="attempt 51 was asked for"):
         option.skill.start(observation.state, option.objects)
 
 
 def test_a_request_that_does_not_fit_says_why(observed):
     observation, target = observed
-    shelf = repertoires(observation)
+    shortcuts = provider(observation)
     space = observation.episode.space
     refused = {
         f"unknown shortcut 'Fly': there are {SHORTCUT}": goal(observation, target, "Fly"),
@@ -217,11 +217,11 @@ def test_a_request_that_does_not_fit_says_why(observed):
     }
     for words, wrong in refused.items():
         with pytest.raises(UnknownSkillError) as error:
-            requested_option(wrong, observation, shelf)
+            requested_option(wrong, observation, shortcuts)
         assert words in str(error.value)
 
 
 def test_without_a_library_a_shortcut_is_unknown(observed):
     observation, target = observed
     with pytest.raises(UnknownSkillError, match="no shortcut library is loaded"):
-        requested_option(goal(observation, target), observation, repertoires(observation, "none"))
+        requested_option(goal(observation, target), observation, provider(observation, "none"))

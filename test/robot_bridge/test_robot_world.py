@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A robot's cell as a world: measurements that become states, commands that become motions."""
+"""A robot as a world: measurements that become states, commands that become motions."""
 
 import math
 
@@ -30,7 +30,7 @@ STEPS = np.zeros(8)
 
 
 class Bench:
-    """A cell, and somebody who measures what a simulated world is like."""
+    """A RobotWorld, and measurements of a simulated world for it."""
 
     def __init__(self, noise=0.002, limits=LIMITS):
         self.world = DOMAIN.make_world(TASK.initial_state)
@@ -69,7 +69,7 @@ class Bench:
 
 @pytest.fixture(scope="module")
 def lifted():
-    """A bench on which a block was picked, by the given skill, through the cell."""
+    """A bench on which a block was picked, by the given skill, through the RobotWorld."""
     bench = Bench()
     bench.measure()
     state = bench.robot_world.measure(0.0)
