@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -74,16 +75,13 @@ def plan_path(
 
     rng = np.random.default_rng(seed)
 
-    def shortened(path: Path) -> Path:
-        shorter = shorten(path, free, rng, tries=shortening_tries, resolution=resolution)
-        shorter = straighten(shorter, free, resolution=resolution)
-        # A piece of a piece is checked at other configurations than the whole of it was.
-        return shorter if free(path_configurations(shorter, resolution)).all() else path
-
     def random_path() -> Path | None:
         found = rrt_connect(start, goal, free, rng, max_samples=max_samples, resolution=resolution)
         return found if found is None else shortened(straighten(found, free, resolution=resolution))
 
+    shortened = partial(
+        _shortened, free=free, rng=rng, tries=shortening_tries, resolution=resolution
+    )
     bent = via_point_path(start, goal, free, rng, resolution=resolution)
     if bent is not None:
         return shortened(bent)
@@ -94,6 +92,16 @@ def plan_path(
             "behind obstacles, or takes more samples"
         )
     return best
+
+
+def _shortened(
+    path: Path, free: Free, rng: np.random.Generator, tries: int, resolution: float
+) -> Path:
+    """The path shortened, if what comes out is free; see :mod:`slap_ros.motion.shortcutting`."""
+    shorter = shorten(path, free, rng, tries=tries, resolution=resolution)
+    shorter = straighten(shorter, free, resolution=resolution)
+    # A piece of a piece is checked at other configurations than the whole of it was.
+    return shorter if free(path_configurations(shorter, resolution)).all() else path
 
 
 def _shortest(make_path: Callable[[], Path | None], attempts: int, enough: float) -> Path | None:

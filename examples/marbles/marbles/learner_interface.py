@@ -24,7 +24,7 @@ def _robot(_: State, hand: Array) -> Array:
     return (hand - [0.5, 0.5, 0.1]) / [SCALE, SCALE, 0.1]
 
 
-def _things(state: State, hand: Array, column: Column) -> Array:
+def _object_features(state: State, hand: Array, column: Column) -> Array:
     if column.objects[0].type == ROBOT:
         return np.zeros((len(hand), len(column.objects), 0))
     place = state.gather(column, ("x", "y"))
@@ -41,7 +41,7 @@ def _distance(state: State, hand: Array, column: Column) -> Array:
     return distance
 
 
-def _apart(state: State, thing: Object, column: Column) -> Array:
+def _separation(state: State, thing: Object, column: Column) -> Array:
     way = state.gather(column, ("x", "y")) - state.gather(Column((thing,)), ("x", "y"))
     apart: Array = np.hypot(way[..., 0], way[..., 1])
     return apart
@@ -50,8 +50,8 @@ def _apart(state: State, thing: Object, column: Column) -> Array:
 LEARNER_INTERFACE = LearnerInterface(
     hand=_hand,
     robot=_robot,
-    objects=_things,
+    objects=_object_features,
     distance=_distance,
-    separation=_apart,
+    separation=_separation,
     grasping=frozenset({HOLDING, HAND_EMPTY}),
 )

@@ -18,7 +18,7 @@ FALLEN = 0.05  # m, under the bin's rim, where what is not in the bin is beside 
 BEHIND = 0.05  # m, from a block away from the bin, where the hand, or what it holds, pushes it
 
 
-def _things(state: State, hand: Array, column: Column) -> Array:
+def _object_features(state: State, hand: Array, column: Column) -> Array:
     """Of blocks, where from the hand, along the base's axes; how fast; where from the bin."""
     kind = column.objects[0].type
     if not kind.is_a(BLOCK):
@@ -58,7 +58,7 @@ def _distance(state: State, hand: Array, column: Column) -> Array:
     return distance
 
 
-def _lost(state: State) -> Bools:
+def _failed(state: State) -> Bools:
     """Whether a block lies on the floor beside the bin."""
     things = CleanupObjectIndex.of(state.layout)
     box = state.gather(_bin(state), ("z", *HALF))[..., 0, :]
@@ -71,11 +71,11 @@ def _lost(state: State) -> Bools:
 LEARNER_INTERFACE = LearnerInterface(
     hand=observation.hand_frame,
     robot=observation.robot,
-    objects=_things,
+    objects=_object_features,
     distance=_distance,
     separation=observation.separations,
     at_rest=observation.at_rest,
-    failed=_lost,
+    failed=_failed,
     joint_limit_penalty=observation.joint_limit_penalty,
     grasping=frozenset({HOLDING, NOT_HOLDING, GRIPPER_EMPTY}),
 )

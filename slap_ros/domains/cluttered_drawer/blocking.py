@@ -35,9 +35,9 @@ from slap_ros.domains.tabletop.footprints import (
     Complex,
     along_axes,
     complex_of,
-    turned_back,
-    unpinched,
-    widths,
+    half_widths,
+    inverse_yaws,
+    steepened,
 )
 from slap_ros.domains.tabletop.observation import grasp_points
 from slap_ros.relational import State
@@ -137,7 +137,7 @@ def _on(index: DrawerObjectIndex, data: Array, blocks: Blocks) -> Array:
     middles = complex_of(data.take(index.middles, axis=-1))[..., 0]
     within = levels[..., 1:3] - along_axes(blocks.places[..., None] - middles[..., None, :])
     gap = (blocks.z - blocks.height)[..., None] - levels[..., 0] - levels[..., 3]
-    touches = unpinched(TOUCHING - np.abs(gap))
+    touches = steepened(TOUCHING - np.abs(gap))
     return np.minimum(touches, np.minimum(within[..., 0], within[..., 1]))
 
 
@@ -165,9 +165,9 @@ def _overlap(boxes: ClearanceBoxes, index: DrawerObjectIndex, blocks: Blocks) ->
         Shape (..., sides, blocks, targets).
     """
     flat, places, rows = blocks.flat, blocks.places, index.target_rows
-    back = turned_back(blocks.q, blocks.edges)
+    back = inverse_yaws(blocks.q, blocks.edges)
     target_back = _towards_base(back.take(rows, axis=-1))
-    target_widths = widths(flat.take(rows, axis=-2), target_back)
+    target_widths = half_widths(flat.take(rows, axis=-2), target_back)
 
     # Along the target's faces: from the middles of the clearances to those of the blocks.
     half_spans = target_widths.take(AXES, axis=-1).swapaxes(-1, -2) + boxes.depth
@@ -176,13 +176,13 @@ def _overlap(boxes: ClearanceBoxes, index: DrawerObjectIndex, blocks: Blocks) ->
         ..., None, :
     ]
     offset = offset[..., None, :, :] - middles[..., None, :]
-    block_widths = widths(flat[..., :, None, :], target_back[..., None, :])[..., None, :, :, :]
+    block_widths = half_widths(flat[..., :, None, :], target_back[..., None, :])[..., None, :, :, :]
     gaps = along_axes(offset) - block_widths - boxes.halves
 
     # Along the faces of the block itself.
     turn = (back[..., None] * target_back[..., None, :].conj())[..., None, :, :]
     own_gaps = along_axes(offset * turn) - along_axes(turn) @ boxes.spans
-    own_gaps -= widths(flat, back)[..., None, :, None, :]
+    own_gaps -= half_widths(flat, back)[..., None, :, None, :]
     apart = np.maximum(gaps, own_gaps)
     return -np.maximum(apart[..., 0], apart[..., 1])
 

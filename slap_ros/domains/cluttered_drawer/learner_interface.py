@@ -21,7 +21,7 @@ CLEAR = frozenset(f"{side}Clear" for side in SIDES)
 FINGER_ROOM = 0.002  # m, more than blocks nothing: so much the next grasp may be off
 
 
-def _things(state: State, hand: Array, column: Column) -> Array:
+def _object_features(state: State, hand: Array, column: Column) -> Array:
     """Where from the hand, in the base's axes.
 
     Of blocks also: how fast, which way they are turned, and where beside the target block.
@@ -67,7 +67,7 @@ def _success_tolerance(atom: GroundAtom) -> float:
 LEARNER_INTERFACE = LearnerInterface(
     hand=observation.hand_frame,
     robot=observation.robot,
-    objects=_things,
+    objects=_object_features,
     distance=_distance,
     separation=observation.separations,
     at_rest=observation.at_rest,

@@ -28,7 +28,7 @@ def _robot(_: State, hand: Array) -> Array:
     return np.stack([2 * x - 1, 2 * y - 1, (y - low) / BLOCK_SIZE, low / BLOCK_SIZE], axis=-1)
 
 
-def _things(state: State, hand: Array, column: Column) -> Array:
+def _object_features(state: State, hand: Array, column: Column) -> Array:
     """Where on the table, how far aside of the gripper; blocks: how far below, whether held."""
     x, y = hand[..., 0, None], hand[..., 1, None]
     there = state.stack(column, "x")
@@ -50,7 +50,7 @@ def _distance(state: State, hand: Array, column: Column) -> Array:
     return distance
 
 
-def _apart(state: State, thing: Object, column: Column) -> Array:
+def _separation(state: State, thing: Object, column: Column) -> Array:
     """Along the table."""
     apart: Array = np.abs(state.stack(column, "x") - state.stack(Column((thing,)), "x"))
     return apart
@@ -59,8 +59,8 @@ def _apart(state: State, thing: Object, column: Column) -> Array:
 LEARNER_INTERFACE = LearnerInterface(
     hand=_hand,
     robot=_robot,
-    objects=_things,
+    objects=_object_features,
     distance=_distance,
-    separation=_apart,
+    separation=_separation,
     grasping=frozenset({HOLDING, GRIPPER_EMPTY}),
 )

@@ -26,7 +26,7 @@ FINGER_ROOM = 0.005  # m, between the target and what lies beside it: enough for
 BESIDE, OVER = CUBE_EDGE / 2, CUBE_EDGE  # m, of the hand over a block's middle and a target's
 
 
-def _things(state: State, hand: Array, column: Column) -> Array:
+def _object_features(state: State, hand: Array, column: Column) -> Array:
     """Where from the hand, in the base's axes; and which joints take the hand there.
 
     Of blocks also: how fast, where over the target, and which joints push them away from there. Of
@@ -101,7 +101,7 @@ def _success_tolerance(atom: GroundAtom) -> float:
 LEARNER_INTERFACE = LearnerInterface(
     hand=observation.hand_frame_and_velocities,
     robot=observation.robot,
-    objects=_things,
+    objects=_object_features,
     distance=_distance,
     separation=observation.separations,
     at_rest=observation.at_rest,

@@ -30,9 +30,9 @@ from slap_ros.domains.tabletop.footprints import (
     Complex,
     along_axes,
     complex_of,
-    turned_back,
-    unpinched,
-    widths,
+    half_widths,
+    inverse_yaws,
+    steepened,
 )
 from slap_ros.domains.tabletop.scalar_box import ScalarBox
 from slap_ros.relational import State
@@ -65,7 +65,7 @@ def support_relations(state: State) -> SupportRelations:
 
     z, height = data.take(objects.z, axis=-1), np.add.reduce(np.abs(edges[..., 6:]), axis=-1)
     gap = (z - height)[..., blocks, None] - (z + height)[..., None, :]
-    touches = unpinched(TOUCHING - np.abs(gap))
+    touches = steepened(TOUCHING - np.abs(gap))
 
     places = complex_of(data.take(objects.places, axis=-1))[..., 0]
     offset = places[..., blocks, None] - places[..., None, :]
@@ -95,8 +95,8 @@ def _covers(blocks: slice, offset: Complex, q: Array, edges: Array) -> Array:
         q: Parts of the things' quaternions, shape (..., things, 4).
         edges: Of the things, m, shape (..., things, 9), as ``TO_EDGES`` gives them.
     """
-    back = turned_back(q, edges)[..., None, :]
-    width = widths(complex_of(edges[..., :6])[..., None, :], back)
+    back = inverse_yaws(q, edges)[..., None, :]
+    width = half_widths(complex_of(edges[..., :6])[..., None, :], back)
     own_width = np.diagonal(width, axis1=-3, axis2=-2).swapaxes(-1, -2)[..., None, :, :]
     ahead_aside = width[..., blocks, :, :] + own_width - along_axes(offset * back)
     return np.minimum(ahead_aside[..., 0], ahead_aside[..., 1])

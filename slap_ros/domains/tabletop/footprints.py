@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How boxes lie, many at once: where their edges point, how wide they are seen from above.
+"""Footprints of many boxes at once: where their edges point, how wide they are from above.
 
 Horizontal vectors are complex numbers: turned by a product, seen along both axes at once.
 """
@@ -51,7 +51,7 @@ def along_axes(vectors: Complex) -> Array:
     return np.abs(vectors[..., None].view(np.float64))
 
 
-def turned_back(q: Array, edges: Array) -> Complex:
+def inverse_yaws(q: Array, edges: Array) -> Complex:
     """What turns the plane so that things lie along its axes, by their yaw.
 
     Of the two parts of a quaternion that have to do with the yaw, one is 0 for what lies on its
@@ -63,13 +63,13 @@ def turned_back(q: Array, edges: Array) -> Complex:
     return back
 
 
-def widths(edges: Complex, back: Complex) -> Array:
+def half_widths(edges: Complex, back: Complex) -> Array:
     """How far boxes reach from their centres along turned axes, shape (..., 2)."""
     along = along_axes(edges * back[..., None])
     width: Array = along[..., 0, :] + along[..., 1, :] + along[..., 2, :]
     return width
 
 
-def unpinched(tolerance: Array) -> Array:
+def steepened(tolerance: Array) -> Array:
     """A tolerance that, where it is kept, leaves a smallest margin to the distances sideways."""
     return np.maximum(tolerance, STEEPNESS * tolerance)

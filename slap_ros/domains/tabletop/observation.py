@@ -214,11 +214,11 @@ def at_rest(state: State) -> Bools:
 def fallen_below(height: float) -> Callable[[State], Bools]:
     """Whether a body's middle is lower than so many m, as it is once it fell: shape (n,)."""
 
-    def lost(state: State) -> Bools:
+    def failed(state: State) -> Bools:
         fallen: Bools = state.stack(bodies(state.layout), "z").min(axis=-1) < height
         return fallen
 
-    return lost
+    return failed
 
 
 @lru_cache(maxsize=256)

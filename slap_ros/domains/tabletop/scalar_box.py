@@ -69,7 +69,7 @@ class ScalarBox:
         return ahead + more_ahead >= 0.0 and aside + more_aside >= 0.0
 
     def _find_frame(self) -> tuple[Vector2, Vector2]:
-        """Cosine and sine of its yaw (see ``footprints.turned_back``), and its reach along it."""
+        """Cosine and sine of its yaw (see ``footprints.inverse_yaws``), and its reach along it."""
         w, z, x, y = self._q
         a, b = (w, z) if self._up > 0.0 else (x, y)
         scale = 1.0 / (a * a + b * b)
