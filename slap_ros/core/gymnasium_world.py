@@ -62,7 +62,7 @@ class GymnasiumWorld:
     def maker(
         cls, make_environment: Callable[[], Environment], actions: ActionSpace
     ) -> Callable[[State], GymnasiumWorld]:
-        """A domain's ``make_world``."""
+        """What a domain needs as ``make_world``: each world has an environment of its own."""
         return lambda state: cls(make_environment(), state, actions)
 
     @property

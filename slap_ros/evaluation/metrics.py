@@ -86,7 +86,7 @@ class RunMetrics:
     unknown: Mapping[str, str] = field(default_factory=dict)  # by metric: why it is None
 
     def as_json(self) -> dict[str, Any]:
-        """Plain data, keys in the order of the fields."""
+        """The JSON object of ``--json``, keys in the order of the fields."""
         return asdict(self) | {
             "error_code": int(self.error_code),
             "unknown": dict(self.unknown),

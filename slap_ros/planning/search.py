@@ -172,7 +172,7 @@ class _QueueEntry:
 
     @property
     def node(self) -> int:
-        """Where it leads."""
+        """Index of the node that it leads to."""
         return self.vertex.node if self.edge is None else self.edge.target
 
 

@@ -35,7 +35,7 @@ class ObservationNormalisation:
         return cls(observations.mean(axis=0).astype(np.float32), deviation.astype(np.float32))
 
     def __call__(self, observations: Weights) -> Weights:
-        """Shape (..., size) to the same."""
+        """Normalised and clipped observations, shape (..., size) to the same."""
         normal = (observations - self.mean) / self.deviation
         clipped: Weights = np.clip(normal, -self.clip, self.clip)
         return clipped

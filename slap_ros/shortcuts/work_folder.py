@@ -82,7 +82,7 @@ class ShortcutWorkFolder:
         return self.path / self.path.name
 
     def checkpoint(self, stage: int) -> Path:
-        """The state of PPO in a stage."""
+        """The file with the state of PPO in a stage, which is counted from 0."""
         return self.path / f"checkpoint{stage}.pt"
 
     @property
