@@ -37,7 +37,7 @@ _SINE = _ELBOW * (_UPPER_ARM + _FOREARM)
 _COSINE = _ELBOW**2 - _UPPER_ARM * _FOREARM
 _SIDES2 = _UPPER_ARM**2 + _FOREARM**2 + 2.0 * _ELBOW**2
 _BEND = math.atan2(_SINE, _COSINE)
-_CONVERGED = 1e-13  # rad, of joint 7
+_CONVERGED = 1e-10  # rad, of joint 7
 _MOST_ROUNDS = 20  # of which a hand tilted by 0.2 rad takes seven
 
 

@@ -23,12 +23,15 @@ from slap_ros.contact.contacts import (
 )
 from slap_ros.contact.hand import HandState, own_way
 from slap_ros.contact.involved import (
+    TOUCH,
     Bounds,
     Involved,
     Mover,
     clusters,
+    frame_bounds,
     hand_bounds,
-    jointed_bounds,
+    meet,
+    moving_bounds,
     part_bounds,
     rigid_bounds,
     touched,
@@ -37,6 +40,7 @@ from slap_ros.contact.scene import ContactScene
 from slap_ros.contact.simulation import GRAVITY, ContactSimulation, Outcome
 from slap_ros.contact.snapshot import ContactSnapshot, Opening, Placement
 from slap_ros.geometry.pose import Pose
+from slap_ros.physics.panda import FINGER_OPEN
 from slap_ros.physics.snapshot import BodyState
 
 # What moved less than this in a control period, and is slower than this after it, is at rest.
@@ -45,6 +49,8 @@ REST_SHIFT = 2e-4  # m, along each axis
 REST_TURN = 1e-3  # 1, of each component of the quaternion; rad, of a joint
 FALL = 0.5 * GRAVITY * CONTROL_PERIOD_S**2  # m, from rest in a period
 SWING = 0.1  # m, from the grasp point to what moves furthest when the hand turns
+OVERSHOOT_S = 0.02  # a hand that moves on goes less far beyond its target than in this time
+NOTHING = Involved(hand=False)
 MOST_REMEMBERED = 256  # arrangements of bodies known to stand or not
 
 Moving = BodyState | Opening
@@ -58,7 +64,8 @@ class ContactDynamics:
         self._scene, self._simulation = scene, simulation
         self._count = len(scene.free) + len(scene.jointed)
         self._standing: dict[object, bool] = {}
-        self._quiet: object = None
+        self._quiet: list[Moving | None] = []
+        self._hand: tuple[Pose, tuple[float, float], tuple[Bounds, ...]] | None = None
         self._bounded: list[tuple[Moving, Bounds] | None] = [None] * self._count
 
     def place(self, placement: Placement) -> None:
@@ -71,8 +78,12 @@ class ContactDynamics:
             if body.solid
             for bounds in part_bounds(body, pose)
         ]
+        self._frames = [
+            frame_bounds(body, pose)
+            for body, pose in zip(self._scene.jointed, placement.jointed, strict=True)
+        ]
         self._standing.clear()
-        self._quiet = None
+        self._quiet = []
         self._bounded = [None] * self._count
 
     def after(self, now: ContactSnapshot, pull: Pose) -> tuple[ContactSnapshot, Contacts]:
@@ -82,59 +93,55 @@ class ContactDynamics:
             now: How everything is, with what the hand was told now.
             pull: Where the hand is pulled in this period.
         """
-        alone = own_way(now.hand, pull, self._scene.forces)
-        sweep = _sweep(now.hand, alone)
-        involved = self._involved(now, sweep)
-        while involved.hand or involved.bodies:
+        involved = self._involved(now, self._sweep(now.hand, pull))
+        if involved == NOTHING:
+            alone = own_way(now.hand, pull, self._scene.forces)
+            return now._replace(hand=alone, held=None), ()
+        while True:
             outcome = self._simulation.run(now, pull, involved)
             if not involved.hand:
+                alone = own_way(now.hand, pull, self._scene.forces)
                 outcome = replace(outcome, hand=alone)
             wider = self._widened(now, involved, outcome)
             if wider == involved:
                 return self._taken_over(now, involved, outcome), outcome.contacts
             involved = wider
-        return replace(now, hand=alone, held=None), ()
 
     # -- what is involved -----------------------------------------------------------------------
 
     def _involved(self, now: ContactSnapshot, sweep: Mover) -> Involved:
-        moving = _all(now)
-        bounds = [self._bounds(i, motion) for i, motion in enumerate(moving)]
-        resting: list[Bounds | None] = [
-            box if motion.still else None for motion, box in zip(moving, bounds, strict=True)
-        ]
-        movers = {
-            i: Mover((box,), self._travel(motion, box))
-            for i, (motion, box) in enumerate(zip(moving, bounds, strict=True))
-            if not motion.still
-        }
+        bounds: list[Bounds] = []
+        movers: dict[int, Mover] = {}
+        resting: list[Bounds | None] = []
+        for i, motion in enumerate(_all(now)):
+            box = self._bounds(i, motion)
+            bounds.append(box)
+            resting.append(box if motion.still else None)
+            if not motion.still:
+                movers[i] = Mover.of(box, self._travel(motion, box))
         movers |= touched([sweep, *movers.values()], resting)
         left = [None if i in movers else box for i, box in enumerate(resting)]
-        for i in self._unsupported(now, left):
-            box = bounds[i]
-            movers[i] = Mover((box,), FALL)
-            left[i] = None
-        movers |= touched(list(movers.values()), left)
-        met = any(space.meets(box) for space in sweep.within for box in self._fixed) or any(
-            space.meets(box)
-            for space in sweep.within
-            for mover in movers.values()
-            for box in mover.within
+        if falling := self._unsupported(now, left):
+            for i in falling:
+                movers[i] = Mover.of(bounds[i], FALL)
+                left[i] = None
+            movers |= touched([movers[i] for i in falling], left)
+        met = meet(sweep.spaces, self._fixed) or any(
+            meet(sweep.spaces, mover.spaces) for mover in movers.values()
         )
         return Involved(tuple(sorted(movers)), met)
 
     def _unsupported(self, now: ContactSnapshot, left: Sequence[Bounds | None]) -> list[int]:
         """Those of the bodies that would not stay where they are by themselves."""
         moving = _all(now)
-        quiet = tuple(motion for motion, box in zip(moving, left, strict=True) if box is not None)
-        key = (quiet, tuple(box is not None for box in left))
-        if key == self._quiet:
+        quiet = [None if box is None else moving[i] for i, box in enumerate(left)]
+        if quiet == self._quiet:
             return []
         falling = [
             i for members in clusters(left) if not self._stand(now, members) for i in members
         ]
         if not falling:
-            self._quiet = key
+            self._quiet = quiet
         return falling
 
     def _stand(self, now: ContactSnapshot, members: tuple[int, ...]) -> bool:
@@ -161,16 +168,18 @@ class ContactDynamics:
             return involved
         moving, after = _all(now), self._results(outcome)
         ways = [
-            self._bounds(i, moving[i]).hull(self._new_bounds(i, after[i])) for i in involved.bodies
+            self._bounds(i, moving[i]).hull(self._new_bounds(i, motion))
+            for i, motion in after.items()
         ]
-        hand = _sweep(now.hand, outcome.hand).bounds
-        spaces = [*ways, *hand] if involved.hand else ways
+        hand = _hulls(self._hand_bounds(now.hand), self._hand_bounds(outcome.hand))
+        met = involved.hand or meet(ways, hand)
+        if involved.hand:
+            ways += hand
         others = [
             i
             for i in range(self._count)
-            if i not in after and any(space.meets(self._bounds(i, moving[i])) for space in spaces)
+            if i not in after and meet(ways, [self._bounds(i, moving[i])])
         ]
-        met = involved.hand or any(way.meets(space) for way in ways for space in hand)
         return Involved(tuple(sorted([*involved.bodies, *others])), met)
 
     # -- what came of it ------------------------------------------------------------------------
@@ -180,14 +189,13 @@ class ContactDynamics:
     ) -> ContactSnapshot:
         """The outcome, with what came to rest put to rest."""
         moving, after = _all(now), self._results(outcome)
-        surfaces = {self._surface(i): i for i in involved.bodies}
-        for group in groups(outcome.contacts, [*surfaces, THE_HAND]):
-            if THE_HAND in group:
-                continue
-            members = [surfaces[surface] for surface in group]
-            if all(_rests(moving[i], after[i]) for i in members):
-                for i in members:
-                    after[i] = _stopped(moving[i])
+        resting = {i for i, motion in after.items() if _rests(moving[i], motion)}
+        if resting:
+            surfaces = {self._surface(i): i for i in involved.bodies}
+            for group in groups(outcome.contacts, [*surfaces, THE_HAND]):
+                members = {surfaces.get(surface, -1) for surface in group}  # -1: the hand
+                if members <= resting:
+                    after |= {i: _stopped(moving[i]) for i in members}
         bodies, openings = list(now.bodies), list(now.openings)
         for i, motion in after.items():
             if isinstance(motion, BodyState):
@@ -195,8 +203,8 @@ class ContactDynamics:
             else:
                 openings[i - len(bodies)] = motion
         held = grasped(outcome.contacts, outcome.hand.pose) if involved.hand else None
-        return replace(
-            now, hand=outcome.hand, bodies=tuple(bodies), openings=tuple(openings), held=held
+        return now._replace(
+            hand=outcome.hand, bodies=tuple(bodies), openings=tuple(openings), held=held
         )
 
     def _results(self, outcome: Outcome) -> dict[int, Moving]:
@@ -210,6 +218,21 @@ class ContactDynamics:
 
     # -- where it is ----------------------------------------------------------------------------
 
+    def _sweep(self, hand: HandState, pull: Pose) -> Mover:
+        """Where the hand can touch something on its way, and how far it can push that."""
+        way = math.dist(hand.pose.position, pull.position) + SWING * hand.pose.angle_to(pull)
+        margin = TOUCH + OVERSHOOT_S * max(map(abs, hand.velocity))
+        there = hand_bounds(hand._replace(pose=pull, fingers=(FINGER_OPEN, FINGER_OPEN)))
+        spaces = _hulls(self._hand_bounds(hand), there)
+        return Mover(tuple(space.grown(margin) for space in spaces), way + margin)
+
+    def _hand_bounds(self, hand: HandState) -> tuple[Bounds, ...]:
+        """The bounds of palm and fingers; worked out again when they moved."""
+        known = self._hand
+        if known is None or known[0] is not hand.pose or known[1] is not hand.fingers:
+            known = self._hand = (hand.pose, hand.fingers, hand_bounds(hand))
+        return known[2]
+
     def _bounds(self, i: int, motion: Moving) -> Bounds:
         """The bounds of a body where it is; worked out again when it moved."""
         known = self._bounded[i]
@@ -221,7 +244,9 @@ class ContactDynamics:
         if isinstance(motion, BodyState):
             return rigid_bounds(self._scene.free[i], motion.pose)
         i -= len(self._scene.free)
-        return jointed_bounds(self._scene.jointed[i], self._placement.jointed[i], motion.position)
+        pose = self._placement.jointed[i]
+        moving = moving_bounds(self._scene.jointed[i], pose, motion.position)
+        return moving.hull(self._frames[i])
 
     def _travel(self, motion: Moving, bounds: Bounds) -> float:
         """How far any point of a body is expected to go in a period, m."""
@@ -237,12 +262,8 @@ def _all(now: ContactSnapshot) -> tuple[Moving, ...]:
     return (*now.bodies, *now.openings)
 
 
-def _sweep(start: HandState, end: HandState) -> Mover:
-    """Where the hand passes."""
-    before, after = hand_bounds(start), hand_bounds(end)
-    spaces = tuple(a.hull(b) for a, b in zip(before, after, strict=True))
-    turn = start.pose.angle_to(end.pose)
-    return Mover(spaces, math.dist(start.pose.position, end.pose.position) + SWING * turn)
+def _hulls(some: Iterable[Bounds], others: Iterable[Bounds]) -> tuple[Bounds, ...]:
+    return tuple(a.hull(b) for a, b in zip(some, others, strict=True))
 
 
 def _rests(before: Moving, after: Moving) -> bool:

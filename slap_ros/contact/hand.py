@@ -38,6 +38,8 @@ YAW_LEASH = 0.3  # rad, the same about the vertical
 SUBSTEPS = 16  # of a control period; a power of two: 1/320 s, and exact
 SHARE = 0.2  # of the way that is left, gone in a substep where the force allows it
 SUBSTEP_S = CONTROL_PERIOD_S / SUBSTEPS
+_RATE = SHARE / SUBSTEP_S  # per s
+_LEFT_OVER = tuple((1.0 - SHARE) ** k for k in range(SUBSTEPS + 1))
 ARRIVED = 1e-7  # m and rad, and per s: nearer and slower than this, the hand is at its target
 
 # In the hand's frame, at finger position 0: like the shapes of the real one.
@@ -178,9 +180,17 @@ def _pulled(
         kick: By how much the force changes the speed in a substep, at most.
         fastest: The largest speed that is wanted.
     """
-    for _ in range(SUBSTEPS):
-        wanted = min(max(SHARE / SUBSTEP_S * left, -fastest), fastest)
-        speed += min(max(wanted - speed, -kick), kick)
+    for done in range(SUBSTEPS):
+        wanted = left * _RATE
+        change = wanted - speed
+        if -kick <= change <= kick and abs(wanted) <= min(fastest, kick / SHARE):
+            # From here on the force always suffices: each substep leaves the same share.
+            left *= _LEFT_OVER[SUBSTEPS - done]
+            speed = left * _RATE / (1.0 - SHARE)
+            break
+        if not -fastest <= wanted <= fastest:
+            change = math.copysign(fastest, wanted) - speed
+        speed += min(max(change, -kick), kick)
         left -= speed * SUBSTEP_S
     if abs(left) < ARRIVED and abs(speed) < ARRIVED:
         return 0.0, 0.0

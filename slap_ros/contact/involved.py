@@ -49,6 +49,15 @@ class Bounds(NamedTuple):
         return a <= x and u <= d and b <= y and v <= e and c <= z and w <= f
 
 
+def meet(some: Iterable[Bounds], others: Iterable[Bounds]) -> bool:
+    """Whether any of some shares a point with any of others."""
+    for first in some:
+        for second in others:
+            if first.meets(second):
+                return True
+    return False
+
+
 def bounds_of(box: OrientedBox) -> Bounds:
     """The bounds of an oriented box."""
     (x, y, z), quaternion = box.pose
@@ -75,18 +84,22 @@ def part_bounds(body: Compound, pose: Pose) -> list[Bounds]:
     return [bounds_of(OrientedBox(pose.compose(box.pose), box.half)) for box in boxes]
 
 
-def jointed_bounds(body: JointedBody, pose: Pose, opening: float) -> Bounds:
-    """The bounds of frame and moving part.
+def frame_bounds(body: JointedBody, pose: Pose) -> Bounds:
+    """The bounds of the frame of a jointed body that stands there."""
+    boxes = (part.bounding_box for part in body.frame)
+    return hull_of(OrientedBox(pose.compose(box.pose), box.half) for box in boxes)
+
+
+def moving_bounds(body: JointedBody, pose: Pose, opening: float) -> Bounds:
+    """The bounds of the moving part of a jointed body.
 
     Args:
         body: Whose.
-        pose: Of its frame.
-        opening: Of its joint, in rad or m.
+        pose: Where it stands.
+        opening: Of its joint, m or rad.
     """
-    moving = body.moving_pose(pose, opening)
-    placed = [(part.bounding_box, pose) for part in body.frame]
-    placed += [(part.bounding_box, moving) for part in body.moving]
-    return hull_of(OrientedBox(at.compose(box.pose), box.half) for box, at in placed)
+    frame, half = body.moving_box
+    return bounds_of(OrientedBox(body.moving_pose(pose, opening).compose(frame), half))
 
 
 # Both fingers in one box, at finger position 0: how far they reach in the hand's frame.
@@ -114,14 +127,13 @@ def hand_bounds(hand: HandState) -> tuple[Bounds, Bounds]:
 class Mover(NamedTuple):
     """Something that can move in a period."""
 
-    bounds: tuple[Bounds, ...]  # where it begins
-    travel: float  # m, how far it is expected to go
+    spaces: tuple[Bounds, ...]  # where it can touch something
+    push: float  # m, how far it can push that
 
-    @property
-    def within(self) -> tuple[Bounds, ...]:
-        """Where it is expected to touch something."""
-        margin = self.travel + TOUCH
-        return tuple(bounds.grown(margin) for bounds in self.bounds)
+    @classmethod
+    def of(cls, bounds: Bounds, travel: float) -> Mover:
+        """What begins there and goes so far, in m, in any direction."""
+        return cls((bounds.grown(travel + TOUCH),), travel)
 
 
 def touched(movers: Sequence[Mover], resting: Sequence[Bounds | None]) -> dict[int, Mover]:
@@ -132,18 +144,15 @@ def touched(movers: Sequence[Mover], resting: Sequence[Bounds | None]) -> dict[i
         resting: The bodies that rest, None for those that do not.
 
     Returns:
-        Each that can be touched, by its index, as far moved as what touches it.
+        Each that can be touched, by its index; it goes as far as what touches it can push it.
     """
     found: dict[int, Mover] = {}
     queue = list(movers)
     while queue:
-        mover = queue.pop()
-        within = mover.within
+        spaces, push = queue.pop()
         for i, bounds in enumerate(resting):
-            if bounds is None or i in found:
-                continue
-            if any(space.meets(bounds) for space in within):
-                found[i] = Mover((bounds,), mover.travel)
+            if bounds is not None and i not in found and meet(spaces, (bounds,)):
+                found[i] = Mover.of(bounds, push)
                 queue.append(found[i])
     return found
 
@@ -155,7 +164,7 @@ def clusters(bounds: Sequence[Bounds | None]) -> list[tuple[int, ...]]:
         if box is None or left[i] is None:
             continue
         left[i] = None
-        members = touched([Mover((box,), 0.0)], left)
+        members = touched([Mover.of(box, 0.0)], left)
         for j in members:
             left[j] = None
         found.append(tuple(sorted([i, *members])))

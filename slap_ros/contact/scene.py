@@ -207,6 +207,11 @@ class JointedBody:
     pose: Pose = IDENTITY
 
     @cached_property
+    def moving_box(self) -> OrientedBox:
+        """The box around the moving part in its own frame."""
+        return bounding_box(self.moving)
+
+    @cached_property
     def lever_m(self) -> float:
         """How far its fastest point goes while it opens by 1: 1 m, or m per rad."""
         if self.joint.kind is JointKind.SLIDE:

@@ -142,17 +142,7 @@ class ContactSimulation:
         (the inertia in world axes) becomes a function of the orientation.
         """
         client = self.client
-        self._park(self._hand, now.hand.pose.quaternion)
-        pybullet.resetBaseVelocity(self._hand, ORIGIN, ORIGIN, client)
-        pybullet.changeConstraint(
-            self._pull,
-            self._places[self._hand],
-            now.hand.pose.quaternion,
-            maxForce=0.0,
-            physicsClientId=client,
-        )
-        for finger, position in zip(FINGERS, now.hand.fingers, strict=True):
-            pybullet.resetJointState(self._hand, finger, position, 0.0, client)
+        self._park_hand(now.hand)
         for body, opening in zip(self._jointed, now.openings, strict=True):
             self._park(body, NO_ROTATION)
             pybullet.resetJointState(body, MOVING, opening.position, 0.0, client)
@@ -168,6 +158,20 @@ class ContactSimulation:
         pybullet.resetBasePositionAndOrientation(body, self._places[body], quaternion, self.client)
 
     # -- the hand -------------------------------------------------------------------------------
+
+    def _park_hand(self, hand: HandState) -> None:
+        client = self.client
+        self._park(self._hand, hand.pose.quaternion)
+        pybullet.resetBaseVelocity(self._hand, ORIGIN, ORIGIN, client)
+        pybullet.changeConstraint(
+            self._pull,
+            self._places[self._hand],
+            hand.pose.quaternion,
+            maxForce=0.0,
+            physicsClientId=client,
+        )
+        for finger, position in zip(FINGERS, hand.fingers, strict=True):
+            pybullet.resetJointState(self._hand, finger, position, 0.0, client)
 
     def _set_hand(self, hand: HandState, pull: Pose) -> None:
         client, forces = self.client, self.scene.forces

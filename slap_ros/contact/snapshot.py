@@ -49,8 +49,7 @@ class Placement(NamedTuple):
     jointed: tuple[Pose, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class ContactSnapshot:
+class ContactSnapshot(NamedTuple):
     """Everything contact physics knows of a state."""
 
     joints: Joints  # rad, of the arm
@@ -68,6 +67,7 @@ class StateIndex:
     robot: NDArray[np.intp]  # (7 + hand,)
     bodies: NDArray[np.intp]  # (free bodies, 14)
     openings: NDArray[np.intp]  # (jointed bodies, 2)
+    everything: NDArray[np.intp]  # all of the above, one after the other
     fixed: tuple[NDArray[np.intp] | None, ...]  # a fixed body's pose, where the state has one
     jointed: tuple[NDArray[np.intp] | None, ...]  # the same of a jointed body
 
@@ -84,11 +84,13 @@ class StateIndex:
             raise InvalidStateError(f"a scene has one robot, the state has {len(robots)}")
         free = [_columns(layout, body.name, BODY_FEATURES) for body in scene.free]
         jointed = [_columns(layout, body.name, DRAWER_FEATURES) for body in scene.jointed]
+        robot = _columns(layout, robots[0].name, (*JOINT_FEATURES, *HAND_FEATURES))
         return StateIndex(
             layout,
-            _columns(layout, robots[0].name, (*JOINT_FEATURES, *HAND_FEATURES)),
+            robot,
             np.array(free, dtype=np.intp).reshape(-1, len(BODY_FEATURES)),
             np.array(jointed, dtype=np.intp).reshape(-1, len(DRAWER_FEATURES)),
+            np.concatenate([robot, *free, *jointed]),
             tuple(_pose_columns(layout, body.name) for body in scene.fixed),
             tuple(_pose_columns(layout, body.name) for body in scene.jointed),
         )
@@ -114,21 +116,17 @@ class StateIndex:
 
     def write(self, state: State, snapshot: ContactSnapshot) -> State:
         """The state with its physics replaced."""
+        values = [*snapshot.joints, *hand_values(snapshot.hand)]
+        for i, body in enumerate(snapshot.bodies):
+            values += body.pose.position
+            values += body.pose.quaternion
+            values += body.velocity
+            values += body.angular_velocity
+            values.append(1.0 if i == snapshot.held else 0.0)
+        for opening in snapshot.openings:
+            values += opening
         data = state.data.copy()
-        data[self.robot] = (*snapshot.joints, *hand_values(snapshot.hand))
-        if snapshot.bodies:
-            data[self.bodies] = [
-                (
-                    *body.pose.position,
-                    *body.pose.quaternion,
-                    *body.velocity,
-                    *body.angular_velocity,
-                    float(i == snapshot.held),
-                )
-                for i, body in enumerate(snapshot.bodies)
-            ]
-        if snapshot.openings:
-            data[self.openings] = snapshot.openings
+        data[self.everything] = values
         return State(state.layout, data)
 
     def placement(self, scene: ContactScene, state: State) -> Placement:

@@ -10,7 +10,6 @@ for bit (``docs/contact.md`` says how, and what it costs).
 from __future__ import annotations
 
 import weakref
-from dataclasses import replace
 from types import TracebackType
 
 from slap_ros.contact.arm import arm_joints, follow, share_in_time
@@ -138,8 +137,8 @@ class ContactWorld:
         pull = told.pose
         if joints is not None:
             pull = _part_way(told.pose, told.target_pose, share_in_time(now.joints, joints))
-        after, self._contacts = self._dynamics.after(replace(now, hand=told), pull)
-        self._snapshot = replace(after, joints=_followed(now, after))
+        after, self._contacts = self._dynamics.after(now._replace(hand=told), pull)
+        self._snapshot = after._replace(joints=_followed(now, after))
         self._state = self._index.write(self._state, self._snapshot)
         return self._state
 

@@ -16,8 +16,7 @@ sys.path[:0] = [str(HERE), str(HERE.parent.parent)]  # the helpers of these test
 @pytest.fixture
 def world():
     """The bench, with the hand above it."""
-    from workbench import BENCH, start
-
+    from benchmarks.workbench import BENCH, start
     from slap_ros.contact.world import ContactWorld
 
     with ContactWorld(BENCH, start()) as world:

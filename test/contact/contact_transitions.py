@@ -17,8 +17,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent.parent))
 
-from workbench import BENCH, HANDLE_AT, Move, Setting, action_towards, position, start
-
+from benchmarks.workbench import BENCH, HANDLE_AT, Move, Setting, action_towards, position, start
 from slap_ros.contact.hand import hand_at
 from slap_ros.contact.world import ACTION_SPACE, ContactWorld
 from slap_ros.geometry.pose import Pose

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from contact_transitions import Transitions, record
-from workbench import BENCH, start
 
+from benchmarks.workbench import BENCH, start
 from slap_ros.contact.simulation_pool import close_idle
 from slap_ros.contact.world import ContactWorld
 from slap_ros.relational import State
@@ -46,7 +46,7 @@ def test_the_steps_are_taken_in_the_thick_of_it(recorded):
     assert (np.abs(get(after, "left", "opening_velocity")) > 1e-3).mean() > 0.05
     assert (np.abs(get(after, "lid", "opening_velocity")) > 1e-3).mean() > 0.02
     moving = [np.abs(after[layout.object(name)][:, 7:13]).max(1) > 0.02 for name in ("cube", "rod")]
-    assert np.logical_or(*moving).mean() > 0.3
+    assert np.logical_or(*moving).mean() > 0.2
     lag = [get(after, "robot", f"target_{x}") - get(after, "robot", x) for x in "xyz"]
     assert (np.abs(lag).max(0) > 0.01).mean() > 0.03  # something stops the hand
 

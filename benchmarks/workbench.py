@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A bench to test contact on: cube, rod, two drawers, a lid, a plate with a hole; and scripts."""
+"""A bench to try contact on: cube, rod, two drawers, a lid, a plate with a hole; and scripts."""
 
 from __future__ import annotations
 
@@ -135,17 +135,25 @@ def start(setting: Setting = AS_USUAL, scene: ContactScene = BENCH) -> State:
     return State.build(features)
 
 
+def lying_above(name: str, height: float) -> Vector:
+    """So high above where a thing of the bench lies at the beginning, m."""
+    x, y, z = {"cube": CUBE_AT, "rod": ROD_AT}[name].position
+    return (x, y, z + height)
+
+
 def hand_of(state: State) -> np.ndarray:
     """The hand's position."""
     return position(state, "robot")
 
 
 def position(state: State, name: str) -> np.ndarray:
+    """An object's position, m."""
     obj = state.layout.object(name)
     return np.array([float(state.get(obj, axis)) for axis in ("x", "y", "z")])
 
 
 def value(state: State, name: str, feature: str) -> float:
+    """One feature of an object."""
     return float(state.get(state.layout.object(name), feature))
 
 
