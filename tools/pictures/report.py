@@ -1,0 +1,75 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Makes ``docs/images/report.png``: the report on one task, solved with a shortcut and without.
+
+python -m tools.pictures.report [CHROMIUM]
+
+It needs a Chromium, of which ``CHROMIUM`` is the program, and Pillow.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from PIL import Image
+
+from slap_ros.cli import app
+from tools.imports import ROOT
+
+OUTPUT = ROOT / "docs" / "images" / "report.png"
+TASK = ("obstacle_tower", "--seed", "1")
+RUNS = {"pure": ("--shortcuts", "none"), "slap": ()}
+SIZE_PX = (840, 1230)
+STEP = 21  # at which the motion is shown
+COLOURS = 128
+SHOW_STEP = f"""<script>
+const slider = document.querySelector("[data-step]");
+slider.value = {STEP};
+slider.dispatchEvent(new Event("input"));
+</script></body>"""
+
+
+def make(path: Path, chromium: str) -> None:
+    """Run the task twice, write the report, and take a picture of its upper part.
+
+    Args:
+        path: Where to.
+        chromium: The program, or a headless shell of it.
+    """
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        bags = [str(folder / run) for run in RUNS]
+        for bag, options in zip(bags, RUNS.values(), strict=True):
+            arguments = ["run", *TASK, *options, "--record", bag, "--in-process"]
+            app(arguments, standalone_mode=False)
+        page, shot = folder / "report.html", folder / "report.png"
+        app(["report", *bags, "--output", str(page)], standalone_mode=False)
+        text = page.read_text(encoding="utf-8")
+        page.write_text(text.replace("</body>", SHOW_STEP), encoding="utf-8")
+        photograph(chromium, page, shot)
+        Image.open(shot).convert("RGB").quantize(COLOURS).save(path, optimize=True)
+
+
+def photograph(chromium: str, page: Path, picture: Path) -> None:
+    """Have a browser draw a page to a file."""
+    width, height = SIZE_PX
+    command = [
+        chromium,
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--hide-scrollbars",
+        f"--user-data-dir={picture.parent / 'profile'}",
+        f"--window-size={width},{height}",
+        "--virtual-time-budget=3000",  # ms
+        f"--screenshot={picture}",
+        page.as_uri(),
+    ]
+    subprocess.run(command, check=True, capture_output=True)
+
+
+if __name__ == "__main__":
+    make(OUTPUT, *(sys.argv[1:] or ["chromium"]))
