@@ -9,14 +9,17 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from tools.imports import ROOT
-from tools.pictures import abstract_graph, architecture, side_by_side, two_levels
+from tools.pictures import abstract_graph, animations, architecture, two_levels
 
 IMAGES = ROOT / "docs" / "images"
-# Pictures that need nothing but this checkout; ``tools.pictures.viewers`` needs a bag.
+# Those that need nothing but this checkout. ``tools.pictures.report`` needs a browser, and
+# ``tools.pictures.viewers`` a bag.
 PICTURES: Mapping[str, Callable[[Path], None]] = {
     "abstract_graph.svg": abstract_graph.make,
     "architecture.svg": architecture.make,
-    "side_by_side.gif": side_by_side.make,
+    "cleanup_table.gif": animations.make_table,
+    "cluttered_drawer.gif": animations.make_drawer,
+    "side_by_side.gif": animations.make_side_by_side,
     "two_levels.svg": two_levels.make,
 }
 

@@ -9,6 +9,7 @@ It needs a Chromium, of which ``CHROMIUM`` is the program, and Pillow.
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -16,15 +17,16 @@ from tempfile import TemporaryDirectory
 
 from PIL import Image
 
-from slap_ros.cli import app
 from tools.imports import ROOT
 
 OUTPUT = ROOT / "docs" / "images" / "report.png"
 TASK = ("obstacle_tower", "--seed", "1")
 RUNS = {"pure": ("--shortcuts", "none"), "slap": ()}
-SIZE_PX = (840, 1230)
+SIZE_PX = (840, 1322)  # of the picture
+WINDOW_PX = (1000, 1574)  # of the browser, drawn at twice the size
 STEP = 21  # at which the motion is shown
-COLOURS = 128
+COLOURS = 256
+POLICY = re.compile(r"<meta[^>]*Content-Security-Policy[^>]*>")  # it refuses other scripts
 SHOW_STEP = f"""<script>
 const slider = document.querySelector("[data-step]");
 slider.value = {STEP};
@@ -43,19 +45,27 @@ def make(path: Path, chromium: str) -> None:
         folder = Path(name)
         bags = [str(folder / run) for run in RUNS]
         for bag, options in zip(bags, RUNS.values(), strict=True):
-            arguments = ["run", *TASK, *options, "--record", bag, "--in-process"]
-            app(arguments, standalone_mode=False)
+            slap("run", *TASK, *options, "--record", bag, "--in-process")
         page, shot = folder / "report.html", folder / "report.png"
-        app(["report", *bags, "--output", str(page)], standalone_mode=False)
+        slap("report", *bags, "--output", str(page))
         text = page.read_text(encoding="utf-8")
-        page.write_text(text.replace("</body>", SHOW_STEP), encoding="utf-8")
+        text = POLICY.sub("", text).replace("</body>", SHOW_STEP)
+        page.write_text(text, encoding="utf-8")
         photograph(chromium, page, shot)
-        Image.open(shot).convert("RGB").quantize(COLOURS).save(path, optimize=True)
+        large = Image.open(shot).convert("RGB")
+        small = large.resize(SIZE_PX, Image.Resampling.LANCZOS)
+        small.quantize(COLOURS).save(path, optimize=True)
+
+
+def slap(*arguments: str) -> None:
+    """Run the command line of this environment."""
+    command = [str(Path(sys.executable).parent / "slap"), *arguments]
+    subprocess.run(command, check=True, capture_output=True)
 
 
 def photograph(chromium: str, page: Path, picture: Path) -> None:
     """Have a browser draw a page to a file."""
-    width, height = SIZE_PX
+    width, height = WINDOW_PX
     command = [
         chromium,
         "--headless",
@@ -64,6 +74,7 @@ def photograph(chromium: str, page: Path, picture: Path) -> None:
         "--hide-scrollbars",
         f"--user-data-dir={picture.parent / 'profile'}",
         f"--window-size={width},{height}",
+        "--force-device-scale-factor=2",
         "--virtual-time-budget=3000",  # ms
         f"--screenshot={picture}",
         page.as_uri(),

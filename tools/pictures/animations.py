@@ -1,47 +1,64 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""One task, solved twice side by side: with the given skills, and with a shortcut as well."""
+"""Animations of solved tasks, with the steps counted: one arm alone, or two side by side."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from itertools import chain, repeat
 from pathlib import Path
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from slap_ros.domains import get_domain
+from slap_ros.domains import cleanup_table, cluttered_drawer, get_domain
+from slap_ros.domains.cleanup_table.scene import scene_of as scene_of_table
+from slap_ros.domains.cleanup_table.shapes import shipped
+from slap_ros.domains.cluttered_drawer.scene import scene_of as scene_of_drawer
 from slap_ros.domains.obstacle_tower.features import SURFACE
-from slap_ros.domains.obstacle_tower.scene import scene_of
+from slap_ros.domains.obstacle_tower.scene import scene_of as scene_of_tower
 from slap_ros.evaluation.approaches import Approach, approaches
 from slap_ros.evaluation.experiment import solve
 from slap_ros.physics.panda import CONTROL_PERIOD_S
 from slap_ros.physics.rendering import Camera
+from slap_ros.physics.scene import Scene
 from slap_ros.physics.viewpoint import Viewpoint
 from slap_ros.planning.options import OptionKind
 from slap_ros.relational import State
 from slap_ros.shortcuts.shipped import chosen_library
 from slap_ros.shortcuts.shortcut import DEFAULT
 
-DOMAIN, SEED = "obstacle_tower", 1
-TITLES = ("planning with given skills", "and with a learned shortcut")
 OVERSAMPLING = 2  # pictures are drawn so many times as large, then scaled down
-WIDTH_PX, HEIGHT_PX = 420, 380  # of one arm's picture
+SIZE_PX = (420, 380)  # of one arm's picture
 HEADER_PX, MARGIN_PX, GAP_PX = 66, 14, 4
-VIEW = Viewpoint(
-    eye=(1.3, -0.95, 0.8),
-    target=(0.31, -0.03, 0.27),
-    field_of_view=42.0,
-    width=OVERSAMPLING * WIDTH_PX,
-    height=OVERSAMPLING * HEIGHT_PX,
-)
 PAUSE_FRAMES = 20  # at the end
 COLOURS = 128
 PAPER, INK, MUTED = "#fbfbfa", "#1f2328", "#57606a"
 SHORTCUT, DONE, PLATE = "#9a3412", "#116329", "#4caf50"
 CLEARANCE_M = 0.0015  # of a plate that is flush with the table, so that one sees which is on top
+TITLES = ("planning with given skills", "and with a learned shortcut")
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is shown.
+
+    Args:
+        domain: By name.
+        preset: Of the domain.
+        seed: Of the task.
+        scene_of: The bodies of a state.
+        viewpoint: Where it is seen from; its size does not matter.
+        prepared: A state as it is drawn.
+    """
+
+    domain: str
+    preset: str
+    seed: int
+    scene_of: Callable[[State], Scene]
+    viewpoint: Viewpoint
+    prepared: Callable[[State], State] = lambda state: state
 
 
 @dataclass(frozen=True)
@@ -62,23 +79,71 @@ class Recording:
 
     @property
     def steps(self) -> int:
-        """How many were executed."""
+        """How many environment steps were executed."""
         return len(self.states) - 1
 
 
-def make(path: Path) -> None:
-    """Solve the task in both ways and write the animation."""
-    domain = get_domain(DOMAIN)
-    given, _, slap = approaches(chosen_library(None, domain), DEFAULT)
-    both = [record(title, approach) for title, approach in zip(TITLES, (given, slap), strict=True)]
-    frames = compose(both)
-    write_gif(path, frames, CONTROL_PERIOD_S)
+def lifted(state: State) -> State:
+    """The same state with the target plate a little above the table."""
+    plates = [s for s in state.layout.of_type(SURFACE) if state.get(s, "is_target") > 0.5]
+    return state.replace({(s, "z"): float(state.get(s, "z")) + CLEARANCE_M for s in plates})
 
 
-def record(title: str, approach: Approach) -> Recording:
+TOWER = Subject(
+    "obstacle_tower",
+    "fair",
+    1,
+    scene_of_tower,
+    Viewpoint(eye=(1.3, -0.95, 0.8), target=(0.31, -0.03, 0.27), field_of_view=42.0),
+    lifted,
+)
+DRAWER = Subject("cluttered_drawer", "paper", 0, scene_of_drawer, cluttered_drawer.VIEWPOINT)
+TABLE = Subject(
+    "cleanup_table",
+    "paper",
+    0,
+    lambda state: scene_of_table(state, shipped()),
+    cleanup_table.VIEWPOINT,
+)
+
+
+def make_side_by_side(path: Path) -> None:
+    """The tower with given skills alone and, beside it, with a shortcut."""
+    given, slap = _given_and_slap(TOWER)
+    both = [
+        record(TOWER, title, approach)
+        for title, approach in zip(TITLES, (given, slap), strict=True)
+    ]
+    write_gif(path, compose(TOWER, both), CONTROL_PERIOD_S)
+
+
+def make_drawer(path: Path) -> None:
+    """The drawer with a shortcut."""
+    _make_alone(path, DRAWER, "Cluttered Drawer")
+
+
+def make_table(path: Path) -> None:
+    """The table with a shortcut."""
+    _make_alone(path, TABLE, "Cleanup Table")
+
+
+def _make_alone(path: Path, subject: Subject, title: str) -> None:
+    _, slap = _given_and_slap(subject)
+    recording = record(subject, title, slap)
+    write_gif(path, compose(subject, [recording]), CONTROL_PERIOD_S)
+
+
+def _given_and_slap(subject: Subject) -> tuple[Approach, Approach]:
+    library = chosen_library(None, get_domain(subject.domain, subject.preset))
+    given, _, slap = approaches(library, DEFAULT)
+    return given, slap
+
+
+def record(subject: Subject, title: str, approach: Approach) -> Recording:
     """Plan and execute.
 
     Args:
+        subject: The task.
         title: What is written above the arm.
         approach: How to plan.
 
@@ -86,8 +151,8 @@ def record(title: str, approach: Approach) -> Recording:
         RuntimeError: The plan was not executed as planned, so that nobody knows which option
             each step belongs to.
     """
-    domain = get_domain(DOMAIN)
-    task = domain.task(SEED)
+    domain = get_domain(subject.domain, subject.preset)
+    task = domain.task(subject.seed)
     goal = domain.atom_space(task.initial_state).mask(task.goal)
     planner = approach.planner("lazy", domain, task.initial_state)
     plan = planner.plan(task.initial_state, goal).plan
@@ -104,53 +169,55 @@ def record(title: str, approach: Approach) -> Recording:
     return Recording(title, episode.states, [captions[0], *captions])
 
 
-def compose(recordings: Sequence[Recording]) -> list[Image.Image]:
+def compose(subject: Subject, recordings: Sequence[Recording]) -> list[Image.Image]:
     """The frames: every arm goes on for as long as it has steps, and then waits for the others."""
     longest = max(recording.steps for recording in recordings)
-    panels = [draw_panels(recording) for recording in recordings]
-    width = len(panels) * WIDTH_PX + (len(panels) - 1) * GAP_PX
+    panels = [draw_panels(subject, recording) for recording in recordings]
+    across, height = SIZE_PX
+    width = len(panels) * across + (len(panels) - 1) * GAP_PX
     frames = []
     for step in range(longest + 1):
-        frame = Image.new("RGB", (width, HEADER_PX + HEIGHT_PX), PAPER)
+        frame = Image.new("RGB", (width, HEADER_PX + height), PAPER)
         for column, panel in enumerate(panels):
-            frame.paste(panel[min(step, len(panel) - 1)], (column * (WIDTH_PX + GAP_PX), 0))
+            frame.paste(panel[min(step, len(panel) - 1)], (column * (across + GAP_PX), 0))
         frames.append(frame)
     return list(chain(frames, repeat(frames[-1], PAUSE_FRAMES)))
 
 
-def draw_panels(recording: Recording) -> list[Image.Image]:
+def draw_panels(subject: Subject, recording: Recording) -> list[Image.Image]:
     """An arm in each of its states, with a header."""
+    width, height = (OVERSAMPLING * size for size in SIZE_PX)
+    viewpoint = replace(subject.viewpoint, width=width, height=height)
     panels = []
-    with Camera(scene_of(recording.states[0]), VIEW) as camera:
+    with Camera(subject.scene_of(recording.states[0]), viewpoint) as camera:
         for step, (state, caption) in enumerate(
             zip(recording.states, recording.captions, strict=True)
         ):
-            large = Image.fromarray(camera.picture(lifted(state)))
-            seen = large.resize((WIDTH_PX, HEIGHT_PX), Image.Resampling.LANCZOS)
+            large = Image.fromarray(camera.picture(subject.prepared(state)))
+            seen = large.resize(SIZE_PX, Image.Resampling.LANCZOS)
             done = step == recording.steps
             shown = Caption(f"goal reached in {step} steps", DONE) if done else caption
             panels.append(with_header(seen, recording.title, step, shown))
     return panels
 
 
-def lifted(state: State) -> State:
-    """The same state with the target plate a little above the table."""
-    plates = [s for s in state.layout.of_type(SURFACE) if state.get(s, "is_target") > 0.5]
-    return state.replace({(s, "z"): float(state.get(s, "z")) + CLEARANCE_M for s in plates})
-
-
 def with_header(seen: Image.Image, title: str, step: int, caption: Caption) -> Image.Image:
     """A picture below its title, its caption and its step."""
-    panel = Image.new("RGB", (WIDTH_PX, HEADER_PX + HEIGHT_PX), PAPER)
+    panel = Image.new("RGB", (seen.width, HEADER_PX + seen.height), PAPER)
     panel.paste(seen, (0, HEADER_PX))
     pen = ImageDraw.Draw(panel)
     pen.text((MARGIN_PX, 10), title, INK, font(19))
-    pen.text((MARGIN_PX, 38), caption.text, caption.colour, font(15))
-    right = WIDTH_PX - MARGIN_PX
+    pen.text((MARGIN_PX, 38), _fitting(caption.text), caption.colour, font(15))
+    right = seen.width - MARGIN_PX
     colour = DONE if caption.colour == DONE else INK
     pen.text((right, 2), str(step), colour, font(40), anchor="ra")
     pen.text((right, 44), "steps", MUTED, font(13), anchor="ra")
     return panel
+
+
+def _fitting(text: str) -> str:
+    """A caption that leaves room for the counter; long ones lose their arguments."""
+    return text if len(text) <= 38 else text.partition("(")[0]
 
 
 def font(size_px: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
