@@ -162,8 +162,8 @@ setup(
     entry_points={
         "console_scripts": [
             "slap = ensemble.cli:main",
-            *(f"{node} = {node}.node:main" for node in NODES),
-            "mock_robot = robot_bridge.mock.node:main",
+            *(f"{node} = {node}.__main__:main" for node in NODES),
+            "mock_robot = robot_bridge.mock.__main__:main",
         ],
         "embedded_ros.interfaces": ["slap_msgs = msg_schemas"],
     },

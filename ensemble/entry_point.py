@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Callable
 
@@ -12,7 +13,7 @@ from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
-from ensemble.network import join_network
+from ensemble.network import first_node, join_network
 from slap_ros.errors import ErrorCode, SlapError
 
 
@@ -23,10 +24,6 @@ def run_node(name: str, make: Callable[[], Node]) -> int:
         Exit code: 0 after a signal, else the error's code, whose message went to stderr.
     """
     try:
-        join_network()
-    except SlapError as error:
-        return _refuse(name, error, error.code)
-    try:
         return _run(name, make)
     finally:
         rclpy.try_shutdown()
@@ -34,6 +31,8 @@ def run_node(name: str, make: Callable[[], Node]) -> int:
 
 def _run(name: str, make: Callable[[], Node]) -> int:
     try:
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # for rclpy to go on with
+        join_network()
         _spin(make)
     except (KeyboardInterrupt, ExternalShutdownException):
         return 0
@@ -50,7 +49,7 @@ def _run(name: str, make: Callable[[], Node]) -> int:
 
 
 def _spin(make: Callable[[], Node]) -> None:
-    node = make()
+    node = first_node(make)
     try:
         rclpy.spin(node)
     finally:

@@ -14,7 +14,7 @@ from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
-from ensemble.network import join_network
+from ensemble.network import first_node, join_network
 
 SPIN_PERIOD = 0.05  # s, the longest time between two checks
 
@@ -63,7 +63,7 @@ def temporary_node(make: Callable[[], N]) -> Iterator[tuple[N, Spinner]]:
         stack.callback(rclpy.try_shutdown)
         executor = SingleThreadedExecutor()
         stack.callback(executor.shutdown)
-        node = make()
+        node = first_node(make)
         stack.callback(node.destroy_node)
         executor.add_node(node)
         yield node, Spinner(executor)

@@ -8,15 +8,18 @@ It waits for a task to be asked for:
 ``ros2 action send_goal /slap/solve_task slap_msgs/action/SolveTask '{max_replans: 5}'``
 """
 
+import os
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
-from launch.conditions import LaunchConfigurationEquals, LaunchConfigurationNotEquals
-from launch.substitutions import LaunchConfiguration, PythonExpression
+from launch import Action, LaunchDescription
+from launch.actions import DeclareLaunchArgument, LogInfo, SetEnvironmentVariable
+from launch.conditions import IfCondition, UnlessCondition
+from launch.substitutions import EqualsSubstitution, LaunchConfiguration, PythonExpression
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
+
+from slap_ros.doctor.settings import RANGE, RANGE_HINT
 
 ARGUMENTS = {
     "domain": ("obstacle2d", "which domain"),
@@ -45,7 +48,16 @@ def generate_launch_description() -> LaunchDescription:
         DeclareLaunchArgument(name, default_value=default, description=description)
         for name, (default, description) in ARGUMENTS.items()
     ]
-    return LaunchDescription([*arguments, *_worlds(), *_solvers(), _recorder(), _rviz()])
+    return LaunchDescription(
+        [*arguments, *_discovery_range(), *_worlds(), *_solvers(), _recorder(), _rviz()]
+    )
+
+
+def _discovery_range() -> list[Action]:
+    """What every node would choose for itself: here once for all, RViz too, and said once."""
+    if RANGE in os.environ:
+        return []
+    return [SetEnvironmentVariable(RANGE, "LOCALHOST"), LogInfo(msg=RANGE_HINT)]
 
 
 def _worlds() -> list[Node]:
@@ -58,17 +70,17 @@ def _worlds() -> list[Node]:
         _node(
             "sim_node",
             task | {"pace": _value("pace", float)},
-            condition=LaunchConfigurationEquals("world", "sim"),
+            condition=IfCondition(_is("world", "sim")),
         ),
         _node(
             "robot_bridge",
             task | arm | {"scene": _value("scene", str)},
-            condition=LaunchConfigurationNotEquals("world", "sim"),
+            condition=UnlessCondition(_is("world", "sim")),
         ),
         _node(
             "mock_robot",
             task | arm | noise,
-            condition=LaunchConfigurationEquals("world", "mock"),
+            condition=IfCondition(_is("world", "mock")),
         ),
     ]
 
@@ -92,7 +104,7 @@ def _recorder() -> Node:
     return _node(
         "recorder_node",
         {"bag": _value("record", str)},
-        condition=LaunchConfigurationNotEquals("record", ""),
+        condition=UnlessCondition(_is("record", "")),
     )
 
 
@@ -106,7 +118,7 @@ def _rviz() -> Node:
             (topic, [LaunchConfiguration("namespace"), topic])
             for topic in ("/slap/markers", "/tf", "/tf_static")
         ],
-        condition=LaunchConfigurationEquals("rviz", "true"),
+        condition=IfCondition(LaunchConfiguration("rviz")),
     )
 
 
@@ -121,6 +133,10 @@ def _node(name: str, parameters: dict[str, ParameterValue], **options: object) -
         output="screen",
         **options,
     )
+
+
+def _is(name: str, value: str) -> EqualsSubstitution:
+    return EqualsSubstitution(LaunchConfiguration(name), value)
 
 
 def _value(name: str, kind: type) -> ParameterValue:

@@ -4,6 +4,13 @@
 
 import sys
 
-from perception_node.node import main
+from ensemble.startup import main_of
 
-sys.exit(main())
+
+def main() -> int:
+    """Run the node."""
+    return main_of("perception_node")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

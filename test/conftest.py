@@ -27,7 +27,9 @@ def network(monkeypatch):
     """A DDS domain that no other worker, and no other run of these tests, uses meanwhile."""
     with _domain() as number:
         monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
-        monkeypatch.delenv("ROS_AUTOMATIC_DISCOVERY_RANGE", raising=False)
+        for name in ("ROS_AUTOMATIC_DISCOVERY_RANGE", "CYCLONEDDS_URI"):
+            monkeypatch.setenv(name, "")  # so that it is put back as it was
+            monkeypatch.delenv(name)
         yield number
 
 

@@ -38,6 +38,8 @@ ENVIRONMENT = (
     "ROS_STATIC_PEERS",
 )
 
+EMBEDDED = ros.RclpyStatus(embedded=True)
+
 
 @pytest.fixture(autouse=True)
 def environment(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
@@ -113,7 +115,7 @@ def test_importing_the_doctor_imports_no_ros() -> None:
 @pytest.mark.parametrize("domain", ["abc", "500", "-1", "1.5", "²"])
 def test_impossible_domain(monkeypatch: pytest.MonkeyPatch, domain: str) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", domain)
-    expect_problem(ros.settings(), "ROS_DOMAIN_ID", domain)
+    expect_problem(ros.settings(EMBEDDED), "ROS_DOMAIN_ID", domain)
 
 
 @pytest.mark.parametrize("domain", ["abc", "500"])
@@ -126,22 +128,22 @@ def test_conversation_in_an_impossible_domain(monkeypatch: pytest.MonkeyPatch, d
 
 def test_domain_with_ports_that_others_may_have(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_DOMAIN_ID", "150")
-    check = ros.settings()
+    check = ros.settings(EMBEDDED)
     assert check.status == "warning"
     assert check.advice
 
 
 def test_unknown_discovery_range(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "GALAXY")
-    expect_problem(ros.settings(), "GALAXY")
+    expect_problem(ros.settings(EMBEDDED), "GALAXY")
     expect_problem(dds.conversation(ros.RclpyStatus()))
 
 
 def test_discovery_switched_off(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF")
-    expect_problem(ros.settings(), "OFF")
+    expect_problem(ros.settings(EMBEDDED), "OFF")
     monkeypatch.setenv("ROS_LOCALHOST_ONLY", "1")  # an older variable, which counts for more
-    assert ros.settings().status == "ok"
+    assert ros.settings(EMBEDDED).status == "ok"
 
 
 def test_nodes_that_do_not_see_each_other(

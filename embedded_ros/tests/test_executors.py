@@ -27,7 +27,7 @@ from conftest import TIMEOUT_S, spin_until, wait_until
 @pytest.fixture
 def no_look_around(monkeypatch: pytest.MonkeyPatch) -> None:
     """Executors wait until they are woken, instead of looking around once a second."""
-    monkeypatch.setattr("rclpy.executors.MAX_WAIT_NS", int(100 * TIMEOUT_S * 1e9))
+    monkeypatch.setattr("rclpy.executors._MAX_WAIT_NS", int(100 * TIMEOUT_S * 1e9))
 
 
 class Overlap:

@@ -13,6 +13,7 @@ from collections.abc import Callable
 
 import pytest
 import rclpy
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.exceptions import (
     InvalidNamespaceException,
     InvalidNodeNameException,
@@ -149,7 +150,7 @@ def test_misuse_is_refused(domain: int) -> None:
     with pytest.raises(NotImplementedError, match="logger service"):
         Node("n", enable_logger_service=True)
     rclpy.shutdown()
-    with pytest.raises(ValueError, match="domain 233 is not in"):
+    with pytest.raises(RCLError, match="domain 233 is not in"):
         rclpy.init(args=[], domain_id=233)
 
 
@@ -161,12 +162,24 @@ def test_the_domain_comes_from_the_environment(
     assert rclpy.get_default_context().get_domain_id() == domain
     rclpy.shutdown()
     monkeypatch.setenv("ROS_DOMAIN_ID", "many")
-    with pytest.raises(ValueError, match="ROS_DOMAIN_ID is 'many'"):
+    with pytest.raises(RCLError, match="ROS_DOMAIN_ID is 'many'"):
         rclpy.init(args=[])
     monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "WORLD")
-    with pytest.raises(ValueError, match="ROS_AUTOMATIC_DISCOVERY_RANGE is 'WORLD'"):
+    with pytest.raises(RCLError, match="ROS_AUTOMATIC_DISCOVERY_RANGE is 'WORLD'"):
         rclpy.init(args=[])
+
+
+def test_a_network_that_cyclonedds_refuses_is_an_rclerror(
+    monkeypatch: pytest.MonkeyPatch, domain: int
+) -> None:
+    monkeypatch.setenv("CYCLONEDDS_URI", "<CycloneDDS><Domain")
+    rclpy.init(args=[], domain_id=domain)
+    with pytest.raises(RCLError, match="check CYCLONEDDS_URI"):
+        Node("n")
+    monkeypatch.delenv("CYCLONEDDS_URI")
+    Node("n").destroy_node()  # nothing stays behind
+    rclpy.shutdown()
 
 
 def test_an_idle_node_sleeps(run: Run) -> None:

@@ -16,6 +16,7 @@ from rclpy.qos import (
     HistoryPolicy,
     InvalidQoSProfileException,
     LivelinessPolicy,
+    QoSCompatibility,
     QoSProfile,
     ReliabilityPolicy,
     qos_check_compatible,
@@ -177,8 +178,11 @@ def test_lifespan_is_honoured(node: Node) -> None:
 
 def test_compatibility_can_be_asked_for() -> None:
     reliable, best_effort = QoSProfile(depth=1), qos_profile_sensor_data
-    assert qos_check_compatible(reliable, best_effort).compatibility == 0
-    assert "Best effort publisher" in qos_check_compatible(best_effort, reliable).reason
+    compatibility, reason = qos_check_compatible(reliable, best_effort)
+    assert (compatibility, reason) == (QoSCompatibility.OK, "")
+    compatibility, reason = qos_check_compatible(best_effort, reliable)
+    assert compatibility == QoSCompatibility.ERROR
+    assert "Best effort publisher" in reason
 
 
 def test_destroyed_means_silent(node: Node) -> None:

@@ -28,7 +28,7 @@ def diagnose(runs: Path = RUNS) -> list[Check]:
         ros.installation(about),
         ros.middleware(about),
         ros.interfaces(about),
-        ros.settings(),
+        ros.settings(about),
         dds.conversation(about),
         libraries.rosbags(),
         libraries.pybullet(),

@@ -29,6 +29,8 @@ def conversation(about: RclpyStatus) -> Check:
     """Start two nodes and let them talk, with the environment as it is."""
     if about.error:
         return Check(NAME, "problem", "not tried, without rclpy", "See ROS 2.")
+    for fault in settings.impossible():
+        return Check(NAME, "problem", f"not tried: {fault.found}", fault.advice)
     asked, answered = _converse()
     used = settings.described()
     for outcome in (asked, answered):

@@ -120,9 +120,11 @@ def interfaces(about: RclpyStatus) -> Check:
     )
 
 
-def settings() -> Check:
+def settings(about: RclpyStatus) -> Check:
     """The environment variables that decide which nodes find each other."""
     name = "ROS 2 settings"
     for fault in variables.faults():
         return Check(name, fault.status, fault.found, fault.advice)
+    if not (about.embedded or about.error or variables.RANGE in os.environ):
+        return Check(name, "warning", variables.described(), variables.RANGE_HINT)
     return Check(name, "ok", variables.described())

@@ -9,13 +9,13 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from std_msgs.msg import String
 
-from ensemble.network import join_network
+from ensemble.network import first_node, join_network
 
 WHILE = 10.0  # s, in which others, where they can be found at all, are found many times over
 
 name, heard = sys.argv[1], set()
 join_network()
-node = rclpy.create_node(name)
+node = first_node(lambda: rclpy.create_node(name))
 node.create_subscription(String, "talk", lambda message: heard.add(message.data), 10)
 publisher = node.create_publisher(String, "talk", 10)
 executor = SingleThreadedExecutor()

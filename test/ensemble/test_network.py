@@ -12,7 +12,7 @@ import pytest
 import rclpy
 
 from ensemble.network import DISCOVERY_RANGE, join_network
-from slap_ros.errors import InvalidParameterError
+from slap_ros.errors import ErrorCode, InvalidParameterError
 
 HERE = Path(__file__).parent
 
@@ -56,9 +56,39 @@ def test_jazzys_own_default_is_not_taken(network, monkeypatch, given, taken):
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("ROS_DOMAIN_ID", "abc"), ("ROS_DOMAIN_ID", "1000"), (DISCOVERY_RANGE, "EVERYWHERE")],
+    [
+        ("ROS_DOMAIN_ID", "abc"),
+        ("ROS_DOMAIN_ID", "1000"),
+        ("ROS_DOMAIN_ID", "-1"),
+        (DISCOVERY_RANGE, "EVERYWHERE"),
+        (DISCOVERY_RANGE, "subnet"),  # ROS 2 takes it for LOCALHOST
+    ],
 )
 def test_a_wrong_environment_is_refused(network, monkeypatch, name, value):
     monkeypatch.setenv(name, value)
     with pytest.raises(InvalidParameterError, match=value):
         join_network()
+    assert not rclpy.ok()
+
+
+def test_a_missing_keystore_is_refused(network, monkeypatch, tmp_path):
+    monkeypatch.setenv("ROS_SECURITY_ENABLE", "true")
+    monkeypatch.setenv("ROS_SECURITY_STRATEGY", "Enforce")
+    monkeypatch.setenv("ROS_SECURITY_KEYSTORE", str(tmp_path / "keys"))
+    with pytest.raises(InvalidParameterError, match="no keystore"):
+        join_network()
+    assert not rclpy.ok()
+
+
+@pytest.mark.parametrize("uri", ["<CycloneDDS><Domain", "file:///nowhere/cyclonedds.xml"])
+def test_a_network_that_dds_refuses_ends_a_node_in_an_error(network, uri):
+    node = subprocess.run(
+        [sys.executable, "-m", "sim_node"],
+        env={**os.environ, "CYCLONEDDS_URI": uri},
+        capture_output=True,
+        text=True,
+        timeout=100,
+    )
+    assert node.returncode == ErrorCode.INVALID_PARAMETER, node.stderr
+    assert "sim_node: DDS cannot be started here" in node.stderr
+    assert "Traceback" not in node.stderr

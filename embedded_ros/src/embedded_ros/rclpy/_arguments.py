@@ -12,7 +12,7 @@ from typing import Any
 
 import yaml
 
-from .exceptions import UnknownROSArgsError
+from embedded_ros.transport.errors import RCLInvalidROSArgsError, UnknownROSArgsError
 
 _START, _END = "--ros-args", "--"
 _WITH_VALUE = {
@@ -96,7 +96,8 @@ def parse_arguments(args: Sequence[str]) -> RosArguments:
     """Read a command line.
 
     Raises:
-        UnknownROSArgsError: A ROS argument is unknown, or lacks its value, or is malformed.
+        UnknownROSArgsError: A ROS argument is unknown.
+        RCLInvalidROSArgsError: One lacks its value, or is malformed.
     """
     remaps: list[RemapRule] = []
     parameters: list[tuple[ParameterRule, ...]] = []
@@ -113,7 +114,7 @@ def parse_arguments(args: Sequence[str]) -> RosArguments:
             raise UnknownROSArgsError(f"Found unknown ROS arguments: {token!r}")
         value = next(tokens, None)
         if value is None:
-            raise UnknownROSArgsError(f"ROS argument {token!r} lacks its value")
+            raise RCLInvalidROSArgsError(f"ROS argument {token!r} lacks its value")
         if kind == "remap":
             remaps.append(_remap_rule(value))
         elif kind == "param":
@@ -154,7 +155,7 @@ def _ros_tokens(args: Sequence[str]) -> Iterator[str]:
 def _remap_rule(text: str) -> RemapRule:
     source, separator, target = text.partition(":=")
     if not (separator and source and target):
-        raise UnknownROSArgsError(f"Remap rule {text!r} is not of the form [node:]from:=to")
+        raise RCLInvalidROSArgsError(f"Remap rule {text!r} is not of the form [node:]from:=to")
     node, source = _split_node(source)
     if source == "__name":
         source = "__node"
@@ -164,7 +165,9 @@ def _remap_rule(text: str) -> RemapRule:
 def _parameter_rule(text: str) -> ParameterRule:
     name, separator, value = text.partition(":=")
     if not (separator and name):
-        raise UnknownROSArgsError(f"Parameter rule {text!r} is not of the form [node:]name:=value")
+        raise RCLInvalidROSArgsError(
+            f"Parameter rule {text!r} is not of the form [node:]name:=value"
+        )
     node, name = _split_node(name)
     return ParameterRule(node or "/**", name, _yaml(value, f"parameter rule {text!r}"))
 
@@ -180,17 +183,17 @@ def _parameter_file(path: str) -> Iterator[ParameterRule]:
     try:
         text = Path(path).read_text(encoding="utf-8")
     except OSError as error:
-        raise UnknownROSArgsError(f"Parameter file {path!r} cannot be read: {error}") from error
+        raise RCLInvalidROSArgsError(f"Parameter file {path!r} cannot be read: {error}") from error
     content = _yaml(text, f"parameter file {path!r}")
     if not isinstance(content, dict):
-        raise UnknownROSArgsError(f"Parameter file {path!r} has no node at its top level")
+        raise RCLInvalidROSArgsError(f"Parameter file {path!r} has no node at its top level")
     yield from _node_rules(content, "", path)
 
 
 def _node_rules(content: dict[Any, Any], prefix: str, path: str) -> Iterator[ParameterRule]:
     for key, value in content.items():
         if not isinstance(value, dict):
-            raise UnknownROSArgsError(
+            raise RCLInvalidROSArgsError(
                 f"Parameter file {path!r}: {key!r} must hold {_PARAMETERS_KEY!r} or further names"
             )
         name = f"{prefix}/{str(key).strip('/')}"
@@ -207,7 +210,7 @@ def _node_rules(content: dict[Any, Any], prefix: str, path: str) -> Iterator[Par
 
 def _flatten(parameters: Any, path: str, prefix: str = "") -> Iterator[tuple[str, Any]]:
     if not isinstance(parameters, dict):
-        raise UnknownROSArgsError(f"Parameter file {path!r}: {parameters!r} is no mapping")
+        raise RCLInvalidROSArgsError(f"Parameter file {path!r}: {parameters!r} is no mapping")
     for key, value in parameters.items():
         name = f"{prefix}{key}"
         if isinstance(value, dict):
@@ -238,4 +241,4 @@ def _yaml(text: str, what: str) -> Any:
     try:
         return yaml.load(text, Loader=_Loader)
     except yaml.YAMLError as error:
-        raise UnknownROSArgsError(f"{what} is no YAML: {error}") from error
+        raise RCLInvalidROSArgsError(f"{what} is no YAML: {error}") from error

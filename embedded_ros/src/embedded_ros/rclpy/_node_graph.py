@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from embedded_ros.transport import graph as dds
@@ -12,11 +13,14 @@ from embedded_ros.transport.graph import Endpoint, Graph
 
 from ._dds_qos import from_qos
 from .topic_endpoint_info import TopicEndpointInfo, TopicEndpointTypeEnum
+from .type_hash import TypeHash
 
 if TYPE_CHECKING:
     from .context import Context
 
 NamesAndTypes = list[tuple[str, list[str]]]
+
+_TYPE_HASH = re.compile(r"RIHS(\d\d)_([0-9a-f]{64})")
 
 
 class NodeGraph:
@@ -99,5 +103,6 @@ def _sorted(found: dict[str, set[str]]) -> NamesAndTypes:
     return [(name, sorted(found[name])) for name in sorted(found)]
 
 
-def _type_hash(endpoint: Endpoint) -> str:
-    return user_data.value(endpoint, "typehash") or ""
+def _type_hash(endpoint: Endpoint) -> TypeHash:
+    match = _TYPE_HASH.fullmatch(user_data.value(endpoint, "typehash") or "")
+    return TypeHash(int(match[1]), bytes.fromhex(match[2])) if match else TypeHash()

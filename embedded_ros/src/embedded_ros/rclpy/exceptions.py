@@ -7,6 +7,28 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from embedded_ros.transport.errors import InvalidHandle
+
+__all__ = [
+    "InvalidHandle",
+    "InvalidNamespaceException",
+    "InvalidNodeNameException",
+    "InvalidParameterException",
+    "InvalidParameterTypeException",
+    "InvalidParameterValueException",
+    "InvalidServiceNameException",
+    "InvalidTopicNameException",
+    "NameValidationException",
+    "NotInitializedException",
+    "ParameterAlreadyDeclaredException",
+    "ParameterException",
+    "ParameterImmutableException",
+    "ParameterNotDeclaredException",
+    "ParameterUninitializedException",
+    "ROSInterruptException",
+    "TimerCancelledError",
+]
+
 if TYPE_CHECKING:
     from .parameter import Parameter
 
@@ -18,17 +40,13 @@ class NotInitializedException(Exception):
         super().__init__("rclpy.init() has not been called", *args)
 
 
-class NameValidationException(ValueError):
+class NameValidationException(Exception):
     """A name is not a valid name of its kind."""
 
     def __init__(self, name_type: str, name: str, error_msg: str, invalid_index: int) -> None:
         super().__init__(
             f"Invalid {name_type}: {error_msg}:\n  '{name}'\n   {' ' * invalid_index}^"
         )
-        self.name_type = name_type
-        self.name = name
-        self.error_msg = error_msg
-        self.invalid_index = invalid_index
 
 
 class InvalidNamespaceException(NameValidationException):
@@ -59,17 +77,11 @@ class InvalidServiceNameException(NameValidationException):
         super().__init__("service name", name, error_msg, invalid_index)
 
 
-class UnknownROSArgsError(ValueError):
-    """Arguments after ``--ros-args`` that ROS 2 does not have."""
-
-
 class ParameterException(Exception):
     """Base of the exceptions about parameters."""
 
     def __init__(self, error_msg: str, parameters: Sequence[str] | str) -> None:
         super().__init__(f"{error_msg}: {parameters}")
-        self.error_msg = error_msg
-        self.parameters = parameters
 
 
 class ParameterNotDeclaredException(ParameterException):
@@ -102,9 +114,6 @@ class InvalidParameterTypeException(ParameterException):
             f"Trying to set parameter '{desired_parameter.name}' to '{desired_parameter.value}' "
             f"of type '{desired_parameter.type_.name}', expecting type '{expected_type}'",
         )
-        self.error_msg = str(self)
-        self.parameters = desired_parameter.name
-        self.param_name = desired_parameter.name
 
 
 class InvalidParameterValueException(ParameterException):
@@ -114,8 +123,6 @@ class InvalidParameterValueException(ParameterException):
         Exception.__init__(
             self, f"Invalid parameter value ({value}) for parameter '{parameter}'. Reason: {reason}"
         )
-        self.error_msg = str(self)
-        self.parameters = parameter
 
 
 class ParameterImmutableException(ParameterException):
@@ -130,8 +137,6 @@ class ParameterUninitializedException(ParameterException):
 
     def __init__(self, parameter: str) -> None:
         Exception.__init__(self, f"The parameter '{parameter}' is not initialized")
-        self.error_msg = str(self)
-        self.parameters = parameter
 
 
 class ROSInterruptException(Exception):

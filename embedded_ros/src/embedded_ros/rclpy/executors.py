@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from .node import Node
 
 # Ends waits now and then, so that Python runs signal handlers that are not rclpy's own.
-MAX_WAIT_NS = 1_000_000_000
+_MAX_WAIT_NS = 1_000_000_000
 QOS_CHECK_PERIOD_S = 1.0
 
 
@@ -292,8 +292,8 @@ class Executor:
             self._ready.append(lambda entity=entity: self._claim(entity))  # type: ignore[misc]
 
     def _wait_ns(self, timeout_sec: float | None, busy: bool) -> int:
-        wait = MAX_WAIT_NS if timeout_sec is None else max(0, int(timeout_sec * 1e9))
-        wait = min(wait, MAX_WAIT_NS)
+        wait = _MAX_WAIT_NS if timeout_sec is None else max(0, int(timeout_sec * 1e9))
+        wait = min(wait, _MAX_WAIT_NS)
         if self._tasks and not busy:
             return 0
         for entity in self._entities:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
 from embedded_ros.transport import names as dds_names
-from embedded_ros.transport.errors import TransportClosedError
+from embedded_ros.transport.errors import InvalidHandle
 from embedded_ros.types import Message, message_class
 from embedded_ros.types import Service as ServiceType
 
@@ -462,7 +462,7 @@ class Node:
             self.destroy_publisher(publisher)
         try:
             self._context.participant.discovery.remove_node(self.discovery_key)
-        except (NotInitializedException, TransportClosedError):
+        except (NotInitializedException, InvalidHandle):
             return  # the context was shut down first, and took everything with it
 
     def detach_from_context(self) -> None:
@@ -730,7 +730,7 @@ class Node:
     @property
     def _participant(self) -> Any:
         if self._destroyed:
-            raise TransportClosedError(f"node {self.get_fully_qualified_name()} is destroyed")
+            raise InvalidHandle(f"node {self.get_fully_qualified_name()} is destroyed")
         return self._context.participant
 
     def _destroy(self, entity: Entity) -> bool:
@@ -775,7 +775,7 @@ class Node:
                 line=record.line,
             )
             # Shut down by another thread just now: the console has the message.
-            with contextlib.suppress(TransportClosedError):
+            with contextlib.suppress(InvalidHandle):
                 publisher.publish(message)
 
         logging.add_sink(self._logger.name, publish)

@@ -7,7 +7,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from embedded_ros.transport.endpoints import Writer
-from embedded_ros.transport.errors import TransportClosedError
+from embedded_ros.transport.errors import InvalidHandle
 from embedded_ros.types import Message
 from embedded_ros.types.cdr import serialize
 
@@ -56,7 +56,7 @@ class Publisher(Generic[MsgT]):
         Raises:
             TypeError: The message is not of the publisher's type.
             MessageFieldError: A field holds a value its type does not allow; says which.
-            TransportError: It could not be written: shut down, or blocked for too long.
+            RCLError: It could not be written: shut down, or blocked for too long.
         """
         if isinstance(msg, bytes | bytearray | memoryview):
             data = bytes(msg)
@@ -68,7 +68,7 @@ class Publisher(Generic[MsgT]):
                 f"{self.topic}: expected {self.msg_type.ros_type}, got {type(msg).__name__}"
             )
         if not self._context.ok():
-            raise TransportClosedError(f"{self.topic}: publisher's context is invalid")
+            raise InvalidHandle(f"{self.topic}: publisher's context is invalid")
         self._writer.write(data)
 
     def get_subscription_count(self) -> int:

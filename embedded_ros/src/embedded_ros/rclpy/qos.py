@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import warnings
 from enum import Enum, IntEnum
-from typing import Any, NamedTuple
+from typing import Any
 
 from .duration import Duration, Infinite
 
@@ -296,22 +296,17 @@ class QoSPresetProfiles(Enum):
 
 
 class QoSCompatibility(IntEnum):
-    """Whether a publisher and a subscription understand each other."""
+    """What :func:`qos_check_compatible` finds."""
 
     OK = 0
     WARNING = 1
     ERROR = 2
 
 
-class QoSCheck(NamedTuple):
-    """What :func:`qos_check_compatible` finds."""
-
-    compatibility: QoSCompatibility
-    reason: str
-
-
-def qos_check_compatible(publisher_qos: QoSProfile, subscription_qos: QoSProfile) -> QoSCheck:
-    """Whether a publisher and a subscription with these profiles understand each other."""
+def qos_check_compatible(
+    publisher_qos: QoSProfile, subscription_qos: QoSProfile
+) -> tuple[QoSCompatibility, str]:
+    """Whether a publisher and a subscription with these profiles understand each other, and why."""
     reasons = []
     if (
         publisher_qos.reliability == ReliabilityPolicy.BEST_EFFORT
@@ -329,4 +324,4 @@ def qos_check_compatible(publisher_qos: QoSProfile, subscription_qos: QoSProfile
     ):
         reasons.append("Subscription deadline is less than publisher deadline")
     text = "".join(f"ERROR: {reason};" for reason in reasons)
-    return QoSCheck(QoSCompatibility.ERROR if reasons else QoSCompatibility.OK, text)
+    return QoSCompatibility.ERROR if reasons else QoSCompatibility.OK, text

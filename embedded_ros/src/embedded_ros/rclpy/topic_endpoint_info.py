@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from .qos import QoSProfile
+from .type_hash import TypeHash
 
 
 class TopicEndpointTypeEnum(IntEnum):
@@ -25,7 +26,7 @@ class TopicEndpointInfo:
     node_name: str
     node_namespace: str
     topic_type: str
-    topic_type_hash: str
+    topic_type_hash: TypeHash
     endpoint_type: TopicEndpointTypeEnum
     endpoint_gid: list[int]
     qos_profile: QoSProfile

@@ -7,11 +7,16 @@ from __future__ import annotations
 import os
 from xml.sax.saxutils import quoteattr
 
+from .errors import RCLError
+
 # A killed peer disappears from the graph after this long; CycloneDDS's own default is 10 s.
 LEASE_DURATION_S = 4
 # Participants (processes, as a rule) a host can have in one domain, less one.
 MAX_PARTICIPANT_INDEX = 63
 MAX_DOMAIN_ID = 232
+# How often a participant announces itself again. Whoever listens to multicast alone, as a ROS 2 at
+# its default range does, is not heard on lo and waits for the next time (CycloneDDS's own: 30 s).
+ANNOUNCEMENT_PERIOD_S = 2
 # How long a writer that is deleted waits for acknowledgements. On one host they take well under
 # 1 ms; only readers that died keep it waiting (CycloneDDS's own default: 1 s each).
 WRITER_LINGER_MS = 200
@@ -29,18 +34,18 @@ def domain_id_from_environment() -> int:
     """``ROS_DOMAIN_ID``, or 0.
 
     Raises:
-        ValueError: It is no number from 0 to 232.
+        RCLError: It is no number from 0 to 232.
     """
     text = os.environ.get(DOMAIN_VARIABLE, "").strip() or "0"
     if not text.isdecimal():
-        raise ValueError(f"{DOMAIN_VARIABLE} is {text!r}, expected a number")
+        raise RCLError(f"{DOMAIN_VARIABLE} is {text!r}, expected a number")
     return checked_domain_id(int(text))
 
 
 def checked_domain_id(domain_id: int) -> int:
-    """The domain, if there can be one of this number; raises ValueError otherwise."""
+    """The domain, if there can be one of this number; raises RCLError otherwise."""
     if not 0 <= domain_id <= MAX_DOMAIN_ID:
-        raise ValueError(f"domain {domain_id} is not in 0..{MAX_DOMAIN_ID}")
+        raise RCLError(f"domain {domain_id} is not in 0..{MAX_DOMAIN_ID}")
     return domain_id
 
 
@@ -48,10 +53,10 @@ def configuration() -> str | None:
     """The configuration as XML, or None where CYCLONEDDS_URI or CycloneDDS itself decides.
 
     Raises:
-        ValueError: ROS_AUTOMATIC_DISCOVERY_RANGE is none of ROS 2's ranges, or SROS 2 is asked for.
+        RCLError: ROS_AUTOMATIC_DISCOVERY_RANGE is none of ROS 2's ranges, or SROS 2 is asked for.
     """
     if os.environ.get(SECURITY_VARIABLE, "").strip().lower() == "true":
-        raise ValueError(
+        raise RCLError(
             f"{SECURITY_VARIABLE} is true, but embedded_ros has no SROS 2: source a ROS 2, or "
             "unset it to run without encryption"
         )
@@ -86,6 +91,7 @@ def configuration() -> str | None:
         f"<ParticipantIndex>{index}</ParticipantIndex>"
         f"<MaxAutoParticipantIndex>{MAX_PARTICIPANT_INDEX}</MaxAutoParticipantIndex>"
         f"<LeaseDuration>{LEASE_DURATION_S} s</LeaseDuration>"
+        f"<SPDPInterval>{ANNOUNCEMENT_PERIOD_S} s</SPDPInterval>"
         f"{tag}<Peers>{peer_elements}</Peers>"
         "</Discovery><Sizing>"
         f"<ReceiveBufferSize>{RECEIVE_BUFFER_KIB} KiB</ReceiveBufferSize>"
@@ -103,9 +109,9 @@ def is_host_only() -> bool:
 def _discovery_range() -> str:
     if os.environ.get("ROS_LOCALHOST_ONLY") == "1":
         return "LOCALHOST"
-    reach = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").strip().upper() or "LOCALHOST"
+    reach = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").strip() or "LOCALHOST"
     if reach not in _RANGES:
-        raise ValueError(
+        raise RCLError(
             f"ROS_AUTOMATIC_DISCOVERY_RANGE is {reach!r}, expected one of {', '.join(_RANGES)}"
         )
     return reach

@@ -16,7 +16,7 @@ from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 
 from . import library
-from .errors import PublishTimeoutError, TransportClosedError, TransportError
+from .errors import InvalidHandle, PublishTimeoutError, RCLError
 
 _ANY = SampleState.Any | ViewState.Any | InstanceState.Any
 _CLOSED_CODES = (library.RETCODE_BAD_PARAMETER, library.RETCODE_ALREADY_DELETED)
@@ -75,20 +75,20 @@ class Writer:
         """Write serialized bytes.
 
         Raises:
-            TransportClosedError: The writer or its context was shut down.
+            InvalidHandle: The writer or its context was shut down.
             PublishTimeoutError: The history is full and a reliable reader does not keep up.
-            TransportError: Anything else CycloneDDS objects to.
+            RCLError: Anything else CycloneDDS objects to.
         """
         if self.closed:
-            raise TransportClosedError(f"{self.topic_name}: the writer is closed")
+            raise InvalidHandle(f"{self.topic_name}: the writer is closed")
         code = library.write_sample(self._ref, data)
         if code >= 0:
             return
         if code == library.RETCODE_TIMEOUT:
             raise PublishTimeoutError(f"{self.topic_name}: a reliable reader does not keep up")
         if self.closed or code in _CLOSED_CODES:
-            raise TransportClosedError(f"{self.topic_name}: the writer is closed (code {code})")
-        raise TransportError(f"{self.topic_name}: writing {len(data)} bytes failed (code {code})")
+            raise InvalidHandle(f"{self.topic_name}: the writer is closed (code {code})")
+        raise RCLError(f"{self.topic_name}: writing {len(data)} bytes failed (code {code})")
 
     def matched_handles(self) -> list[int]:
         """Handles of the readers that receive from this writer."""
@@ -141,7 +141,7 @@ class Reader:
             if isinstance(taken, int):
                 if taken in (*_CLOSED_CODES, library.RETCODE_NO_DATA):
                     return None
-                raise TransportError(f"{self.topic_name}: taking a sample failed (code {taken})")
+                raise RCLError(f"{self.topic_name}: taking a sample failed (code {taken})")
             if not taken:
                 return None
             data, info = taken[0]
@@ -181,7 +181,7 @@ class WaitSet:
         self._ref = library.dds_create_waitset(participant_ref)
         self._guard = library.dds_create_guardcondition(participant_ref)
         if self._ref < 0 or self._guard < 0:
-            raise TransportClosedError("the context is shut down")
+            raise InvalidHandle("the context is shut down")
         self._attached: dict[int, int] = {}  # condition by token
         self._lock = threading.Lock()
         self._closed = False

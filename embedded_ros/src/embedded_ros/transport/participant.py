@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import nullcontext
 from typing import Any
 
-from cyclonedds.core import Policy, Qos
+from cyclonedds.core import DDSException, Policy, Qos
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
@@ -20,7 +20,7 @@ from ..types import message_type_hash
 from . import config, descriptors, names
 from .discovery import DiscoveryInfo
 from .endpoints import Reader, WaitSet, Writer
-from .errors import TransportClosedError
+from .errors import InvalidHandle, RCLError
 from .graph import Graph
 from .loopback import loopback_only
 
@@ -60,18 +60,33 @@ def _configured(domain_id: int) -> Domain | None:
 _domains = _Domains()
 
 
+def _joined(domain_id: int) -> DomainParticipant:
+    """A participant in a domain.
+
+    Raises:
+        RCLError: CycloneDDS refuses its configuration, or finds no network.
+    """
+    try:
+        _domains.acquire(domain_id)
+        try:
+            # SROS 2's enclave, which `ros2 node info` and rmw's graph cache look for.
+            return DomainParticipant(domain_id, Qos(Policy.Userdata(b"enclave=/;")))
+        except BaseException:
+            _domains.release(domain_id)
+            raise
+    except DDSException as error:
+        raise RCLError(
+            f"CycloneDDS cannot join domain {domain_id}: its own message above says why; check "
+            "CYCLONEDDS_URI, ROS_AUTOMATIC_DISCOVERY_RANGE and ROS_STATIC_PEERS"
+        ) from error
+
+
 class Participant:
     """One per context: creates endpoints and announces which node each belongs to."""
 
     def __init__(self, domain_id: int) -> None:
         self.domain_id = config.checked_domain_id(domain_id)
-        _domains.acquire(domain_id)
-        try:
-            # SROS 2's enclave, which `ros2 node info` and rmw's graph cache look for.
-            self._entity = DomainParticipant(domain_id, Qos(Policy.Userdata(b"enclave=/;")))
-        except BaseException:
-            _domains.release(domain_id)
-            raise
+        self._entity = _joined(domain_id)
         self.gid: bytes = self._entity.guid.bytes
         self._lock = threading.RLock()
         self._topics: dict[tuple[str, str], Topic[Any]] = {}
@@ -192,7 +207,7 @@ class Participant:
 
     def _open_entity(self) -> DomainParticipant:
         if self.closed:
-            raise TransportClosedError("the context is shut down")
+            raise InvalidHandle("the context is shut down")
         return self._entity
 
     def _topic(self, name: str, full_name: str, *, service: bool) -> Topic[Any]:
