@@ -6,10 +6,10 @@ BIN := $(VENV)/bin
 TORCH := torch==2.13.0  # pinned: another version trains other policies from the same seed
 METADATA := pyproject.toml setup.py setup.cfg embedded_ros/pyproject.toml
 
-.PHONY: help install demo test faults lint format docs clean
+.PHONY: help install demo test test-ros faults lint format docs clean
 
 help:  ## Show what can be made
-	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
 
 install: $(VENV)/.installed  ## Make .venv with everything that running needs
 
@@ -52,6 +52,9 @@ test: $(VENV)/.tested lint  ## Run every test
 	$(BIN)/pytest -q -n 2 --dist worksteal
 	cd embedded_ros && $(abspath $(BIN))/pytest -q -n 2 --dist worksteal
 
+test-ros: $(VENV)/.installed  ## Run the tests that face ROS 2 on a sourced Jazzy
+	EMBEDDED_PYTHON=$(abspath $(BIN))/python test/ros/run
+
 faults: $(VENV)/.tested  ## Inject many more faults than the tests do, for about an hour
 	$(BIN)/pytest -q test/faults --fault-cases $(or $(CASES),100)
 
@@ -74,4 +77,4 @@ $(VENV)/.documented: $(VENV)/.installed
 	@touch $@
 
 clean:  ## Remove what was made
-	rm -rf $(VENV) build install log site *.egg-info
+	rm -rf $(VENV) .venv-ros build install log site *.egg-info

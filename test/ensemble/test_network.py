@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 import rclpy
 
-from ensemble.network import DISCOVERY_RANGE, join_network
+from ensemble.network import DISCOVERY_RANGE, is_embedded, join_network
 from slap_ros.errors import ErrorCode, InvalidParameterError
 
 HERE = Path(__file__).parent
@@ -41,7 +41,8 @@ def test_another_host_is_heard_only_where_that_was_asked_for(network, reach, ope
     assert set(told.stdout.split()) == {
         "inside:True" if open_to_all else "inside:False",
         "outside:True" if open_to_all else "outside:False",
-        "door:True" if open_to_all else "door:False",
+        # Bound to lo, a port is as good as closed; with a filter it is open, but nobody hears.
+        "door:True" if open_to_all or not is_embedded() else "door:False",
     }
 
 

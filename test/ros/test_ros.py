@@ -1,0 +1,172 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The ensemble on a sourced ROS 2, by the commands of the README."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+from commands import LIMIT, ros2, solve, started
+
+from ensemble.client import RunClient
+from ensemble.interfaces import DOMAIN, JOINT_STATES, MARKERS, PLAN_EVENTS, STATE, TASK
+from ensemble.spinner import temporary_node
+from slap_ros.bags import evaluate_bag, read_bag
+
+ROOT = Path(__file__).parents[2]
+EXECUTABLES = (
+    "sim_node",
+    "perception_node",
+    "planner_node",
+    "skill_server",
+    "recorder_node",
+    "robot_bridge",
+    "mock_robot",
+)
+NODES = EXECUTABLES[:4]
+
+
+def test_the_executables_of_the_readme_are_there():
+    listed = ros2("pkg", "executables", "slap_ros").split()
+    readme = (ROOT / "README.md").read_text()
+    for name in (*EXECUTABLES, "slap"):
+        assert name in listed
+        assert f"ros2 run slap_ros {name}" in readme
+
+
+@pytest.mark.parametrize(("domain", "shortcuts"), [("obstacle2d", "none"), ("obstacle_tower", "")])
+def test_a_launched_ensemble_solves_what_it_is_asked_for(cli, tmp_path, domain, shortcuts):
+    launch = ["ros2", "launch", "slap_ros", "ensemble.launch.py", f"domain:={domain}", "seed:=1"]
+    launch += [f"record:={tmp_path / 'ours'}", f"shortcuts:={shortcuts}"]
+    record = ["ros2", "bag", "record", "--all", "--output", tmp_path / "theirs"]
+    with (
+        started(record, tmp_path / "record.txt"),
+        started(launch, tmp_path / "launch.txt"),
+    ):
+        plan_length = solve()
+        ros2("service", "call", "/slap/close_bag", "std_srvs/srv/Trigger")
+    told = (tmp_path / "launch.txt").read_text()
+    assert "deprecated" not in told.lower()
+    for bag in ("ours", "theirs"):
+        found = evaluate_bag(tmp_path / bag)
+        assert found.runs[-1].success
+        assert found.runs[-1].plan_length == plan_length
+    if domain == "obstacle_tower":
+        check_playing(tmp_path / "ours")
+
+
+def check_playing(bag):
+    """``ros2 bag play`` reaches whoever listens as our nodes do."""
+    heard = []
+    topics = (DOMAIN, TASK, STATE, PLAN_EVENTS, MARKERS, JOINT_STATES)
+    recorded = [item.type_name for item in read_bag(bag)]
+    play = ["ros2", "bag", "play", bag, "--rate", "20"]
+    with (
+        temporary_node(lambda: RunClient(lambda name, _: heard.append(name), topics)) as (
+            _,
+            spinner,
+        ),
+        started(play, bag.parent / "play.txt"),
+    ):
+        for topic in topics:
+            wanted = recorded.count(topic.type_name)
+            assert wanted
+            assert spinner.spin_until(lambda: heard.count(topic.type_name) >= wanted, LIMIT), topic  # noqa: B023
+
+
+@pytest.mark.parametrize("embedded_nodes", [NODES[:2], NODES[2:]], ids=["world", "solver"])
+def test_embedded_and_real_nodes_solve_a_task_together(
+    cli, tmp_path, embedded, real, embedded_nodes
+):
+    with ExitStack() as stack:
+        for name in NODES:
+            command, environment = embedded if name in embedded_nodes else real
+            output = tmp_path / f"{name}.txt"
+            options = ["-p", "shortcuts:=none"] if name in ("planner_node", "skill_server") else []
+            call = [*command, name, "--ros-args", *options]
+            stack.enter_context(started(call, output, **environment))
+        assert solve() > 0
+        assert set(ros2("node", "list").split()) >= {f"/{name}" for name in NODES}
+
+
+def test_a_terminal_at_the_default_range_finds_an_embedded_node_soon(cli, tmp_path, embedded):
+    """Long before CycloneDDS itself would announce it again, after 30 s."""
+    command, environment = embedded
+    look = (
+        "import rclpy, sys, time; rclpy.init(); node = rclpy.create_node('looker')\n"
+        "end = time.monotonic() + 15.0\n"
+        "while '/slap/state' not in dict(node.get_topic_names_and_types()):\n"
+        "    rclpy.spin_once(node, timeout_sec=0.05)\n"
+        "    if time.monotonic() > end: sys.exit('not found')\n"
+    )
+    with started([*command, "sim_node"], tmp_path / "sim_node.txt", **environment):
+        ros2("topic", "echo", "--once", "/slap/task")  # it is up
+        env = os.environ | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
+        subprocess.run([sys.executable, "-c", look], env=env, check=True, timeout=LIMIT)
+
+
+def test_the_range_is_hinted_at_once(network, tmp_path):
+    launch = ["ros2", "launch", "slap_ros", "ensemble.launch.py"]
+    with started(launch, tmp_path / "launch.txt"):
+        ros2(
+            "topic", "echo", "--once", "/slap/task", ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST"
+        )  # fmt: skip
+    told = (tmp_path / "launch.txt").read_text()
+    assert told.count("export ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST") == 1
+
+
+WRONG = [
+    ({"ROS_DOMAIN_ID": "abc"}, "abc"),
+    ({"ROS_DOMAIN_ID": "1000"}, "1000"),
+    ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "EVERYWHERE"}, "EVERYWHERE"),
+    (
+        {
+            "ROS_SECURITY_ENABLE": "true",
+            "ROS_SECURITY_STRATEGY": "Enforce",
+            "ROS_SECURITY_KEYSTORE": "/nowhere",
+        },
+        "/nowhere",
+    ),
+]
+
+
+@pytest.mark.parametrize(("wrong", "words"), WRONG, ids=["abc", "1000", "range", "keystore"])
+def test_a_wrong_environment_is_an_error_and_no_traceback(network, wrong, words):
+    run = ["ros2", "run", "slap_ros"]
+    environment = os.environ | wrong
+    options = {"env": environment, "capture_output": True, "text": True, "timeout": LIMIT}
+    node = subprocess.run([*run, "sim_node"], **options)
+    assert node.returncode == 15, node.stderr
+    assert words in node.stderr
+    assert "Traceback" not in node.stderr
+    doctor = subprocess.run([*run, "slap", "doctor", "--json"], **options)
+    assert "Traceback" not in doctor.stderr
+    checks = {check["name"]: check for check in json.loads(doctor.stdout)}
+    for name in ("ROS 2 settings", "DDS between two processes"):
+        assert checks[name]["status"] == "problem"
+        assert words in checks[name]["found"]
+
+
+@pytest.mark.parametrize("name", EXECUTABLES)
+def test_ctrl_c_is_quiet_from_the_start(network, tmp_path, name):
+    options = ["-p", f"bag:={tmp_path / 'bag'}"] if name == "recorder_node" else []
+    options += ["-p", "domain:=obstacle_tower"] if name in ("robot_bridge", "mock_robot") else []
+    executable = subprocess.check_output(["ros2", "pkg", "prefix", "slap_ros"], text=True).strip()
+    for delay_s in (0.3, 0.5, 0.7, 0.9, 1.2, 1.5):
+        node = subprocess.Popen(
+            [f"{executable}/lib/slap_ros/{name}", "--ros-args", *options],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        time.sleep(delay_s)
+        node.send_signal(signal.SIGINT)
+        told, _ = node.communicate(timeout=LIMIT)
+        assert "Traceback" not in told, (delay_s, told)
+        assert node.returncode == 0, (delay_s, told)
