@@ -19,6 +19,7 @@ from slap_ros.evaluation.approaches import Approach, approaches
 from slap_ros.evaluation.experiment import Experiment, Trial, run_all
 from slap_ros.evaluation.summary import Spread, Summary
 from slap_ros.planning.planner import make_planner
+from slap_ros.versions import versions
 
 
 def evaluate(
@@ -51,7 +52,8 @@ def evaluate(
     summaries = _run(experiment, approaches(library, sampling(samples)), jobs)
     if json:
         rows = [summary.as_row() for summary in summaries]
-        print_json(summaries[-1].as_json() | {"approaches": rows})
+        made = {"approaches": rows, "versions": versions()}
+        print_json(summaries[-1].as_json() | made)
     else:
         console.print(_table(experiment, summaries))
     solved = all(summary.success_rate == 1.0 for summary in summaries)

@@ -29,6 +29,7 @@ from slap_ros.relational.pddl import (
     write_domain,
     write_problem,
 )
+from slap_ros.versions import versions
 
 
 def plan(
@@ -78,6 +79,7 @@ def _show(result: PlanningResult, json: bool) -> None:
                 "graph_nodes": result.graph_nodes,
                 "graph_edges": result.graph_edges,
                 "edges_rolled_out": result.edges_rolled_out,
+                "versions": versions(),
             }
         )
         return
