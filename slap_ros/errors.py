@@ -188,7 +188,7 @@ class SkillNotApplicableError(SlapError):
 
 
 class TaskCanceledError(SlapError):
-    """A run was canceled by whoever asked for it."""
+    """A run was canceled by its client."""
 
     code = ErrorCode.GOAL_CANCELED
 

@@ -23,7 +23,7 @@ from slap_ros.robot.robot_world import GripperAction
 from slap_ros.robot.worlds import MOCK
 
 REACHED = {
-    None: "nobody looked at the end",
+    None: "nothing was measured at the end",
     True: "the goal holds",
     False: "the goal does not hold",
 }
@@ -33,7 +33,7 @@ def replay_on_robot(options: ReplayOptions) -> int:
     """Check the motion, and unless that is all, execute it; the exit code.
 
     Raises:
-        TaskCanceledError: Nobody at the terminal said that the arm may move.
+        TaskCanceledError: The person at the terminal did not let the arm move.
         SlapError: The motion must not be executed, or failed; a robot then holds.
     """
     parameters = PlayerParameters(**parse_parameters(options.robot, PlayerParameters, "robot"))
@@ -49,7 +49,7 @@ def replay_on_robot(options: ReplayOptions) -> int:
         return int(ErrorCode.UNSAFE_COMMAND) if checked.violations else 0
     checked.require_safe()
     if not (options.yes or options.to == MOCK or _agreed()):
-        raise TaskCanceledError("nothing moved: nobody said that it may (--yes)")
+        raise TaskCanceledError("nothing moved: it needs a yes on the terminal, or --yes")
     return _execute(options, recorded, checked, parameters)
 
 
@@ -71,7 +71,7 @@ def _execute(
 
 
 def _agreed() -> bool:
-    """Whether the person at the terminal lets the arm move; nobody there does not."""
+    """Whether the person at the terminal lets the arm move; False without a terminal."""
     if not sys.stdin.isatty():
         return False
     return typer.confirm("The arm is going to move. Is everybody out of its reach?", err=True)

@@ -44,7 +44,7 @@ class BagInfo:
 
 
 def bag_info(path: Path | str) -> BagInfo:
-    """Look at a bag, whoever recorded it.
+    """Look at a bag, also one that no ensemble recorded.
 
     Args:
         path: The bag's folder, or a single ``.mcap`` or ``.db3`` file.

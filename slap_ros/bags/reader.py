@@ -30,7 +30,7 @@ class Bag:
 
     Attributes:
         path: Where it is.
-        metadata: What the run was made with, as its writer was told.
+        metadata: What the run was made with, as its writer states.
         damage: Where reading has to stop and why; None for a sound bag. Deserialising may find
             damage that only shows at the end of an iteration.
         undecoded: Types that are left out, and why they cannot be deserialised.

@@ -11,7 +11,7 @@ from slap_ros.doctor.check import Check, Status
 
 __all__ = ["Check", "Status", "diagnose"]
 
-RUNS = Path("runs")  # where runs are recorded unless told otherwise
+RUNS = Path("runs")  # where runs are recorded by default
 
 
 def diagnose(runs: Path = RUNS) -> list[Check]:

@@ -34,7 +34,7 @@ class AtomNaming:
         return [ADDED + atom for atom in added] + [REMOVED + atom for atom in removed]
 
     def sentence(self, mask: int) -> str:
-        """The fluent atoms in full, for whoever asks for details."""
+        """All fluent atoms in one sentence, for a title."""
         return self._space.describe(mask) or "no fluent atom holds"
 
     def option(self, option: Option) -> list[str]:

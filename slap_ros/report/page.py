@@ -113,7 +113,7 @@ def _read(name: str) -> str:
 
 
 def _readable(value: object) -> object:
-    """Text as it can be shown, whoever wrote it."""
+    """Text as it can be shown, with what would mislead a reader replaced."""
     if type(value) is str:  # not Markup, which is ours
         return TURNING.sub("\ufffd", clean_value(value))
     return value
@@ -135,7 +135,7 @@ def _shown(runs: Sequence[RunReport]) -> list[PageRun]:
 
 
 def _labels(runs: Sequence[RunReport]) -> list[str]:
-    """Names of runs, as short as they can be told apart by."""
+    """The shortest names that differ from run to run."""
     approaches = Counter(run.approach for run in runs)
     bags = Counter((run.approach, run.bag) for run in runs)
     labels = []

@@ -89,7 +89,7 @@ def picture(draw: Callable[[Figure], None], size: Size) -> str:
         draw(figure)
         drawn = StringIO()
         figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": None})
-    # A line that ends in a space is a change to whoever edits the file.
+    # Editors strip spaces at the ends of lines: without them, the file stays the same.
     return "\n".join(line.rstrip() for line in drawn.getvalue().splitlines()) + "\n"
 
 
