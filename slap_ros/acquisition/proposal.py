@@ -86,9 +86,9 @@ class Proposal:
     rewards: Mapping[str, RewardTemplate] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
 
-    def to_json(self) -> str:
-        """JSON, the same bytes for the same proposal."""
-        data = {
+    def to_data(self) -> dict[str, Any]:
+        """What JSON can hold, in the same order for the same proposal."""
+        return {
             "format": "slap_ros proposal",
             "version": VERSION,
             "problem": self.problem,
@@ -102,7 +102,10 @@ class Proposal:
             "remarks": list(self.remarks),
             "provenance": asdict(self.provenance),
         }
-        return json.dumps(data, indent=2, ensure_ascii=True, allow_nan=False) + "\n"
+
+    def to_json(self) -> str:
+        """JSON, the same bytes for the same proposal."""
+        return json.dumps(self.to_data(), indent=2, allow_nan=False) + "\n"
 
     def to_pddl(self, problem: AcquisitionProblem) -> tuple[str, str]:
         """Domain and problem, readable by ``slap plan``.

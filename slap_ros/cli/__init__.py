@@ -7,7 +7,7 @@ from __future__ import annotations
 import typer
 
 from slap_ros import __version__
-from slap_ros.cli import bag, check, domains, evaluate, plan, report, study, train
+from slap_ros.cli import bag, check, domains, evaluate, plan, propose, report, study, train
 from slap_ros.cli import doctor as doctor_command
 from slap_ros.cli.console import exits
 from slap_ros.cli.options import flat_options
@@ -24,6 +24,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command("plan")(exits(plan.plan))
+app.command("propose")(exits(flat_options(propose.propose)))
 app.command("evaluate")(exits(evaluate.evaluate))
 app.command("report")(exits(report.report))
 app.command("train")(exits(flat_options(train.train)))

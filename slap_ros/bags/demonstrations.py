@@ -1,0 +1,46 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The demonstrations in a bag: which atoms held, step by step."""
+
+from __future__ import annotations
+
+from slap_ros.bags.reader import Bag
+from slap_ros.bags.recording import Recording, initial_state
+from slap_ros.core import Domain
+from slap_ros.errors import ForeignBagError
+from slap_ros.messages.decode import decode_state
+from slap_ros.relational import GroundAtom
+
+Demonstration = tuple[frozenset[GroundAtom], ...]  # by step
+
+
+def read_demonstrations(bag: Bag, domain: Domain) -> list[Demonstration]:
+    """The episodes of a bag as atoms, from the recorded states.
+
+    Args:
+        bag: Of an ensemble.
+        domain: The one that was recorded.
+
+    Returns:
+        A demonstration per episode that has states.
+
+    Raises:
+        ForeignBagError: The bag is of another domain, or has no states.
+    """
+    recording = Recording.of(bag)
+    info = recording.domain_info
+    if info is None or info.name != domain.name:
+        recorded = "no domain" if info is None else info.name
+        raise ForeignBagError(f"{bag.path} has recorded {recorded}, not {domain.name}")
+    found = []
+    for episode in recording.episodes.values():
+        first = initial_state(episode, domain)
+        if first is None or not episode.states:
+            continue
+        space = domain.atom_space(first[1])
+        states = (episode.states[step] for step in sorted(episode.states))
+        masks = (space.abstract(decode_state(msg, domain.types_by_name)) for msg in states)
+        found.append(tuple(frozenset(space.decode(mask)) for mask in masks))
+    if not found:
+        raise ForeignBagError(f"{bag.path} has no states, so it shows nothing")
+    return found
