@@ -11,6 +11,7 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 NAME = "slap_ros"
+README = Path(__file__).resolve().parent / "README.md"  # colcon's symlinks leave it where it is
 PACKAGES = [
     "slap_ros",
     "ensemble",
@@ -107,7 +108,7 @@ setup(
         "Abstract planning with learned shortcuts (SLAP) and language-guided skills (LG-SAIL) "
         "for ROS 2 Jazzy"
     ),
-    long_description=Path("README.md").read_text(encoding="utf-8"),
+    long_description=README.read_text(encoding="utf-8"),
     long_description_content_type="text/markdown",
     author="The slap_ros authors",
     maintainer="The slap_ros authors",
