@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the documentation shows of the sources is what the sources have."""
 
+import ast
+import builtins
 import re
 from pathlib import Path
 
@@ -62,6 +64,21 @@ def test_every_source_file_that_pages_name_exists():
         for page in PAGES
         for name in re.findall(r"`([\w/]+\.py)[`:]", page.read_text(encoding="utf-8"))
         if not any(f"/{source}".endswith(f"/{name}") for source in [*SOURCES, "setup.py"])
+    ]
+    assert not dead
+
+
+def test_every_class_that_pages_name_exists():
+    interfaces = [*ROOT.glob("msg_schemas/*/*.*"), *ROOT.glob("embedded_ros/src/**/*.*")]
+    defined = {path.stem for path in interfaces} | set(dir(builtins))
+    for name in SOURCES:
+        tree = ast.parse((ROOT / name).read_text(encoding="utf-8"))
+        defined |= {node.name for node in ast.walk(tree) if isinstance(node, ast.ClassDef)}
+    dead = [
+        f"{page.name}: {name}"
+        for page in PAGES
+        for name in re.findall(r"`([A-Z][a-z]+\w*)[`.]", page.read_text(encoding="utf-8"))
+        if name not in defined | {"Makefile"}
     ]
     assert not dead
 
