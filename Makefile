@@ -69,7 +69,7 @@ format: $(VENV)/.tested  ## Format the code
 	$(BIN)/ruff check --fix . embedded_ros
 
 docs: $(VENV)/.documented  ## Build the documentation into site/
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 	@echo "open site/index.html; for the search: $(BIN)/python -m http.server --directory site"
 
 $(VENV)/.documented: $(VENV)/.installed
