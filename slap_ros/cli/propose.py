@@ -188,8 +188,8 @@ def _proposer(
         path = options.operators
         return ManualProposer(read_operators(path, problem), source=path.name)
     if options.proposer == "induced":
-        count, bags = len(problem.shown), len(options.demonstrations or ())
-        return InducedProposer(f"{count} demonstrations in {bags} bags")
+        bags = ", ".join(path.name for path in options.demonstrations or ())
+        return InducedProposer(f"demonstrations: {len(problem.shown)}, from {bags}")
     if inquiry is not None and options.proposer == "language":
         return LanguageProposer(inquiry)
     return ManualProposer(own)

@@ -35,6 +35,7 @@ def diagnose(runs: Path = RUNS) -> list[Check]:
         libraries.training(),
         libraries.figures(),
         libraries.live(),
+        libraries.language(),
         machine.disk_space(runs),
         machine.write_permission(runs),
         machine.open_files(),

@@ -45,6 +45,13 @@ def live() -> Check:
     return _extra("Live view", ["foxglove"], ["foxglove-sdk"], "live", "for `slap run --live`")
 
 
+def language() -> Check:
+    """Needed to ask a language model."""
+    return _extra(
+        "Language models", ["openai"], ["openai"], "language", "to ask one, not to replay"
+    )
+
+
 def _extra(name: str, modules: list[str], distributions: list[str], extra: str, use: str) -> Check:
     """What may well be missing: ``use`` says for what it is needed."""
     missing = [module for module in modules if find_spec(module) is None]

@@ -166,7 +166,7 @@ class OpenAIClient:
         left = deadline - time.monotonic()
         if failures >= retry.tries or pause >= left:
             raise LanguageUnavailableError(
-                f"no answer from {self.source} after {failures} tries: {failure.words}; "
+                f"no answer from {self.source} (tried {failures} times): {failure.words}; "
                 f"{max(left, 0.0):.0f} s were left to wait"
                 + (f", and it asked for {pause:.0f} s" if failure.retry_after else "")
             )

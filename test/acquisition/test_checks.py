@@ -7,10 +7,19 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from model_answers import operator_data
-from paper_problems import ALL, METRICS, make_coffee, peg_in_hole, printed_insert, stow_hammer
+from paper_problems import (
+    ALL,
+    METRICS,
+    Printed,
+    make_coffee,
+    peg_in_hole,
+    printed_insert,
+    stow_hammer,
+)
 
 from slap_ros.acquisition.complaints import (
     REWARD_ERROR_GROUPS,
@@ -28,6 +37,7 @@ from slap_ros.language.formats import parse_decomposition, parse_operator, parse
 from slap_ros.relational import LiftedOperator
 from slap_ros.relational.pddl import parse_domain, parse_problem
 
+ROOT = Path(__file__).parents[2]
 PEGS = peg_in_hole()
 PICK, INSERT = PEGS.operators
 
@@ -138,6 +148,11 @@ def test_every_class_has_an_example() -> None:
     assert {kind for kind, _ in EXAMPLES} | BY_THE_LOOP == set(ComplaintClass)
 
 
+def test_the_page_lists_every_class() -> None:
+    page = (ROOT / "docs" / "language.md").read_text(encoding="utf-8")
+    assert not [kind for kind in ComplaintClass if f"`{kind.value}`" not in page]
+
+
 def test_the_papers_groups_are_disjoint() -> None:
     grouped = [kind for group in REWARD_ERROR_GROUPS.values() for kind in group]
     assert len(grouped) == len(set(grouped))
@@ -149,7 +164,7 @@ def test_the_papers_groups_are_disjoint() -> None:
 
 
 @pytest.mark.parametrize("printed", [make() for make in ALL], ids=[make.__name__ for make in ALL])
-def test_the_papers_plans_are_found(printed) -> None:  # type: ignore[no-untyped-def]
+def test_the_papers_plans_are_found(printed: Printed) -> None:
     for name, (_, length) in printed.goals.items():
         problem = printed.with_goal(name)
         verification = verify(printed.operators, problem)

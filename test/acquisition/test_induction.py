@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from random import Random
 
@@ -72,7 +72,9 @@ def meaning(operators: Sequence[LiftedOperator]) -> set[tuple[frozenset[str], ..
 
 
 @pytest.mark.parametrize("make", ALL, ids=[make.__name__ for make in ALL])
-def test_ten_demonstrations_plan_every_goal_in_the_papers_length(make) -> None:  # type: ignore[no-untyped-def]
+def test_ten_demonstrations_plan_every_goal_in_the_papers_length(
+    make: Callable[[], Printed],
+) -> None:
     printed = make()
     problem = shown(printed, 10)
     operators = InducedProposer("demonstrations").operators(problem).operators
@@ -83,7 +85,7 @@ def test_ten_demonstrations_plan_every_goal_in_the_papers_length(make) -> None: 
 
 
 @pytest.mark.parametrize("make", ALL, ids=[make.__name__ for make in ALL])
-def test_one_demonstration_plans_what_it_shows(make) -> None:  # type: ignore[no-untyped-def]
+def test_one_demonstration_plans_what_it_shows(make: Callable[[], Printed]) -> None:
     printed = make()
     trace = tuple(demonstration(printed, "training", Random(1)))
     proposal = InducedProposer("one").operators(replace(printed.problem, shown=(trace,)))

@@ -106,7 +106,7 @@ def test_a_bag_is_a_demonstration() -> None:
     bag = EXAMPLE.parent.parent / "test" / "bags" / "data" / "recorded_by_0.1.0"
     result = slap("propose", "obstacle2d", "--proposer", "induced", "--demonstrations", bag)
     assert result.exit_code == 0, result.stderr
-    assert "proposer induced (1 demonstrations in 1 bags)" in result.stderr
+    assert "proposer induced (demonstrations: 1, from recorded_by_0.1.0)" in result.stderr
     assert "seen once; each of its preconditions may be too many" in result.stderr
 
 

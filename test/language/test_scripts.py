@@ -348,7 +348,7 @@ def test_nobody_there() -> None:
     outcome = run(PEGS, "http://127.0.0.1:9/v1")
     assert outcome.error is not None
     assert outcome.error.code == ErrorCode.LANGUAGE_UNAVAILABLE
-    assert "after 4 tries" in str(outcome.error)
+    assert "tried 4 times" in str(outcome.error)
 
 
 @pytest.mark.parametrize(
