@@ -30,7 +30,7 @@ COPIED = {
     "changelog.md": "CHANGELOG.md",
 }
 RESULTS = ROOT / "docs" / "results"
-LINK = re.compile(r"\]\((?P<target>[^)#:]+)(?P<anchor>#[^)]*)?\)")
+LINK = re.compile(r"\[(?P<text>[^\]]*)\]\((?P<target>[^)#:]+)(?P<anchor>#[^)]*)?\)")
 QUOTATION = re.compile(r'(title="[\w/.]+): [\w., ]+"')  # see tools.quotations
 SECTION = re.compile(r"^---\s*$", re.MULTILINE)
 FIELD = re.compile(r"^(?P<type>\S+)\s+(?P<name>\w+)(=(?P<value>\S+))?\s*(#\s*(?P<comment>.*))?$")
@@ -70,10 +70,12 @@ def on_page_markdown(markdown: str, page: Any, config: Any, **_: Any) -> str:
     def shown(match: re.Match[str]) -> str:
         target = (folder / match["target"]).resolve()
         if target in pages:
-            return f"]({up}{pages[target]}{match['anchor'] or ''})"
+            return f"[{match['text']}]({up}{pages[target]}{match['anchor'] or ''})"
         if target.is_relative_to(config.docs_dir) or not target.exists():
             return match[0]
-        return f"] (`{target.relative_to(ROOT)}`)"
+        path = target.relative_to(ROOT).as_posix()
+        named = path.endswith(match["text"].strip("`").rstrip("/"))
+        return f"`{path}`" if named else f"{match['text']} (`{path}`)"
 
     return LINK.sub(shown, QUOTATION.sub(r'\1"', markdown))
 
@@ -85,7 +87,8 @@ def copied(source: str) -> str:
     def moved(match: re.Match[str]) -> str:
         target, anchor = match["target"], match["anchor"] or ""
         inside = target.startswith("docs/")
-        return f"]({target.removeprefix('docs/') if inside else f'../{target}'}{anchor})"
+        page = target.removeprefix("docs/") if inside else f"../{target}"
+        return f"[{match['text']}]({page}{anchor})"
 
     return LINK.sub(moved, text)
 
