@@ -61,9 +61,9 @@ def drawer(name: str, pose: Pose) -> JointedBody:
         BoxPart((length, thick, sides), Pose((0.0, -inner, 0.0))),
         BoxPart((thick, inner, sides), Pose((length, 0.0, 0.0))),
         BoxPart((thick, inner, 0.024), Pose((-length, 0.0, 0.0))),
-        BoxPart((0.007, 0.04, 0.007), Pose((-length - 0.075, 0.0, 0.0))),
-        BoxPart((0.037, 0.005, 0.005), Pose((-length - 0.037, 0.035, 0.0))),
-        BoxPart((0.037, 0.005, 0.005), Pose((-length - 0.037, -0.035, 0.0))),
+        BoxPart((0.007, 0.04, 0.007), Pose((-length - 0.092, 0.0, 0.0))),
+        BoxPart((0.044, 0.005, 0.005), Pose((-length - 0.046, 0.035, 0.0))),
+        BoxPart((0.044, 0.005, 0.005), Pose((-length - 0.046, -0.035, 0.0))),
     )
     joint = Joint(JointKind.SLIDE, (-1.0, 0.0, 0.0), TRAVEL, damping=5.0, dry_friction=2.0)
     return JointedBody(name, frame, moving, joint, mass_kg=0.6, pose=pose)
@@ -84,7 +84,7 @@ def lid(name: str, pose: Pose) -> JointedBody:
     return JointedBody(name, frame, moving, joint, mass_kg=0.1, pose=pose)
 
 
-def holed_plate(half_hole_m: float, x: float = 0.6, z: float = 0.2) -> Compound:
+def holed_plate(half_hole_m: float, x: float = 0.66, z: float = 0.2) -> Compound:
     """An upright plate with a square hole along x."""
     side = 0.05  # m, half the width of what is around the hole
     far, long = half_hole_m + side, 2.0 * side + half_hole_m
@@ -97,9 +97,9 @@ def holed_plate(half_hole_m: float, x: float = 0.6, z: float = 0.2) -> Compound:
     return Compound("plate", parts, friction=0.5, pose=Pose((x, 0.0, z)))
 
 
-LEFT_DRAWER = drawer("left", Pose((0.65, 0.25, 0.034)))
-RIGHT_DRAWER = drawer("right", Pose((0.65, -0.25, 0.034)))
-HANDLE_AT = (0.65 - 0.173, 0.25, 0.034)  # m, the left drawer's while it is closed
+LEFT_DRAWER = drawer("left", Pose((0.72, 0.25, 0.034)))
+RIGHT_DRAWER = drawer("right", Pose((0.72, -0.25, 0.034)))
+HANDLE_AT = (0.72 - 0.19, 0.25, 0.034)  # m, the left drawer's while it is closed
 THE_LID = lid("lid", Pose((0.72, 0.0, 0.021)))
 BENCH = ContactScene((TABLE, CUBE, ROD, LEFT_DRAWER, RIGHT_DRAWER, THE_LID))
 LOOSE = ContactScene((TABLE, CUBE, ROD))  # without anything jointed

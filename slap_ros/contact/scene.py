@@ -242,7 +242,7 @@ class HandForces:
     """
 
     pull_n: float = 60.0
-    grip_n: float = 20.0
+    grip_n: float = 40.0
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -38,6 +39,8 @@ GRAVITY = 9.81  # m/s², downwards
 LIFT = (0.0, 0.0, GRAVITY * MASS)  # N, cancels the hand's weight
 PALM_FRICTION = 0.9  # 1
 FINGER_FRICTION = 2.0  # 1, of rubber
+FINGER_SPINNING = 0.005  # m, of pads that give way: a rod touches them in more than one point
+ROLLING = 5e-4  # m, of what things lie on; without it, PyBullet's cylinders roll ever faster
 COUPLING_N = 50.0  # with which the fingers are kept at the same distance from the middle
 COUPLING_SHARE = 0.1  # of their difference, made up for in a substep
 ITERATIONS = 50  # of the contact solver
@@ -333,15 +336,16 @@ class ContactSimulation:
 
     def _touchable(self, body: int, link: int, surface: Surface, friction: float) -> None:
         self._sides[body, link] = surface
-        damping = {} if surface.side is Side.FREE else {"linearDamping": 0.0, "angularDamping": 0.0}
-        pybullet.changeDynamics(
-            body,
-            link,
-            lateralFriction=friction,
-            activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING,
-            physicsClientId=self.client,
-            **damping,
-        )
+        # One call each: of a call with several properties, a link takes the friction as its base's.
+        change = partial(pybullet.changeDynamics, body, link, physicsClientId=self.client)
+        change(activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING)
+        if surface.side is not Side.FREE:
+            change(linearDamping=0.0, angularDamping=0.0)
+        change(lateralFriction=friction)
+        if surface.side in (Side.LEFT_FINGER, Side.RIGHT_FINGER):
+            change(spinningFriction=FINGER_SPINNING)
+        elif surface.side in (Side.FIXED, Side.FRAME, Side.MOVING):
+            change(rollingFriction=ROLLING)
 
     def _load(self, text: str, fixed: bool) -> int:
         """A body from URDF, which PyBullet reads from files only."""
@@ -351,7 +355,7 @@ class ContactSimulation:
             body: int = pybullet.loadURDF(
                 str(file),
                 useFixedBase=fixed,
-                flags=pybullet.URDF_USE_IMPLICIT_CYLINDER,
+                flags=pybullet.URDF_USE_IMPLICIT_CYLINDER | pybullet.URDF_USE_INERTIA_FROM_FILE,
                 physicsClientId=self.client,
             )
         return body

@@ -102,8 +102,8 @@ def episodes(rng: np.random.Generator) -> Iterable[tuple[State, list[Move]]]:
     above = (*HANDLE_AT[:2], 0.14)
     yield start(Setting(hand_at(above, QUARTER))), pulling()
     yield start(Setting(hand_at((0.76, 0.0, 0.12)), openings=(0.1, 0.0, 1.5))), pushing()
-    in_drawer = Pose((0.53, 0.25, 0.1), (0.0, 0.0, math.sin(0.2), math.cos(0.2)))
-    yield start(Setting(hand_at((0.53, 0.25, 0.2)), cube=in_drawer, openings=(0.15, 0.05, 0.3))), []
+    in_drawer = Pose((0.55, 0.25, 0.1), (0.0, 0.0, math.sin(0.2), math.cos(0.2)))
+    yield start(Setting(hand_at((0.55, 0.25, 0.2)), cube=in_drawer, openings=(0.15, 0.05, 0.3))), []
     place = (float(rng.uniform(0.45, 0.6)), float(rng.uniform(-0.1, 0.1)), 0.1)
     yield start(Setting(hand_at(place))), []
 
