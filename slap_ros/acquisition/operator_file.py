@@ -13,6 +13,7 @@ from slap_ros.acquisition.complaints import Complaint, serious
 from slap_ros.acquisition.drafts import check_operator
 from slap_ros.acquisition.problem import AcquisitionProblem
 from slap_ros.errors import InvalidParameterError, MalformedAnswerError, ProposalRejectedError
+from slap_ros.files import parse_json, read_text
 from slap_ros.language.formats import (
     LABELS,
     AtomDraft,
@@ -41,7 +42,7 @@ def read_operators(path: Path, problem: AcquisitionProblem) -> tuple[LiftedOpera
         ProposalRejectedError: An operator is wrong by itself, with all complaints.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
     except (OSError, UnicodeDecodeError) as error:
         raise InvalidParameterError(f"cannot read {path}: {error}") from error
     operators: list[LiftedOperator] = []
@@ -71,9 +72,9 @@ def _drafts(text: str, source: str) -> list[OperatorDraft]:
 
 def _from_json(text: str, source: str) -> Iterator[OperatorDraft]:
     try:
-        entries = json.loads(text)["operators"]
+        entries = parse_json(text)["operators"]
         texts = [json.dumps(entry) for entry in entries]
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError) as error:
         raise MalformedAnswerError(f"{source} is no proposal's JSON: {error!r}") from error
     for entry in texts:
         yield parse_operator(entry).draft

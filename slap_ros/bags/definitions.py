@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Iterator
 from functools import lru_cache
@@ -24,6 +25,8 @@ from slap_ros.errors import DamagedBagError, ForeignBagError
 from slap_ros.messages.interfaces import PACKAGE, definition, message_texts, typestore
 
 IDL_SEPARATOR = "=" * 80 + "\n"
+MAX_DEFINITION_FIELDS = 5_000  # with those of nested types, constants included
+MAX_DEFINITION_CHARACTERS = 2**20
 UNDEFINED = (TypesysError, SyntaxError, ValueError, KeyError, IndexError, RecursionError)
 UNREADABLE = (SerdeError, struct.error, ValueError, KeyError, IndexError, TypeError, OverflowError)
 
@@ -63,6 +66,7 @@ def store_for(channel: Channel) -> Typestore:
         return typestore()
     if not text:
         raise TypesysError("the bag does not define it")
+    _require_short(text)
     store = get_typestore(Stores.EMPTY)
     try:
         store.register(_parse(channel.definition, channel.type_name))
@@ -70,6 +74,21 @@ def store_for(channel: Channel) -> Typestore:
     except UNDEFINED as error:
         raise TypesysError(f"its definition cannot be read: {one_line(error)}") from error
     return store
+
+
+def _require_short(text: str) -> None:
+    """Refuse what takes long to read: a program is generated from a definition.
+
+    Raises:
+        TypesysError: It has more fields than any message in use.
+    """
+    lines = (line.strip() for line in re.split(r"[\n;]", text[: MAX_DEFINITION_CHARACTERS + 1]))
+    count = sum(1 for line in lines if line and line[0] not in "#/=")
+    if count > MAX_DEFINITION_FIELDS or len(text) > MAX_DEFINITION_CHARACTERS:
+        raise TypesysError(
+            f"its definition has {len(text)} characters; at most {MAX_DEFINITION_CHARACTERS}, "
+            f"and {MAX_DEFINITION_FIELDS} fields, are read"
+        )
 
 
 def _parse(given: MessageDefinition, type_name: str) -> Typesdict:

@@ -7,6 +7,7 @@ The index at a file's end is not used: a file whose writer was killed has none.
 
 from __future__ import annotations
 
+import os
 import zlib
 from collections.abc import Iterator
 from contextlib import suppress
@@ -30,9 +31,12 @@ from slap_ros.bags.mcap_records import (
 )
 from slap_ros.bags.raw import Channel, MessageDefinition, RawMessage, one_line
 from slap_ros.errors import DamagedBagError
+from slap_ros.files import open_regular
 
 UNREADABLE = (MalformedRecordError, UnicodeDecodeError, OSError)
 IGNORED = (Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT, Opcode.METADATA)  # outside of chunks
+# Of a record, and of a chunk uncompressed; recorders begin a new chunk after a few MB at most.
+MAX_RECORD_BYTES = 256 * 2**20
 
 
 class _EndOfFileError(Exception):
@@ -51,7 +55,7 @@ def read_mcap(path: Path) -> Iterator[RawMessage]:
         DamagedBagError: After the last message that precedes the damage.
     """
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             yield from _McapScan(file, path.stat().st_size).messages()
     except UNREADABLE as error:
         raise DamagedBagError(f"{path} {_complaint(error)}") from error
@@ -60,7 +64,7 @@ def read_mcap(path: Path) -> Iterator[RawMessage]:
 def read_mcap_metadata(path: Path, name: str) -> dict[str, str]:
     """A metadata record from before the first message; empty where there is none to be read."""
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             return _McapScan(file, path.stat().st_size).metadata(name)
     except UNREADABLE:
         return {}  # reading the messages tells what is wrong
@@ -127,13 +131,25 @@ class _McapScan:
         self._position += len(data)
         return data
 
+    def _skip(self, size: int) -> bytes:
+        """Go on behind so many bytes; returns none."""
+        if size > self._size - self._position:
+            raise _EndOfFileError(Opcode.ATTACHMENT, b"")
+        self._file.seek(size, os.SEEK_CUR)
+        self._position += size
+        return b""
+
     def _next_record(self) -> tuple[int, bytes]:
         head = self._read(RECORD.size)
         if len(head) < RECORD.size:
             raise _EndOfFileError(0, b"")
         opcode, length = RECORD.unpack(head)
-        content = self._read(length)
+        if opcode == Opcode.ATTACHMENT:  # of any size, and nothing to us
+            return opcode, self._skip(length)
+        content = self._read(min(length, MAX_RECORD_BYTES))
         if len(content) < length:
+            if self._position < self._size:
+                raise MalformedRecordError(_too_large("has a record", length))
             raise _EndOfFileError(opcode, content)
         return opcode, content
 
@@ -152,6 +168,8 @@ class _McapScan:
         compression = fields.string()
         if fields.u64() != fields.left:
             raise MalformedRecordError("a chunk's length contradicts itself")
+        if size > MAX_RECORD_BYTES:
+            raise MalformedRecordError(_too_large("a chunk", size))
         data = _decompress(compression, fields.rest(), size)
         if len(data) != size:
             raise MalformedRecordError(f"a chunk of {size} bytes has {len(data)}")
@@ -220,6 +238,10 @@ class _McapScan:
 
 def _complaint(error: Exception) -> str:
     return f"cannot be read: {error.strerror}" if isinstance(error, OSError) else str(error)
+
+
+def _too_large(what: str, size: int) -> str:
+    return f"{what} of {size} bytes; at most {MAX_RECORD_BYTES // 2**20} MiB are read at once"
 
 
 def _decompress(compression: str, data: memoryview, size: int) -> memoryview:

@@ -12,11 +12,13 @@ from typing import Any
 
 import yaml
 
+from slap_ros.files import parse_yaml, read_text
 from slap_ros.messages.qos import offered_qos
 
 VERSION = 9
 ROS_DISTRO = "jazzy"
 FILE_NAME = "metadata.yaml"
+MAX_METADATA_BYTES = 4 * 2**20
 ROOT = "rosbag2_bagfile_information"
 
 EMPTY_START = 2**63 - 1  # ns, where rosbag2 lets a bag without messages begin
@@ -149,11 +151,8 @@ def read_metadata(folder: Path) -> dict[str, Any]:
         OSError: It is not there or cannot be read.
         ValueError: It is not such a file.
     """
-    text = (folder / FILE_NAME).read_text(encoding="utf-8")
-    try:
-        content = yaml.safe_load(text)
-    except (yaml.YAMLError, RecursionError) as error:
-        raise ValueError("it is not YAML") from error
+    text = read_text(folder / FILE_NAME, MAX_METADATA_BYTES)
+    content = parse_yaml(text)
     information = content.get(ROOT) if isinstance(content, dict) else None
     if not isinstance(information, dict):
         raise ValueError(f"it has no {ROOT}")

@@ -17,6 +17,7 @@ from slap_ros.domains import get_domain
 from slap_ros.drawing import draw_abstract_graph
 from slap_ros.errors import InvalidParameterError, StorageFullError
 from slap_ros.evaluation.approaches import approaches
+from slap_ros.files import read_text
 from slap_ros.planning.abstract_graph import AbstractGraph, build_abstract_graph
 from slap_ros.planning.ff import find_operator_sequence
 from slap_ros.planning.plan import PlanningResult
@@ -139,6 +140,6 @@ def _plan_pddl(domain_file: Path, problem_file: Path, json: bool) -> None:
 
 def _read(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        return read_text(path)
     except (OSError, UnicodeDecodeError) as error:
         raise InvalidParameterError(f"cannot read {path}: {error}") from error

@@ -32,6 +32,7 @@ from slap_ros.cli.options import Goal, Index, Json, Preset, Seed
 from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError, StorageFullError
+from slap_ros.files import read_text
 from slap_ros.language.budget import Budget, BudgetLimits
 from slap_ros.language.cassette import open_client, with_recorded
 from slap_ros.language.settings import read_settings
@@ -254,6 +255,6 @@ def _write(folder: Path, proposal: Proposal, problem: AcquisitionProblem) -> lis
 
 def _read(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        return read_text(path)
     except (OSError, UnicodeDecodeError) as error:
         raise InvalidParameterError(f"cannot read {path}: {error}") from error

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
@@ -20,6 +19,7 @@ from slap_ros.cli.console import console, print_json
 from slap_ros.cli.options import DomainName, Json, Preset
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
+from slap_ros.files import parse_json, read_text
 from slap_ros.shortcuts.library import save_library
 from slap_ros.shortcuts.settings import TrainingSettings, training_settings
 from slap_ros.shortcuts.task_distribution import TaskDistribution
@@ -206,5 +206,5 @@ def _latest(path: Path) -> dict[int, dict[str, Any]]:
     """The last line of each stage in a progress file; an unfinished line is left out."""
     if not path.exists():
         return {}
-    lines = path.read_text(encoding="utf-8").split("\n")[:-1]
-    return {line["stage"]: line for line in map(json.loads, lines)}
+    lines = read_text(path).split("\n")[:-1]
+    return {line["stage"]: line for line in map(parse_json, lines)}

@@ -24,6 +24,7 @@ from slap_ros.errors import (
     LanguageOffError,
     StorageFullError,
 )
+from slap_ros.files import parse_json, read_bytes
 from slap_ros.language.client import OpenAIClient
 from slap_ros.language.request import Client, Message, OutputDegree, Reply, Request, Schema
 from slap_ros.language.settings import LanguageSettings
@@ -222,7 +223,7 @@ def read_cassette(path: Path) -> Cassette:
         InvalidCassetteError: It cannot be read, is none, is cut, or was changed by hand.
     """
     try:
-        data = path.read_bytes()
+        data = read_bytes(path)
         lines = data.decode("utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise InvalidCassetteError(f"cannot read cassette {path}: {error}") from error
@@ -252,8 +253,8 @@ def _refuse_existing(path: Path) -> None:
 
 def _read_line(path: Path, number: int, line: str) -> dict[str, Any]:
     try:
-        entry = json.loads(line)
-    except (ValueError, RecursionError) as error:
+        entry = parse_json(line)
+    except ValueError as error:
         raise InvalidCassetteError(
             f"{path}, line {number}: no JSON ({error}); if the recording was interrupted there, "
             "delete the line"

@@ -22,6 +22,7 @@ from types import ModuleType
 from typing import Any
 
 from slap_ros.errors import LanguageRefusedError, LanguageUnavailableError
+from slap_ros.files import parse_json
 from slap_ros.language.request import OutputDegree, Reply, Request, replace_unprintable
 from slap_ros.language.settings import KEY_VARIABLE, OPENAI_URL, LanguageSettings
 
@@ -291,11 +292,11 @@ def _quiet() -> Iterator[None]:
 def _read_envelope(body: bytes) -> dict[str, Any] | _Failure:
     """The server's JSON around the answer, as far as it is needed."""
     try:
-        envelope = json.loads(body)
+        envelope = parse_json(body)
         message = envelope["choices"][0]["message"]
         if not isinstance(message, dict):
             raise TypeError("no message")
-    except (ValueError, TypeError, KeyError, IndexError, RecursionError):
+    except (ValueError, TypeError, KeyError, IndexError):
         return _Failure(f"an answer of {len(body)} bytes that is no chat completion")
     return dict(envelope)
 

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
@@ -13,6 +12,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from slap_ros.errors import InvalidParameterError
+from slap_ros.files import parse_json, read_text
 from slap_ros.language.request import JsonObject, OutputDegree
 
 OPENAI_URL = "https://api.openai.com/v1"
@@ -111,8 +111,8 @@ def read_settings(
 
 def _read_file(path: Path) -> LanguageSettings:
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
+        data = parse_json(read_text(path))
+    except (OSError, ValueError) as error:
         raise InvalidParameterError(f"cannot read language settings {path}: {error}") from error
     if not isinstance(data, dict):
         raise InvalidParameterError(f"{path}: expected a JSON object of language settings")

@@ -16,12 +16,14 @@ from pathlib import Path
 import numpy as np
 
 from slap_ros.errors import InvalidMeshError, MeshUnavailableError
+from slap_ros.files import read_bytes, read_text
 from slap_ros.meshes.cache import cache_folder, store
 from slap_ros.meshes.obj import from_obj, to_obj
 from slap_ros.meshes.solid import Array, ConvexPiece, Solid
 
 Y_IS_UP = (".glb", ".gltf")  # by their standard; of other files z is taken to be
 TO_Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+MAX_MESH_BYTES = 512 * 2**20
 FORMAT = 1  # of cached files; with a new one, old files are no longer read
 
 
@@ -61,13 +63,13 @@ def load_mesh(
     if not (math.isfinite(size_m) and size_m > 0.0):
         raise InvalidMeshError(f"the size of a mesh must be above 0 m, not {size_m}")
     try:
-        content = file.read_bytes()
+        content = read_bytes(file, MAX_MESH_BYTES)
     except OSError as error:
         raise MeshUnavailableError(f"{file} cannot be read: {error.strerror}") from error
     cached = cached_file(content, file.suffix.lower(), size_m, settings)
     if not cached.exists():
         store(cached, to_obj(_decomposed(file, size_m, settings)).encode())
-    return Solid.of(from_obj(cached.read_text(encoding="utf-8")))
+    return Solid.of(from_obj(read_text(cached, MAX_MESH_BYTES)))
 
 
 def cached_file(

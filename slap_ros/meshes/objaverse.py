@@ -11,8 +11,14 @@ import re
 from pathlib import Path
 
 from slap_ros.errors import InvalidMeshError, MeshUnavailableError
+from slap_ros.files import read_bytes
 from slap_ros.meshes.cache import cache_folder, store
-from slap_ros.meshes.decomposition import DEFAULT_SETTINGS, DecompositionSettings, load_mesh
+from slap_ros.meshes.decomposition import (
+    DEFAULT_SETTINGS,
+    MAX_MESH_BYTES,
+    DecompositionSettings,
+    load_mesh,
+)
 from slap_ros.meshes.solid import Solid
 
 IDENTIFIER = re.compile(r"[0-9a-f]{32}")
@@ -43,7 +49,7 @@ def load_objaverse(
         )
     cached = cache_folder() / "objaverse" / f"{identifier}.glb"
     if not cached.exists():
-        store(cached, _downloaded(identifier, cached).read_bytes())
+        store(cached, read_bytes(_downloaded(identifier, cached), MAX_MESH_BYTES))
     return load_mesh(cached, size_m, settings)
 
 

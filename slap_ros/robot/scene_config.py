@@ -24,10 +24,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidMeasurementError, InvalidSceneError, InvalidStateError
+from slap_ros.files import parse_yaml, read_text
 from slap_ros.geometry.pose import IDENTITY, ORIGIN, Pose
 from slap_ros.physics.features import (
     ROBOT,
@@ -39,6 +38,7 @@ from slap_ros.physics.panda import HOME
 from slap_ros.relational import Object, State
 from slap_ros.robot.tracking import measured_pose
 
+MAX_SCENE_BYTES = 2**20
 DETECTED = "detected_"  # prefix of detection frames where no scene file names them
 PARKED = 10.0  # m from the base: where what was not yet detected is out of everything's way
 KEYS = frozenset({"type", "frame", "offset", "pose", "features"})
@@ -79,8 +79,8 @@ def read_scene_config(path: Path, domain: Domain) -> SceneConfig:
         InvalidSceneError: It is missing or malformed, or its objects are not the domain's.
     """
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError, yaml.YAMLError) as error:
+        content = parse_yaml(read_text(path, MAX_SCENE_BYTES))
+    except (OSError, ValueError) as error:
         raise InvalidSceneError(f"scene file {path} cannot be read: {error}") from error
     if not isinstance(content, dict) or not isinstance(content.get("objects"), dict):
         raise InvalidSceneError(f"scene file {path} has no mapping `objects`")

@@ -32,6 +32,7 @@ from safetensors.numpy import load, save
 
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidLibraryError
+from slap_ros.files import parse_json, read_bytes, read_text
 from slap_ros.shortcuts.mlp_policy import MlpPolicy, ObservationNormalisation, Weights
 from slap_ros.shortcuts.observation_encoder import make_action_map, observation_size
 from slap_ros.shortcuts.shortcut import Shortcut
@@ -194,7 +195,7 @@ def _tensors(policy: MlpPolicy) -> dict[str, Weights]:
 
 def _load_policy(path: Path, checksum: str) -> MlpPolicy:
     try:
-        content = path.read_bytes()
+        content = read_bytes(path)
         tensors = load(content)
     except (OSError, SafetensorError) as error:
         raise InvalidLibraryError(f"{path}: cannot be read: {error}") from error
@@ -234,7 +235,7 @@ def _check(path: Path, policy: MlpPolicy) -> None:
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = parse_json(read_text(path))
     except OSError as error:
         raise InvalidLibraryError(f"{path}: cannot be read: {error.strerror}") from error
     except ValueError as error:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -21,11 +22,13 @@ from stable_baselines3.common.logger import configure
 from stable_baselines3.common.vec_env import VecEnv as Sb3VecEnv
 
 from slap_ros.errors import InvalidParameterError
+from slap_ros.files import read_bytes
 from slap_ros.shortcuts.mlp_policy import MlpPolicy, ObservationNormalisation
 from slap_ros.shortcuts.ppo_settings import PpoSettings
 from slap_ros.shortcuts.progress import Progress
 from slap_ros.shortcuts.vec_env import VecEnv, VecEnvStep
 
+MAX_CHECKPOINT_BYTES = 2**30
 RECENT = 200  # episodes over which success and length are taken
 ACTION_REPEAT = 8  # steps for which a random action is repeated before normalisation
 
@@ -243,7 +246,7 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
         InvalidParameterError: It is damaged.
     """
     try:
-        saved = torch.load(path, weights_only=True)
+        saved = torch.load(BytesIO(read_bytes(path, MAX_CHECKPOINT_BYTES)), weights_only=True)
         steps, shortest = int(saved["steps"]), int(saved["shortest"])
         return {
             "steps": steps,

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 from collections.abc import Iterator
@@ -14,6 +13,7 @@ import slap_ros
 from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError
+from slap_ros.files import parse_json, read_text
 from slap_ros.planning.planner import WITH_SHORTCUTS
 from slap_ros.shortcuts.library import LIBRARY, Library, load_library
 from slap_ros.shortcuts.observation_encoder import learner_interface
@@ -89,7 +89,7 @@ def require_usable(choice: str, planner: str = "lazy") -> None:
 def _domain_of(path: Path) -> str:
     """The name of the domain that a library says it is for."""
     try:
-        return str(json.loads((path / LIBRARY).read_text(encoding="utf-8"))["domain"])
+        return str(parse_json(read_text(path / LIBRARY))["domain"])
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InvalidLibraryError(
             f"{path}: no shortcut library: {LIBRARY}: {error!r}; give a folder that `slap train` "

@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from slap_ros.errors import InvalidParameterError
+from slap_ros.files import parse_json, read_text
 
 Result = TypeVar("Result")
 # What decoding raises where JSON is not what was written.
@@ -60,7 +61,7 @@ class WorkFolder:
             draft.rename(path)
             return decode(data)
         try:
-            return decode(json.loads(path.read_text(encoding="utf-8")))
+            return decode(parse_json(read_text(path)))
         except DECODING_ERRORS as error:
             raise InvalidParameterError(
                 f"{path}: damaged: {error!r}; remove it to have it made again"

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from slap_ros.errors import InvalidParameterError
+from slap_ros.files import parse_json, read_text
 from slap_ros.shortcuts.explore import ExplorationResult
 from slap_ros.shortcuts.settings import ExplorationSettings
 
@@ -124,7 +124,7 @@ def read_curve(path: Path) -> LearningCurve:
     """
     stages: dict[int, list[LearningPoint]] = {}
     try:
-        complete = path.read_text(encoding="utf-8").split("\n")[:-1]
+        complete = read_text(path).split("\n")[:-1]
     except (OSError, ValueError) as error:
         raise _damaged(path, error) from error
     for number, line in enumerate(complete, start=1):
@@ -147,7 +147,7 @@ def read_curve(path: Path) -> LearningCurve:
 def _parse(line: str, where: str) -> tuple[int, LearningPoint]:
     """Stage, and point with the steps of that stage."""
     try:
-        data = json.loads(line)
+        data = parse_json(line)
         length = None if data["length"] is None else float(data["length"])
         stage, point = (
             int(data["stage"]),
@@ -163,7 +163,7 @@ def _parse(line: str, where: str) -> tuple[int, LearningPoint]:
 
 def _read(path: Path) -> Any:
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        return parse_json(read_text(path))
     except OSError as error:
         raise InvalidParameterError(
             f"{path}: cannot be read: {error.strerror}; give the work folder of `slap train`"

@@ -14,9 +14,9 @@ import yaml
 from truthful_run import Published, Script, record, without
 from typer.testing import CliRunner
 
+from ensemble.cli import app
 from slap_ros.bags import bag_info, evaluate_bag, read_bag, replay_bag
 from slap_ros.bags.rosbag2 import ROOT
-from slap_ros.cli import app
 from slap_ros.errors import ErrorCode
 from slap_ros.messages.events import PlanEventKind, SkillEventKind
 from slap_ros.messages.interfaces import PLAN, PLAN_EVENT, SKILL_EVENT, STATE, TASK

@@ -1,0 +1,142 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Reading what somebody else may have written: regular files of a stated size, bounded nesting.
+
+A name may stand for a pipe that nobody writes to, a device without end, a file that claims
+terabytes. Whatever is read goes through here, so that reading ends, and in bounded memory.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import stat
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import yaml
+
+MAX_BYTES = 64 * 2**20  # of a file that is read at once, where its reader states no other limit
+MAX_YAML_NODES = 200_000  # with what is repeated by reference counted as often as it is repeated
+# What PyYAML raises where a scalar is not of the kind that its tag says, beside its own errors.
+YAML_ERRORS = (yaml.YAMLError, RecursionError, LookupError, TypeError, AttributeError)
+KINDS = {
+    stat.S_IFDIR: "a folder",
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+    stat.S_IFSOCK: "a socket",
+}
+
+
+def open_regular(path: Path) -> BinaryIO:
+    """Open a regular file for reading, without waiting.
+
+    Raises:
+        OSError: It cannot be opened, or is a folder, pipe, device or socket.
+    """
+    # Without O_NONBLOCK, opening a pipe waits until somebody writes to it.
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    kind = stat.S_IFMT(os.fstat(descriptor).st_mode)
+    if kind != stat.S_IFREG:
+        os.close(descriptor)
+        found = KINDS.get(kind, "no regular file")
+        raise OSError(errno.EINVAL, f"{found}, where a file is expected", str(path))
+    return os.fdopen(descriptor, "rb")
+
+
+def require_regular(path: Path) -> None:
+    """Refuse what :func:`open_regular` refuses, for readers that open files themselves.
+
+    Raises:
+        OSError: As there.
+    """
+    open_regular(path).close()
+
+
+def read_bytes(path: Path, limit: int = MAX_BYTES) -> bytes:
+    """The content of a regular file.
+
+    Args:
+        path: Of the file.
+        limit: Its largest size, bytes.
+
+    Returns:
+        All of it.
+
+    Raises:
+        OSError: It cannot be read, is no regular file, or is larger.
+    """
+    with open_regular(path) as file:
+        # What the file claims is looked at first, then what it has: it may grow meanwhile.
+        claimed = os.fstat(file.fileno()).st_size
+        content = file.read(limit + 1) if claimed <= limit else b""
+    if max(claimed, len(content)) > limit:
+        complaint = f"larger than {limit / 2**20:.0f} MiB, the most that is read of such a file"
+        raise OSError(errno.EFBIG, complaint, str(path))
+    return content
+
+
+def read_text(path: Path, limit: int = MAX_BYTES) -> str:
+    """The text of a regular file in UTF-8, its lines ended as Python has it.
+
+    Args:
+        path: Of the file.
+        limit: Its largest size, bytes.
+
+    Returns:
+        The text.
+
+    Raises:
+        OSError: See :func:`read_bytes`.
+        UnicodeDecodeError: It is not UTF-8.
+    """
+    text = read_bytes(path, limit).decode("utf-8")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def parse_json(text: str | bytes) -> Any:
+    """The data of a JSON text.
+
+    Raises:
+        ValueError: It is none, or nested too deep.
+    """
+    try:
+        return json.loads(text)
+    except RecursionError:
+        raise ValueError("nested too deep") from None
+
+
+def parse_yaml(text: str) -> Any:
+    """The data of a YAML text of plain types.
+
+    Raises:
+        ValueError: It is none, is nested too deep, or grows without bounds by references.
+    """
+    try:
+        loader = yaml.SafeLoader(text)
+        try:
+            node = loader.get_single_node()
+            if node is None:
+                return None
+            if _expanded_size(node, {}) > MAX_YAML_NODES:
+                raise ValueError(f"more than {MAX_YAML_NODES} values")
+            return loader.construct_document(node)
+        finally:
+            loader.dispose()
+    except YAML_ERRORS as error:
+        raise ValueError(f"no YAML: {' '.join(str(error).split())[:200]}") from error
+
+
+def _expanded_size(node: yaml.Node, known: dict[yaml.Node, int]) -> int:
+    """The number of values below a node if each reference were written out."""
+    if node not in known:
+        known[node] = MAX_YAML_NODES + 1  # what a reference from within itself finds here
+        below = node.value if isinstance(node, yaml.CollectionNode) else ()
+        known[node] = 1 + sum(
+            _expanded_size(child, known)
+            for item in below
+            for child in (item if isinstance(item, tuple) else (item,))
+        )
+    return known[node]
