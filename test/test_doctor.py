@@ -85,6 +85,8 @@ def test_healthy(tmp_path: Path) -> None:
         "Training",
         "Figures",
         "Live view",
+        "Language models",
+        "Local language model",
         "Disk space for runs",
         "Write permission for runs",
         "Open-file limit",

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
@@ -85,6 +86,7 @@ class Inquiry:
         self.settings = settings
         self.budget = budget
         self.log = log
+        self._answers = Counter[str]()  # by subject
 
     def ask(self, question: Question[D, T], rejected: Rejected | None = None) -> Answer[T]:
         """Ask until an answer passes.
@@ -105,6 +107,7 @@ class Inquiry:
             reply = self._complete(question.subject, request, rejected)
             judged = _judge(question, reply)
             self.budget.book(reply)
+            self._answers[question.subject] += 1
             self.log.answer(
                 question.subject, request, reply, judged.cut, judged.complaints, self.budget
             )
@@ -117,7 +120,8 @@ class Inquiry:
             messages = conversation(question.text)
         else:
             words = [complaint.for_model for complaint in rejected.complaints[:MAX_COMPLAINTS]]
-            complaint = feedback(question.template, words, name=question.name)
+            number = self._answers[question.subject]
+            complaint = feedback(question.template, words, question.name, number)
             messages = conversation(question.text, rejected.text, complaint)
         return Request(self.settings.model, messages, question.schema, self.settings.sampling)
 

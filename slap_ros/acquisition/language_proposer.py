@@ -183,7 +183,7 @@ class LanguageRewarder:
             "reward",
             operator.name,
             text,
-            reward_schema(problem.metrics),
+            reward_schema(problem.metrics, operator),
             parse_rewards,
             partial(check_rewards, operator=operator, problem=problem),
         )

@@ -36,6 +36,7 @@ def diagnose(runs: Path = RUNS) -> list[Check]:
         libraries.figures(),
         libraries.live(),
         libraries.language(),
+        libraries.local_language(),
         machine.disk_space(runs),
         machine.write_permission(runs),
         machine.open_files(),

