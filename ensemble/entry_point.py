@@ -14,6 +14,7 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
 from ensemble.network import first_node, join_network
+from ensemble.startup import leave_quietly
 from slap_ros.errors import ErrorCode, SlapError
 
 
@@ -31,7 +32,8 @@ def run_node(name: str, make: Callable[[], Node]) -> int:
 
 def _run(name: str, make: Callable[[], Node]) -> int:
     try:
-        signal.signal(signal.SIGINT, signal.default_int_handler)  # for rclpy to go on with
+        if signal.getsignal(signal.SIGINT) is leave_quietly:
+            signal.signal(signal.SIGINT, signal.default_int_handler)  # for rclpy to go on with
         join_network()
         _spin(make)
     except (KeyboardInterrupt, ExternalShutdownException):

@@ -21,10 +21,12 @@ def main_of(package: str) -> int:
     Returns:
         The exit code of its ``main``.
     """
-    signal.signal(signal.SIGINT, _leave)
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not in the background
+        signal.signal(signal.SIGINT, leave_quietly)
     code: int = import_module(f"{package}.node").main()
     return code
 
 
-def _leave(_number: int, _frame: object) -> None:
+def leave_quietly(_number: int, _frame: object) -> None:
+    """End the process at once."""
     os._exit(0)  # nothing is open yet; SystemExit might end up in somebody's import

@@ -24,6 +24,7 @@ from rcl_interfaces.srv import (
     SetParameters,
     SetParametersAtomically,
 )
+from rclpy._rclpy_pybind11 import UnknownROSArgsError
 from rclpy.exceptions import (
     InvalidParameterTypeException,
     InvalidParameterValueException,
@@ -31,7 +32,6 @@ from rclpy.exceptions import (
     ParameterImmutableException,
     ParameterNotDeclaredException,
     ParameterUninitializedException,
-    UnknownROSArgsError,
 )
 from rclpy.node import Node
 from rclpy.parameter import Parameter

@@ -24,6 +24,12 @@ def ros2(*arguments, limit=LIMIT, **environment):
     return done.stdout
 
 
+def wait_for_task(**environment):
+    """Return once a simulator has published its task."""
+    latched = ["--qos-durability", "transient_local", "--qos-reliability", "reliable"]
+    ros2("topic", "echo", "--once", *latched, "/slap/task", "slap_msgs/msg/Task", **environment)
+
+
 def solve():
     """The plan length of the task that ``ros2 action send_goal`` has solved."""
     kind = "slap_msgs/action/SolveTask"

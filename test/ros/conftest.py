@@ -4,6 +4,7 @@
 
 import os
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -20,9 +21,10 @@ collect_ignore_glob = ["test_*.py"] if is_embedded() or not shutil.which("ros2")
 
 @pytest.fixture
 def cli(network, monkeypatch):
-    """A terminal as the README leaves it."""
+    """A terminal as the README leaves it, whose daemon ends with it."""
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    return network
+    yield network
+    subprocess.run(["ros2", "daemon", "stop"], check=True, capture_output=True)
 
 
 @pytest.fixture
