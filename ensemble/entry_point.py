@@ -13,7 +13,7 @@ from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
-from ensemble.network import first_node, join_network
+from ensemble.network import start_node
 from ensemble.startup import leave_quietly
 from slap_ros.errors import ErrorCode, SlapError
 
@@ -34,7 +34,6 @@ def _run(name: str, make: Callable[[], Node]) -> int:
     try:
         if signal.getsignal(signal.SIGINT) is leave_quietly:
             signal.signal(signal.SIGINT, signal.default_int_handler)  # for rclpy to go on with
-        join_network()
         _spin(make)
     except (KeyboardInterrupt, ExternalShutdownException):
         return 0
@@ -51,7 +50,7 @@ def _run(name: str, make: Callable[[], Node]) -> int:
 
 
 def _spin(make: Callable[[], Node]) -> None:
-    node = first_node(make)
+    node = start_node(make)
     try:
         rclpy.spin(node)
     finally:

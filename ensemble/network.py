@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 from ensemble.loopback import loopback_only
 from slap_ros.doctor import settings
@@ -26,6 +27,7 @@ OPENER_OPTIONS = {
     "use_global_arguments": False,  # which would rename it
     "enable_rosout": False,
     "start_parameter_services": False,
+    "parameter_overrides": [Parameter("start_type_description_service", value=False)],
 }
 
 N = TypeVar("N", bound=Node)
@@ -47,15 +49,30 @@ def join_network(**options: Any) -> None:
     # rcl finds some of it out with the first node only, and takes some of it for something else.
     for fault in settings.impossible():
         raise InvalidParameterError(f"{fault.found}. {fault.advice}")
-    if DISCOVERY_RANGE not in os.environ:
-        os.environ[DISCOVERY_RANGE] = "LOCALHOST"
-        if not is_embedded():
-            sys.stderr.write(f"{settings.RANGE_HINT}\n")
+    os.environ.setdefault(DISCOVERY_RANGE, "LOCALHOST")
     try:
         rclpy.init(**options)
     except (RCLError, UnknownROSArgsError) as error:
         rclpy.try_shutdown()
         raise InvalidParameterError(str(error)) from error
+
+
+def start_node(make: Callable[[], N], **options: Any) -> N:
+    """Join the network with a node, and say once how terminals find it at once.
+
+    Args:
+        make: Makes the node.
+        options: Those of ``rclpy.init``.
+
+    Raises:
+        InvalidParameterError: As :func:`join_network` and :func:`first_node`.
+    """
+    has_range = DISCOVERY_RANGE in os.environ
+    join_network(**options)
+    node = first_node(make)
+    if not (has_range or is_embedded()):
+        sys.stderr.write(f"{settings.RANGE_HINT}\n")
+    return node
 
 
 def first_node(make: Callable[[], N]) -> N:

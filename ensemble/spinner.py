@@ -14,7 +14,7 @@ from rclpy.executors import Executor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
-from ensemble.network import first_node, join_network
+from ensemble.network import start_node
 
 SPIN_PERIOD = 0.05  # s, the longest time between two checks
 
@@ -56,14 +56,14 @@ def temporary_node(make: Callable[[], N]) -> Iterator[tuple[N, Spinner]]:
         InvalidParameterError: An environment variable, such as ROS_DOMAIN_ID, is wrong.
     """
     with ExitStack() as stack:
-        join_network(
+        stack.callback(rclpy.try_shutdown)
+        node = start_node(
+            make,
             args=["--ros-args", "--log-level", "warn"],
             signal_handler_options=SignalHandlerOptions.NO,
         )
-        stack.callback(rclpy.try_shutdown)
         executor = SingleThreadedExecutor()
         stack.callback(executor.shutdown)
-        node = first_node(make)
         stack.callback(node.destroy_node)
         executor.add_node(node)
         yield node, Spinner(executor)

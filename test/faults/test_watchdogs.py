@@ -6,11 +6,23 @@ import pytest
 from living_ensemble import laboratory
 from process_faults import LIMIT
 
+from ensemble.network import is_embedded
 from slap_ros.errors import ErrorCode
 from slap_ros.messages.events import SkillEventKind
 from slap_ros.messages.interfaces import SKILL_EVENT, STATE
 
 SLOWLY = 1.0  # environment steps a second: a skill takes longer than a dead node is missed
+# As embedded_ros has it; CycloneDDS's own is 10 s, in which a skill ends even so.
+LEASE = (
+    "<CycloneDDS><Domain><Discovery><LeaseDuration>4 s</LeaseDuration></Discovery></Domain>"
+    "</CycloneDDS>"
+)
+
+
+@pytest.fixture(autouse=True)
+def short_lease(network, monkeypatch):
+    if not is_embedded():
+        monkeypatch.setenv("CYCLONEDDS_URI", LEASE)
 
 
 def holds(bench):
