@@ -11,6 +11,7 @@ from rclpy.node import Node
 
 from ensemble import encode
 from ensemble.interfaces import DIAGNOSTICS
+from ensemble.steady_time import create_timer
 
 PERIOD = 1.0  # s
 
@@ -23,7 +24,7 @@ class DiagnosticsPublisher:
         self._node = node
         self._counts = counts
         self._publisher = node.create_publisher(DIAGNOSTICS.type, DIAGNOSTICS.name, DIAGNOSTICS.qos)
-        node.create_timer(PERIOD, self._publish)
+        create_timer(node, PERIOD, self._publish)
 
     def _publish(self) -> None:
         name = self._node.get_fully_qualified_name()

@@ -12,13 +12,10 @@ from typing import TypeVar
 from rclpy.node import Node
 from rclpy.task import Future
 
+from ensemble.steady_time import create_timer
+
 T = TypeVar("T")
 POLL_PERIOD = 0.02  # s, between two looks at a condition
-
-
-def node_time_s(node: Node) -> float:
-    """The node's time, s."""
-    return float(node.get_clock().now().nanoseconds) * 1e-9
 
 
 def submit(workers: Executor, function: Callable[[], T]) -> Future:
@@ -56,7 +53,7 @@ async def wait_for_first(node: Node, future: Future, condition: Callable[[], boo
             end()
 
     future.add_done_callback(end)
-    timer = node.create_timer(POLL_PERIOD, poll)
+    timer = create_timer(node, POLL_PERIOD, poll)
     try:
         await ended
     finally:

@@ -4,9 +4,10 @@
 
 from __future__ import annotations
 
+from time import monotonic
+
 from rclpy.node import Node
 
-from ensemble.futures import node_time_s
 from ensemble.interfaces import Topic
 
 PERIOD = 0.5  # s between two queries of the graph, which cost time; DDS takes longer to miss a node
@@ -24,14 +25,14 @@ class NodeLiveness:
         self._node = node
         self._topic = node.resolve_topic_name(topic.name)
         self._known = self._now = self._publishers()
-        self._queried_s = node_time_s(node)
+        self._queried_s = monotonic()
 
     def is_alive(self) -> bool:
         """Whether one of them is there."""
-        if node_time_s(self._node) - self._queried_s > PERIOD:
+        if monotonic() - self._queried_s > PERIOD:
             self._now = self._publishers()
             self._known = self._known or self._now
-            self._queried_s = node_time_s(self._node)
+            self._queried_s = monotonic()
         return not self._known.isdisjoint(self._now)
 
     def is_lost(self) -> bool:

@@ -19,7 +19,8 @@ class Episode:
 
     Args:
         number: Counts the resets of the world, from 1 on.
-        opened_ns: Stamp of the task, ns: messages with an earlier stamp are another episode's.
+        opened_ns: Stamp of the task, ns. With the number it identifies the episode, as a simulator
+            that was started again counts from 1. It says nothing about before or after.
         domain: What the world runs.
         task: Initial state, goal and step limit.
         space: Every ground atom over the task's objects.
@@ -31,19 +32,15 @@ class Episode:
     task: Task
     space: AtomSpace
 
-    def follows(self, message: StateMessage) -> bool:
-        """Whether this episode was opened after the message was sent."""
-        return stamp_ns(message.header) < self.opened_ns
-
     def has(self, message: StateMessage) -> bool:
-        """Whether the message is a state of this episode.
+        """Whether the message is a state of this episode, as far as it says.
 
-        The number alone does not distinguish a restarted simulator's first episode from the old
-        one.
+        The initial state has the stamp of its task, by which the first states of two episodes of
+        the same number are distinguished. Later states follow one another by their steps.
         """
         return (
             message.episode == self.number
-            and stamp_ns(message.header) >= self.opened_ns
+            and (message.step > 0 or stamp_ns(message.header) == self.opened_ns)
             and [obj.name for obj in message.objects] == [o.name for o in self.space.layout.objects]
         )
 

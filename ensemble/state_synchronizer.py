@@ -4,21 +4,38 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict, deque
 from collections.abc import Callable
+from time import monotonic
+from typing import NamedTuple
 
 from rclpy.node import Node
 from slap_msgs.msg import AbstractState, ObjectCentricState
 
 from ensemble.episode_tracker import EpisodeTracker, subscribe
-from ensemble.futures import node_time_s, wait_until
+from ensemble.futures import wait_until
 from ensemble.interfaces import ATOMS, STATE
 from ensemble.observation import Episode, Observation
 from slap_ros.errors import SlapError
 from slap_ros.messages.decode import decode_atoms, decode_seen, decode_state, stamp_ns
 
+WAITING = 100  # messages kept until their counterpart, or their episode, is known
+
+Key = tuple[int, int, int]  # episode, step, stamp: the atoms' header is a copy of the state's
+
+
+class Pair(NamedTuple):
+    """A state and the atoms that hold in it."""
+
+    state: ObjectCentricState
+    atoms: AbstractState
+
 
 class StateSynchronizer:
-    """Pairs states with the atoms of the same step, and reports each pair newer than the last."""
+    """Pairs states with the atoms of the same step, and reports each pair newer than the last.
+
+    Within an episode, the order is that of the steps. A new episode begins from nothing.
+    """
 
     def __init__(
         self,
@@ -37,8 +54,9 @@ class StateSynchronizer:
         self._node = node
         self._on_observation = on_observation
         self._on_episode = on_episode
-        self._state: ObjectCentricState | None = None
-        self._atoms: AbstractState | None = None
+        self._states: OrderedDict[Key, ObjectCentricState] = OrderedDict()  # without atoms
+        self._atoms: OrderedDict[Key, AbstractState] = OrderedDict()  # without a state
+        self._early: deque[Pair] = deque(maxlen=WAITING)  # of no episode that is known
         self._episodes = EpisodeTracker(node, self._open)
         subscribe(node, STATE, self._on_state)
         subscribe(node, ATOMS, self._on_atoms)
@@ -57,7 +75,7 @@ class StateSynchronizer:
 
         Args:
             episode: The number of the episode; 0: any.
-            timeout_s: How long to wait, s of the node's time.
+            timeout_s: How long to wait, s.
             missing: The error to raise where no such observation comes in time.
 
         Returns:
@@ -66,12 +84,12 @@ class StateSynchronizer:
         Raises:
             SlapError: ``missing``.
         """
-        deadline = node_time_s(self._node) + timeout_s
+        deadline = monotonic() + timeout_s
 
         def seen() -> bool:
             return self.latest is not None and self.latest.episode.number >= episode
 
-        await wait_until(self._node, lambda: seen() or node_time_s(self._node) > deadline)
+        await wait_until(self._node, lambda: seen() or monotonic() > deadline)
         if self.latest is None or not seen():
             raise missing(
                 f"no perceived state{f' of episode {episode}' if episode else ''} within "
@@ -81,29 +99,34 @@ class StateSynchronizer:
 
     def _open(self, episode: Episode) -> None:
         self._on_episode(episode)
-        self._pair()
+        early = [pair for pair in self._early if episode.has(pair.state)]
+        self._early.clear()
+        if early:
+            self._observe(episode, max(early, key=lambda pair: pair.state.step))
 
     def _on_state(self, message: ObjectCentricState) -> None:
-        if not _is_late(message, self._state):
-            self._state = message
-            self._pair()
+        atoms = self._atoms.pop(_key(message), None)
+        if atoms is None:
+            _keep(self._states, message)
+        else:
+            self._take(Pair(message, atoms))
 
     def _on_atoms(self, message: AbstractState) -> None:
-        if not _is_late(message, self._atoms):
-            self._atoms = message
-            self._pair()
+        state = self._states.pop(_key(message), None)
+        if state is None:
+            _keep(self._atoms, message)
+        else:
+            self._take(Pair(state, message))
 
-    def _pair(self) -> None:
-        episode, state, atoms = self._episodes.current, self._state, self._atoms
-        if episode is None or state is None or atoms is None:
-            return
-        if (state.episode, state.step) != (atoms.episode, atoms.step):
-            return
-        if not episode.has(state):
-            return
-        known = self.latest
-        if known is not None and known.episode is episode and state.step <= known.step:
-            return
+    def _take(self, pair: Pair) -> None:
+        episode, known = self._episodes.current, self.latest
+        if episode is None or not episode.has(pair.state):
+            self._early.append(pair)
+        elif known is None or known.episode is not episode or pair.state.step > known.step:
+            self._observe(episode, pair)
+
+    def _observe(self, episode: Episode, pair: Pair) -> None:
+        state, atoms = pair
         self.latest = Observation(
             episode,
             state.step,
@@ -115,8 +138,14 @@ class StateSynchronizer:
         self._on_observation(self.latest)
 
 
-def _is_late(
-    message: ObjectCentricState | AbstractState, newest: ObjectCentricState | AbstractState | None
-) -> bool:
-    """Whether the message is older than what is known: it was sent again, or overtaken."""
-    return newest is not None and stamp_ns(message.header) < stamp_ns(newest.header)
+def _key(message: ObjectCentricState | AbstractState) -> Key:
+    return message.episode, message.step, stamp_ns(message.header)
+
+
+def _keep(
+    waiting: OrderedDict[Key, ObjectCentricState | AbstractState],
+    message: ObjectCentricState | AbstractState,
+) -> None:
+    waiting[_key(message)] = message
+    if len(waiting) > WAITING:
+        waiting.popitem(last=False)

@@ -45,8 +45,11 @@ from ensemble.observation import Episode
 from ensemble.parameters import read_parameters
 from ensemble.perception_parameters import PerceptionParameters
 from slap_ros.errors import InvalidStateError
+from slap_ros.messages import qos
 from slap_ros.messages.decode import decode_state
 from slap_ros.perception import ExactPerceiver, NoisyPerceiver, Perceiver
+
+BEFORE_FIRST = -1  # step before an episode's first
 
 
 class PerceptionNode(Node):
@@ -58,7 +61,8 @@ class PerceptionNode(Node):
         self._quality, self._seed = parameters.quality, parameters.noise_seed
         self._perceiver: Perceiver
         self._perceived = 0
-        self._pending: deque[ObjectCentricState] = deque()
+        self._step = BEFORE_FIRST  # of the newest state perceived in this episode
+        self._early: deque[ObjectCentricState] = deque(maxlen=qos.EPISODE.depth)
         self._atoms = self.create_publisher(ATOMS.type, ATOMS.name, ATOMS.qos)
         self._episodes = EpisodeTracker(self, self._open)
         subscribe(self, STATE, self._on_state)
@@ -66,7 +70,11 @@ class PerceptionNode(Node):
 
     def _open(self, episode: Episode) -> None:
         self._perceiver = self._perceiver_of(episode)
-        self._perceive_pending()
+        self._step = BEFORE_FIRST
+        early = [message for message in self._early if episode.has(message)]
+        self._early.clear()
+        for message in early:
+            self._perceive(message, episode)
 
     def _perceiver_of(self, episode: Episode) -> Perceiver:
         if self._quality.exact:
@@ -76,21 +84,17 @@ class PerceptionNode(Node):
         return NoisyPerceiver.of(episode.domain, episode.space, initial, self._quality, rng)
 
     def _on_state(self, message: ObjectCentricState) -> None:
-        self._pending.append(message)
-        self._perceive_pending()
-
-    def _perceive_pending(self) -> None:
-        """States may arrive before the task that says what they consist of."""
         episode = self._episodes.current
-        while episode is not None and self._pending:
-            if episode.has(self._pending[0]):
-                self._perceive(self._pending.popleft(), episode)
-            elif episode.follows(self._pending[0]):
-                self._pending.popleft()
-            else:
-                return  # its task is still to come
+        if episode is not None and episode.has(message):
+            self._perceive(message, episode)
+        else:
+            self._early.append(message)  # of an episode whose task is still to come, perhaps
 
     def _perceive(self, message: ObjectCentricState, episode: Episode) -> None:
+        """Perceive a state, each once and in the order of steps."""
+        if message.step <= self._step:
+            return
+        self._step = message.step
         try:
             state = decode_state(message, episode.domain.types_by_name)
         except InvalidStateError as error:

@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
+from time import monotonic
+
 from rclpy.action import ActionClient
 from rclpy.node import Node
 
-from ensemble.futures import node_time_s
 from ensemble.interfaces import SKILL_EVENTS
 from ensemble.node_liveness import NodeLiveness
 
@@ -21,14 +22,14 @@ class SkillServerWatch:
         Args:
             node: Who watches.
             skills: Its client of the skill server.
-            timeout_s: How long the server may be away; s, the node's time.
+            timeout_s: How long the server may be away, s.
         """
         self._node, self._skills, self._timeout_s = node, skills, timeout_s
         self._liveness = NodeLiveness(node, SKILL_EVENTS)
-        self._alive_s = node_time_s(node)  # when it was last there
+        self._alive_s = monotonic()  # when it was last there
 
     def is_lost(self) -> bool:
         """Whether it has been away for longer than it may."""
         if self._liveness.is_alive() and self._skills.server_is_ready():
-            self._alive_s = node_time_s(self._node)
-        return node_time_s(self._node) - self._alive_s > self._timeout_s
+            self._alive_s = monotonic()
+        return monotonic() - self._alive_s > self._timeout_s

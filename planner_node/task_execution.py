@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from math import inf
+from time import monotonic
 
 from action_msgs.msg import GoalStatus
 from rclpy.action import ActionClient
@@ -19,7 +20,7 @@ from slap_msgs.action import ExecuteSkill, SolveTask
 from slap_msgs.msg import PlanEvent
 
 from ensemble import encode
-from ensemble.futures import node_time_s, submit, wait_for_first
+from ensemble.futures import submit, wait_for_first
 from ensemble.observation import Observation
 from ensemble.state_synchronizer import StateSynchronizer
 from planner_node.plan_publisher import PlanPublisher
@@ -215,11 +216,11 @@ class TaskExecution:
 
     async def _wait_for_hold(self, ended: Future) -> None:
         """Wait for a canceled skill to end, unless the skill server is gone."""
-        deadline = node_time_s(self.node) + ANSWER_TIMEOUT
+        deadline = monotonic() + ANSWER_TIMEOUT
         await wait_for_first(
             self.node,
             ended,
-            lambda: self.skill_server.is_lost() or node_time_s(self.node) > deadline,
+            lambda: self.skill_server.is_lost() or monotonic() > deadline,
         )
 
     async def _observe(self, step: int) -> None:
@@ -243,7 +244,7 @@ class TaskExecution:
 
         Args:
             future: What to wait for.
-            timeout_s: For how long; s, the node's time.
+            timeout_s: For how long, s.
             condition: What else to wait for.
 
         Returns:
@@ -254,11 +255,11 @@ class TaskExecution:
             NodeDiedError: The skill server is gone.
             EpisodeChangedError: The simulator was reset.
         """
-        deadline = node_time_s(self.node) + timeout_s
+        deadline = monotonic() + timeout_s
         await wait_for_first(
             self.node,
             future,
-            lambda: condition() or self._interrupted() or node_time_s(self.node) > deadline,
+            lambda: condition() or self._interrupted() or monotonic() > deadline,
         )
         if self.goal.is_cancel_requested:
             raise TaskCanceledError("canceled")

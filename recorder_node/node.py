@@ -23,6 +23,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from time import monotonic, monotonic_ns
 from typing import Any
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -40,7 +41,7 @@ from slap_ros.bags.writer import BagWriter, require_new
 from slap_ros.errors import InvalidParameterError
 from slap_ros.versions import versions
 
-QUIET_NS = 200_000_000  # without a message for so long, nothing more is expected
+QUIET = 0.2  # s without a message, after which nothing more is expected
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,8 @@ class RecorderNode(Node):
         self._early: list[Record] = []  # before domain and task are known
         self._writer: BagWriter | None = None
         self._closed = False
-        self._newest_ns = 0
+        self._started_ns = self.get_clock().now().nanoseconds - monotonic_ns()
+        self._newest_s = monotonic()
         self._written = 0  # messages
         for topic in RECORDED:
             self._subscribe(topic)
@@ -97,10 +99,9 @@ class RecorderNode(Node):
     def _on_message(self, topic: Topic, name: str, raw: bytes) -> None:
         if self._closed:
             return
-        now_ns = self.get_clock().now().nanoseconds
         if topic is not DIAGNOSTICS:  # these never stop
-            self._newest_ns = now_ns
-        record = Record(name, topic.type_name, now_ns, bytes(raw))
+            self._newest_s = monotonic()
+        record = Record(name, topic.type_name, self._now_ns(), bytes(raw))
         if self._writer is not None:
             self._write(record)
             return
@@ -111,6 +112,10 @@ class RecorderNode(Node):
             self._metadata |= _of_task(deserialize_message(raw, Task))
         if "domain" in self._metadata and "seed" in self._metadata:
             self._begin()
+
+    def _now_ns(self) -> int:
+        """Time of arrival, from the clock as it was at the start: readers sort messages by it."""
+        return self._started_ns + monotonic_ns()
 
     def _begin(self) -> None:
         self._writer = BagWriter(self._path, self._metadata | versions())
@@ -124,9 +129,7 @@ class RecorderNode(Node):
         self._written += 1
 
     async def _on_close(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        await wait_until(
-            self, lambda: self.get_clock().now().nanoseconds - self._newest_ns > QUIET_NS
-        )
+        await wait_until(self, lambda: monotonic() - self._newest_s > QUIET)
         response.success = self._writer is not None
         response.message = str(self._path) if response.success else "nothing was recorded"
         self._close()

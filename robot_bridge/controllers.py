@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from time import monotonic
 from typing import Any
 
 from action_msgs.msg import GoalStatus
@@ -15,7 +16,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from ensemble.futures import node_time_s, wait_for_first
+from ensemble.futures import wait_for_first
 from slap_ros.errors import (
     ControllerAbortedError,
     ControllerRejectedError,
@@ -98,9 +99,9 @@ class Controllers:
         name = self._names[client]
         if not client.server_is_ready():
             raise ControllerTimeoutError(f"{name} is not there: is the controller running?")
-        end = node_time_s(self._node) + limit_s
+        end = monotonic() + limit_s
         sent = client.send_goal_async(goal)
-        if not await wait_for_first(self._node, sent, lambda: node_time_s(self._node) > end):
+        if not await wait_for_first(self._node, sent, lambda: monotonic() > end):
             sent.add_done_callback(_cancel)  # should it be accepted after all
             raise ControllerTimeoutError(f"{name} did not answer within {limit_s:.2f} s")
         handle = sent.result()
@@ -108,7 +109,7 @@ class Controllers:
             raise ControllerRejectedError(f"{name} rejected a goal")
         self._active = handle
         ended = handle.get_result_async()
-        if not await wait_for_first(self._node, ended, lambda: node_time_s(self._node) > end):
+        if not await wait_for_first(self._node, ended, lambda: monotonic() > end):
             self.hold()
             raise ControllerTimeoutError(f"{name} was not done within {limit_s:.2f} s")
         self._active = None

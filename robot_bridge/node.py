@@ -64,10 +64,10 @@ from builtin_interfaces.msg import Time
 from slap_msgs.srv import ResetTask
 
 from ensemble.entry_point import run_node
-from ensemble.futures import node_time_s
 from ensemble.interfaces import MARKERS
 from ensemble.lockstep_world import UNSAMPLED, LockstepWorld
 from ensemble.robot_parameters import RobotBridgeParameters
+from ensemble.steady_time import create_timer
 from ensemble.visualization import markers
 from robot_bridge.robot import Robot
 from robot_bridge.step_measurement import StepMeasurement
@@ -104,12 +104,14 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
         super().__init__("robot_bridge", RobotBridgeParameters, counted, **kwargs)
         self._robot = Robot(self, self._domain, self._sampled_state, self._settings)
         self._phase = Phase.STARTING
-        self._since_s = node_time_s(self)  # when the phase, or the measurement of a state, began
+        self._since_s = (
+            self._robot.clock.now_s()
+        )  # when the phase, or the measurement of a state, began
         self._fault = ErrorCode.NONE
         self._goal: Collection[GroundAtom] = ()
         self._measurement: StepMeasurement  # of the step under way
         self._markers = self.create_publisher(MARKERS.type, MARKERS.name, MARKERS.qos)
-        self.create_timer(POLL_PERIOD, self._poll)
+        create_timer(self, POLL_PERIOD, self._poll)
         self._publish_domain()
 
     def destroy_node(self) -> None:
@@ -121,7 +123,7 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
         return self._domain.task(self._settings.seed, self._settings.index).initial_state
 
     def _diagnostics(self) -> dict[str, object]:
-        idle = node_time_s(self) - self._since_s > self._settings.hold_after
+        idle = self._robot.clock.now_s() - self._since_s > self._settings.hold_after
         holding = self._phase is Phase.FAULT or (self._phase is Phase.READY and idle)
         return {
             **super()._diagnostics(),
@@ -136,7 +138,7 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
 
     def _enter(self, phase: Phase) -> None:
         self._phase = phase
-        self._since_s = node_time_s(self)
+        self._since_s = self._robot.clock.now_s()
 
     def _fail(self, error: SlapError) -> None:
         """Hold until reset."""
@@ -186,7 +188,7 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
                 self._fail(error)
 
     def _measure(self) -> None:
-        state = self._measurement.poll(node_time_s(self))
+        state = self._measurement.poll(self._robot.clock.now_s())
         if state is not None:
             self._enter(Phase.READY)
             self._publish_step(state)

@@ -25,7 +25,7 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.task import Future
 
-from ensemble.futures import node_time_s, wait_for_first
+from ensemble.futures import wait_for_first
 from ensemble.robot_parameters import PlayerParameters
 from robot_bridge.robot import Robot
 from slap_ros.errors import (
@@ -102,9 +102,9 @@ class Player(Node):
 
     async def _begin(self) -> None:
         """Wait for the robot; refuse to begin elsewhere than the recording does."""
-        end = node_time_s(self) + self._settings.start_timeout
+        end = self._robot.clock.now_s() + self._settings.start_timeout
         await wait_for_first(
-            self, Future(), lambda: self._robot.controllers.ready or node_time_s(self) > end
+            self, Future(), lambda: self._robot.controllers.ready or self._robot.clock.now_s() > end
         )
         if not self._robot.controllers.ready:
             raise ControllerTimeoutError("the controllers are not there: are they running?")
@@ -135,7 +135,7 @@ class Player(Node):
 
     async def _measure(self, when: str) -> State:
         """The state, measured from now on."""
-        since_s = node_time_s(self)
+        since_s = self._robot.clock.now_s()
         end_s = since_s + self._settings.start_timeout
         found: list[State] = []
         reasons: list[InvalidStateError] = []
@@ -147,7 +147,7 @@ class Player(Node):
                 reasons.append(error)
             else:
                 found.extend([state] if state is not None else [])
-            return bool(found) or node_time_s(self) > end_s
+            return bool(found) or self._robot.clock.now_s() > end_s
 
         await wait_for_first(self, Future(), measure)
         if found:
@@ -178,12 +178,14 @@ class Player(Node):
 
     async def _require_at(self, joints: tuple[float, ...], when: str) -> None:
         """Wait for new joint positions, which must be where the recording had the arm."""
-        since_s = node_time_s(self)
+        since_s = self._robot.clock.now_s()
         end_s = since_s + self._settings.joint_timeout
         await wait_for_first(
             self,
             Future(),
-            lambda: self._robot.world.newest_joints_s > since_s or node_time_s(self) > end_s,
+            lambda: (
+                self._robot.world.newest_joints_s > since_s or self._robot.clock.now_s() > end_s
+            ),
         )
         if self._robot.world.newest_joints_s <= since_s:
             raise NoJointStateError(

@@ -11,8 +11,9 @@ from pathlib import Path
 from rclpy.node import Node
 from rclpy.task import Future
 
-from ensemble.futures import node_time_s, wait_for_first
+from ensemble.futures import wait_for_first
 from ensemble.robot_parameters import RobotParameters, action_name, arm_joints
+from ensemble.steady_time import JumpFreeClock
 from robot_bridge.controllers import Controllers
 from robot_bridge.sensors import Sensors
 from slap_ros.core import Domain
@@ -43,13 +44,14 @@ class Robot:
             InvalidSceneError: The scene file is missing or malformed.
         """
         self._node, self._settings = node, settings
+        self.clock = JumpFreeClock(node)
         scene_config = (
             read_scene_config(Path(settings.scene), domain)
             if settings.scene
             else sampled_scene_config(sampled())
         )
         self.world = RobotWorld(domain, scene_config, settings.limits, settings.tracking)
-        self.sensors = Sensors(node, self.world, settings.arm)
+        self.sensors = Sensors(node, self.world, settings.arm, self.clock)
         self.controllers = Controllers(
             node,
             action_name(settings.trajectory_action, settings.arm),
@@ -68,12 +70,12 @@ class Robot:
         """Refuse to go on without news of where the joints are.
 
         Args:
-            since_s: When news were asked for; s, the node's time.
+            since_s: When news were asked for; s, of ``clock``.
 
         Raises:
             NoJointStateError: There were none for ``joint_timeout``.
         """
-        silence = node_time_s(self._node) - max(self.world.newest_joints_s, since_s)
+        silence = self.clock.now_s() - max(self.world.newest_joints_s, since_s)
         if silence > self._settings.joint_timeout:
             raise NoJointStateError(f"no joint positions for {silence:.1f} s")
 
@@ -107,12 +109,12 @@ class Robot:
         await self.controllers.move_gripper(
             gap * settings.gripper_scale, settings.gripper_effort, settings.gripper_timeout
         )
-        done_s = node_time_s(self._node) + GAP_AGE
+        done_s = self.clock.now_s() + GAP_AGE
         late_s = done_s + settings.joint_timeout
         await wait_for_first(
             self._node,
             Future(),
-            lambda: sensors.gap_s > done_s or node_time_s(self._node) > late_s,
+            lambda: sensors.gap_s > done_s or self.clock.now_s() > late_s,
         )
         if sensors.gap is None or sensors.gap_s <= done_s:
             raise NoJointStateError(

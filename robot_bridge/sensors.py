@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 
 from geometry_msgs.msg import TransformStamped
@@ -12,9 +13,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
-from ensemble.futures import node_time_s
 from ensemble.interfaces import JOINT_STATES, SENSOR_DATA, TF, TF_STATIC
 from ensemble.robot_parameters import arm_joints, base_frame, finger_joints
+from ensemble.steady_time import JumpFreeClock
 from slap_ros.errors import InvalidMeasurementError
 from slap_ros.geometry.pose import Pose
 from slap_ros.geometry.static_transforms import StaticTransforms
@@ -29,20 +30,21 @@ AHEAD = 0.05  # s, by which clocks of machines may differ
 class Sensors:
     """Gives joint positions and detections to a RobotWorld; counts what that refuses."""
 
-    def __init__(self, node: Node, world: RobotWorld, arm: str) -> None:
+    def __init__(self, node: Node, world: RobotWorld, arm: str, clock: JumpFreeClock) -> None:
         """Subscribe to joint states and frames.
 
         Args:
             node: Who subscribes.
             world: What takes the measurements.
             arm: Prefix of the names of joints and frames.
+            clock: What measurements are dated by.
         """
-        self._node, self._world = node, world
+        self._node, self._world, self._clock = node, world, clock
         self._arm, self._fingers = arm_joints(arm), finger_joints(arm)
         self._frames = StaticTransforms(base_frame(arm))
         self.counts: Counter[str] = Counter(readings=0, detections=0, refused_measurements=0)
         self.gap: float | None = None  # m, between the fingers
-        self.gap_s = 0.0  # stamp of the gap
+        self.gap_s = -math.inf  # when the gap was measured
         node.create_subscription(JOINT_STATES.type, JOINT_STATES.name, self._on_joints, SENSOR_DATA)
         node.create_subscription(TF.type, TF.name, self._on_frames, SENSOR_DATA)
         node.create_subscription(TF_STATIC.type, TF_STATIC.name, self._on_static, TF_STATIC.qos)
@@ -96,12 +98,12 @@ class Sensors:
                 self.counts["detections"] += 1
 
     def _stamp_s(self, header: Header) -> float | None:
-        """When something was measured; None where that is still to come.
+        """When something was measured, s of ``clock``; None where that is still to come.
 
         From a clock that is ahead, what is older than the last motion would look newer.
         """
-        stamp_s = stamp_ns(header) / NANOSECONDS
-        ahead_s = stamp_s - node_time_s(self._node)
+        stamp_s = self._clock.of_stamp(stamp_ns(header) / NANOSECONDS)
+        ahead_s = stamp_s - self._clock.now_s()
         if ahead_s <= AHEAD:
             return stamp_s
         self._refuse(

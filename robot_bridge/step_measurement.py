@@ -28,7 +28,7 @@ class StepMeasurement:
     Args:
         robot: What is measured.
         limits: How long it may take.
-        since_s: When the arm came to rest; s, the node's time.
+        since_s: When the arm came to rest; s, of the robot's clock.
         target: Where the controller says that the arm went, rad.
     """
 

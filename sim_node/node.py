@@ -38,6 +38,7 @@ from slap_msgs.srv import ResetTask
 from ensemble.entry_point import run_node
 from ensemble.lockstep_world import UNSAMPLED, LockstepWorld
 from ensemble.parameters import parameter
+from ensemble.steady_time import create_timer
 from ensemble.visualization import Visualizer
 from ensemble.world_parameters import WorldParameters
 from slap_ros.core import Action, Task, World
@@ -71,7 +72,7 @@ class SimNode(LockstepWorld[SimParameters]):
         state = self._world.step(action)
         if self._settings.pace > 0.0:
             delay_s = 1.0 / self._settings.pace
-            self._timer = self.create_timer(delay_s, lambda: self._end_step(state))
+            self._timer = create_timer(self, delay_s, lambda: self._end_step(state))
         else:
             self._publish_step(state)
 

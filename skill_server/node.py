@@ -47,6 +47,7 @@ from ensemble.observation import Observation
 from ensemble.parameters import parameter, read_parameters
 from ensemble.shortcuts import ShortcutParameters, ShortcutProvider
 from ensemble.state_synchronizer import StateSynchronizer
+from ensemble.steady_time import create_timer
 from skill_server.requested_option import requested_option
 from skill_server.skill_execution import SkillExecution, result
 from skill_server.skill_publisher import SkillPublisher
@@ -84,7 +85,7 @@ class SkillServer(Node):
             self._execute,
             cancel_callback=lambda _: CancelResponse.ACCEPT,
         )
-        self.create_timer(CHECK_PERIOD, self._check)
+        create_timer(self, CHECK_PERIOD, self._check)
         DiagnosticsPublisher(self, lambda: self._publisher.counts)
 
     def destroy_node(self) -> None:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from time import monotonic
 
 import numpy as np
 from rclpy.action.server import ServerGoalHandle
@@ -14,7 +15,6 @@ from slap_msgs.action import ExecuteSkill
 from slap_msgs.msg import SkillEvent
 
 from ensemble import encode
-from ensemble.futures import node_time_s
 from ensemble.node_liveness import NodeLiveness
 from ensemble.observation import Observation
 from skill_server.skill_publisher import SkillPublisher
@@ -47,7 +47,7 @@ class SkillExecution:
     def __post_init__(self) -> None:
         self.latest = self.start
         self._ended = Future()  # of OptionResult
-        self._newest_s = node_time_s(self.node)  # when the latest observation came
+        self._newest_s = monotonic()  # when the latest observation came
 
     @property
     def option(self) -> Option:
@@ -75,7 +75,7 @@ class SkillExecution:
         """Answer an observation with a command, or end."""
         if self._ended.done():
             return
-        self._newest_s = node_time_s(self.node)
+        self._newest_s = monotonic()
         if observation.episode is not self.start.episode:
             self._stop(ErrorCode.EPISODE_CHANGED, "the simulator was reset")
             return
@@ -98,7 +98,7 @@ class SkillExecution:
         """End if no state has come for ``state_timeout_s``, or the planner is gone."""
         if self._ended.done():
             return
-        silence_s = node_time_s(self.node) - self._newest_s
+        silence_s = monotonic() - self._newest_s
         if silence_s > state_timeout_s:
             self._stop(ErrorCode.NO_STATE, f"no new state for {silence_s:.1f} s")
         elif self.planner.is_lost():

@@ -14,6 +14,7 @@ from rclpy.task import Future
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 from ensemble.robot_parameters import MockRobotParameters, action_name, arm_joints
+from ensemble.steady_time import create_timer
 from robot_bridge.mock.noise_model import NoiseModel
 from robot_bridge.mock.plant import Plant
 
@@ -137,7 +138,7 @@ class MockControllers:
 async def pause(node: Node, duration_s: float) -> None:
     """Wait without blocking the executor."""
     over = Future()
-    timer = node.create_timer(max(duration_s, 1e-3), lambda: over.done() or over.set_result(None))
+    timer = create_timer(node, max(duration_s, 1e-3), lambda: over.done() or over.set_result(None))
     try:
         await over
     finally:

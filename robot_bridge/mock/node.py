@@ -46,6 +46,7 @@ from ensemble.diagnostics import DiagnosticsPublisher
 from ensemble.entry_point import run_node
 from ensemble.parameters import read_parameters
 from ensemble.robot_parameters import MockRobotParameters
+from ensemble.steady_time import create_timer
 from robot_bridge.mock.controllers import MockControllers
 from robot_bridge.mock.noise_model import NoiseModel, NoiseSettings
 from robot_bridge.mock.plant import Plant
@@ -83,7 +84,7 @@ class MockRobot(Node):
             self, self._plant, noise, settings, period_s, self._counts
         )
         self._sensors = MockSensors(self, self._plant, noise, settings)
-        self.create_timer(period_s, self._idle)
+        create_timer(self, period_s, self._idle)
         DiagnosticsPublisher(self, lambda: self._counts)
 
     def destroy_node(self) -> None:

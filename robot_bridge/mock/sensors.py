@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import heapq
 from itertools import count
+from time import monotonic
 
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from rclpy.node import Node
@@ -13,9 +14,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
-from ensemble.futures import node_time_s
 from ensemble.interfaces import JOINT_STATES, TF
 from ensemble.robot_parameters import MockRobotParameters, arm_joints, base_frame, finger_joints
+from ensemble.steady_time import create_timer
 from robot_bridge.mock.noise_model import NoiseModel
 from robot_bridge.mock.plant import Plant
 from slap_ros.geometry.pose import Pose
@@ -45,9 +46,9 @@ class MockSensors:
         self._numbers = count()
         self._frames = node.create_publisher(TF.type, TF.name, TF.qos)
         self._joints = node.create_publisher(JOINT_STATES.type, JOINT_STATES.name, JOINT_STATES.qos)
-        node.create_timer(1.0 / settings.joint_rate, self._publish_joints)
-        node.create_timer(1.0 / settings.rate, self._detect)
-        node.create_timer(DELIVERY_PERIOD, self._deliver)
+        create_timer(node, 1.0 / settings.joint_rate, self._publish_joints)
+        create_timer(node, 1.0 / settings.rate, self._detect)
+        create_timer(node, DELIVERY_PERIOD, self._deliver)
 
     def _header(self) -> Header:
         return Header(stamp=self._node.get_clock().now().to_msg(), frame_id=self._frame)
@@ -61,7 +62,7 @@ class MockSensors:
 
     def _detect(self) -> None:
         """Measure everything now; it is published a little later, not always in order."""
-        now_s, header = node_time_s(self._node), self._header()
+        now_s, header = monotonic(), self._header()
         for name, pose in self._plant.poses().items():
             if self._noise.dropped() or name == self._settings.hidden:
                 continue
@@ -71,7 +72,7 @@ class MockSensors:
             heapq.heappush(self._pending, (due_s, next(self._numbers), item))
 
     def _deliver(self) -> None:
-        now_s, due = node_time_s(self._node), []
+        now_s, due = monotonic(), []
         while self._pending and self._pending[0][0] <= now_s:
             due.append(heapq.heappop(self._pending)[2])
         if due:

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from clocks import BY_THE_CLOCK, SettableClock
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import JointState
@@ -197,6 +198,7 @@ def test_sensors_that_fall_silent_stop_the_state(network):
         for timer in list(mock.timers):
             mock.destroy_timer(timer)
         bench.wait(1.0)
+        bench.until(lambda: bench.health.get("steps") == "4")
         assert bench.health["fault"] == "NONE"  # it stands anyway
         bench.command(deltas=[0.02, *STILL[1:]])
         bench.until(lambda: bench.health.get("fault") == "NO_JOINT_STATE")
@@ -238,6 +240,23 @@ def test_a_clock_that_is_ahead_is_not_believed(network):
         bench.until(lambda: int(bench.health.get("refused_measurements", 0)) > 0)
         bench.step()
         assert bench.states[-1].objects[0].features == bench.states[0].objects[0].features
+
+
+@pytest.mark.parametrize("set_by", [-0.3, -3.0, 3.0, -86_400.0])
+def test_a_robot_goes_on_after_its_clock_was_set(network, set_by):
+    """Bridge, sensors and controllers go by one clock, and none of their deadlines does."""
+    with lab(BY_THE_CLOCK, BY_THE_CLOCK, started=False) as bench:
+        clock = SettableClock()
+        bench.spinner.executor.add_node(clock)
+        bench.until(lambda: bench.states and bench.commands.get_subscription_count())
+        bench.step()
+        clock.set_by(set_by)
+        for _ in range(3):
+            bench.step(deltas=[0.02, *STILL[1:]])
+        bench.until(lambda: bench.health.get("steps") == "4")
+        assert bench.health["fault"] == "NONE"
+        assert bench.states[-1].objects[0].features[0] != bench.states[0].objects[0].features[0]
+        clock.destroy_node()
 
 
 def test_a_reset_opens_an_episode_as_measured_and_ends_a_fault(network):

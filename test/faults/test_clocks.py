@@ -1,0 +1,82 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Clocks that are set in the middle of a run: order comes from steps."""
+
+from contextlib import contextmanager
+
+import pytest
+import rclpy
+from clocks import BY_THE_CLOCK, SettableClock
+from faulty_links import Laboratory
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
+
+from ensemble.client import RunClient
+from ensemble.nodes import RunSettings, node_class, node_parameters
+from ensemble.spinner import Spinner
+from slap_ros.bags import evaluate_bag
+from slap_ros.messages.interfaces import STATE
+
+LIMIT = 60.0  # s, far more than anything here takes
+PACE = 40.0  # environment steps per second
+DAY = 86_400.0  # s
+
+
+class ClockLaboratory(Laboratory):
+    """An ensemble that goes by a clock that can be set."""
+
+    def __init__(self, client, spinner, clock, heard):
+        super().__init__(client, spinner, relay=None)
+        self.clock, self.heard = clock, heard
+
+    @property
+    def steps(self):
+        return [message.step for type_name, message in self.heard if type_name == STATE]
+
+
+@contextmanager
+def laboratory(bag):
+    """Everything in this process; ``bag`` is recorded."""
+    settings = RunSettings("obstacle2d", "fair", 3, 0, "lazy", bag, PACE, shortcuts="none")
+    heard = []
+    rclpy.init()
+    executor, nodes = SingleThreadedExecutor(), []
+    try:
+        nodes.append(clock := SettableClock())
+        nodes.append(client := RunClient(lambda *message: heard.append(message)))
+        for name, parameters in node_parameters(settings).items():
+            given = {**parameters, **BY_THE_CLOCK}
+            overrides = [Parameter(key, value=value) for key, value in given.items()]
+            nodes.append(node_class(name)(parameter_overrides=overrides))
+        for node in nodes:
+            executor.add_node(node)
+        bench = ClockLaboratory(client, Spinner(executor), clock, heard)
+        assert bench.spinner.spin_until(lambda: client.ready(True) and bench.steps, LIMIT)
+        yield bench
+    finally:
+        for node in reversed(nodes):
+            node.destroy_node()
+        executor.shutdown()
+        rclpy.shutdown()
+
+
+@pytest.mark.parametrize("set_by", [-0.3, -3.0, -DAY, 400.0 * DAY])
+def test_a_clock_that_is_set_changes_nothing_but_stamps(network, tmp_path, set_by):
+    with laboratory(tmp_path / "bag") as bench:
+        sent = bench.client.send((), 0, 0)
+        assert bench.spinner.spin_until(lambda: len(bench.steps) > 3, LIMIT)
+        bench.clock.set_by(set_by)
+        assert bench.spinner.spin_until(sent.done, LIMIT)
+        ended = sent.result().get_result_async()
+        assert bench.spinner.spin_until(ended.done, LIMIT)
+        first = ended.result().result
+        assert first.success, first.error_msg
+        bench.clock.set_by(-2.0 * set_by)  # between two episodes, the other way
+        again = bench.solve(bench.reset(seed=4))
+        assert again.success, again.error_msg
+        bench.close_bag()
+    found = evaluate_bag(tmp_path / "bag")
+    assert (found.damage, found.mismatches) == (None, [])
+    lengths = [run.plan_length for run in found.runs]
+    assert lengths == [first.plan_length, again.plan_length]
+    assert found.compared == sum(lengths) + 2
