@@ -12,7 +12,7 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import KeyValue
 from std_msgs.msg import Header
 
-from slap_ros.core import Action, Domain, Skill, Task
+from slap_ros.core import Action, ActionSpace, Domain, Skill, Task
 from slap_ros.perception import Percept
 from slap_ros.planning.options import OptionKind
 from slap_ros.planning.plan import Plan, PlanEdge
@@ -31,7 +31,7 @@ def header(stamp: Time) -> Header:
 
 def domain_info(domain: Domain, stamp: Time) -> msgs.DomainInfo:
     """Which world runs: types, predicates, operators, configuration and versions."""
-    arm = domain.action_space.axes[:-1]
+    moved = domain.action_space.displacement_axes
     return msgs.DomainInfo(
         header=header(stamp),
         name=domain.name,
@@ -50,8 +50,8 @@ def domain_info(domain: Domain, stamp: Time) -> msgs.DomainInfo:
             for p in domain.predicates
         ],
         operators_pddl=write_domain(domain.name, domain.types, domain.predicates, domain.operators),
-        action_names=[axis.name for axis in arm],
-        action_units=[axis.unit for axis in arm],
+        action_names=[axis.name for axis in moved],
+        action_units=[axis.unit for axis in moved],
         control_period=domain.execution.control_period_s,
         configuration=key_values(domain.configuration),
         versions=key_values(versions()),
@@ -156,11 +156,14 @@ def task(
     )
 
 
-def command(action: Action, episode: int, step: int, stamp: Time) -> msgs.RobotCommand:
+def command(
+    action: Action, actions: ActionSpace, episode: int, step: int, stamp: Time
+) -> msgs.RobotCommand:
     """What the robot is to do next.
 
     Args:
-        action: As in the domain's action space, gripper last; shape (n + 1,).
+        action: One entry per axis.
+        actions: The domain's: which axis is the gripper.
         episode: Number of the episode.
         step: The step of the state that it answers.
         stamp: When it was decided.
@@ -168,9 +171,9 @@ def command(action: Action, episode: int, step: int, stamp: Time) -> msgs.RobotC
     Returns:
         The message.
     """
-    *deltas, gripper = action.tolist()
+    deltas, gripper = actions.split(action)
     return msgs.RobotCommand(
-        header=header(stamp), episode=episode, step=step, deltas=deltas, gripper=gripper
+        header=header(stamp), episode=episode, step=step, deltas=deltas.tolist(), gripper=gripper
     )
 
 

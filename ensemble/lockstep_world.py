@@ -116,7 +116,7 @@ class LockstepWorld(Node, ABC, Generic[P]):
     def _on_command(self, message: RobotCommand) -> None:
         try:
             self._require_current(message)
-            self._apply(decode_command(message))
+            self._apply(decode_command(message, self._domain.action_space))
         except tuple(REFUSALS) as error:
             self._refuse(error)
 

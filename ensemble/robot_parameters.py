@@ -84,7 +84,7 @@ class RobotBridgeParameters(RobotParameters, WorldParameters):
     """Those of a robot, and how long robot_bridge waits: see the docstring of its node."""
 
     domain: str = parameter("obstacle_tower", "which domain")
-    preset: str = parameter("fair", "one that obeys the joints' speed limit")
+    preset: str = parameter("", "one that obeys the joints' speed limit")
     settle_time: float = parameter(1.5, "s to wait for what moves to come to rest")
     detection_timeout: float = parameter(2.0, "s without a measured state until the robot holds")
     hold_after: float = parameter(0.5, "s without a command after which it says that it holds")
@@ -104,7 +104,7 @@ class MockRobotParameters(WorldParameters):
     """What a mock robot is: see the docstring of ``robot_bridge.mock.node``."""
 
     domain: str = parameter("obstacle_tower", "which domain")
-    preset: str = parameter("fair", "as the bridge's")
+    preset: str = parameter("", "as the bridge's")
     seed: int = parameter(0, "samples the task")
     arm: str = parameter("panda", "prefix of joints and frames")
     trajectory_action: str = parameter(TRAJECTORY_ACTION, "the arm's controller")

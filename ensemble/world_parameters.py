@@ -14,6 +14,6 @@ class WorldParameters:
     """Which domain runs, and its first task."""
 
     domain: str = parameter("obstacle2d", "which domain")
-    preset: str = parameter("fair", "fair: random tasks; paper: the paper's start states")
+    preset: str = parameter("", "the domain's; empty: its first, which of ours is fair")
     seed: int = parameter(0, "samples the first task")
     index: int = parameter(0, "which of the seed's tasks")

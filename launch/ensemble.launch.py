@@ -23,7 +23,10 @@ from slap_ros.doctor.settings import RANGE, RANGE_HINT
 
 ARGUMENTS = {
     "domain": ("obstacle2d", "which domain"),
-    "preset": ("fair", "fair: random tasks; paper: the paper's start states"),
+    "preset": (
+        "",
+        "fair: random tasks; paper: the paper's start states; empty: the domain's first",
+    ),
     "seed": ("0", "samples the task"),
     "index": ("0", "which of the seed's tasks"),
     "planner": ("lazy", "lazy, exhaustive or ff"),

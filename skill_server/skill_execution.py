@@ -7,7 +7,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from time import monotonic
 
-import numpy as np
 from rclpy.action.server import ServerGoalHandle
 from rclpy.node import Node
 from rclpy.task import Future
@@ -115,8 +114,7 @@ class SkillExecution:
 
     def _hold(self) -> None:
         """Stop the robot where it is, gripper as it is."""
-        axes = self.start.episode.domain.action_space.axes
-        self.publisher.command(np.zeros(len(axes)), self.latest)
+        self.publisher.command(self.start.episode.domain.action_space.hold, self.latest)
         self._stop(ErrorCode.SKILL_CANCELED, "canceled")
 
     def _stop(self, code: ErrorCode, reason: str) -> None:

@@ -39,7 +39,8 @@ class SkillPublisher:
     def command(self, action: Action, at: Observation) -> None:
         """Publish the action that answers an observation."""
         now = self._node.get_clock().now().to_msg()
-        self._commands.publish(encode.command(action, at.episode.number, at.step, now))
+        actions = at.episode.domain.action_space
+        self._commands.publish(encode.command(action, actions, at.episode.number, at.step, now))
 
     def event(self, kind: int, option: Option, at: Observation, outcome: OptionResult) -> None:
         """Publish a SkillEvent.

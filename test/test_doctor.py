@@ -89,6 +89,7 @@ def test_healthy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, about: ros.Rcl
         "Live view",
         "Language models",
         "Local language model",
+        "Domains",
         "Disk space for runs",
         "Write permission for runs",
         "Open-file limit",

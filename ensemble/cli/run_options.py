@@ -31,7 +31,7 @@ class RunOptions:
     domain: DomainName
     seed: Seed = 0
     index: Index = 0
-    preset: Preset = "fair"
+    preset: Preset = None
     goal: Goal = None
     shortcuts: Shortcuts = None
     samples: Samples = SAMPLES

@@ -84,7 +84,7 @@ def _request(options: RunOptions, domain: Domain, task: Task) -> RunRequest:
     quality.require_known(task.initial_state.layout.by_name.keys())
     settings = RunSettings(
         options.domain,
-        options.preset,
+        domain.preset,
         options.seed,
         options.index,
         options.planner,

@@ -6,7 +6,7 @@ It moves the domain's world when its controllers are asked to, and lets time pas
 as anything moves. For tests, and for trying the bridge out before there is a robot.
 
 ROS Parameters:
-    domain (string, "obstacle_tower"), preset (string, "fair"), seed (int, 0), index (int, 0): the
+    domain (string, "obstacle_tower"), preset (string, ""), seed (int, 0), index (int, 0): the
         task in whose initial state the world is.
     arm (string, "panda"): prefix of joints and frames.
     trajectory_action (string, "ARM_arm_controller/follow_joint_trajectory"),

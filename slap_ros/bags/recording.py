@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from slap_ros.bags.reader import Bag
-from slap_ros.core import Action, Domain
+from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.errors import ForeignBagError
 from slap_ros.evaluation.metrics import AtomNames, atom_names
-from slap_ros.messages.decode import decode_command, decode_state, stamp_ns
+from slap_ros.messages.decode import decode_state, stamp_ns
 from slap_ros.messages.interfaces import (
     ATOMS,
     BODIES,
@@ -42,7 +42,7 @@ class RecordedEpisode:
     states: dict[int, StateMessage] = field(default_factory=dict)
     atoms: dict[int, AtomNames] = field(default_factory=dict)
     exact: set[int] = field(default_factory=set)  # steps of atoms that can be found again
-    commands: dict[int, list[Action]] = field(default_factory=dict)  # in order of arrival
+    commands: dict[int, list[CommandMessage]] = field(default_factory=dict)  # in order of arrival
 
 
 class Recording:
@@ -94,7 +94,7 @@ class Recording:
 
     def _add_command(self, msg: CommandMessage) -> None:
         commands = self._episode(msg.episode).commands
-        commands.setdefault(msg.step, []).append(decode_command(msg))
+        commands.setdefault(msg.step, []).append(msg)
 
     def _add_markers(self, msg: MarkersMessage) -> None:
         if any(marker.ns == BODIES for marker in msg.markers):

@@ -12,9 +12,10 @@ import numpy as np
 
 from slap_ros.bags.evaluate import read_runs
 from slap_ros.bags.recording import RecordedEpisode, initial_state
-from slap_ros.core import Action, Domain, World
+from slap_ros.core import ActionSpace, Domain, World
 from slap_ros.errors import DamagedBagError, InvalidCommandError, InvalidStateError
-from slap_ros.messages.decode import decode_state
+from slap_ros.messages.decode import decode_command, decode_state
+from slap_ros.messages.protocols import CommandMessage
 from slap_ros.relational import State
 
 
@@ -78,7 +79,8 @@ class _Replay:
     """An episode replayed in a world of its own."""
 
     world: World
-    commands: dict[int, list[Action]] = field(default_factory=dict)
+    actions: ActionSpace
+    commands: dict[int, list[CommandMessage]] = field(default_factory=dict)
 
     def advance(self, first: int, last: int, recorded: State) -> State | None:
         """From the state of step ``first`` to that of ``last``; None where commands are missing."""
@@ -89,7 +91,7 @@ class _Replay:
             return None
         return self.world.state
 
-    def _step(self, candidates: Sequence[Action], recorded: State | None) -> bool:
+    def _step(self, candidates: Sequence[CommandMessage], recorded: State | None) -> bool:
         """Carry out the command that the simulator took.
 
         The bag has those that it refused, too, and topics from several nodes interleave as they
@@ -98,11 +100,11 @@ class _Replay:
         """
         before = self.world.state
         after: list[State] = []
-        for action in candidates:
+        for message in candidates:
             if after:
                 self.world.reset(before)
             try:
-                after.append(self.world.step(action))
+                after.append(self.world.step(decode_command(message, self.actions)))
             except InvalidCommandError:
                 continue  # the simulator refused it just so
             if recorded is None or after[-1] == recorded:
@@ -118,7 +120,7 @@ def _replay(episode: RecordedEpisode, domain: Domain) -> Iterator[tuple[int, Sta
     if start is None:
         return
     current, state = start
-    replay = _Replay(domain.make_world(state), episode.commands)
+    replay = _Replay(domain.make_world(state), domain.action_space, episode.commands)
     types = domain.types_by_name
     for step in sorted(episode.states):
         recorded = decode_state(episode.states[step], types)

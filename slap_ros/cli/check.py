@@ -19,7 +19,7 @@ from slap_ros.errors import ErrorCode
 
 def check(
     domain: DomainName,
-    preset: Preset = "fair",
+    preset: Preset = None,
     seed: Seed = 0,
     tasks: Annotated[int, typer.Option(min=1, help="Tasks that are planned and executed.")] = 50,
     states: Annotated[

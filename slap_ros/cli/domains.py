@@ -11,7 +11,7 @@ from rich.table import Table
 from slap_ros.cli.console import console, print_json
 from slap_ros.cli.options import Json
 from slap_ros.core import Domain
-from slap_ros.domains import PRESETS, domain_names, get_domain
+from slap_ros.domains import domain_names, get_domain, preset_names
 from slap_ros.errors import InvalidDomainError
 
 
@@ -19,7 +19,7 @@ def _available() -> Iterator[Domain]:
     """Every domain that can be made here; for the others, say why not."""
     for name in domain_names():
         try:
-            yield from [get_domain(name, preset) for preset in PRESETS]
+            yield from [get_domain(name, preset) for preset in preset_names(name)]
         except InvalidDomainError as error:
             console.print(str(error))
 

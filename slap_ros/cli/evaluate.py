@@ -33,7 +33,7 @@ def evaluate(
             help="Test seeds are those from 0 on; training draws its tasks from seed 1000000 on.",
         ),
     ] = 0,
-    preset: Preset = "fair",
+    preset: Preset = None,
     shortcuts: Shortcuts = None,
     samples: Samples = SAMPLES,
     planner: Planner = "lazy",

@@ -17,7 +17,11 @@ R = TypeVar("R")
 DomainName = Annotated[str, typer.Argument(help="One of `slap domains`.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
 Preset = Annotated[
-    str, typer.Option(help="fair: random tasks; paper: the start states of the paper's code.")
+    str | None,
+    typer.Option(
+        help="One of the domain's, see `slap domains`; default: its first. Of ours, fair: random "
+        "tasks; paper: the start states of the paper's code."
+    ),
 ]
 Planner = Annotated[
     str, typer.Option(help="lazy, exhaustive (the paper's) or ff (greedy best-first, SLAP D.2).")

@@ -40,7 +40,7 @@ def plan(
     ] = None,
     seed: Seed = 0,
     index: Index = 0,
-    preset: Preset = "fair",
+    preset: Preset = None,
     goal: Goal = None,
     shortcuts: Shortcuts = None,
     samples: Samples = SAMPLES,

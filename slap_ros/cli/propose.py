@@ -75,7 +75,7 @@ class ProposeOptions:
     ] = None
     seed: Seed = 0
     index: Index = 0
-    preset: Preset = "fair"
+    preset: Preset = None
     goal: Goal = None
     model: Annotated[
         str | None, typer.Option(help="Default: SLAP_LANGUAGE_MODEL, or the settings' own.")

@@ -56,7 +56,7 @@ class TaskOptions:
 
     tasks: Tasks = 4
     seeds: Seeds = 5
-    preset: Preset = "fair"
+    preset: Preset = None
     jobs: Jobs = 1
     output: Output = RESULTS
 
@@ -135,16 +135,16 @@ def pruning_(
 ) -> None:
     """SLAP Table 2: how many candidates random rollouts leave over."""
     require_matplotlib()
-    get_domain(domain, options.preset)
+    preset = get_domain(domain, options.preset).preset
     if work:
         folders = [TrainingFolder(folder) for folder in work]
         explored, how = pruning.explored_in(folders, domain)
         origin = Provenance(domain, _command("pruning", domain, work=work), _trainings(folders))
     else:
         how = training_settings(settings, domain).exploration
-        explored = _explore(domain, options, how)
+        explored = _explore(domain, preset, options, how)
         sampled_from = {
-            "preset": options.preset,
+            "preset": preset,
             "tasks": options.tasks,
             "seeds": options.seeds,
             "settings": settings,
@@ -206,7 +206,7 @@ def _compare(domain: str, options: ComparisonOptions) -> tuple[Comparison, Data]
         )
     compared = approaches(library, sampling(options.samples))
     settings = {
-        "preset": options.preset,
+        "preset": chosen.preset,
         "tasks": options.tasks,
         "seeds": options.seeds,
         "samples": options.samples,
@@ -227,10 +227,9 @@ def _given(options: ComparisonOptions, settings: Data) -> Data:
 
 
 def _explore(
-    domain: str, options: TaskOptions, how: ExplorationSettings
+    domain: str, preset: str, options: TaskOptions, how: ExplorationSettings
 ) -> tuple[pruning.PrunedCandidates, ...]:
-    preset, seeds = options.preset, range(options.seeds)
-    trainings = [TaskDistribution(domain, preset, seed) for seed in seeds]
+    trainings = [TaskDistribution(domain, preset, seed) for seed in range(options.seeds)]
     with _StudyBars() as bars:
         return pruning.explore(trainings, options.tasks, how, options.jobs, bars)
 

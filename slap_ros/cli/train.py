@@ -38,7 +38,7 @@ class TrainOptions:
     output: Annotated[
         Path | None, typer.Option(help="The library's folder. Default: runs/models/DOMAIN.")
     ] = None
-    preset: Preset = "fair"
+    preset: Preset = None
     seed: Annotated[int, typer.Option(min=0, help="Of everything.")] = 0
     settings: Annotated[str, typer.Option(help="ours, or paper: the paper's hyper-parameters.")] = (
         "ours"
@@ -93,11 +93,12 @@ def train(options: TrainOptions) -> int:
     Interrupted, it goes on where it was when the same command is given again. Progress for
     TensorBoard is in the work folder.
     """
-    get_domain(options.domain, options.preset)
+    domain = get_domain(options.domain, options.preset)
+    options = replace(options, preset=domain.preset)
     settings = options.training_settings
     _require_torch()
     began, folder = monotonic(), options.library_folder
-    distribution = TaskDistribution(options.domain, options.preset, options.seed)
+    distribution = TaskDistribution(domain.name, domain.preset, options.seed)
     with _workers(options.jobs, options.ray) as workers, _TrainingBars() as bars:
         library = Training(distribution, settings, options.work_folder, workers, bars).run()
     library = replace(library, record={"command": options.command, **library.record})

@@ -21,7 +21,7 @@ from slap_ros.contact.scene import ContactScene
 from slap_ros.contact.simulation_pool import acquire, release
 from slap_ros.contact.snapshot import ContactSnapshot, StateIndex
 from slap_ros.contact.validation import require_possible
-from slap_ros.core import Action, ActionSpace
+from slap_ros.core import Action, ActionSpace, GripperAxis
 from slap_ros.errors import InvalidStateError
 from slap_ros.geometry.pose import Pose, from_rotation_vector, multiply
 from slap_ros.relational import Feature, State
@@ -36,6 +36,7 @@ ACTION_SPACE = ActionSpace(
     ),
     low=(-MAX_SHIFT, -MAX_SHIFT, -MAX_SHIFT, -MAX_TURN, -1.0),
     high=(MAX_SHIFT, MAX_SHIFT, MAX_SHIFT, MAX_TURN, 1.0),
+    gripper=GripperAxis("gripper"),
 )
 ACTING = 0.5  # 1, beyond which the gripper is told something new
 

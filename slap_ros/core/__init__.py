@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The contract between domains and everything that plans, learns, executes or shows."""
 
-from slap_ros.core.action_space import Action, ActionSpace
+from slap_ros.core.action_space import Action, ActionSpace, GripperAxis
 from slap_ros.core.display import Animate, Display, VisibleBody
 from slap_ros.core.domain import Domain, Execution
+from slap_ros.core.domain_factory import DomainFactory, presets
 from slap_ros.core.learner_interface import LearnerInterface, Learning
 from slap_ros.core.skill import Policy, Skill
 from slap_ros.core.task import Task
@@ -16,7 +17,9 @@ __all__ = [
     "Animate",
     "Display",
     "Domain",
+    "DomainFactory",
     "Execution",
+    "GripperAxis",
     "LearnerInterface",
     "Learning",
     "MakeVectorWorld",
@@ -27,4 +30,5 @@ __all__ = [
     "VectorWorld",
     "VisibleBody",
     "World",
+    "presets",
 ]

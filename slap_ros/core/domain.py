@@ -72,7 +72,7 @@ class Domain:
 
         Raises:
             InvalidDomainError: A name occurs twice, an operator uses an unknown predicate or
-                type, or has no skill.
+                type, or has no skill; or learned actions have other axes than the robot.
         """
         for kind, names in (
             ("type", [t.name for t in self.types]),
@@ -90,6 +90,16 @@ class Domain:
                 )
         for operator in self.operators:
             self._check_operator(operator)
+        self._check_learned_actions()
+
+    def _check_learned_actions(self) -> None:
+        own, learned = self.action_space, self.learned_actions
+        if (own.axes, own.gripper) != (learned.axes, learned.gripper):
+            raise InvalidDomainError(
+                f"domain {self.name}: learned actions have other axes or another gripper than the "
+                f"robot's ({', '.join(axis.name for axis in own.axes)}; {own.gripper}): give "
+                "Learning.actions narrower limits and nothing else"
+            )
 
     def _check_operator(self, operator: LiftedOperator) -> None:
         where = f"domain {self.name}, operator {operator.name}"

@@ -8,7 +8,7 @@ What an environment needs beyond Gymnasium's own interface:
   order and the units of its :class:`~slap_ros.relational.Type`, and *everything* that the next
   step depends on is among them;
 - ``reset(options={"state": observation})`` continues from that observation, exactly;
-- actions are arrays: a displacement along each axis, the gripper last.
+- actions are arrays with one entry per axis of the action space, in its order.
 
 Rewards and ends of episodes are not read: tasks have goals. Wrappers that end episodes are better
 left off (``env.unwrapped``).

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from slap_ros.doctor import dds, libraries, machine, ros
+from slap_ros.doctor import dds, domains, libraries, machine, ros
 from slap_ros.doctor.check import Check, Status
 
 __all__ = ["Check", "Status", "diagnose"]
@@ -37,6 +37,7 @@ def diagnose(runs: Path = RUNS) -> list[Check]:
         libraries.live(),
         libraries.language(),
         libraries.local_language(),
+        domains.others(),
         machine.disk_space(runs),
         machine.write_permission(runs),
         machine.open_files(),

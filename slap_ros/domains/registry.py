@@ -2,24 +2,28 @@
 # SPDX-License-Identifier: Apache-2.0
 """Domains by name: ours, and those that other distributions register.
 
-Another distribution adds a domain with an entry point in the group ``slap_ros.domains`` whose
-value is a function ``make(preset: str) -> Domain``; one that also takes a mapping of settings to
-change, by name and as text, has presets such as ``fair:obstacles=6``.
+Another distribution adds a domain with an entry point in the group ``slap_ros.domains``, whose name
+is the domain's and whose value is a function that makes it. A function that takes nothing makes the
+one preset ``default``; :func:`slap_ros.core.presets` names others.
+
+Whatever the code of another distribution raises is an InvalidDomainError of that domain, and
+nobody else's.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib import import_module
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, distributions
+from traceback import format_exception_only
 
-from slap_ros.core import Domain
+from slap_ros.core import Domain, DomainFactory
 from slap_ros.domains.variation import parse_preset
 from slap_ros.errors import InvalidDomainError, InvalidParameterError, UnknownDomainError
 
-PRESETS = ("fair", "paper")  # random tasks; the paper's own start states
 ENTRY_POINTS = "slap_ros.domains"
 OURS = {
     "obstacle2d": "slap_ros.domains.obstacle2d",
@@ -27,47 +31,131 @@ OURS = {
     "cluttered_drawer": "slap_ros.domains.cluttered_drawer",
     "cleanup_table": "slap_ros.domains.cleanup_table",
 }
+CACHED = 64  # domains that are made once
+
+
+@dataclass(frozen=True)
+class Registrations:
+    """What other distributions register.
+
+    Args:
+        entries: Of all distributions that can be read.
+        unreadable: The others, each with what reading it raised.
+    """
+
+    entries: tuple[EntryPoint, ...]
+    unreadable: tuple[str, ...]
+
+
+def registrations() -> Registrations:
+    """Read every distribution by itself: ``entry_points`` raises for all if one is malformed."""
+    entries: list[EntryPoint] = []
+    unreadable: list[str] = []
+    seen: set[str] = set()
+    for distribution in distributions():
+        name = distribution.metadata["Name"] or str(distribution)
+        if name in seen:  # one that comes later on the path is hidden
+            continue
+        seen.add(name)
+        try:
+            entries += distribution.entry_points.select(group=ENTRY_POINTS)
+        except (TypeError, ValueError, OSError) as error:
+            unreadable.append(f"{name}: {error!r}")
+    return Registrations(tuple(entries), tuple(unreadable))
 
 
 def domain_names() -> list[str]:
     """Every known domain: ours first, then those of other distributions."""
-    others = {entry.name for entry in entry_points(group=ENTRY_POINTS)} - set(OURS)
+    others = {entry.name for entry in registrations().entries} - set(OURS)
     return [*OURS, *sorted(others)]
 
 
-@lru_cache(maxsize=64)
-def get_domain(name: str, preset: str = "fair") -> Domain:
+def preset_names(name: str) -> tuple[str, ...]:
+    """The presets of a domain, the default one first.
+
+    Raises:
+        UnknownDomainError: No such domain.
+        InvalidDomainError: The domain's own code fails.
+    """
+    return _factory(name).presets
+
+
+def get_domain(name: str, preset: str | None = None) -> Domain:
     """Make a domain.
 
     Args:
         name: One of :func:`domain_names`.
-        preset: One of ``PRESETS``, maybe with settings: ``fair:obstacles=6``.
+        preset: One of :func:`preset_names`, maybe with settings: ``fair:obstacles=6``. None, or
+            empty: the first.
 
     Raises:
         UnknownDomainError: No such domain.
         InvalidParameterError: No such preset or setting.
         InvalidDomainError: The domain's own code fails or is inconsistent.
     """
-    base, changes = parse_preset(preset)
-    if base not in PRESETS:
-        raise InvalidParameterError(f"unknown preset {base!r}; there are {', '.join(PRESETS)}")
+    return _make(name, preset or preset_names(name)[0])
+
+
+def forget_domains() -> None:
+    """Look again at what is installed, and make domains again."""
+    _factory.cache_clear()
+    _make.cache_clear()
+
+
+@lru_cache(maxsize=CACHED)
+def _make(name: str, preset: str) -> Domain:
     factory = _factory(name)
-    return replace(factory(base, changes), preset=preset) if changes else factory(base)
+    base, changes = parse_preset(preset)
+    with _blaming(name, let_pass=(InvalidParameterError,)):
+        domain = factory(base, changes)
+        if not isinstance(domain, Domain):
+            raise InvalidDomainError(f"domain {name!r}: {domain!r} was made, which is no Domain")
+        if domain.name != name:
+            raise InvalidDomainError(
+                f"domain {name!r} calls itself {domain.name!r}; give the entry point that name"
+            )
+    return domain if domain.preset == preset else replace(domain, preset=preset)
 
 
-def _factory(name: str) -> Callable[..., Domain]:
-    if name in OURS:
-        return _load(name, lambda: import_module(OURS[name]).make)
-    for entry in entry_points(group=ENTRY_POINTS):
-        if entry.name == name:
-            return _load(entry.name, entry.load)
-    raise UnknownDomainError(f"unknown domain {name!r}; there are {', '.join(domain_names())}")
+@lru_cache(maxsize=CACHED)
+def _factory(name: str) -> DomainFactory:
+    entries = [entry for entry in registrations().entries if entry.name == name]
+    if name not in OURS and not entries:
+        raise UnknownDomainError(f"unknown domain {name!r}; there are {', '.join(domain_names())}")
+    with _blaming(name):
+        made = import_module(OURS[name]).make if name in OURS else _load(name, entries)
+        if not callable(made):
+            raise InvalidDomainError(f"domain {name!r}: {made!r} is no function that makes it")
+        return made if isinstance(made, DomainFactory) else DomainFactory(made)
 
 
-def _load(name: str, load: Callable[[], Callable[..., Domain]]) -> Callable[..., Domain]:
+def _load(name: str, entries: list[EntryPoint]) -> object:
+    """What the entry points of this name, one as a rule, stand for."""
+    if len({entry.value for entry in entries}) > 1:
+        owners = ", ".join(sorted(f"{e.dist.name if e.dist else '?'} ({e.value})" for e in entries))
+        raise InvalidDomainError(f"domain {name!r} is registered more than once: by {owners}")
+    return entries[0].load()
+
+
+@contextmanager
+def _blaming(name: str, let_pass: tuple[type[Exception], ...] = ()) -> Iterator[None]:
+    """Whatever a domain's own code raises, even to end the process, is that domain's error.
+
+    Args:
+        name: Of the domain.
+        let_pass: What is nobody's fault but the caller's.
+    """
     try:
-        return load()
-    except (ImportError, AttributeError) as error:
+        yield
+    except BaseException as error:
+        if isinstance(error, (KeyboardInterrupt, *let_pass)):
+            raise
+        if isinstance(error, InvalidDomainError) and name in str(error):
+            raise
+        # Also of an exception whose own message fails.
+        *_, said = "".join(format_exception_only(error)).strip().splitlines()
         raise InvalidDomainError(
-            f"domain {name!r} cannot be imported: {error}; `slap doctor` says what is missing"
+            f"domain {name!r} cannot be made: {said}; `slap doctor` says what is missing of ours, "
+            f'`python -c "from slap_ros.domains import get_domain; get_domain({name!r})"` where it '
+            "fails"
         ) from error

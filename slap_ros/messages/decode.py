@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from slap_ros.core import Action
+from slap_ros.core import Action, ActionSpace
 from slap_ros.errors import InvalidStateError
 from slap_ros.messages.protocols import (
     CommandMessage,
@@ -103,6 +103,10 @@ def decode_goal(msgs: Iterable[GroundAtomMessage], space: AtomSpace) -> frozense
     return frozenset(space.atom(msg.predicate, msg.objects) for msg in msgs)
 
 
-def decode_command(msg: CommandMessage) -> Action:
-    """The action that a command asks for, the gripper last. Not checked: a world does that."""
-    return np.array([*msg.deltas, msg.gripper], dtype=np.float64)
+def decode_command(msg: CommandMessage, actions: ActionSpace) -> Action:
+    """The action that a command asks for. Its range is not checked: a world does that.
+
+    Raises:
+        InvalidCommandError: It commands a gripper, and there is none.
+    """
+    return actions.join(np.asarray(msg.deltas, dtype=np.float64), float(msg.gripper))

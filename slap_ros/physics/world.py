@@ -13,7 +13,7 @@ import weakref
 from dataclasses import replace
 from types import TracebackType
 
-from slap_ros.core import Action, ActionSpace
+from slap_ros.core import Action, ActionSpace, GripperAxis
 from slap_ros.errors import InvalidStateError
 from slap_ros.physics.arm import Arm, Obstacle, Penetration, Sweep
 from slap_ros.physics.features import JOINT_FEATURES
@@ -37,6 +37,7 @@ ACTION_SPACE = ActionSpace(
     axes=(*JOINT_FEATURES, Feature("gripper", "1")),
     low=(*(-step for step in MAX_STEP), -1.0),
     high=(*MAX_STEP, 1.0),
+    gripper=GripperAxis("gripper"),
 )
 STEPPING = Stepping()
 

@@ -10,8 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from time import perf_counter
 
-import numpy as np
-
 from slap_ros.core import Action, Domain, World
 from slap_ros.errors import (
     ErrorCode,
@@ -111,7 +109,7 @@ class Executor:
             episode.replans += 1
             if unplanned and episode.plan_length < self.step_limit:
                 # Another percept may be right where this one has no plan.
-                self._act(np.zeros(len(self.domain.action_space.axes)), episode)
+                self._act(self.domain.action_space.hold, episode)
 
     def _plan_and_execute(self, episode: EpisodeResult) -> tuple[OptionResult, bool]:
         """One plan, up to its end or divergence; second, whether there was no plan."""

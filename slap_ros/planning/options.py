@@ -211,5 +211,5 @@ class OptionExecution:
         action = self._policy(state) if self._held_steps == 0 else None
         if action is None and self._held_steps < self.patience:
             self._held_steps += 1
-            return np.zeros(len(self.actions.axes))
+            return self.actions.hold
         return action

@@ -14,6 +14,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
+import numpy as np
+
 from slap_ros.core import Action, Domain
 from slap_ros.errors import (
     InvalidMeasurementError,
@@ -255,7 +257,7 @@ class RobotWorld:
 def _require_panda(domain: Domain, limits: Limits) -> None:
     if ROBOT not in domain.types:
         raise InvalidParameterError(f"{domain.name} has no Panda, which a real robot is here")
-    *reach, _ = domain.action_space.high
+    reach, _ = domain.action_space.split(np.array(domain.action_space.high))
     if any(a > b + STEP_TOLERANCE for a, b in zip(reach, limits.step, strict=True)):
         raise InvalidParameterError(
             f"preset {domain.preset} of {domain.name} lets joints jump by up to {max(reach):.2f} "

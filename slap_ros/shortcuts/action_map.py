@@ -14,16 +14,16 @@ class ActionMap:
     """Scales actions from [-1, 1] to the range of the learned axes of a domain."""
 
     def __init__(self, domain: Domain, gripper: bool) -> None:
-        """``gripper``: whether the policy has the gripper among its actions, as the last axis."""
+        """``gripper``: whether the policy commands the gripper too, where there is one."""
         space = domain.learned_actions
         low, high = np.array(space.low), np.array(space.high)
         self._middle, self._half = (low + high) / 2, (high - low) / 2
-        self._gripper = gripper
-        self.size = len(low) if gripper else len(low) - 1
+        self._axes = list(range(len(low)) if gripper else space.displacement_indices)
+        self.size = len(self._axes)
 
     def __call__(self, actions: Array) -> Array:
-        """The robot's actions, shape (..., axes); without a gripper axis it stays as it is."""
-        if not self._gripper:
-            actions = np.concatenate([actions, np.zeros((*actions.shape[:-1], 1))], axis=-1)
-        mapped: Array = self._middle + self._half * np.clip(actions, -1.0, 1.0)
+        """The robot's actions, shape (..., axes); one that is not commanded is 0."""
+        mapped = np.zeros((*actions.shape[:-1], len(self._middle)))
+        scaled = self._half[self._axes] * np.clip(actions, -1.0, 1.0)
+        mapped[..., self._axes] = self._middle[self._axes] + scaled
         return mapped

@@ -34,7 +34,7 @@ from slap_ros.shortcuts.stored_keys import restored, stored
 OperatorPath = tuple[str, ...]  # operators by which a shortcut's source was reached
 ABSORBED_MOTION = 0.5  # of a motion's steps that remain where it is part of a shortcut
 UNBATCHED_WORLDS = 4  # worlds where a domain's cannot be stepped together
-GRIPPER_CHOICES = np.array([0.0, 0.0, 0.0, 1.0, -1.0])  # in every second rollout
+KEEPS = 3  # times that a gripper stays as it is, for each that it closes and each that it opens
 
 
 @dataclass(frozen=True)
@@ -154,7 +154,7 @@ class Explorer:
         )
         worlds = settings.rollouts if domain.steps_together else UNBATCHED_WORLDS
         self._worlds = domain.make_vector_world([self.task.initial_state] * worlds)
-        self._gripper = np.arange(worlds) % 2 == 1
+        self._grips = np.arange(worlds) % 2 == 1  # whether the gripper acts in a world
         self._steps = 0
 
     def explore(self) -> ExplorationResult:
@@ -268,7 +268,7 @@ class Explorer:
     def _roll_out(self, vertex: Vertex, index: Mapping[int, int]) -> dict[int, list[int]]:
         """Random rollouts, for all targets at once: steps to each node reached, by node."""
         reached: dict[int, list[int]] = {}
-        for _ in range(0, self._settings.rollouts, len(self._gripper)):
+        for _ in range(0, self._settings.rollouts, len(self._grips)):
             for first in self._roll_out_batch(vertex.state, index):
                 for j, steps in first.items():
                     if j > vertex.node:
@@ -278,15 +278,15 @@ class Explorer:
     def _roll_out_batch(self, state: State, index: Mapping[int, int]) -> list[dict[int, int]]:
         """In every world: the first step at which each node was reached, with all at rest."""
         learner, to_action = learner_interface(self._domain), ActionMap(self._domain, gripper=True)
-        worlds = len(self._gripper)
+        worlds = len(self._grips)
         for world in range(worlds):
             self._worlds.reset(world, state)
         first: list[dict[int, int]] = [{} for _ in range(worlds)]
         alive = np.ones(worlds, dtype=bool)
         for step in range(self._settings.length):
             if step % self._settings.action_repeat == 0:
-                actions = self._random_actions(to_action.size)
-            states = self._worlds.step(to_action(actions))
+                actions = self._random_actions(to_action)
+            states = self._worlds.step(actions)
             alive &= ~learner.failed(states)
             self._steps += int(alive.sum())
             at_rest = np.flatnonzero(alive & learner.at_rest(states))
@@ -300,11 +300,14 @@ class Explorer:
                 break
         return first
 
-    def _random_actions(self, axes: int) -> NDArray[np.float64]:
+    def _random_actions(self, to_action: ActionMap) -> NDArray[np.float64]:
         """One for every world, shape (worlds, axes); in every second one the gripper acts too."""
-        actions = self._rng.uniform(-1.0, 1.0, (len(self._gripper), axes))
-        commands = self._rng.choice(GRIPPER_CHOICES, len(self._gripper))
-        actions[:, -1] = np.where(self._gripper, commands, 0.0)
+        actions = to_action(self._rng.uniform(-1.0, 1.0, (len(self._grips), to_action.size)))
+        space = self._domain.learned_actions
+        if space.gripper is not None:
+            choices = np.array([*(0.0,) * KEEPS, space.gripper.closes, space.gripper.opens])
+            commands = self._rng.choice(choices, len(self._grips))
+            actions[:, space.gripper_index] = np.where(self._grips, commands, 0.0)
         return actions
 
 

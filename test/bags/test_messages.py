@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from truthful_run import Script
 
+from slap_ros.domains import get_domain
 from slap_ros.errors import (
     ErrorCode,
     InvalidStateError,
@@ -92,7 +93,7 @@ def test_atoms_and_goals(script: Script) -> None:
 
 def test_commands_and_stamps(script: Script) -> None:
     message = next(m.message for m in script.messages if m.type_name == COMMAND)
-    action = decode_command(message)
+    action = decode_command(message, get_domain("obstacle2d").action_space)
     assert action.dtype == np.float64
     assert action.tolist() == [*message.deltas, message.gripper]
     stamp = SimpleNamespace(stamp=SimpleNamespace(sec=1_700_000_000, nanosec=999_999_999))

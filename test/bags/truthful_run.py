@@ -143,13 +143,14 @@ class Script:
         self.messages[-1].message.header = header
 
     def publish_command(self, action: Any, step: int) -> None:
+        deltas, gripper = self.domain.action_space.split(action)
         self.publish(
             "/slap/command",
             interfaces.COMMAND,
             episode=self.episode,
             step=step,
-            deltas=action[:-1].copy(),
-            gripper=float(action[-1]),
+            deltas=deltas,
+            gripper=gripper,
         )
 
     def plan_event(self, kind: PlanEventKind, step: int, edge: int = 0, rolled: int = 0) -> None:

@@ -16,7 +16,7 @@ from types import MappingProxyType
 from marbles import model, skills
 from marbles.environment import MAX_STEP, PERIOD, MarblesEnv
 from marbles.learner_interface import LEARNER_INTERFACE
-from slap_ros.core import ActionSpace, Display, Domain, Execution, Learning
+from slap_ros.core import ActionSpace, Display, Domain, Execution, GripperAxis, Learning, presets
 from slap_ros.core.gymnasium_world import GymnasiumWorld
 from slap_ros.domains.variation import varied
 from slap_ros.relational import Feature
@@ -25,9 +25,11 @@ ACTIONS = ActionSpace(
     axes=(*(Feature(axis, "m") for axis in ("x", "y", "z")), Feature("gripper", "1")),
     low=(-MAX_STEP, -MAX_STEP, -MAX_STEP, -1.0),
     high=(MAX_STEP, MAX_STEP, MAX_STEP, 1.0),
+    gripper=GripperAxis("gripper"),
 )
 
 
+@presets(*model.SETTINGS)
 def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Domain:
     """The domain: preset ``fair`` strews marbles, ``paper`` has them in a row."""
     tasks = varied(model.SETTINGS[preset], changes)

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from slap_ros.core import Display, Domain, Execution, Learning
+from slap_ros.core import Display, Domain, Execution, Learning, presets
 from slap_ros.domains.cleanup_table import features, operators, predicates, skills, tasks
 from slap_ros.domains.cleanup_table.learner_interface import LEARNER_INTERFACE
 from slap_ros.domains.cleanup_table.scene import scene_of
@@ -36,6 +36,7 @@ SETTINGS: Mapping[str, tasks.RandomCleanupTasks | tasks.PaperCleanupTasks] = {
 VIEWPOINT = Viewpoint(eye=(1.7, 1.15, 0.95), target=(0.33, 0.13, 0.13))  # m, into the bin
 
 
+@presets(*SETTINGS)
 def make(
     preset: str,
     changes: Mapping[str, str] = MappingProxyType({}),

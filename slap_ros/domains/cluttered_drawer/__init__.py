@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from slap_ros.core import Display, Domain, Execution, Learning
+from slap_ros.core import Display, Domain, Execution, Learning, presets
 from slap_ros.domains.cluttered_drawer import features, operators, skills, tasks
 from slap_ros.domains.cluttered_drawer.blocking import FingerClearance
 from slap_ros.domains.cluttered_drawer.learner_interface import LEARNER_INTERFACE
@@ -38,6 +38,7 @@ VIEWPOINT = Viewpoint(
 )  # into the drawer, past the hand
 
 
+@presets(*SETTINGS)
 def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Domain:
     """The domain: preset ``fair`` samples different tasks, ``paper`` has the reference's one."""
     settings, actions = varied(SETTINGS[preset], changes), ACTION_SPACES[preset]

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from slap_ros.core import Display, Domain, Execution, Learning
+from slap_ros.core import Display, Domain, Execution, Learning, presets
 from slap_ros.domains.obstacle2d import model, skills, tasks
 from slap_ros.domains.obstacle2d.bodies import visible_bodies
 from slap_ros.domains.obstacle2d.dynamics import (
@@ -26,6 +26,7 @@ from slap_ros.domains.obstacle2d.learner_interface import LEARNER_INTERFACE
 from slap_ros.domains.variation import varied
 
 
+@presets(*tasks.SETTINGS)
 def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Domain:
     """The domain: preset ``fair`` samples different tasks, ``paper`` the reference's three."""
     settings = varied(tasks.SETTINGS[preset], changes)

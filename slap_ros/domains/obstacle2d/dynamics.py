@@ -17,7 +17,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.core import Action, ActionSpace
+from slap_ros.core import Action, ActionSpace, GripperAxis
 from slap_ros.domains.obstacle2d.model import BLOCK, BLOCK_SIZE, ROBOT, X, Y
 from slap_ros.errors import InvalidStateError
 from slap_ros.relational import Feature, Layout, State
@@ -28,6 +28,7 @@ ACTION_SPACE = ActionSpace(
     axes=(X, Y, Feature("gripper", "1")),
     low=(-MAX_STEP, -MAX_STEP, -1.0),
     high=(MAX_STEP, MAX_STEP, 1.0),
+    gripper=GripperAxis("gripper"),
 )
 CONTROL_PERIOD = 0.1  # s, nominal: the world has no dynamics
 CLOSE, OPEN = 0.5, -0.5  # gripper commands beyond which it closes or opens

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from slap_ros.core import Display, Domain, Execution, Learning
+from slap_ros.core import Display, Domain, Execution, Learning, presets
 from slap_ros.domains.obstacle_tower import features, operators, predicates, skills, tasks
 from slap_ros.domains.obstacle_tower.learner_interface import LEARNER_INTERFACE
 from slap_ros.domains.obstacle_tower.scene import scene_of
@@ -30,6 +30,7 @@ SETTINGS: Mapping[str, tasks.RandomTowerTasks | tasks.PaperTowerTasks] = {
 }
 
 
+@presets(*SETTINGS)
 def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Domain:
     """The domain: preset ``fair`` samples different tasks, ``paper`` has the reference's one."""
     settings, actions = varied(SETTINGS[preset], changes), ACTION_SPACES[preset]
