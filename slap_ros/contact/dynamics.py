@@ -34,6 +34,7 @@ from slap_ros.contact.involved import (
     moving_bounds,
     part_bounds,
     rigid_bounds,
+    space_of_way,
     touched,
 )
 from slap_ros.contact.scene import ContactScene
@@ -93,7 +94,8 @@ class ContactDynamics:
             now: How everything is, with what the hand was told now.
             pull: Where the hand is pulled in this period.
         """
-        involved = self._involved(now, self._sweep(now.hand, pull))
+        far = self._is_far(now, pull)
+        involved = NOTHING if far else self._involved(now, self._sweep(now.hand, pull))
         if involved == NOTHING:
             alone = own_way(now.hand, pull, self._scene.forces)
             return now._replace(hand=alone, held=None), ()
@@ -108,6 +110,26 @@ class ContactDynamics:
             involved = wider
 
     # -- what is involved -----------------------------------------------------------------------
+
+    def _is_far(self, now: ContactSnapshot, pull: Pose) -> bool:
+        """Whether nothing moves but the hand, and that passes nothing; quick, so that it may miss.
+
+        What it misses is found out by looking at palm and fingers one by one.
+        """
+        margin = TOUCH + OVERSHOOT_S * max(map(abs, now.hand.velocity))
+        space = space_of_way(now.hand.pose, pull, margin)
+        if space is None:
+            return False
+        for box in self._fixed:
+            if space.meets(box):
+                return False
+        bounds: list[Bounds | None] = []
+        for i, motion in enumerate(_all(now)):
+            box = self._bounds(i, motion)
+            if not motion.still or space.meets(box):
+                return False
+            bounds.append(box)
+        return not self._unsupported(now, bounds)
 
     def _involved(self, now: ContactSnapshot, sweep: Mover) -> Involved:
         bounds: list[Bounds] = []

@@ -124,6 +124,31 @@ def hand_bounds(hand: HandState) -> tuple[Bounds, Bounds]:
     )
 
 
+UPRIGHT = 0.01  # 1, of z and w of its quaternion: a hand that points straight down, nearly
+_AROUND, _ABOVE, _BELOW = 0.113, 0.14, 0.017  # m, no part of such a hand is further away
+
+
+def space_of_way(start: Pose, end: Pose, margin: float) -> Bounds | None:
+    """A space that a hand does not leave on its way, however it is turned about the vertical.
+
+    Args:
+        start: Where the hand begins.
+        end: Where it is pulled.
+        margin: By how much it may miss the straight way, m.
+
+    Returns:
+        None where the hand does not point straight down.
+    """
+    if any(abs(q) > UPRIGHT for q in (*start.quaternion[2:], *end.quaternion[2:])):
+        return None
+    (a, b, c), (x, y, z) = start.position, end.position
+    aside = _AROUND + margin
+    return Bounds(
+        (min(a, x) - aside, min(b, y) - aside, min(c, z) - _BELOW - margin),
+        (max(a, x) + aside, max(b, y) + aside, max(c, z) + _ABOVE + margin),
+    )
+
+
 class Mover(NamedTuple):
     """Something that can move in a period."""
 
