@@ -139,8 +139,8 @@ def grasps(name: str, count: int) -> dict[str, float]:
     return {
         "count": count,
         "held_percent": 100.0 * len(held) / count,
-        "slip_median_mm": 1e3 * float(np.median(held)),
-        "slip_p95_mm": 1e3 * float(np.percentile(held, 95)),
+        "slip_median_mm": 1e3 * float(np.median(held)) if held.size else math.inf,
+        "slip_p95_mm": 1e3 * float(np.percentile(held, 95)) if held.size else math.inf,
     }
 
 

@@ -45,6 +45,8 @@ COUPLING_N = 50.0  # with which the fingers are kept at the same distance from t
 COUPLING_SHARE = 0.1  # of their difference, made up for in a substep
 ITERATIONS = 50  # of the contact solver
 FASTEST = 2.0  # m/s, of any point of a jointed body, about: jammed, it would be flung
+# In each substep, a motor may give the impulse of a whole period; its force is made up for that.
+MOTOR_SUBSTEPS = SUBSTEPS
 FINGERS = (LEFT, RIGHT)
 BASE = -1  # PyBullet's number of a body's first link
 
@@ -195,7 +197,7 @@ class ContactSimulation:
                 finger,
                 pybullet.POSITION_CONTROL,
                 targetPosition=wanted,
-                force=forces.grip_n / SUBSTEPS,  # PyBullet takes a period's impulse in each substep
+                force=forces.grip_n / MOTOR_SUBSTEPS,
                 positionGain=SHARE,
                 velocityGain=1.0,
                 maxVelocity=FINGER_SPEED,
@@ -297,6 +299,10 @@ class ContactSimulation:
             localInertiaDiagonal=body.inertia,
             physicsClientId=self.client,
         )
+        if all(isinstance(part, CylinderPart) for part in body.parts):
+            pybullet.changeDynamics(
+                added, BASE, rollingFriction=ROLLING, physicsClientId=self.client
+            )
         return added
 
     def _add_rigid(self, body: Compound, surface: Surface) -> int:
@@ -329,7 +335,7 @@ class ContactSimulation:
             MOVING,
             pybullet.VELOCITY_CONTROL,
             targetVelocity=0.0,
-            force=body.joint.dry_friction / SUBSTEPS,  # as for the fingers
+            force=body.joint.dry_friction / MOTOR_SUBSTEPS,
             physicsClientId=self.client,
         )
         return added
@@ -344,8 +350,6 @@ class ContactSimulation:
         change(lateralFriction=friction)
         if surface.side in (Side.LEFT_FINGER, Side.RIGHT_FINGER):
             change(spinningFriction=FINGER_SPINNING)
-        elif surface.side in (Side.FIXED, Side.FRAME, Side.MOVING):
-            change(rollingFriction=ROLLING)
 
     def _load(self, text: str, fixed: bool) -> int:
         """A body from URDF, which PyBullet reads from files only."""
