@@ -25,7 +25,7 @@ from slap_ros.relational import LiftedAtom, LiftedOperator, Predicate, Type, Var
 from slap_ros.relational.pddl.names import check_name
 
 MAX_ACTIONS = 32
-MAX_GROUNDINGS = 20_000  # of one operator; more would keep the planner busy, not the robot
+MAX_GROUNDINGS = 5_000  # of one operator; more would keep the planner busy, not the robot
 DECOMPOSITION = "decomposition"
 
 _VARIABLE = re.compile(r"\?[A-Za-z][A-Za-z0-9_-]{0,63}")

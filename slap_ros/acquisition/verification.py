@@ -30,8 +30,10 @@ from slap_ros.relational import (
     ground_operators,
 )
 
-MAX_EXPANSIONS = 50_000  # abstract states, for a plan
-MAX_EXPLORED = 20_000  # abstract states, for an explanation
+# A model may answer with operators of thousands of groundings, each of which is looked at in every
+# abstract state; so what is bounded is the work, a few seconds of it, rather than the states.
+MAX_WORK = 2_000_000  # ground operators looked at, in all states together
+FEWEST_STATES = 50
 MAX_COMPARED = 6  # parameters of operators that are compared in every order
 SUBJECT = "operators"
 
@@ -51,25 +53,15 @@ class Verification:
     blamed: tuple[str, ...]
 
 
-def verify(
-    operators: Sequence[LiftedOperator],
-    problem: AcquisitionProblem,
-    max_expansions: int = MAX_EXPANSIONS,
-) -> Verification:
-    """Whether the operators make a plan for the problem.
-
-    Args:
-        operators: Each sound by itself.
-        problem: What they are for.
-        max_expansions: Abstract states that planning may expand.
-    """
+def verify(operators: Sequence[LiftedOperator], problem: AcquisitionProblem) -> Verification:
+    """Whether the operators, each sound by itself, make a plan for the problem."""
     if duplicates := _duplicates(operators):
         complaints, blamed = duplicates
         return Verification(None, complaints, blamed)
     grounded = ground_operators(operators, problem.space)
     try:
         sequence = find_shortest_sequence(
-            problem.start_mask, problem.goal_mask, grounded, max_expansions
+            problem.start_mask, problem.goal_mask, grounded, _most_states(grounded)
         )
     except PlanningLimitError as error:
         complaint = Complaint(ComplaintClass.TOO_LARGE, SUBJECT, str(error))
@@ -105,7 +97,7 @@ class _Exploration:
     @classmethod
     def of(cls, start: int, operators: Sequence[GroundOperator]) -> _Exploration:
         found, queue = {start}, deque([start])
-        ever_true = start
+        ever_true, most = start, _most_states(operators)
         while queue:
             state = queue.popleft()
             for operator in operators:
@@ -113,12 +105,16 @@ class _Exploration:
                     continue
                 successor = operator.apply(state)
                 if successor not in found:
-                    if len(found) == MAX_EXPLORED:
+                    if len(found) == most:
                         return cls(frozenset(found), _relaxed(start, operators), False)
                     found.add(successor)
                     queue.append(successor)
                     ever_true |= successor
         return cls(frozenset(found), ever_true, True)
+
+
+def _most_states(operators: Sequence[GroundOperator]) -> int:
+    return max(FEWEST_STATES, MAX_WORK // max(1, len(operators)))
 
 
 def _relaxed(start: int, operators: Sequence[GroundOperator]) -> int:
@@ -345,7 +341,10 @@ class _Diagnosis:
         changed = [replace(g, delete_effects=g.delete_effects & kept) for g in self._grounded]
         try:
             find_shortest_sequence(
-                self._problem.start_mask, self._problem.goal_mask, changed, MAX_EXPLORED
+                self._problem.start_mask,
+                self._problem.goal_mask,
+                changed,
+                _most_states(changed),
             )
         except (UnsolvableError, PlanningLimitError):
             return False

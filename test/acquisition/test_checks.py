@@ -34,7 +34,7 @@ from slap_ros.acquisition.rewards import check_rewards
 from slap_ros.acquisition.verification import verify
 from slap_ros.errors import ProposalRejectedError
 from slap_ros.language.formats import parse_decomposition, parse_operator, parse_rewards
-from slap_ros.relational import LiftedOperator
+from slap_ros.relational import Layout, LiftedOperator
 from slap_ros.relational.pddl import parse_domain, parse_problem
 
 ROOT = Path(__file__).parents[2]
@@ -218,6 +218,23 @@ def test_nothing_that_adds_the_goal_blames_everyone() -> None:
     verification = verify([PICK, forgetful], PEGS.problem)
     assert verification.blamed == ("Pick", "Insert")
     assert "no action adds In" in verification.complaints[0].fact
+
+
+def test_operators_that_would_keep_the_planner_busy_are_too_large() -> None:
+    """Thousands of groundings, each possible in nearly every state of astronomically many."""
+    peg, hole = (PEGS.problem.types_by_name[name] for name in ("peg", "hole"))
+    objects = [peg(f"p{i}") for i in range(15)] + [hole(f"h{i}") for i in range(15)]
+    goal = frozenset({PEGS.problem.predicates_by_name["Holding"](objects[0])})
+    problem = replace(PEGS.problem, layout=Layout.of(tuple(objects)), init=frozenset(), goal=goal)
+    fill = PEGS.words.operator(
+        "Fill", "?peg1 ?peg2 ?hole", "", "IsClear(?hole)", "In(?peg1, ?hole) OnTable(?peg2)"
+    )
+    last = PEGS.words.operator(
+        "Take", "?peg ?hole", "In(?peg, ?hole) IsClear(?hole) OnTable(?peg)", "", "Holding(?peg)"
+    )
+    clear = PEGS.words.operator("Clear", "?hole ?peg", "In(?peg, ?hole)", "", "HandEmpty()")
+    (complaint, *_) = verify([fill, clear, last], problem).complaints
+    assert complaint.kind in (C.TOO_LARGE, C.PRECONDITION_NEVER_TRUE)
 
 
 # -- proposers that ask nobody ---------------------------------------------------------------------

@@ -52,8 +52,8 @@ class ScriptedServer:
         self.headers: list[dict[str, str]] = []
         self._count: dict[str, int] = {}
         self._lock = threading.Lock()
-        self._http = ThreadingHTTPServer(("127.0.0.1", 0), self._handler())
-        self._http.daemon_threads = True
+        self._http = _Http(("127.0.0.1", 0), _Handler)
+        self._http.scripted = self
         self._thread = threading.Thread(
             target=self._http.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True
         )
@@ -72,79 +72,83 @@ class ScriptedServer:
         """How often a subject was asked for, errors included."""
         return self._count.get(subject, 0)
 
-    def next_step(self, body: dict[str, Any]) -> Step:
+    def next_step(self, body: dict[str, Any], headers: dict[str, str]) -> Step:
+        """What the script says to a request, which is kept."""
         subject = subject_of(body["messages"])
         with self._lock:
             self.requests.append(body)
+            self.headers.append(headers)
             number = self._count.get(subject, 0)
             self._count[subject] = number + 1
         steps = self.script[subject]
         return steps[min(number, len(steps) - 1)]
 
-    def _handler(self) -> type[BaseHTTPRequestHandler]:
-        server = self
 
-        class Handler(BaseHTTPRequestHandler):
-            protocol_version = "HTTP/1.1"
-            disable_nagle_algorithm = True  # else each answer waits 40 ms
+class _Http(ThreadingHTTPServer):
+    """Knows whose it is, for its handlers."""
 
-            def log_message(self, format: str, *args: object) -> None:  # noqa: A002
-                pass
+    daemon_threads = True
+    scripted: ScriptedServer
 
-            def do_POST(self) -> None:
-                length = int(self.headers["content-length"])
-                body = json.loads(self.rfile.read(length))
-                with server._lock:
-                    server.headers.append(dict(self.headers))
-                if not self.path.endswith("/chat/completions"):
-                    self._send(404, {}, b"{}")
-                    return
-                step = server.next_step(body)
-                time.sleep(step.stall_s)
-                if not step.schema and body.get("response_format", {}).get("type") == "json_schema":
-                    step = Step(status=400, error="response_format json_schema is not supported")
-                self._react(step, body)
 
-            def _react(self, step: Step, body: dict[str, Any]) -> None:
-                if step.status != 200:
-                    error = json.dumps({"error": {"message": step.error}}).encode()
-                    self._send(step.status, step.headers, error)
-                    return
-                data = step.raw if step.raw is not None else envelope(step, body)
-                if step.reset:
-                    self._begin(200, {}, len(data))
-                    self.wfile.write(data[: len(data) // 2])
-                    self.wfile.flush()
-                    linger = struct.pack("ii", 1, 0)
-                    self.connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, linger)
-                    self.connection.close()
-                    self.close_connection = True
-                    return
-                self._send(200, step.headers, data, step.trickle_s)
+class _Handler(BaseHTTPRequestHandler):
+    """Reacts to a request as the script says."""
 
-            def _begin(self, status: int, headers: Mapping[str, str], length: int) -> None:
-                self.send_response(status)
-                for name, value in {"content-type": "application/json", **headers}.items():
-                    self.send_header(name, value)
-                self.send_header("content-length", str(length))
-                self.end_headers()
+    protocol_version = "HTTP/1.1"
+    disable_nagle_algorithm = True  # else each answer waits 40 ms
+    server: _Http
 
-            def _send(
-                self, status: int, headers: Mapping[str, str], data: bytes, trickle_s: float = 0.0
-            ) -> None:
-                try:
-                    self._begin(status, headers, len(data))
-                    if trickle_s:
-                        for i in range(len(data)):
-                            self.wfile.write(data[i : i + 1])
-                            self.wfile.flush()
-                            time.sleep(trickle_s)
-                    else:
-                        self.wfile.write(data)
-                except (BrokenPipeError, ConnectionResetError):
-                    self.close_connection = True  # the client did not wait
+    def log_message(self, format: str, *args: object) -> None:  # noqa: A002
+        pass
 
-        return Handler
+    def do_POST(self) -> None:
+        body = json.loads(self.rfile.read(int(self.headers["content-length"])))
+        if not self.path.endswith("/chat/completions"):
+            self._send(404, {}, b"{}")
+            return
+        step = self.server.scripted.next_step(body, dict(self.headers))
+        time.sleep(step.stall_s)
+        if not step.schema and body.get("response_format", {}).get("type") == "json_schema":
+            step = Step(status=400, error="response_format json_schema is not supported")
+        if step.status != 200:
+            error = json.dumps({"error": {"message": step.error}}).encode()
+            self._send(step.status, step.headers, error)
+            return
+        data = step.raw if step.raw is not None else envelope(step, body)
+        if step.reset:
+            self._reset_after_half(data)
+        else:
+            self._send(200, step.headers, data, step.trickle_s)
+
+    def _begin(self, status: int, headers: Mapping[str, str], length: int) -> None:
+        self.send_response(status)
+        for name, value in {"content-type": "application/json", **headers}.items():
+            self.send_header(name, value)
+        self.send_header("content-length", str(length))
+        self.end_headers()
+
+    def _reset_after_half(self, data: bytes) -> None:
+        self._begin(200, {}, len(data))
+        self.wfile.write(data[: len(data) // 2])
+        self.wfile.flush()
+        linger = struct.pack("ii", 1, 0)
+        self.connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, linger)
+        self.connection.close()
+        self.close_connection = True
+
+    def _send(
+        self, status: int, headers: Mapping[str, str], data: bytes, trickle_s: float = 0.0
+    ) -> None:
+        try:
+            self._begin(status, headers, len(data))
+            for i in range(len(data) if trickle_s else 0):
+                self.wfile.write(data[i : i + 1])
+                self.wfile.flush()
+                time.sleep(trickle_s)
+            if not trickle_s:
+                self.wfile.write(data)
+        except (BrokenPipeError, ConnectionResetError):
+            self.close_connection = True  # the client did not wait
 
 
 def envelope(step: Step, body: dict[str, Any]) -> bytes:
