@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, permutations
+from itertools import combinations, islice, permutations
 
 from slap_ros.acquisition.complaints import Complaint, ComplaintClass
 from slap_ros.acquisition.problem import AcquisitionProblem
@@ -31,9 +31,10 @@ from slap_ros.relational import (
 )
 
 # A model may answer with operators of thousands of groundings, each of which is looked at in every
-# abstract state; so what is bounded is the work, a few seconds of it, rather than the states.
-MAX_WORK = 2_000_000  # ground operators looked at, in all states together
-FEWEST_STATES = 50
+# abstract state. So the work is bounded, to some seconds, and not the states alone.
+MAX_WORK = 10_000_000  # ground operators looked at, in all states together
+MAX_STATES = 20_000  # abstract states
+MAX_PREDICATES = 8  # whose loss is tried to be undone
 MAX_COMPARED = 6  # parameters of operators that are compared in every order
 SUBJECT = "operators"
 
@@ -114,7 +115,7 @@ class _Exploration:
 
 
 def _most_states(operators: Sequence[GroundOperator]) -> int:
-    return max(FEWEST_STATES, MAX_WORK // max(1, len(operators)))
+    return min(MAX_STATES, MAX_WORK // max(1, len(operators)))
 
 
 def _relaxed(start: int, operators: Sequence[GroundOperator]) -> int:
@@ -231,7 +232,9 @@ class _Diagnosis:
         if not groundings:
             return "its preconditions that nothing changes hold of no choice of objects together"
         atoms = _ordered(operator.preconditions)
-        for pair in combinations(atoms, 2):
+        # Only so many pairs can be compared: each with each grounding, in each state.
+        pairs = MAX_WORK // (len(groundings) * len(self._seen.states)) + 1
+        for pair in islice(combinations(atoms, 2), pairs):
             masks = {self._mask(pair, operator, g) for g in groundings}
             if not any(state & mask == mask for mask in masks for state in self._seen.states):
                 takers = self._takers(pair)
@@ -311,7 +314,7 @@ class _Diagnosis:
         atoms = ", ".join(map(str, self._problem.space.decode(goal)))
         fact = f"{atoms} can be reached each, but never together; at most {reached}"
         lost = self._never_restored()
-        decisive = [name for name in lost if self._would_help(name)]
+        decisive = [name for name in islice(lost, MAX_PREDICATES) if self._would_help(name)]
         parts = []
         for name in decisive or lost:
             deleters = " and ".join(op.name for op in lost[name])

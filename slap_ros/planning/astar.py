@@ -19,14 +19,14 @@ from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.planning.hmax import HMaxHeuristic
 from slap_ros.relational import GroundOperator
 
-MAX_EXPANSIONS = 100_000  # abstract states; some ten seconds with fifty operators
+MAX_STATES = 100_000  # abstract states; some ten seconds with fifty operators
 
 
 def find_shortest_sequence(
     start: int,
     goal: int,
     operators: Sequence[GroundOperator],
-    max_expansions: int = MAX_EXPANSIONS,
+    max_states: int = MAX_STATES,
 ) -> list[int]:
     """A shortest sequence of operators from an abstract state to the goal.
 
@@ -34,14 +34,15 @@ def find_shortest_sequence(
         start: The abstract state to start from.
         goal: Mask of atoms that must hold.
         operators: Ground operators over the same atom space.
-        max_expansions: Abstract states to expand before giving up.
+        max_states: Abstract states to discover before giving up: the heuristic looks at every
+            operator for each of them, and that is what takes the time.
 
     Returns:
         Indices into ``operators``; none where the goal holds already.
 
     Raises:
         UnsolvableError: No sequence leads to the goal.
-        PlanningLimitError: None was found within ``max_expansions``.
+        PlanningLimitError: None was found within ``max_states``.
     """
     distance = HMaxHeuristic(goal, operators)
     at_least = distance(start)
@@ -58,11 +59,6 @@ def find_shortest_sequence(
             return _trace(arrivals, state)
         if state in expanded:
             continue
-        if len(expanded) >= max_expansions:
-            raise PlanningLimitError(
-                f"no plan within {max_expansions} expansions of abstract states; raise the limit "
-                "or give a goal nearer by"
-            )
         expanded.add(state)
         length = lengths[state] + 1
         for index, operator in enumerate(operators):
@@ -76,6 +72,11 @@ def find_shortest_sequence(
                 continue
             lengths[successor], arrivals[successor] = length, (state, index)
             discovered += 1
+            if discovered > max_states:
+                raise PlanningLimitError(
+                    f"no plan within {max_states} abstract states; raise the limit or give a goal "
+                    "nearer by"
+                )
             heapq.heappush(queue, (length + remaining, remaining, discovered, successor))
     raise UnsolvableError(
         f"no sequence of operators leads to the goal: {len(expanded)} abstract states were expanded"

@@ -80,14 +80,14 @@ def test_of_equal_plans_the_one_of_earlier_operators_is_found() -> None:
 
 
 def test_nothing_to_do() -> None:
-    assert find_shortest_sequence(0b11, 0b01, [], max_expansions=0) == []
+    assert find_shortest_sequence(0b11, 0b01, [], max_states=0) == []
 
 
 def test_the_limit_is_said() -> None:
     chain = [operator(1 << i, 2 << i, 1 << i) for i in range(6)]
     assert find_shortest_sequence(1, 1 << 6, chain) == list(range(6))
-    with pytest.raises(PlanningLimitError, match="within 3 expansions"):
-        find_shortest_sequence(1, 1 << 6, chain, max_expansions=3)
+    with pytest.raises(PlanningLimitError, match="within 3 abstract states"):
+        find_shortest_sequence(1, 1 << 6, chain, max_states=3)
 
 
 def test_out_of_reach_by_deletes_and_without() -> None:
