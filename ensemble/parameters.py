@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+import math
+from array import array
+from collections.abc import Collection, Mapping
 from dataclasses import field, fields
 from typing import Any, TypeVar
 
@@ -14,11 +16,23 @@ from rclpy.node import Node
 from slap_ros.errors import InvalidParameterError
 
 P = TypeVar("P")
+MAX_NUMBER = 1e9  # of what has no other limit: seconds and steps as ROS messages have room for
+MAX_SEED = 2**63 - 1
 
 
-def parameter(default: Any, description: str) -> Any:
-    """A field of a parameters dataclass: its default gives the type, which ROS then enforces."""
-    return field(default=default, metadata={"description": description})
+def parameter(default: Any, description: str, low: float = 0.0, high: float = MAX_NUMBER) -> Any:
+    """A field of a parameters dataclass: its default gives the type, which ROS then enforces.
+
+    Args:
+        default: What it is where nothing else is said.
+        description: What it means, with its unit.
+        low: Of a number, the lowest that is allowed.
+        high: The highest.
+
+    Returns:
+        The field, for :func:`read_parameters`.
+    """
+    return field(default=default, metadata={"description": description, "low": low, "high": high})
 
 
 def read_parameters(node: Node, kind: type[P]) -> P:
@@ -26,11 +40,14 @@ def read_parameters(node: Node, kind: type[P]) -> P:
 
     Raises:
         rclpy.exceptions.InvalidParameterTypeException: A value was given with another type.
+        InvalidParameterError: A number is not finite or beyond its limits.
     """
     values = {}
     for item in fields(kind):  # type: ignore[arg-type]
         descriptor = ParameterDescriptor(description=item.metadata["description"], read_only=True)
-        values[item.name] = node.declare_parameter(item.name, item.default, descriptor).value
+        value = node.declare_parameter(item.name, item.default, descriptor).value
+        _require_within(f"parameter {item.name} of {node.get_name()}", value, item.metadata)
+        values[item.name] = value
     return kind(**values)
 
 
@@ -53,7 +70,8 @@ def parse_parameters(
     Raises:
         InvalidParameterError: An unknown parameter, or a value that it cannot have.
     """
-    kinds = {item.name: type(item.default) for item in fields(kind)}  # type: ignore[arg-type]
+    known_fields = {item.name: item for item in fields(kind)}  # type: ignore[arg-type]
+    kinds = {name: type(item.default) for name, item in known_fields.items()}
     known = [name for name in kinds if name not in given]
     found: dict[str, Any] = {}
     for part in filter(None, text.split(",")):
@@ -68,4 +86,16 @@ def parse_parameters(
             )
         except ValueError:
             raise InvalidParameterError(f"the {what}'s {name} is a number, not {value!r}") from None
+        _require_within(f"the {what}'s {name}", found[name], known_fields[name].metadata)
     return found
+
+
+def _require_within(what: str, value: Any, limits: Mapping[str, Any]) -> None:
+    """Refuse numbers that are not finite or beyond their limits; what is no number passes."""
+    low, high = limits["low"], limits["high"]
+    numbers = value if isinstance(value, list | tuple | array) else (value,)
+    for number in numbers:
+        if isinstance(number, bool) or not isinstance(number, int | float):
+            continue
+        if not (math.isfinite(number) and low <= number <= high):
+            raise InvalidParameterError(f"{what} is {number}; it must be from {low:g} to {high:g}")

@@ -6,8 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ensemble.parameters import parameter
-from slap_ros.errors import InvalidParameterError
+from ensemble.parameters import MAX_SEED, parameter
 from slap_ros.perception import Quality
 from slap_ros.perception.quality import MEMORY
 
@@ -23,16 +22,7 @@ class PerceptionParameters:
     hidden: str = parameter("", "objects that are never seen, separated by blanks")
     memory: int = parameter(MEMORY, "steps for which what is not seen is where it was")
     debounce: int = parameter(1, "times in a row that an atom is to be perceived as changed")
-    noise_seed: int = parameter(0, "noise is a function of it")
-
-    def __post_init__(self) -> None:
-        """Refuse a negative seed.
-
-        Raises:
-            InvalidParameterError: ``noise_seed`` is negative.
-        """
-        if self.noise_seed < 0:
-            raise InvalidParameterError(f"noise_seed is 0 or more, not {self.noise_seed}")
+    noise_seed: int = parameter(0, "noise is a function of it", high=MAX_SEED)
 
     @property
     def quality(self) -> Quality:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
-from ensemble.parameters import parameter, parse_parameters
+from ensemble.parameters import MAX_SEED, parameter, parse_parameters
 from ensemble.world_parameters import WorldParameters
 from slap_ros.errors import InvalidParameterError
 from slap_ros.physics.panda import JOINTS
@@ -47,7 +47,9 @@ class RobotParameters:
     scene: str = parameter("", "a scene file; empty: the sampled task's objects")
     arm: str = parameter("panda", "panda or fr3")
     speed: float = parameter(0.5, "fraction of the velocity and acceleration limits")
-    workspace: tuple[float, ...] = parameter(WORKSPACE, "m, fingertips, lowest x y z, highest")
+    workspace: tuple[float, ...] = parameter(
+        WORKSPACE, "m, fingertips, lowest x y z, highest", low=-10.0
+    )
     trajectory_action: str = parameter(TRAJECTORY_ACTION, "the arm's controller")
     gripper_action: str = parameter(GRIPPER_ACTION, "the gripper's controller")
     gripper_scale: float = parameter(0.5, "position to be sent per m between the fingers")
@@ -105,7 +107,7 @@ class MockRobotParameters(WorldParameters):
 
     domain: str = parameter("obstacle_tower", "which domain")
     preset: str = parameter("", "as the bridge's")
-    seed: int = parameter(0, "samples the task")
+    seed: int = parameter(0, "samples the task", high=MAX_SEED)
     arm: str = parameter("panda", "prefix of joints and frames")
     trajectory_action: str = parameter(TRAJECTORY_ACTION, "the arm's controller")
     gripper_action: str = parameter(GRIPPER_ACTION, "the gripper's controller")
@@ -116,11 +118,13 @@ class MockRobotParameters(WorldParameters):
     turn_noise: float = parameter(0.01, "rad, of detections about each axis")
     joint_noise: float = parameter(0.0, "rad, of joint positions")
     dropout: float = parameter(0.0, "share of detections that are lost")
-    rate: float = parameter(30.0, "Hz, of detections")
-    joint_rate: float = parameter(100.0, "Hz, of joint positions")
+    rate: float = parameter(30.0, "Hz, of detections", low=0.1, high=1e3)
+    joint_rate: float = parameter(100.0, "Hz, of joint positions", low=0.1, high=1e3)
     hidden: str = parameter("", "an object that is never detected")
-    pace: float = parameter(1.0, "how many times faster than a real one it moves")
-    noise_seed: int = parameter(0, "noise and delays are a function of it")
+    pace: float = parameter(
+        1.0, "how many times faster than a real one it moves", low=0.01, high=1e3
+    )
+    noise_seed: int = parameter(0, "noise and delays are a function of it", high=MAX_SEED)
     fault: str = parameter("", "reject, abort or ignore: what is done to a motion")
     fault_after: int = parameter(0, "and after how many good ones")
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ensemble.parameters import parameter
+from ensemble.parameters import MAX_SEED, parameter
 
 
 @dataclass(frozen=True)
@@ -15,5 +15,5 @@ class WorldParameters:
 
     domain: str = parameter("obstacle2d", "which domain")
     preset: str = parameter("", "the domain's; empty: its first, which of ours is fair")
-    seed: int = parameter(0, "samples the first task")
+    seed: int = parameter(0, "samples the first task", high=MAX_SEED)
     index: int = parameter(0, "which of the seed's tasks")

@@ -43,8 +43,11 @@ from ensemble.steady_time import create_timer
 from ensemble.visualization import Visualizer
 from ensemble.world_parameters import WorldParameters
 from slap_ros.core import Action, Task, World
+from slap_ros.errors import InvalidParameterError
 from slap_ros.messages.decode import decode_goal, decode_state
 from slap_ros.relational import State
+
+SLOWEST_PACE = 0.001  # steps per second
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,17 @@ class SimParameters(WorldParameters):
 
     pace: float = parameter(0.0, "environment steps per second; 0: as fast as commands come")
     visualize: bool = parameter(True, "publish markers, frames and joint states")
+
+    def __post_init__(self) -> None:
+        """Refuse steps that take hours.
+
+        Raises:
+            InvalidParameterError: ``pace`` is between 0 and ``SLOWEST_PACE``.
+        """
+        if 0.0 < self.pace < SLOWEST_PACE:
+            raise InvalidParameterError(
+                f"parameter pace is 0 or at least {SLOWEST_PACE}, not {self.pace}"
+            )
 
 
 class SimNode(LockstepWorld[SimParameters]):

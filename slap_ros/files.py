@@ -12,6 +12,7 @@ import errno
 import json
 import os
 import stat
+import tempfile
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -53,6 +54,28 @@ def require_regular(path: Path) -> None:
         OSError: As there.
     """
     open_regular(path).close()
+
+
+def require_writable(path: Path) -> None:
+    """Check that a file or folder of a name can be made or written, before there is what to write.
+
+    Raises:
+        OSError: Something is in its place that is neither file nor folder, or nothing can be
+            written there.
+    """
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise OSError(errno.EINVAL, "neither a file nor a folder", str(path))
+    if path.is_file() and not os.access(path, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+    there = path if path.is_dir() else path.absolute().parent
+    while not there.exists():
+        there = there.parent
+    try:
+        with tempfile.TemporaryFile(dir=there):
+            return  # where there is no right, root may pass every other test
+    except OSError as error:
+        # The name of the trial file is of no use to anybody.
+        raise OSError(error.errno, os.strerror(error.errno or errno.EIO), str(path)) from error
 
 
 def read_bytes(path: Path, limit: int = MAX_BYTES) -> bytes:

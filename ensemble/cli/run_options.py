@@ -11,9 +11,10 @@ from typing import Annotated
 import typer
 
 from slap_ros.bags.writer import require_new
-from slap_ros.cli.options import DomainName, Goal, Index, Json, Planner, Preset, Seed
+from slap_ros.cli.options import MAX_INDEX, DomainName, Goal, Index, Json, Planner, Preset, Seed
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts
 from slap_ros.errors import InvalidParameterError
+from slap_ros.files import require_writable
 from slap_ros.planning.execution import MAX_REPLANS
 from slap_ros.report import check_output
 from slap_ros.robot.worlds import MOCK, ROBOT, SIM, WORLDS
@@ -26,6 +27,7 @@ class RunOptions:
     Raises:
         InvalidParameterError: Options do not fit together, or the report is no place for one.
         BagExistsError: There is something where a bag is to be recorded.
+        OSError: Bag, report or animation cannot be written.
     """
 
     domain: DomainName
@@ -36,7 +38,9 @@ class RunOptions:
     shortcuts: Shortcuts = None
     samples: Samples = SAMPLES
     planner: Planner = "lazy"
-    max_replans: Annotated[int, typer.Option(min=0, help="Plans after the first.")] = MAX_REPLANS
+    max_replans: Annotated[
+        int, typer.Option(min=0, max=MAX_INDEX, help="Plans after the first.")
+    ] = MAX_REPLANS
     record: Annotated[
         Path | None, typer.Option(help="Record a bag as a new folder with this name.")
     ] = None
@@ -44,9 +48,12 @@ class RunOptions:
         False
     )
     pace: Annotated[
-        float, typer.Option(min=0.0, help="Steps per second, for watching; 0: at full speed.")
+        float,
+        typer.Option(min=0.0, max=1e6, help="Steps per second, for watching; 0: at full speed."),
     ] = 0.0
-    timeout: Annotated[float, typer.Option(min=0.1, help="Give up after so many seconds.")] = 600.0
+    timeout: Annotated[
+        float, typer.Option(min=0.1, max=1e9, help="Give up after so many seconds.")
+    ] = 600.0
     render: Annotated[
         Path | None, typer.Option(help="Write an animation of the run: a .gif or .mp4.")
     ] = None
@@ -94,6 +101,7 @@ class RunOptions:
             raise InvalidParameterError("--watched and --live-port are for --live")
         if self.record is not None:
             require_new(self.record)
+            require_writable(self.record)
         if self.report is not None:
             check_output(self.report)
 

@@ -36,6 +36,8 @@ from slap_ros.messages.protocols import StateMessage
 from slap_ros.planning.planner import make_planner
 from slap_ros.relational import GroundAtom
 from slap_ros.relational.pddl import parse_goal
+from slap_ros.robot.robot_world import require_robot
+from slap_ros.robot.worlds import SIM
 from slap_ros.shortcuts.shipped import chosen_library
 
 LOOK_S = 0.05  # s, between two looks at whether somebody watches
@@ -79,6 +81,8 @@ def _request(options: RunOptions, domain: Domain, task: Task) -> RunRequest:
         SlapError: The domain, or what perceives it, cannot do what is asked for.
     """
     goal = _check_planning(options, domain, task)
+    if options.world != SIM:
+        require_robot(domain, task.initial_state)
     perception = parse_parameters(options.perception, PerceptionParameters, "perception")
     quality = PerceptionParameters(**perception).quality
     quality.require_known(task.initial_state.layout.by_name.keys())

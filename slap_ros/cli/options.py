@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from functools import wraps
 from inspect import Parameter, signature
@@ -12,7 +13,10 @@ from typing import Annotated, Any, TypeVar, get_type_hints
 
 import typer
 
+from slap_ros.errors import InvalidParameterError
+
 R = TypeVar("R")
+MAX_SEED, MAX_INDEX = 2**63 - 1, 2**32 - 1  # as messages and bags have room for them
 
 DomainName = Annotated[str, typer.Argument(help="One of `slap domains`.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
@@ -26,8 +30,8 @@ Preset = Annotated[
 Planner = Annotated[
     str, typer.Option(help="lazy, exhaustive (the paper's) or ff (greedy best-first, SLAP D.2).")
 ]
-Seed = Annotated[int, typer.Option(min=0, help="Samples the task.")]
-Index = Annotated[int, typer.Option(min=0, help="Which of the seed's tasks.")]
+Seed = Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Samples the task.")]
+Index = Annotated[int, typer.Option(min=0, max=MAX_INDEX, help="Which of the seed's tasks.")]
 Goal = Annotated[
     str | None,
     typer.Option(help="Another goal, e.g. '(and (On block2 target) (GripperEmpty robot))'."),
@@ -62,6 +66,7 @@ def flat_options(command: Callable[..., R]) -> Callable[..., R]:
 
     @wraps(command)
     def run(**given: Any) -> R:
+        _require_finite(given)
         for name, kind in groups.items():
             given[name] = kind(**{field.name: given.pop(field.name) for field in fields(kind)})
         return command(**given)
@@ -71,6 +76,17 @@ def flat_options(command: Callable[..., R]) -> Callable[..., R]:
     run.__signature__ = flat  # type: ignore[attr-defined]
     run.__annotations__ = {one.name: one.annotation for one in parameters}
     return run
+
+
+def _require_finite(given: Mapping[str, Any]) -> None:
+    """Refuse numbers that no range of an option keeps out: NaN is neither too small nor too large.
+
+    Raises:
+        InvalidParameterError: Names the option.
+    """
+    for name, value in given.items():
+        if isinstance(value, float) and not math.isfinite(value):
+            raise InvalidParameterError(f"--{name.replace('_', '-')} is {value}; give a number")
 
 
 def _parameters_of(kind: Any) -> list[Parameter]:

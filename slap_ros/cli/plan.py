@@ -17,7 +17,7 @@ from slap_ros.domains import get_domain
 from slap_ros.drawing import draw_abstract_graph
 from slap_ros.errors import InvalidParameterError, StorageFullError
 from slap_ros.evaluation.approaches import approaches
-from slap_ros.files import read_text
+from slap_ros.files import read_text, require_writable
 from slap_ros.planning.abstract_graph import AbstractGraph, build_abstract_graph
 from slap_ros.planning.ff import find_operator_sequence
 from slap_ros.planning.plan import PlanningResult
@@ -57,6 +57,8 @@ def plan(
     if problem is not None:
         _plan_pddl(Path(domain), problem, json)
         return
+    if output is not None:
+        require_writable(output)
     chosen = get_domain(domain, preset)
     task = chosen.task(seed, index)
     space = chosen.atom_space(task.initial_state)

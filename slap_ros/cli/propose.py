@@ -32,7 +32,7 @@ from slap_ros.cli.options import Goal, Index, Json, Preset, Seed
 from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError, StorageFullError
-from slap_ros.files import read_text
+from slap_ros.files import read_text, require_writable
 from slap_ros.language.budget import Budget, BudgetLimits
 from slap_ros.language.cassette import open_client, with_recorded
 from slap_ros.language.settings import read_settings
@@ -127,6 +127,8 @@ def propose(options: ProposeOptions) -> None:
     With two PDDL files: for the symbolic problem that they state; the domain file's own actions
     are what the proposer manual takes, and are shown to no model.
     """
+    if options.output is not None:
+        require_writable(options.output)
     problem, own = _problem(options)
     log = AttemptLog(
         None if options.output is None else options.output / "attempts.jsonl", _show_entry

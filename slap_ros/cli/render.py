@@ -10,6 +10,7 @@ from pathlib import Path
 from slap_ros.cli.console import console, progress
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError, StorageFullError
+from slap_ros.files import require_writable
 from slap_ros.physics.animation import WRITERS
 from slap_ros.relational import State
 
@@ -20,6 +21,7 @@ def check_renderable(domain: Domain, path: Path) -> None:
     Raises:
         InvalidParameterError: The domain has no pictures, or the file another ending than those
             of animations.
+        OSError: It cannot be written.
     """
     if domain.display.animate is None:
         raise InvalidParameterError(f"{domain.name} has no pictures; leave out rendering")
@@ -27,6 +29,7 @@ def check_renderable(domain: Domain, path: Path) -> None:
         raise InvalidParameterError(
             f"an animation is a file that ends in {' or '.join(WRITERS)}, not {path.name!r}"
         )
+    require_writable(path)
 
 
 def render(domain: Domain, states: Sequence[State], path: Path) -> None:

@@ -22,7 +22,10 @@ Shortcuts = Annotated[
     typer.Option(help="A shortcut library, or none. Default: the shipped one, if there is."),
 ]
 Samples = Annotated[
-    int, typer.Option(min=1, help="Attempts of a shortcut in the model; the shortest is used.")
+    int,
+    typer.Option(
+        min=1, max=10**6, help="Attempts of a shortcut in the model; the shortest is used."
+    ),
 ]
 
 

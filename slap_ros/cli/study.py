@@ -19,6 +19,7 @@ from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose, sampling
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.approaches import approaches
+from slap_ros.files import require_writable
 from slap_ros.shortcuts.settings import ExplorationSettings, training_settings
 from slap_ros.shortcuts.shipped import shipped_library
 from slap_ros.shortcuts.task_distribution import TaskDistribution
@@ -60,6 +61,14 @@ class TaskOptions:
     jobs: Jobs = 1
     output: Output = RESULTS
 
+    def __post_init__(self) -> None:
+        """Check that there is where to write, before hours are spent.
+
+        Raises:
+            OSError: It is no place for files.
+        """
+        require_writable(self.output)
+
 
 @dataclass(frozen=True)
 class ComparisonOptions(TaskOptions):
@@ -81,6 +90,7 @@ class GoalOptions(ComparisonOptions):
 def dynamics_(domain: DomainName, work: Work, output: Output = RESULTS) -> None:
     """SLAP Fig. 4: success and length while shortcuts are learned, from trainings' work folders."""
     require_matplotlib()
+    require_writable(output)
     get_domain(domain)
     folders = [TrainingFolder(folder) for folder in work]
     report = dynamics.study(domain, folders)

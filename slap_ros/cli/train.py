@@ -16,10 +16,10 @@ import typer
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
 from slap_ros.cli.console import console, print_json
-from slap_ros.cli.options import DomainName, Json, Preset
+from slap_ros.cli.options import MAX_SEED, DomainName, Json, Preset
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
-from slap_ros.files import parse_json, read_text
+from slap_ros.files import parse_json, read_text, require_writable
 from slap_ros.shortcuts.library import save_library
 from slap_ros.shortcuts.settings import TrainingSettings, training_settings
 from slap_ros.shortcuts.task_distribution import TaskDistribution
@@ -39,7 +39,7 @@ class TrainOptions:
         Path | None, typer.Option(help="The library's folder. Default: runs/models/DOMAIN.")
     ] = None
     preset: Preset = None
-    seed: Annotated[int, typer.Option(min=0, help="Of everything.")] = 0
+    seed: Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Of everything.")] = 0
     settings: Annotated[str, typer.Option(help="ours, or paper: the paper's hyper-parameters.")] = (
         "ours"
     )
@@ -96,6 +96,8 @@ def train(options: TrainOptions) -> int:
     domain = get_domain(options.domain, options.preset)
     options = replace(options, preset=domain.preset)
     settings = options.training_settings
+    for folder in (options.library_folder, options.work_folder):
+        require_writable(folder)
     _require_torch()
     began, folder = monotonic(), options.library_folder
     distribution = TaskDistribution(domain.name, domain.preset, options.seed)

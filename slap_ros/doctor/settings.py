@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import os
+import socket
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,7 +20,8 @@ SECURITY, STRATEGY, KEYSTORE = (
     "ROS_SECURITY_STRATEGY",
     "ROS_SECURITY_KEYSTORE",
 )
-REPORTED = (DOMAIN_ID, RANGE, LOCALHOST_ONLY, "ROS_STATIC_PEERS", URI, SECURITY, STRATEGY, KEYSTORE)
+PEERS = "ROS_STATIC_PEERS"
+REPORTED = (DOMAIN_ID, RANGE, LOCALHOST_ONLY, PEERS, URI, SECURITY, STRATEGY, KEYSTORE)
 MAX_DOMAIN_ID = 232  # DDS has no ports for more
 # Domain N uses ports from 7400 + 250 N; from 32768 on Linux gives them to any program that asks.
 SAFE_DOMAIN_IDS = range(102)
@@ -59,7 +61,7 @@ def faults() -> list[SettingFault]:
 
 def impossible() -> list[SettingFault]:
     """Values with which a node cannot start, or starts as if there were another."""
-    return [*_domain_faults(), *_range_faults(), *_keystore_faults()]
+    return [*_domain_faults(), *_range_faults(), *_peer_faults(), *_keystore_faults()]
 
 
 def is_open_to_others() -> bool:
@@ -114,6 +116,18 @@ def _range_faults() -> list[SettingFault]:
         return []
     found = f"{RANGE} is {_range()!r}, none of {', '.join(RANGES)}"
     return [SettingFault("problem", found, WANTED_RANGE)]
+
+
+def _peer_faults() -> list[SettingFault]:
+    # With a name that it cannot resolve, CycloneDDS ends the process.
+    for peer in filter(None, os.environ.get(PEERS, "").split(";")):
+        try:
+            socket.getaddrinfo(peer, None)
+        except (OSError, UnicodeError):
+            found = f"{PEERS} has {peer!r}, which is no address of a host"
+            advice = f"Set {PEERS} to names or addresses with ';' between them, or unset it."
+            return [SettingFault("problem", found, advice)]
+    return []
 
 
 def _off_faults() -> list[SettingFault]:

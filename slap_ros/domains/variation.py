@@ -4,9 +4,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, fields, replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 from slap_ros.errors import InvalidParameterError
 
@@ -16,8 +17,37 @@ if TYPE_CHECKING:
     Settings = TypeVar("Settings", bound=DataclassInstance)
 
 
+LONGEST_TEXT = 60  # characters of a value in a message
+Limits = tuple[float, float]
+
+
 class TaskSettings:
-    """A dataclass from whose fields tasks are sampled."""
+    """A dataclass from whose fields tasks are sampled.
+
+    Attributes:
+        limits: The lowest and highest number of a field, both allowed, where it has such. All
+            numbers are finite anyway.
+    """
+
+    limits: ClassVar[Mapping[str, Limits]] = {}
+
+    def __post_init__(self: DataclassInstance) -> None:
+        """Check every number.
+
+        Raises:
+            InvalidParameterError: One is not finite or beyond its limits.
+        """
+        limits: Mapping[str, Limits] = getattr(self, "limits", {})
+        for field in fields(self):
+            value = getattr(self, field.name)
+            low, high = limits.get(field.name, (-math.inf, math.inf))
+            for number in _numbers(value):
+                # An integer beyond what floats hold is compared as it is; NaN fails.
+                if not low <= number <= high or number in (math.inf, -math.inf):
+                    wanted = f"from {low:g} to {high:g}" if field.name in limits else "finite"
+                    raise InvalidParameterError(
+                        f"setting {field.name!r} is {_shortened(str(value))}; it must be {wanted}"
+                    )
 
     def as_configuration(self: DataclassInstance) -> Mapping[str, str]:
         """The settings by name, as bags record them."""
@@ -58,6 +88,19 @@ def varied(settings: Settings, changes: Mapping[str, str]) -> Settings:
     return replace(settings, **values)
 
 
+def _numbers(value: object) -> Iterator[float]:
+    """The numbers of a setting: itself, or those of a tuple however nested."""
+    if isinstance(value, tuple):
+        for part in value:
+            yield from _numbers(part)
+    elif isinstance(value, int | float):
+        yield value
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= LONGEST_TEXT else f"{text[:LONGEST_TEXT]}… ({len(text)} characters)"
+
+
 def _read(name: str, text: str, now: object) -> object:
     """The text as a value like the present one."""
     is_range = isinstance(now, tuple) and len(now) == 2
@@ -71,7 +114,7 @@ def _read(name: str, text: str, now: object) -> object:
         numbers = []
     if not 1 <= len(numbers) <= 2 or numbers[0] > numbers[-1]:
         raise InvalidParameterError(
-            f"setting {name!r} is {now}, which {text!r} cannot replace"
+            f"setting {name!r} is {now}, which {_shortened(repr(text))} cannot replace"
             + ("; give low..high" if is_range else "")
         )
     return (numbers[0], numbers[-1]) if is_range else numbers[0]

@@ -25,6 +25,7 @@ from slap_ros.drawing.svg import clean_value
 from slap_ros.drawing.words import counted
 from slap_ros.errors import InvalidParameterError, StorageFullError
 from slap_ros.evaluation.metrics import known
+from slap_ros.files import require_writable
 from slap_ros.report.animation import Drawing, draw
 from slap_ros.report.content import PURE_PLANNING, BagReport, RunReport
 
@@ -51,11 +52,13 @@ def check_output(path: Path) -> None:
 
     Raises:
         InvalidParameterError: It is a folder, or has another ending than that of pages.
+        OSError: It cannot be written.
     """
     if path.suffix != ENDING:
         raise InvalidParameterError(f"a report is a file that ends in {ENDING}, not {path.name!r}")
     if path.is_dir():
         raise InvalidParameterError(f"{path} is a folder; name a file for the report")
+    require_writable(path)
 
 
 def write_page(path: Path, text: str) -> None:

@@ -254,6 +254,18 @@ class RobotWorld:
         self._model.close()
 
 
+def require_robot(domain: Domain, initial: State) -> None:
+    """Refuse a domain without a Panda before anything is started for it.
+
+    Raises:
+        InvalidParameterError: Its robot is another one.
+    """
+    if ROBOT not in domain.types or not isinstance(domain.make_world(initial), PandaWorld):
+        raise InvalidParameterError(
+            f"{domain.name} has no Panda, which the robots here are; use --world sim"
+        )
+
+
 def _require_panda(domain: Domain, limits: Limits) -> None:
     if ROBOT not in domain.types:
         raise InvalidParameterError(f"{domain.name} has no Panda, which a real robot is here")

@@ -63,6 +63,8 @@ def test_jazzys_own_default_is_not_taken(network, monkeypatch, given, taken):
         ("ROS_DOMAIN_ID", "-1"),
         (DISCOVERY_RANGE, "EVERYWHERE"),
         (DISCOVERY_RANGE, "subnet"),  # ROS 2 takes it for LOCALHOST
+        ("ROS_STATIC_PEERS", "no host"),
+        ("ROS_STATIC_PEERS", "<x>&"),
     ],
 )
 def test_a_wrong_environment_is_refused(network, monkeypatch, name, value):

@@ -8,6 +8,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
+from typing import ClassVar
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from slap_ros.domains.cleanup_table.features import BLOCK, HALF, MIDDLE, SURFACE
 from slap_ros.domains.cleanup_table.predicates import IS_DRAWER, ON
 from slap_ros.domains.cleanup_table.scene import BIN, MATERIAL, TABLE, TABLE_TOP, kind_of
 from slap_ros.domains.cleanup_table.shapes import WIPER
+from slap_ros.domains.tabletop.variation_limits import MATERIAL_LIMITS, REACH, TURN
 from slap_ros.domains.variation import TaskSettings
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.geometry.oriented_box import OrientedBox
@@ -81,6 +83,17 @@ def everything_in_the_bin(state: State) -> frozenset[GroundAtom]:
 class RandomCleanupTasks(TaskSettings):
     """Toys anywhere beside the bin, turned as they like; the wiper on the other side."""
 
+    limits: ClassVar = MATERIAL_LIMITS | {
+        "toys": (0, 20),
+        "toy_x": REACH,
+        "toy_y": REACH,
+        "toy_yaw": TURN,
+        "gap": (0.0, REACH[1]),
+        "wiper_x": REACH,
+        "wiper_y": REACH,
+        "wiper_yaw": TURN,
+    }
+
     toys: tuple[int, int] = (3, 3)  # inclusive
     toy_x: Range = (0.38, 0.62)
     toy_y: Range = (0.06, 0.25)
@@ -122,6 +135,8 @@ class RandomCleanupTasks(TaskSettings):
 @dataclass(frozen=True)
 class PaperCleanupTasks(TaskSettings):
     """One start state, as the reference has; toys in its ranges."""
+
+    limits: ClassVar = {"toys": TURN, "wiper": TURN}  # m and rad; cannot be given as text
 
     toys: tuple[PlanarPose, ...] = ((0.40, 0.10, 0.0), (0.50, 0.20, 0.0), (0.60, 0.10, 0.0))
     wiper: PlanarPose = (0.5, -0.12, 0.0)

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from slap_ros.domains.cluttered_drawer.features import BLOCK, TABLE, TARGET
 from slap_ros.domains.cluttered_drawer.predicates import ON
 from slap_ros.domains.cluttered_drawer.scene import BOTTOM, FIXED, HALF_WIDTH, MIDDLE, OPENING
 from slap_ros.domains.tabletop.placements import GAP
+from slap_ros.domains.tabletop.variation_limits import MATERIAL_LIMITS, REACH, TURN
 from slap_ros.domains.variation import TaskSettings
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.geometry.pose import Pose, from_yaw
@@ -37,6 +39,7 @@ NEIGHBOUR = 0.0675  # between the middles of the target block and of a blocker (
 APART = 0.15  # from the target block to a block that blocks no side of it
 WALL_GAP = 0.04  # between a wall and a block's middle
 ENDS = 0.06  # along y: of the drawer's two ends, where the blocks stand that block no side
+BLOCKING_LIMITS = {"reach": (0.0, OPENING), "half_width": (0.0, OPENING)}
 
 Range = tuple[float, float]
 PlanarPose = tuple[float, float, float]  # x, y, yaw in rad
@@ -90,6 +93,20 @@ TOWARDS: tuple[complex, ...] = tuple(blocking.TOWARDS.tolist())
 @dataclass(frozen=True)
 class RandomDrawerTasks(TaskSettings):
     """Everything is sampled for each task. Lengths in m, angles in rad, masses in kg."""
+
+    limits: ClassVar = (
+        MATERIAL_LIMITS
+        | BLOCKING_LIMITS
+        | {
+            "obstacles": (0, 20),
+            "target_x": REACH,
+            "target_y": REACH,
+            "yaw": TURN,
+            "distance": (0.0, OPENING),
+            "aside": (0.0, OPENING),
+            "turn": TURN,
+        }
+    )
 
     obstacles: tuple[int, int] = (4, 6)  # inclusive: up to four surround the target
     target_x: Range = (MIDDLE - 0.01, MIDDLE + 0.01)
@@ -154,6 +171,8 @@ class RandomDrawerTasks(TaskSettings):
 @dataclass(frozen=True)
 class PaperDrawerTasks(TaskSettings):
     """The single start state of the reference."""
+
+    limits: ClassVar = BLOCKING_LIMITS
 
     # In the configuration that bags record, arrangements go by this name.
     scenery: DrawerArrangement = field(

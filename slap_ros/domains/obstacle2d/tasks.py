@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -21,6 +22,7 @@ TABLE_WIDTH = 1.0 + BLOCK_SIZE  # m: block centres range over the unit square
 TARGET_WIDTH = BLOCK_SIZE  # m, an area for one block
 TRIES = 20_000  # scenes drawn before there is said to be no room
 LEAST_OVERLAP = 0.02  # m, by which the obstacle reaches into the target area at least
+UNIT_SQUARE = (0.0, 1.0)  # m, along either axis
 
 Range = tuple[float, float]
 
@@ -41,6 +43,13 @@ def target_block_in_target_area(state: State) -> frozenset[GroundAtom]:
 @dataclass(frozen=True)
 class RandomObstacle2DTasks(TaskSettings):
     """Everything is sampled for each task. Lengths in m."""
+
+    limits: ClassVar = {
+        "bystanders": (0, 10),
+        "robot_x": UNIT_SQUARE,
+        "robot_y": UNIT_SQUARE,
+        "target_x": UNIT_SQUARE,
+    }
 
     bystanders: tuple[int, int] = (0, 2)  # how many blocks stand about besides, inclusive
     robot_x: Range = (0.0, 1.0)
@@ -82,6 +91,13 @@ class RandomObstacle2DTasks(TaskSettings):
 @dataclass(frozen=True)
 class PaperObstacle2DTasks(TaskSettings):
     """The reference's start states: one scene, the obstacle at one of three places."""
+
+    limits: ClassVar = {
+        "robot": UNIT_SQUARE,
+        "target_x": UNIT_SQUARE,
+        "target_block_x": UNIT_SQUARE,
+        "obstacle_x": UNIT_SQUARE,
+    }
 
     robot: tuple[float, float] = (0.5, 1.0)  # m
     target_x: float = 0.5  # m

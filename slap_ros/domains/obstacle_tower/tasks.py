@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from slap_ros.core import Task
 from slap_ros.domains.obstacle_tower.features import BLOCK, SURFACE
 from slap_ros.domains.obstacle_tower.predicates import NOT_IS_TARGET, ON
 from slap_ros.domains.tabletop.placements import GAP
+from slap_ros.domains.tabletop.variation_limits import MATERIAL_LIMITS, REACH, TURN
 from slap_ros.domains.variation import TaskSettings
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.geometry.pose import Pose, from_yaw
@@ -77,6 +79,18 @@ def target_block_on_target(state: State) -> frozenset[GroundAtom]:
 @dataclass(frozen=True)
 class RandomTowerTasks(TaskSettings):
     """Everything is sampled for each task. Lengths in m, angles in rad, masses in kg."""
+
+    limits: ClassVar = MATERIAL_LIMITS | {
+        "obstacles": (0, 20),
+        "distractors": (0, 20),
+        "target_x": REACH,
+        "target_y": REACH,
+        "yaw": TURN,
+        "block_x": REACH,
+        "block_y": REACH,
+        "stacking_offset": (0.0, CUBE_EDGE),
+        "stacking_turn": TURN,
+    }
 
     obstacles: tuple[int, int] = (3, 3)  # blocks of the tower, inclusive
     distractors: tuple[int, int] = (0, 2)  # blocks that stand about besides, inclusive

@@ -1,0 +1,195 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What cannot be is refused where it comes in, with a code, before anything is started."""
+
+import math
+import os
+from dataclasses import fields, is_dataclass
+from importlib import import_module
+from inspect import signature
+from typing import get_args
+
+import pytest
+from typer.testing import CliRunner
+
+from ensemble.cli import app
+from ensemble.nodes import node_class
+from ensemble.parameters import _require_within, parse_parameters
+from ensemble.robot_parameters import MockRobotParameters, PlayerParameters, RobotBridgeParameters
+from slap_ros.domains import domain_names, get_domain
+from slap_ros.domains.variation import TaskSettings
+from slap_ros.errors import ErrorCode, InvalidParameterError
+
+NO_NUMBERS = ("nan", "inf", "-inf", "1e400", "-1e400")
+NO_SETTINGS = (*NO_NUMBERS, "9" * 400, "-" + "9" * 400, "9" * 5_000, "1e30", "-1e30", "nan..1")
+NOWHERE = "/proc/no/such"  # nobody can write there, root included
+
+
+def slap(*arguments):
+    result = CliRunner().invoke(app, list(arguments))
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    return result
+
+
+# -- settings of tasks ----------------------------------------------------------------------------
+
+
+def settings_of_domains():
+    for name in domain_names():
+        get_domain(name)
+    return [kind for kind in TaskSettings.__subclasses__() if kind.__module__.startswith("slap_")]
+
+
+def of_numbers(value):
+    while isinstance(value, tuple):
+        value = value[0]
+    return isinstance(value, int | float)
+
+
+def test_every_number_of_every_domain_has_limits():
+    kinds = settings_of_domains()
+    assert len(kinds) == 2 * len(domain_names())
+    for kind in kinds:
+        numbers = {f.name for f in fields(kind) if of_numbers(getattr(kind(), f.name))}
+        assert numbers == set(kind.limits), kind
+
+
+@pytest.mark.parametrize("value", NO_SETTINGS, ids=lambda text: text[:12])
+@pytest.mark.parametrize("name", domain_names())
+def test_a_setting_is_finite_and_within_its_limits(name, value):
+    kinds = [kind for kind in settings_of_domains() if f".{name}." in kind.__module__]
+    for preset, kind in zip(("fair", "paper"), sorted(kinds, key=preset_of), strict=True):
+        for setting in kind.limits:
+            with pytest.raises(InvalidParameterError, match=setting) as caught:
+                get_domain(name, f"{preset}:{setting}={value}")
+            assert len(str(caught.value)) < 300
+
+
+def preset_of(kind):
+    return "fair" if kind.__name__.startswith("Random") else "paper"
+
+
+@pytest.mark.parametrize("name", domain_names())
+def test_what_is_within_the_limits_is_a_task_or_an_error(name, monkeypatch):
+    # Where there is no room, thousands of scenes are drawn; here a few will do.
+    monkeypatch.setattr(import_module(f"slap_ros.domains.{name}.tasks"), "TRIES", 50)
+    (kind,) = (k for k in settings_of_domains() if f".{name}." in k.__module__ and "R" in str(k))
+    for setting, limits in kind.limits.items():
+        for number in limits:
+            try:
+                assert get_domain(name, f"fair:{setting}={number}").task(0).goal
+            except InvalidParameterError as error:
+                assert "room" in str(error)
+
+
+# -- options and parameters -----------------------------------------------------------------------
+
+
+def float_options(group=app, path=()):
+    """Every command with its options that are floats."""
+    for command in group.registered_commands:
+        name = command.name or command.callback.__name__
+        for option, parameter in signature(command.callback).parameters.items():
+            if float in get_args(parameter.annotation):
+                yield (*path, name), f"--{option.replace('_', '-')}"
+    for sub in group.registered_groups:
+        yield from float_options(sub.typer_instance, (*path, sub.name))
+
+
+def test_every_option_that_is_a_number_is_finite():
+    options = list(float_options())
+    assert {option for _, option in options} >= {"--pace", "--timeout", "--seconds"}
+    for path, option in options:
+        for value in NO_NUMBERS:
+            result = slap(*path, "obstacle2d", f"{option}={value}")
+            assert result.exit_code in (2, ErrorCode.INVALID_PARAMETER), (path, option, value)
+
+
+NODES = ("sim_node", "perception_node", "planner_node", "skill_server")
+
+
+def parameter_kinds():
+    """The dataclass of parameters in each node's module, and those of robots."""
+    own = [
+        kind
+        for name in NODES
+        for kind in vars(__import__(node_class(name).__module__, fromlist=["_"])).values()
+        if is_dataclass(kind) and isinstance(kind, type) and kind.__name__.endswith("Parameters")
+    ]
+    return [*own, MockRobotParameters, PlayerParameters, RobotBridgeParameters]
+
+
+def test_every_number_that_a_node_takes_is_finite_and_limited():
+    numbers = [
+        item
+        for kind in parameter_kinds()
+        for item in fields(kind)
+        if of_numbers(item.default) and not isinstance(item.default, bool)
+    ]
+    assert len(numbers) > 30
+    for item in numbers:
+        low, high = item.metadata["low"], item.metadata["high"]
+        _require_within(item.name, item.default, item.metadata)
+        for value in (math.nan, math.inf, -math.inf, low - 1, high * 2, [low, math.nan]):
+            with pytest.raises(InvalidParameterError, match=item.name):
+                _require_within(item.name, value, item.metadata)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -1.0, 1e-300])
+def test_a_node_refuses_a_number_that_it_cannot_use(network, value):
+    import rclpy
+    from rclpy.parameter import Parameter
+
+    rclpy.init()
+    try:
+        with pytest.raises(InvalidParameterError, match="pace"):
+            node_class("sim_node")(parameter_overrides=[Parameter("pace", value=value)])
+    finally:
+        rclpy.shutdown()
+
+
+@pytest.mark.parametrize("value", NO_NUMBERS)
+@pytest.mark.parametrize("name", ["pace", "rate", "latency", "noise_seed"])
+def test_parameters_on_the_command_line_are_finite(name, value):
+    with pytest.raises(InvalidParameterError, match=name):
+        parse_parameters(f"{name}={value}", MockRobotParameters, "mock robot")
+
+
+# -- robots and outputs ---------------------------------------------------------------------------
+
+
+def test_a_robot_is_for_domains_with_a_panda():
+    for world in ("mock", "robot"):
+        result = slap("run", "obstacle2d", "--world", world)
+        assert result.exit_code == ErrorCode.INVALID_PARAMETER
+        assert "no Panda" in result.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("run", "obstacle2d", "--record", NOWHERE),
+        ("run", "obstacle_tower", "--render", f"{NOWHERE}.gif"),
+        ("run", "obstacle2d", "--report", f"{NOWHERE}.html"),
+        ("plan", "obstacle2d", "--output", NOWHERE),
+        ("propose", "obstacle2d", "--output", NOWHERE),
+        ("train", "obstacle2d", "--output", NOWHERE),
+        ("train", "obstacle2d", "--output", "library", "--work", NOWHERE),
+        ("study", "goals", "obstacle2d", "--output", NOWHERE),
+        ("report", "bag", "--output", f"{NOWHERE}.html"),
+        ("run", "obstacle2d", "--record", "file/below"),
+        ("run", "obstacle_tower", "--render", "pipe.gif"),
+        ("plan", "obstacle2d", "--output", "x" * 300),
+    ],
+    ids=lambda arguments: " ".join(arguments)[:40],
+)
+def test_an_output_that_cannot_be_written_is_refused_before_the_run(
+    tmp_path, monkeypatch, arguments
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").touch()
+    os.mkfifo(tmp_path / "pipe.gif")
+    result = slap(*arguments)
+    assert result.exit_code == ErrorCode.INPUT_OUTPUT, result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1  # no word of a run
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "pipe.gif"]
