@@ -104,26 +104,6 @@ def rolling() -> Figures:
     return {"after_2.5_s_m_per_s": abs(value(state, "rod", "vy"))}
 
 
-def overrun() -> Figures:
-    """How far a closed lid is pressed beyond its end, degrees."""
-    deepest = 0.0
-    read = simulation.pybullet.getJointState
-
-    def watching(body: int, link: int, client: int) -> Any:
-        nonlocal deepest
-        state = read(body, link, client)
-        deepest = min(deepest, state[0])
-        return state
-
-    above = Setting(hand=hand_at((0.67, 0.0, 0.08), finger=0.0, closing=True), openings=(0, 0, 0.0))
-    with without(simulation.pybullet, "getJointState", watching):
-        world = ContactWorld(BENCH, start(above))
-        for _ in range(60):
-            world.step(np.array([0.0, 0.0, -0.02, 0.0, 0.0]))
-        world.close()
-    return {"lid_beyond_its_end_deg": -math.degrees(deepest)}
-
-
 def drift() -> Figures:
     """How far a cube moves in 500 steps in which nobody touches it, m."""
     near = Setting(hand=hand_at((0.45, 0.1, 0.09)))
@@ -160,18 +140,9 @@ def press() -> Figures:
     return {"pressed_n": force}
 
 
-def split_impulses(**parameters: Any) -> None:
-    """Set PyBullet's parameters, but leave split impulses as they come."""
-    parameters.pop("useSplitImpulse", None)
-    SET_PARAMETERS(**parameters)
-
-
-SET_PARAMETERS = simulation.pybullet.setPhysicsEngineParameter
-
-
 def pieces() -> dict[str, tuple[Callable[[], Figures], tuple[Any, str, Any]]]:
     """Of each: what measures it, and what is instead of it."""
-    contact, engine = simulation.ContactSimulation, simulation.pybullet
+    contact = simulation.ContactSimulation
     return {
         "prime": (impure, (contact, "_prime", lambda *_: None)),
         "rest mark": (drift, (dynamics, "REST_SPEED", 0.0)),
@@ -181,7 +152,6 @@ def pieces() -> dict[str, tuple[Callable[[], Figures], tuple[Any, str, Any]]]:
         "spinning friction": (droop, (simulation, "FINGER_SPINNING", 0.0)),
         "rolling friction": (rolling, (simulation, "ROLLING", 0.0)),
         "weight cancelled": (press, (simulation, "LIFT", (0.0, 0.0, 0.0))),
-        "no split impulse": (overrun, (engine, "setPhysicsEngineParameter", split_impulses)),
     }
 
 
