@@ -108,7 +108,7 @@ class LanguageProposer:
             "operator",
             name,
             text,
-            operator_schema(problem.types, problem.predicates),
+            operator_schema(name, problem.types, problem.predicates),
             parse_operator,
             partial(check_operator, name=name, problem=problem),
         )

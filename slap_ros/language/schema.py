@@ -40,12 +40,21 @@ def decomposition_schema(types: Sequence[Type]) -> Schema:
     return Schema("decomposition", _object(actions=_array(action)), DECOMPOSITION_TEXT)
 
 
-def operator_schema(types: Sequence[Type], predicates: Sequence[Predicate]) -> Schema:
-    """Of one operator."""
+def operator_schema(name: str, types: Sequence[Type], predicates: Sequence[Predicate]) -> Schema:
+    """Of the operator of one action.
+
+    Args:
+        name: The action's.
+        types: The task's.
+        predicates: The task's.
+
+    Returns:
+        The schema, which allows no other name.
+    """
     predicate = _choice([predicate.name for predicate in predicates])
     atoms = _array(_object(predicate=predicate, arguments=_array(_STRING)))
     definition = _object(
-        name=_STRING,
+        name=_choice([name]),
         parameters=_array(_parameter(types)),
         preconditions=atoms,
         delete_effects=atoms,

@@ -60,7 +60,7 @@ def test_every_answer_is_well_formed_and_of_the_tasks_words() -> None:
         model = Dice(seed)
         for action in parse_decomposition(ask(model, decomposition_schema(problem.types))).draft:
             assert all(p.name.startswith("?") and p.type for p in action.parameters)
-        text = ask(model, operator_schema(problem.types, problem.predicates))
+        text = ask(model, operator_schema("Place", problem.types, problem.predicates))
         draft = parse_operator(text).draft
         atoms = (*draft.preconditions, *draft.delete_effects, *draft.add_effects)
         assert {atom.name for atom in atoms} <= set(problem.predicates_by_name)
