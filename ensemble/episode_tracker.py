@@ -4,17 +4,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
+from concurrent.futures import ThreadPoolExecutor
+from typing import Generic, TypeVar
 
 from rclpy.node import Node
 from slap_msgs.msg import DomainInfo
 from slap_msgs.msg import Task as TaskMessage
 
+from ensemble.futures import run_in_executor
 from ensemble.interfaces import DOMAIN, TASK, Topic
 from ensemble.observation import Episode
-from slap_ros.core import Task
+from ensemble.refusals import Refusals
+from ensemble.steady_time import create_timer
+from slap_ros.core import Domain, Task
 from slap_ros.domains import get_domain
+from slap_ros.errors import SlapError
 from slap_ros.messages.decode import decode_goal, decode_state, stamp_ns
+
+RIVAL_PERIOD = 1.0  # s, between two looks at whether another simulator is still there
+
+Endpoint = tuple[int, ...]
+T = TypeVar("T")  # what is prepared for an episode
 
 
 def subscribe(node: Node, topic: Topic, callback: Callable[..., None]) -> None:
@@ -28,21 +39,42 @@ def subscribe(node: Node, topic: Topic, callback: Callable[..., None]) -> None:
     node.create_subscription(topic.type, topic.name, callback, topic.qos)
 
 
-class EpisodeTracker:
+class EpisodeTracker(Generic[T]):
     """Follows ``slap/domain`` and ``slap/task``, which may arrive in either order.
 
-    An UnknownDomainError comes out of the callbacks, and so out of ``spin``, where the simulator
-    runs a domain that is not installed here.
+    Whatever takes time, such as the import of a domain, is done in a thread. What cannot be used is
+    refused: it is counted and logged, and the episode that is under way goes on.
     """
 
-    def __init__(self, node: Node, on_episode: Callable[[Episode], None]) -> None:
-        """``on_episode`` is called for each new episode."""
+    def __init__(
+        self,
+        node: Node,
+        prepare: Callable[[Episode], T],
+        on_episode: Callable[[Episode, T], None],
+        refusals: Refusals,
+    ) -> None:
+        """Subscribe.
+
+        Args:
+            node: Who subscribes.
+            prepare: Called in a thread for each new episode; an episode for which it raises a
+                SlapError is refused.
+            on_episode: Called with each new episode, and with what was prepared for it.
+            refusals: Where refused domains and tasks are counted.
+        """
         self.current: Episode | None = None
-        self._on_episode = on_episode
-        self._domain: DomainInfo | None = None
-        self._task: TaskMessage | None = None
+        self.refusal: SlapError | None = None  # why the newest task, or its domain, was refused
+        self._node, self._refusals = node, refusals
+        self._prepare, self._on_episode = prepare, on_episode
+        self._workers = ThreadPoolExecutor(1, thread_name_prefix="episode")
+        self._domains: dict[str, Domain] = {}  # by name: the newest preset
+        self._domain: DomainInfo | None = None  # the newest
+        self._task: TaskMessage | None = None  # the newest that is not a rival's
+        self._simulator: frozenset[Endpoint] = frozenset()  # which publish tasks
+        self._rival: tuple[TaskMessage, frozenset[Endpoint]] | None = None  # another simulator's
         subscribe(node, DOMAIN, self._on_domain)
         subscribe(node, TASK, self._on_task)
+        create_timer(node, RIVAL_PERIOD, self._check_rival)
 
     # What is latched is sent again when two nodes find each other again after a moment of silence.
     # That is no new episode.
@@ -50,21 +82,95 @@ class EpisodeTracker:
     def _on_domain(self, message: DomainInfo) -> None:
         if message != self._domain:
             self._domain = message
-            self._open()
+            known = self._domains.get(message.name)
+            if known is None or known.preset != message.preset:
+                self._start(self._load(message.name, message.preset))
 
     def _on_task(self, message: TaskMessage) -> None:
-        if message != self._task:
-            self._task = message
-            self._open()
-
-    def _open(self) -> None:
-        if self._domain is None or self._task is None or self._domain.name != self._task.domain:
+        if message == self._task:
             return
-        domain = get_domain(self._domain.name, self._domain.preset)
-        initial = decode_state(self._task.initial_state, domain.types_by_name)
+        if reason := self._rivalry(message):
+            endpoints = frozenset(self._publishers())
+            self._rival = message, endpoints - self._simulator or endpoints
+            self._refusals.add("refused_tasks", reason)
+            return
+        self._task, self._rival = message, None
+        if message.domain in self._domains:
+            self._start(self._open(message))
+
+    def _start(self, work: Coroutine[None, None, None]) -> None:
+        self._node.executor.create_task(work)
+
+    async def _load(self, name: str, preset: str) -> None:
+        """Import a domain, and open the episode that waits for it."""
+        try:
+            domain = await run_in_executor(self._workers, lambda: get_domain(name, preset))
+        except SlapError as error:
+            self._refuse("refused_domains", error)
+            return
+        known = self._domains.get(name)
+        if known is not None and known.preset == preset:
+            return  # announced twice meanwhile
+        self._domains[name] = domain
+        if self._task is not None and self._task.domain == name:
+            await self._open(self._task)
+
+    async def _open(self, message: TaskMessage) -> None:
+        domain = self._domains[message.domain]
+        try:
+            episode, prepared = await run_in_executor(
+                self._workers, lambda: self._made(message, domain)
+            )
+        except SlapError as error:
+            self._refuse("refused_tasks", error)
+            return
+        if message is self._task:  # not overtaken meanwhile
+            self.current, self.refusal = episode, None
+            self._simulator = frozenset(self._publishers())
+            self._on_episode(episode, prepared)
+
+    def _made(self, message: TaskMessage, domain: Domain) -> tuple[Episode, T]:
+        initial = decode_state(message.initial_state, domain.types_by_name)
         space = domain.atom_space(initial)
-        goal = decode_goal(self._task.goal, space)
-        task = Task(initial, goal, self._task.step_limit)
-        opened_ns = stamp_ns(self._task.header)
-        self.current = Episode(self._task.episode, opened_ns, domain, task, space)
-        self._on_episode(self.current)
+        task = Task(initial, decode_goal(message.goal, space), message.step_limit)
+        episode = Episode(message.episode, stamp_ns(message.header), domain, task, space)
+        return episode, self._prepare(episode)
+
+    def _refuse(self, kind: str, error: SlapError) -> None:
+        self._refusals.add(kind, error)
+        self.refusal = error
+
+    # A simulator that was started again with another domain looks like a second one until DDS has
+    # missed the first.
+
+    def _rivalry(self, message: TaskMessage) -> str | None:
+        """Why a task is another simulator's; None where it is not, as far as can be told."""
+        current, publishers = self.current, self._publishers()
+        if current is None or message.domain == current.domain.name:
+            return None
+        if len(publishers) < 2 or self._simulator.isdisjoint(publishers):
+            return None
+        return (
+            f"a task of {message.domain!r} refused, as one of {current.domain.name} is under way: "
+            f"{' and '.join(sorted(publishers.values()))} publish tasks on this network. Stop one "
+            "of them, or give it another ROS_DOMAIN_ID or namespace"
+        )
+
+    def _check_rival(self) -> None:
+        """Follow another simulator once the first is gone; forget it if it is gone itself."""
+        if self._rival is None:
+            return
+        message, endpoints = self._rival
+        publishers = self._publishers()
+        if endpoints.isdisjoint(publishers):
+            self._rival = None
+        elif self._simulator.isdisjoint(publishers):
+            self._on_task(message)
+
+    def _publishers(self) -> dict[Endpoint, str]:
+        """Names of the nodes that publish tasks, by their endpoints."""
+        topic = self._node.resolve_topic_name(TASK.name)
+        return {
+            tuple(info.endpoint_gid): f"{info.node_namespace.rstrip('/')}/{info.node_name}"
+            for info in self._node.get_publishers_info_by_topic(topic)
+        }

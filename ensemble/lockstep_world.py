@@ -49,8 +49,8 @@ P = TypeVar("P", bound=WorldParameters)
 class LockstepWorld(Node, ABC, Generic[P]):
     """A node that takes one step per command.
 
-    A subclass calls :meth:`_publish_domain` when it is ready, and :meth:`_open_episode` when it has
-    a first state.
+    A subclass calls :meth:`_open_episode` when it has a first state, and :meth:`_publish_domain`
+    before if that takes its time.
     """
 
     def __init__(self, name: str, parameters: type[P], counted: tuple[str, ...], **kwargs: Any):
@@ -146,6 +146,7 @@ class LockstepWorld(Node, ABC, Generic[P]):
     # -- episodes -------------------------------------------------------------------------------
 
     def _publish_domain(self) -> None:
+        """Say what runs, also before there is a first state."""
         self._domains.publish(encode.domain_info(self._domain, self._now()))
 
     def _open_episode(self, task: Task, seed: int, index: int) -> None:
@@ -159,6 +160,7 @@ class LockstepWorld(Node, ABC, Generic[P]):
         self._episode += 1
         self._step = 0
         now = self._now()
+        self._publish_domain()  # for whoever was told something else meanwhile
         message = encode.task(task, self._domain, self._episode, seed, index, now)
         self._tasks.publish(message)
         self._states.publish(message.initial_state)

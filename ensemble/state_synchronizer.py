@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict, deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from time import monotonic
 from typing import NamedTuple
 
@@ -16,6 +16,7 @@ from ensemble.episode_tracker import EpisodeTracker, subscribe
 from ensemble.futures import wait_until
 from ensemble.interfaces import ATOMS, STATE
 from ensemble.observation import Episode, Observation
+from ensemble.refusals import Refusals
 from slap_ros.errors import SlapError
 from slap_ros.messages.decode import decode_atoms, decode_seen, decode_state, stamp_ns
 
@@ -41,23 +42,23 @@ class StateSynchronizer:
         self,
         node: Node,
         on_observation: Callable[[Observation], None],
-        on_episode: Callable[[Episode], None] = lambda _: None,
+        prepare: Callable[[Episode], None] = lambda _: None,
     ) -> None:
         """Subscribe to task, state and atoms.
 
         Args:
             node: Who subscribes.
             on_observation: Called with each observation that is newer than the last.
-            on_episode: Called with each new episode, before its first observation.
+            prepare: Called in a thread for each new episode, before its first observation.
         """
         self.latest: Observation | None = None
         self._node = node
         self._on_observation = on_observation
-        self._on_episode = on_episode
+        self._refusals = Refusals(node)
         self._states: OrderedDict[Key, ObjectCentricState] = OrderedDict()  # without atoms
         self._atoms: OrderedDict[Key, AbstractState] = OrderedDict()  # without a state
         self._early: deque[Pair] = deque(maxlen=WAITING)  # of no episode that is known
-        self._episodes = EpisodeTracker(node, self._open)
+        self._episodes = EpisodeTracker(node, prepare, self._open, self._refusals)
         subscribe(node, STATE, self._on_state)
         subscribe(node, ATOMS, self._on_atoms)
 
@@ -65,6 +66,11 @@ class StateSynchronizer:
     def episode(self) -> Episode | None:
         """The current episode, once known."""
         return self._episodes.current
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """What was refused, for diagnostics."""
+        return self._refusals.counts
 
     async def observe(
         self, episode: int, timeout_s: float, missing: type[SlapError]
@@ -82,7 +88,7 @@ class StateSynchronizer:
             An observation of this episode, or of a later one.
 
         Raises:
-            SlapError: ``missing``.
+            SlapError: ``missing``, or why the task was refused.
         """
         deadline = monotonic() + timeout_s
 
@@ -90,6 +96,8 @@ class StateSynchronizer:
             return self.latest is not None and self.latest.episode.number >= episode
 
         await wait_until(self._node, lambda: seen() or monotonic() > deadline)
+        if self.latest is None and self._episodes.refusal is not None:
+            raise self._episodes.refusal
         if self.latest is None or not seen():
             raise missing(
                 f"no perceived state{f' of episode {episode}' if episode else ''} within "
@@ -97,8 +105,7 @@ class StateSynchronizer:
             )
         return self.latest
 
-    def _open(self, episode: Episode) -> None:
-        self._on_episode(episode)
+    def _open(self, episode: Episode, _: None) -> None:
         early = [pair for pair in self._early if episode.has(pair.state)]
         self._early.clear()
         if early:
@@ -126,16 +133,24 @@ class StateSynchronizer:
             self._observe(episode, pair)
 
     def _observe(self, episode: Episode, pair: Pair) -> None:
-        state, atoms = pair
-        self.latest = Observation(
-            episode,
-            state.step,
-            decode_seen(atoms.seen, decode_state(state, episode.domain.types_by_name)),
-            decode_atoms(atoms.atoms, episode.space),
-            frozenset(atoms.missing),
-            bool(atoms.exact),
-        )
-        self._on_observation(self.latest)
+        try:
+            self.latest = _decoded(episode, pair)
+        except SlapError as error:
+            self._refusals.add("refused_states", f"step {pair.state.step} refused: {error}")
+        else:
+            self._on_observation(self.latest)
+
+
+def _decoded(episode: Episode, pair: Pair) -> Observation:
+    state, atoms = pair
+    return Observation(
+        episode,
+        state.step,
+        decode_seen(atoms.seen, decode_state(state, episode.domain.types_by_name)),
+        decode_atoms(atoms.atoms, episode.space),
+        frozenset(atoms.missing),
+        bool(atoms.exact),
+    )
 
 
 def _key(message: ObjectCentricState | AbstractState) -> Key:

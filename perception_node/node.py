@@ -20,7 +20,7 @@ ROS Parameters:
 Publishers:
     slap/atoms (slap_msgs/AbstractState): the ground atoms of each state, and what else is perceived
         otherwise than it is.
-    diagnostics (diagnostic_msgs/DiagnosticArray): states perceived; 1 Hz.
+    diagnostics (diagnostic_msgs/DiagnosticArray): states perceived, messages refused; 1 Hz.
 
 Subscribers:
     slap/domain (slap_msgs/DomainInfo), slap/task (slap_msgs/Task): what to perceive.
@@ -44,7 +44,8 @@ from ensemble.interfaces import ATOMS, STATE
 from ensemble.observation import Episode
 from ensemble.parameters import read_parameters
 from ensemble.perception_parameters import PerceptionParameters
-from slap_ros.errors import InvalidStateError
+from ensemble.refusals import Refusals
+from slap_ros.errors import SlapError
 from slap_ros.messages import qos
 from slap_ros.messages.decode import decode_state
 from slap_ros.perception import ExactPerceiver, NoisyPerceiver, Perceiver
@@ -64,12 +65,13 @@ class PerceptionNode(Node):
         self._step = BEFORE_FIRST  # of the newest state perceived in this episode
         self._early: deque[ObjectCentricState] = deque(maxlen=qos.EPISODE.depth)
         self._atoms = self.create_publisher(ATOMS.type, ATOMS.name, ATOMS.qos)
-        self._episodes = EpisodeTracker(self, self._open)
+        self._refusals = Refusals(self)
+        self._episodes = EpisodeTracker(self, self._perceiver_of, self._open, self._refusals)
         subscribe(self, STATE, self._on_state)
-        DiagnosticsPublisher(self, lambda: {"states": self._perceived})
+        DiagnosticsPublisher(self, lambda: {"states": self._perceived, **self._refusals.counts})
 
-    def _open(self, episode: Episode) -> None:
-        self._perceiver = self._perceiver_of(episode)
+    def _open(self, episode: Episode, perceiver: Perceiver) -> None:
+        self._perceiver = perceiver
         self._step = BEFORE_FIRST
         early = [message for message in self._early if episode.has(message)]
         self._early.clear()
@@ -94,13 +96,13 @@ class PerceptionNode(Node):
         """Perceive a state, each once and in the order of steps."""
         if message.step <= self._step:
             return
-        self._step = message.step
         try:
             state = decode_state(message, episode.domain.types_by_name)
-        except InvalidStateError as error:
-            self.get_logger().error(f"state of step {message.step} not perceived: {error}")
+            percept = self._perceiver.perceive(state)
+        except SlapError as error:
+            self._refusals.add("refused_states", f"step {message.step} not perceived: {error}")
             return
-        percept = self._perceiver.perceive(state)
+        self._step = message.step
         self._atoms.publish(encode.percept(percept, message, episode.space, state))
         self._perceived += 1
 

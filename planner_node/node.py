@@ -12,7 +12,8 @@ ROS Parameters:
 Publishers:
     slap/plan (slap_msgs/Plan): the plan under execution; latched.
     slap/plan_events (slap_msgs/PlanEvent): what happens to it.
-    diagnostics (diagnostic_msgs/DiagnosticArray): tasks tried and solved; 1 Hz.
+    diagnostics (diagnostic_msgs/DiagnosticArray): tasks tried and solved, messages refused;
+        1 Hz.
 
 Subscribers:
     slap/domain, slap/task, slap/state, slap/atoms: see ``ensemble.observation``.
@@ -100,7 +101,7 @@ class PlannerNode(Node):
             self._execute,
             cancel_callback=lambda _: CancelResponse.ACCEPT,
         )
-        DiagnosticsPublisher(self, lambda: self._counts)
+        DiagnosticsPublisher(self, lambda: {**self._counts, **self._synchronizer.counts})
 
     def destroy_node(self) -> None:
         """Stop the planning thread as well."""

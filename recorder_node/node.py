@@ -67,7 +67,8 @@ class RecorderNode(Node):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("recorder_node", **kwargs)
         self._path = _new_folder(read_parameters(self, RecorderParameters).bag)
-        self._metadata: dict[str, str] = {}
+        self._domain: DomainInfo | None = None
+        self._task: Task | None = None
         self._early: list[Record] = []  # before domain and task are known
         self._writer: BagWriter | None = None
         self._closed = False
@@ -107,18 +108,19 @@ class RecorderNode(Node):
             return
         self._early.append(record)
         if topic is DOMAIN:
-            self._metadata |= _of_domain(deserialize_message(raw, DomainInfo))
+            self._domain = deserialize_message(raw, DomainInfo)
         elif topic is TASK:
-            self._metadata |= _of_task(deserialize_message(raw, Task))
-        if "domain" in self._metadata and "seed" in self._metadata:
-            self._begin()
+            self._task = deserialize_message(raw, Task)
+        domain, task = self._domain, self._task
+        if domain is not None and task is not None and domain.name == task.domain:
+            self._begin(_of_domain(domain) | _of_task(task))
 
     def _now_ns(self) -> int:
         """Time of arrival, from the clock as it was at the start: readers sort messages by it."""
         return self._started_ns + monotonic_ns()
 
-    def _begin(self) -> None:
-        self._writer = BagWriter(self._path, self._metadata | versions())
+    def _begin(self, metadata: dict[str, str]) -> None:
+        self._writer = BagWriter(self._path, metadata | versions())
         for record in self._early:
             self._write(record)
         self._early.clear()

@@ -78,7 +78,6 @@ class SimNode(LockstepWorld[SimParameters]):
         self._timer: Timer | None = None  # until the next state is due
         visualize = self._settings.visualize
         self._visualizer = Visualizer(self, self._domain) if visualize else None
-        self._publish_domain()
         self._open_sampled(self._settings.seed, self._settings.index)
 
     # -- commands and steps ---------------------------------------------------------------------

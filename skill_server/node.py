@@ -12,7 +12,7 @@ ROS Parameters:
 Publishers:
     slap/command (slap_msgs/RobotCommand): the robot's next step.
     slap/skill_events (slap_msgs/SkillEvent): what happens to each skill.
-    diagnostics (diagnostic_msgs/DiagnosticArray): skills run; 1 Hz.
+    diagnostics (diagnostic_msgs/DiagnosticArray): skills run, messages refused; 1 Hz.
 
 Subscribers:
     slap/domain, slap/task, slap/state, slap/atoms: see ``ensemble.observation``.
@@ -86,7 +86,7 @@ class SkillServer(Node):
             cancel_callback=lambda _: CancelResponse.ACCEPT,
         )
         create_timer(self, CHECK_PERIOD, self._check)
-        DiagnosticsPublisher(self, lambda: self._publisher.counts)
+        DiagnosticsPublisher(self, lambda: {**self._publisher.counts, **self._synchronizer.counts})
 
     def destroy_node(self) -> None:
         """Stop the worker thread as well."""
