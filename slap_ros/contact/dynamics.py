@@ -21,7 +21,7 @@ from slap_ros.contact.contacts import (
     grasped,
     groups,
 )
-from slap_ros.contact.hand import HandState, own_way
+from slap_ros.contact.hand import HandState, hand_at, own_way
 from slap_ros.contact.involved import (
     TOUCH,
     Bounds,
@@ -40,7 +40,7 @@ from slap_ros.contact.involved import (
 from slap_ros.contact.scene import ContactScene
 from slap_ros.contact.simulation import GRAVITY, ContactSimulation, Outcome
 from slap_ros.contact.snapshot import ContactSnapshot, Opening, Placement
-from slap_ros.geometry.pose import Pose
+from slap_ros.geometry.pose import IDENTITY, Pose
 from slap_ros.physics.panda import FINGER_OPEN
 from slap_ros.physics.snapshot import BodyState
 
@@ -52,6 +52,7 @@ FALL = 0.5 * GRAVITY * CONTROL_PERIOD_S**2  # m, from rest in a period
 SWING = 0.1  # m, from the grasp point to what moves furthest when the hand turns
 OVERSHOOT_S = 0.02  # a hand that moves on goes less far beyond its target than in this time
 NOTHING = Involved(hand=False)
+SOMEWHERE = hand_at((0.5, 0.0, 0.5))  # stands for any hand where there is to be none
 MOST_REMEMBERED = 256  # arrangements of bodies known to stand or not
 
 Moving = BodyState | Opening
@@ -176,7 +177,8 @@ class ContactDynamics:
         key = (members, tuple(moving[i] for i in members))
         stands = self._standing.get(key)
         if stands is None:
-            outcome = self._simulation.run(now, now.hand.pose, Involved(members, hand=False))
+            alone = _alone(now, members)
+            outcome = self._simulation.run(alone, SOMEWHERE.pose, Involved(members, hand=False))
             after = self._results(outcome)
             stands = all(_rests(moving[i], after[i]) for i in members)
             if len(self._standing) == MOST_REMEMBERED:
@@ -277,6 +279,18 @@ class ContactDynamics:
             return abs(motion.velocity) * max(1.0, size) * CONTROL_PERIOD_S + FALL
         speed = math.hypot(*motion.velocity) + 0.5 * size * math.hypot(*motion.angular_velocity)
         return speed * CONTROL_PERIOD_S + FALL
+
+
+def _alone(now: ContactSnapshot, members: tuple[int, ...]) -> ContactSnapshot:
+    """The same with all else as it always is, so that what is known of these holds for ever."""
+    count = len(now.bodies)
+    return now._replace(
+        hand=SOMEWHERE,
+        bodies=tuple(b if i in members else BodyState(IDENTITY) for i, b in enumerate(now.bodies)),
+        openings=tuple(
+            o if count + i in members else Opening(0.0) for i, o in enumerate(now.openings)
+        ),
+    )
 
 
 def _all(now: ContactSnapshot) -> tuple[Moving, ...]:
