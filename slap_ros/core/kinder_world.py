@@ -1,0 +1,250 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Object-centric environments of KinDER (the distribution ``kindergarden``) as worlds.
+
+Nothing of KinDER is imported here: its environments are passed in. Of them are used
+``type_features``, ``initial_constant_state``, ``action_space``, ``step``, and ``reset`` with
+``options={"init_state": ...}``.
+
+What KinDER calls a state is not Markov. Chipmunk, behind its ``Dynamic2D`` environments, starts
+each step from the contact impulses of the one before, and its robot is given by one arm length and
+one finger gap, while the engine has four bodies that drift apart a little. So
+:class:`~slap_ros.core.rebuild_each_step.RebuildEachStep` is used: a step of a world is the first
+step of a new environment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slap_ros.core.action_space import Action, ActionSpace, GripperAxis
+from slap_ros.core.rebuild_each_step import MakeSimulator
+from slap_ros.errors import InvalidDomainError, InvalidStateError
+from slap_ros.relational import Feature, Layout, Object, State, Type
+
+# Units of features by KinDER's names, which are the same in all its types; others have none.
+UNITS: Mapping[str, str] = MappingProxyType(
+    {
+        **dict.fromkeys(("x", "y", "width", "height", "radius", "length", "size"), "m"),
+        **dict.fromkeys(("arm_joint", "arm_length", "base_radius", "finger_gap"), "m"),
+        **dict.fromkeys(("finger_width", "finger_height"), "m"),
+        **dict.fromkeys(("gripper_base_width", "gripper_base_height"), "m"),
+        "theta": "rad",
+        "mass": "kg",
+    }
+)
+VELOCITY_UNITS = {"vx": "m/s", "vy": "m/s", "omega": "rad/s"}  # also as vx_base, ...
+
+
+class KinderType(Protocol):
+    """KinDER's type of object."""
+
+    @property
+    def name(self) -> str:
+        """Such as ``dyn_rectangle``."""
+        ...
+
+    @property
+    def parent(self) -> Any:
+        """The type above, if any."""
+        ...
+
+
+class KinderState(Protocol):
+    """KinDER's state: an array of features for each object."""
+
+    @property
+    def data(self) -> dict[Any, NDArray[Any]]:
+        """Features by object."""
+        ...
+
+    def copy(self) -> Any:
+        """The same state, with arrays of its own."""
+        ...
+
+
+class KinderEnvironment(Protocol):
+    """As much of ``ObjectCentricKinDEREnv`` as is used."""
+
+    @property
+    def type_features(self) -> Mapping[Any, list[str]]:
+        """The names of a type's features."""
+        ...
+
+    @property
+    def initial_constant_state(self) -> Any:
+        """Objects that never change and that no observation has, such as walls."""
+        ...
+
+    @property
+    def action_space(self) -> Any:
+        """The limits of each axis, as Gymnasium has them."""
+        ...
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Sample a state by ``seed``, or continue from ``options["init_state"]``."""
+        ...
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Act for one control period."""
+        ...
+
+
+class KinderBridge:
+    """Translates between the states of one kind of KinDER environment and ours."""
+
+    def __init__(
+        self,
+        make_environment: Callable[[], KinderEnvironment],
+        subtypes: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
+        """Learn the objects and types from a first reset.
+
+        Args:
+            make_environment: Makes environments that have the same objects, whatever the seed.
+            subtypes: KinDER tells some roles of one type apart by names alone: objects whose
+                names begin with a key get a type of their own, named by the value, below KinDER's.
+        """
+        self._make = make_environment
+        environment = make_environment()
+        self._exemplar: KinderState = environment.reset(seed=0)[0]
+        features = environment.type_features
+        self._types: dict[str, Type] = {}
+        objects = []
+        for kinder_object in sorted(self._exemplar.data, key=lambda obj: str(obj.name)):
+            of_kind = self._adopt(kinder_object.type, features)
+            for prefix, name in subtypes.items():
+                if kinder_object.name.startswith(prefix):
+                    of_kind = self._types.setdefault(name, Type(name, of_kind.features, of_kind))
+            objects.append(Object(kinder_object.name, of_kind))
+        self.layout = Layout.of(tuple(objects))
+
+    def _adopt(self, kind: KinderType, features: Mapping[Any, list[str]]) -> Type:
+        """KinDER's type as ours, below KinDER's parent where it has all of that one's features."""
+        if kind.name not in self._types:
+            own = features[kind]
+            inherits = kind.parent is not None and set(features[kind.parent]) <= set(own)
+            parent = self._adopt(kind.parent, features) if inherits else None
+            described = tuple(Feature(name, unit_of(name)) for name in own)
+            self._types[kind.name] = Type(kind.name, described, parent)
+        return self._types[kind.name]
+
+    @property
+    def types(self) -> tuple[Type, ...]:
+        """The types of all objects, and those above them."""
+        return tuple(self._types.values())
+
+    def type(self, name: str) -> Type:
+        """The type of that name.
+
+        Raises:
+            InvalidDomainError: There is none.
+        """
+        if name not in self._types:
+            raise InvalidDomainError(
+                f"the environment has no type {name!r}; it has {', '.join(self._types)}"
+            )
+        return self._types[name]
+
+    def sample(self, seed: int) -> State:
+        """An initial state from the environment's own sampler, settled as it settles it."""
+        return self.state_of(self._make().reset(seed=seed)[0])
+
+    def state_of(self, observed: KinderState) -> State:
+        """KinDER's state as ours.
+
+        Raises:
+            InvalidDomainError: It has other objects than the first one had.
+        """
+        by_name = {obj.name: features for obj, features in observed.data.items()}
+        if set(by_name) != set(self.layout.by_name):
+            raise InvalidDomainError(
+                f"the environment observes {', '.join(sorted(by_name))}; the objects are "
+                f"{', '.join(sorted(self.layout.by_name))}"
+            )
+        return State(self.layout, np.concatenate([by_name[o.name] for o in self.layout.objects]))
+
+    def kinder_state(self, state: State) -> Any:
+        """Our state as KinDER's.
+
+        Raises:
+            InvalidStateError: It has other objects.
+        """
+        if state.layout is not self.layout:
+            raise InvalidStateError(
+                f"the state has {', '.join(map(str, state.layout.objects))}; the environment has "
+                f"{', '.join(map(str, self.layout.objects))}"
+            )
+        translated = self._exemplar.copy()
+        for obj in translated.data:
+            translated.data[obj] = np.array(state[self.layout.object(obj.name)])
+        return translated
+
+    def action_space(
+        self, axes: Sequence[Feature], gripper: GripperAxis | None = None
+    ) -> ActionSpace:
+        """The environment's action space.
+
+        Args:
+            axes: Names and units, which KinDER states only in its descriptions.
+            gripper: Which of them is a gripper; None: the robot has none.
+
+        Returns:
+            It, with the environment's own limits.
+
+        Raises:
+            InvalidDomainError: The environment has another number of axes.
+        """
+        box = self._make().action_space
+        if len(axes) != len(box.low):
+            raise InvalidDomainError(f"{len(axes)} axes are named; there are {len(box.low)}")
+        return ActionSpace(tuple(axes), tuple(box.low.tolist()), tuple(box.high.tolist()), gripper)
+
+    @property
+    def make_simulator(self) -> MakeSimulator:
+        """Builds environments in a state, as ``RebuildEachStep`` wants them."""
+        return lambda state: self.simulator(state)
+
+    def simulator(self, state: State) -> KinderSimulator:
+        """A new environment in a state."""
+        return KinderSimulator(self, self._make(), state)
+
+
+class KinderSimulator:
+    """An environment that runs on from a state. Alone it is not Markov: see the module."""
+
+    def __init__(self, bridge: KinderBridge, environment: KinderEnvironment, state: State) -> None:
+        """Continue from ``state``.
+
+        Args:
+            bridge: Translates states.
+            environment: What is stepped; nobody else may use it.
+            state: Where to begin.
+
+        Raises:
+            InvalidStateError: It has other objects.
+        """
+        self._bridge, self._environment = bridge, environment
+        self._low, self._high = environment.action_space.low, environment.action_space.high
+        # KinDER makes walls and table the first time that somebody asks for them; a reset to a
+        # given state does not, and everything would fall for ever.
+        _ = environment.initial_constant_state
+        environment.reset(options={"init_state": bridge.kinder_state(state)})
+
+    def step(self, action: Action) -> State:
+        """Act for one control period."""
+        # What rounding leaves outside the limits, KinDER refuses by an assertion.
+        observed, *_ = self._environment.step(np.clip(action, self._low, self._high))
+        return self._bridge.state_of(observed)
+
+
+def unit_of(feature: str) -> str:
+    """The unit of a feature, by KinDER's name of it."""
+    return UNITS.get(feature) or VELOCITY_UNITS.get(feature.split("_")[0], "1")

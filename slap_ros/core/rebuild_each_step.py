@@ -1,0 +1,79 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Simulators that are not Markov, made Markov by building a new one from the state in each step.
+
+Physics engines keep more than their states tell: impulses of the last step to begin the next one
+with (warm starts), contacts, what a controller remembers. A simulator that was just built has none
+of this, so what it does next depends on the state alone. The price is the building, in each step,
+and that what was kept is lost: motion differs a little from that of a simulator that runs on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from slap_ros.core.action_space import Action, ActionSpace
+from slap_ros.relational import State
+
+
+class Simulator(Protocol):
+    """What is built from a state, and stepped once."""
+
+    def step(self, action: Action) -> State:
+        """Act for one control period."""
+        ...
+
+
+MakeSimulator = Callable[[State], Simulator]  # a new one in each call, sharing nothing
+
+
+class RebuildEachStep:
+    """A world whose every step is the first of a new simulator; see ``slap_ros.core.World``."""
+
+    def __init__(self, make: MakeSimulator, state: State, actions: ActionSpace) -> None:
+        """Begin in ``state``.
+
+        Args:
+            make: Builds a simulator in a state. It has to be a function of that state: simulators
+                share nothing that changes.
+            state: Where to begin.
+            actions: What the robot can do.
+
+        Raises:
+            InvalidStateError: The state is not finite, or ``make`` refuses it.
+        """
+        self._make, self._actions = make, actions
+        self.reset(state)
+
+    @classmethod
+    def maker(cls, make: MakeSimulator, actions: ActionSpace) -> Callable[[State], RebuildEachStep]:
+        """What a domain needs as ``make_world``."""
+        return lambda state: cls(make, state, actions)
+
+    @property
+    def state(self) -> State:
+        """The current state."""
+        return self._state
+
+    def reset(self, state: State) -> None:
+        """Continue from ``state``.
+
+        Raises:
+            InvalidStateError: It is not finite, or ``make`` refuses it.
+        """
+        state.require_finite()
+        # Built at once, so that a state is refused here and not in the next step.
+        self._built: Simulator | None = self._make(state)
+        self._state = state
+
+    def step(self, action: Action) -> State:
+        """Act for one control period.
+
+        Raises:
+            InvalidCommandError: The action is not in the action space; nothing moved.
+        """
+        self._actions.check(action)
+        simulator, self._built = self._built or self._make(self._state), None
+        self._state = simulator.step(action)
+        return self._state
