@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the documentation shows of the sources is what the sources have."""
 
+import json
 import re
 from pathlib import Path
 
@@ -87,3 +88,9 @@ def test_the_citation_is_of_this_version():
     assert citation["version"] == slap_ros.__version__
     changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     assert f"## {slap_ros.__version__}" in changes
+
+
+def test_the_readme_names_the_pybullet_of_its_figures():
+    (named,) = re.findall(r"on PyBullet (\d+\.\d+\.\d+)", (ROOT / "README.md").read_text())
+    results = [json.loads(path.read_text()) for path in ROOT.glob("docs/results/*.json")]
+    assert {result["versions"]["pybullet"] for result in results} == {named}

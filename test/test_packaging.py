@@ -4,6 +4,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -183,3 +184,22 @@ def test_the_core_imports_no_ros():
         "sys.exit(str(bad) if bad else 0)"
     )
     subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT)
+
+
+def required(lines):
+    """The distributions that requirements name."""
+    return {re.match(r"[\w.-]+", line)[0] for line in lines if line[:1].isalpha()}
+
+
+def test_what_rosdep_does_not_give_is_what_the_readme_installs():
+    setup = (ROOT / "setup.py").read_text()
+    lists = [re.search(rf"^{name} = \[(.*?)^\]", setup, re.M | re.S)[1] for name in LISTS]
+    needed = required(re.findall(r'^    "(.+)",', "\n".join(lists), re.M))
+    by_pip = required((ROOT / "requirements-ros.txt").read_text().splitlines())
+    depends = ET.parse(ROOT / "package.xml").getroot().findall("exec_depend")
+    by_rosdep = {tag.text.removeprefix("python3-").replace("yaml", "pyyaml") for tag in depends}
+    assert needed <= by_pip | by_rosdep
+    assert by_pip <= needed
+
+
+LISTS = ("RUNTIME", "PHYSICS")
