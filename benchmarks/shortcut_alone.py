@@ -73,7 +73,7 @@ def measure(shortcut: Shortcut, domain: Domain, starts: list[Start]) -> dict[str
 
 def explore(name: str) -> list[ExplorationResult]:
     """What training found, from which it is known where a shortcut begins."""
-    settings = training_settings("ours", name).exploration
+    settings = training_settings("ours", get_domain(name)).exploration
     distribution = TaskDistribution(name, "fair", 0)
     found = (jobs.explore(distribution, index, settings) for index in range(settings.tasks))
     return [ExplorationResult.from_json(data) for data in found]

@@ -16,6 +16,7 @@ from rich.progress import TaskID
 from slap_ros.cli.console import console, exits, progress
 from slap_ros.cli.options import DomainName, Jobs, Preset, flat_options
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose, sampling
+from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.approaches import approaches
@@ -145,16 +146,16 @@ def pruning_(
 ) -> None:
     """SLAP Table 2: how many candidates random rollouts leave over."""
     require_matplotlib()
-    preset = get_domain(domain, options.preset).preset
+    chosen = get_domain(domain, options.preset)
     if work:
         folders = [TrainingFolder(folder) for folder in work]
         explored, how = pruning.explored_in(folders, domain)
         origin = Provenance(domain, _command("pruning", domain, work=work), _trainings(folders))
     else:
-        how = training_settings(settings, domain).exploration
-        explored = _explore(domain, preset, options, how)
+        how = training_settings(settings, chosen).exploration
+        explored = _explore(chosen, options, how)
         sampled_from = {
-            "preset": preset,
+            "preset": chosen.preset,
             "tasks": options.tasks,
             "seeds": options.seeds,
             "settings": settings,
@@ -237,9 +238,11 @@ def _given(options: ComparisonOptions, settings: Data) -> Data:
 
 
 def _explore(
-    domain: str, preset: str, options: TaskOptions, how: ExplorationSettings
+    domain: Domain, options: TaskOptions, how: ExplorationSettings
 ) -> tuple[pruning.PrunedCandidates, ...]:
-    trainings = [TaskDistribution(domain, preset, seed) for seed in range(options.seeds)]
+    trainings = [
+        TaskDistribution(domain.name, domain.preset, seed) for seed in range(options.seeds)
+    ]
     with _StudyBars() as bars:
         return pruning.explore(trainings, options.tasks, how, options.jobs, bars)
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
@@ -17,10 +18,12 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemaining
 
 from slap_ros.cli.console import console, print_json
 from slap_ros.cli.options import MAX_SEED, DomainName, Json, Preset
+from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, read_text, require_writable
 from slap_ros.shortcuts.library import save_library
+from slap_ros.shortcuts.setting_changes import changed, parse_changes
 from slap_ros.shortcuts.settings import TrainingSettings, training_settings
 from slap_ros.shortcuts.task_distribution import TaskDistribution
 from slap_ros.shortcuts.training import CandidateGroup, Training
@@ -40,12 +43,22 @@ class TrainOptions:
     ] = None
     preset: Preset = None
     seed: Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Of everything.")] = 0
-    settings: Annotated[str, typer.Option(help="ours, or paper: the paper's hyper-parameters.")] = (
-        "ours"
-    )
+    settings: Annotated[
+        str, typer.Option(help="ours, paper (the paper's hyper-parameters), or the domain's own.")
+    ] = "ours"
+    set: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUE",
+            help="Change one of the settings, as exploration.rollouts=16; may be repeated. A wrong "
+            "name lists all.",
+        ),
+    ] = None
     steps: Annotated[
         int | None,
-        typer.Option(min=1, help="Environment steps per shortcut; default: settings'."),
+        typer.Option(
+            min=1, help="Environment steps per shortcut, all stages together; default: settings'."
+        ),
     ] = None
     jobs: Annotated[int, typer.Option(min=1, help="Processes.")] = 2
     ray: Annotated[
@@ -67,24 +80,27 @@ class TrainOptions:
         """Where checkpoints and logs are, by default beside the library."""
         return self.work or self.library_folder.with_name(f"{self.library_folder.name}-training")
 
-    @property
-    def training_settings(self) -> TrainingSettings:
+    def training_settings(self, domain: Domain) -> TrainingSettings:
         """Hyper-parameters of the training.
 
         Raises:
-            InvalidParameterError: There are none of that name.
+            InvalidParameterError: There are none of that name, or they cannot be changed so.
+            InvalidDomainError: See :func:`~slap_ros.shortcuts.settings.training_settings`.
         """
-        chosen = training_settings(self.settings, self.domain)
-        if self.steps is None:
-            return chosen
-        return replace(chosen, ppo=replace(chosen.ppo, total_steps=self.steps))
+        chosen = training_settings(self.settings, domain)
+        changes = parse_changes(self.set or (), TrainingSettings)
+        if self.steps is not None and (both := [n for n in changes if n.endswith("total_steps")]):
+            raise InvalidParameterError(f"--steps and --set {both[0]} say the same: give one")
+        chosen = changed(chosen, changes)
+        return chosen if self.steps is None else chosen.with_total_steps(self.steps)
 
     @property
     def command(self) -> str:
         """The command that trains the same library again."""
         command = f"slap train {self.domain} --preset {self.preset} --seed {self.seed}"
         steps = "" if self.steps is None else f" --steps {self.steps}"
-        return f"{command} --settings {self.settings}{steps}"
+        changes = "".join(f" --set {shlex.quote(text)}" for text in self.set or ())
+        return f"{command} --settings {self.settings}{steps}{changes}"
 
 
 def train(options: TrainOptions) -> int:
@@ -95,7 +111,7 @@ def train(options: TrainOptions) -> int:
     """
     domain = get_domain(options.domain, options.preset)
     options = replace(options, preset=domain.preset)
-    settings = options.training_settings
+    settings = options.training_settings(domain)
     for folder in (options.library_folder, options.work_folder):
         require_writable(folder)
     _require_torch()
@@ -159,6 +175,10 @@ class _TrainingBars:
         self._bars.update(self._counting[what], completed=done, detail=f"{done} of {total}")
         if done == total:
             self._bars.remove_task(self._counting.pop(what))
+
+    def on_left_out(self, use: str, index: int, reason: str) -> None:
+        """A task has no plan."""
+        console.print(f"{use}: task {index} is left out, as it has no plan: {reason}")
 
     def on_ranked(self, ranked: Sequence[CandidateGroup]) -> None:
         """What was found worth learning."""

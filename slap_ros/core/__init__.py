@@ -6,7 +6,7 @@ from slap_ros.core.action_space import Action, ActionSpace, GripperAxis
 from slap_ros.core.display import Animate, Display, VisibleBody
 from slap_ros.core.domain import Domain, Execution
 from slap_ros.core.domain_factory import DomainFactory, presets
-from slap_ros.core.learner_interface import LearnerInterface, Learning
+from slap_ros.core.learner_interface import LearnerInterface, Learning, SettingValue
 from slap_ros.core.skill import Policy, Skill
 from slap_ros.core.task import Task
 from slap_ros.core.world import MakeVectorWorld, SyncVectorWorld, VectorWorld, World
@@ -24,6 +24,7 @@ __all__ = [
     "Learning",
     "MakeVectorWorld",
     "Policy",
+    "SettingValue",
     "Skill",
     "SyncVectorWorld",
     "Task",

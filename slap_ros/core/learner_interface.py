@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -73,6 +73,9 @@ class LearnerInterface:
     length_m: float = 0.1
 
 
+SettingValue = bool | int | float | tuple[int, ...] | None  # None: a part that is left out
+
+
 @dataclass(frozen=True)
 class Learning:
     """What a domain offers to those who learn in it.
@@ -82,8 +85,12 @@ class Learning:
         actions: What a learned policy may command, where that is less than the action space.
         make_vector_world: Makes worlds that are stepped together, where that is faster than one
             after the other.
+        settings: What a training's settings are in this domain, where they differ: by the name of
+            ``slap train --settings`` (``ours``, ``paper``, or a new one), then by dotted name, as
+            ``slap train --set`` has it.
     """
 
     interface: LearnerInterface
     actions: ActionSpace | None = None
     make_vector_world: MakeVectorWorld | None = None
+    settings: Mapping[str, Mapping[str, SettingValue]] = field(default_factory=dict)

@@ -60,7 +60,7 @@ def speed(domain: Domain, experience: Experience) -> Iterator[Check]:
         "warning" if steps < SLOW_STEPS else "ok",
         f"{steps:,.0f} steps, {resets:,.0f} resets, {atoms:,.0f} abstract states a second",
     )
-    settings = training_settings("ours", domain.name)
+    settings = training_settings("ours", domain)
     wanted = settings.shortcuts * settings.total_steps
     hours = wanted / steps / 3600.0
     yield Check(

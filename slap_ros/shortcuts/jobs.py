@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from slap_ros.errors import SlapError
+from slap_ros.errors import PlanningLimitError, SlapError, UnsolvableError
 from slap_ros.planning.planner import GraphPlanner, Problem
 from slap_ros.shortcuts.explore import Explorer, OperatorPath
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
@@ -55,6 +55,22 @@ def explore(
     return {**explorer.explore().as_json(), "cpu_s": process_time() - began}
 
 
+def try_to_explore(
+    distribution: TaskDistribution, index: int, settings: ExplorationSettings
+) -> dict[str, Any] | str:
+    """The same, or why the task has no plan, in words.
+
+    Args:
+        distribution: Whose task.
+        index: Of the task.
+        settings: How to explore.
+    """
+    try:
+        return explore(distribution, index, settings)
+    except (UnsolvableError, PlanningLimitError) as error:
+        return str(error)
+
+
 def start(
     distribution: TaskDistribution,
     index: int,
@@ -87,7 +103,7 @@ def start(
 
 def plan_length(
     distribution: TaskDistribution, index: int, shortcuts: tuple[Shortcut, ...], sampling: Sampling
-) -> int | None:
+) -> int | str:
     """Plan for one validation task.
 
     Args:
@@ -97,7 +113,7 @@ def plan_length(
         sampling: How they are tried out.
 
     Returns:
-        Environment steps of the plan in the model; None where there is no plan.
+        Environment steps of the plan in the model; or why there is none, in words.
     """
     domain = distribution.make_domain()
     task = domain.task(distribution.task_seed, VALIDATION + index)
@@ -106,8 +122,8 @@ def plan_length(
     planner = GraphPlanner(problem, shortcuts=grounded)
     try:
         result = planner.plan(initial, problem.model.space.mask(task.goal))
-    except SlapError:
-        return None
+    except SlapError as error:
+        return str(error)
     return result.plan.predicted_steps
 
 

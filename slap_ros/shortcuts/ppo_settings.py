@@ -6,6 +6,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from slap_ros.errors import InvalidParameterError
+
 
 @dataclass(frozen=True)
 class PpoSettings:
@@ -24,3 +26,9 @@ class PpoSettings:
     log_std: float = -0.5
     hidden: tuple[int, ...] = (64, 64)
     total_steps: int = 300_000
+
+    def __post_init__(self) -> None:
+        if self.environments % self.parts:
+            raise InvalidParameterError(
+                f"{self.environments} environments cannot be divided into {self.parts} equal parts"
+            )

@@ -8,9 +8,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from slap_ros.errors import InvalidParameterError
+from slap_ros.core import Domain
+from slap_ros.errors import InvalidDomainError, InvalidParameterError
 from slap_ros.shortcuts.ppo_settings import PpoSettings
 from slap_ros.shortcuts.rewards import Rewards
+from slap_ros.shortcuts.setting_changes import changed
 from slap_ros.shortcuts.shortcut import DEFAULT, PAPER, Sampling
 from slap_ros.shortcuts.stored_keys import restored, stored
 
@@ -107,8 +109,26 @@ class TrainingSettings:
 
     @property
     def total_steps(self) -> int:
-        """Environment steps that a shortcut is trained for."""
+        """Environment steps that a shortcut is trained for, in all stages together."""
         return sum(stage.total_steps for stage in self.stages)
+
+    def with_total_steps(self, steps: int) -> TrainingSettings:
+        """As many environment steps in all, shared among the stages as they are now.
+
+        Raises:
+            InvalidParameterError: Fewer steps than stages.
+        """
+        if steps < len(self.stages):
+            raise InvalidParameterError(f"{len(self.stages)} stages cannot share {steps} steps")
+        if self.polish is None:
+            return replace(self, ppo=replace(self.ppo, total_steps=steps))
+        share = round(steps * self.ppo.total_steps / self.total_steps)
+        first = min(max(share, 1), steps - 1)
+        return replace(
+            self,
+            ppo=replace(self.ppo, total_steps=first),
+            polish=replace(self.polish, total_steps=steps - first),
+        )
 
     def as_json(self) -> dict[str, Any]:
         """A JSON object, under the keys of :mod:`slap_ros.shortcuts.stored_keys`."""
@@ -137,76 +157,27 @@ _PAPER = replace(
     horizon=100,
     sampling=PAPER,
 )
-SETTINGS: Mapping[str, Mapping[str, TrainingSettings]] = {
-    "ours": {
-        "obstacle2d": replace(
-            OURS,
-            # Its worlds are stepped together, so that many cost little.
-            exploration=ExplorationSettings(tasks=6, rollouts=6000, length=16, action_repeat=4),
-            ppo=PpoSettings(
-                environments=128, rollout_steps=32, batch_size=512, total_steps=400_000
-            ),
-            polish=None,
-            horizon=30,
-            starts=300,
-        ),
-        "obstacle_tower": replace(
-            OURS,
-            ppo=replace(LEARN, environments=32, parts=2, batch_size=512, total_steps=300_000),
-            polish=replace(
-                POLISH, environments=32, parts=2, batch_size=1024, total_steps=1_500_000
-            ),
-            polish_rewards=Rewards(failure=-30.0),
-            horizon=50,
-            starts=4000,
-            shortcuts=1,  # all that is found is the slap, from the one or the other state
-        ),
-        "cluttered_drawer": replace(
-            OURS,
-            polish=replace(POLISH, total_steps=200_000),
-            horizon=50,
-            starts=600,
-        ),
-        "cleanup_table": replace(
-            OURS,
-            # Nodes: everything over which the hand can be, that it can grasp, and lift.
-            exploration=ExplorationSettings(tasks=3, rollouts=32, length=40, nodes=13),
-            ppo=replace(LEARN, total_steps=120_000),
-            polish=replace(POLISH, total_steps=200_000),
-            horizon=40,
-            starts=200,
-            shortcuts=2,
-        ),
-        "": OURS,
-    },
-    "paper": {
-        "obstacle2d": replace(
-            _PAPER,
-            exploration=ExplorationSettings(
-                rollouts=1000, length=100, hits=1, action_repeat=1, nodes=1000
-            ),
-            ppo=replace(_PAPER_PPO, rollout_steps=50, total_steps=50_000),
-            rewards=Rewards(
-                step=-0.5, success=10.0, failure=0.0, shaping=0.0, discount=0.99, scale=1.0
-            ),
-            horizon=50,
-            sampling=replace(PAPER, horizon=50),
-        ),
-        "": _PAPER,
-    },
-}
+GENERAL: Mapping[str, TrainingSettings] = {"ours": OURS, "paper": _PAPER}
 
 
-def training_settings(name: str, domain: str) -> TrainingSettings:
-    """Settings by name, for a domain.
+def training_settings(name: str, domain: Domain) -> TrainingSettings:
+    """Settings by name, as they are in a domain.
 
     Args:
-        name: One of ``SETTINGS``.
-        domain: Its name; one without settings of its own has the general ones.
+        name: One of ``GENERAL``, or of the domain's own; those begin with ``ours``.
+        domain: Its ``Learning.settings`` say what differs.
 
     Raises:
         InvalidParameterError: There are none of that name.
+        InvalidDomainError: The domain changes settings that there are not, or as they cannot be.
     """
-    if name not in SETTINGS:
-        raise InvalidParameterError(f"unknown settings {name!r}; there are {', '.join(SETTINGS)}")
-    return SETTINGS[name].get(domain, SETTINGS[name][""])
+    own = {} if domain.learning is None else domain.learning.settings
+    if name not in GENERAL and name not in own:
+        known = ", ".join(dict.fromkeys([*GENERAL, *own]))
+        raise InvalidParameterError(f"unknown settings {name!r}; there are {known}")
+    try:
+        return changed(GENERAL.get(name, OURS), own.get(name, {}))
+    except InvalidParameterError as error:
+        raise InvalidDomainError(
+            f"domain {domain.name}, Learning.settings[{name!r}]: {error}"
+        ) from error

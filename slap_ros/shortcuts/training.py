@@ -9,13 +9,14 @@ interrupted.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import fmean
 from typing import Any, Protocol
 
-from slap_ros.errors import InvalidParameterError
+from slap_ros.errors import InvalidParameterError, UnsolvableError
 from slap_ros.shortcuts import jobs
 from slap_ros.shortcuts.explore import ExplorationResult, OperatorPath, ShortcutCandidate
 from slap_ros.shortcuts.library import Library
@@ -28,6 +29,8 @@ from slap_ros.shortcuts.work_folder import WorkFolder
 from slap_ros.shortcuts.workers import Workers, in_order
 from slap_ros.versions import versions
 
+UNRECORDED = "why was not recorded"  # in work folders of version 0.1.0
+
 
 class TrainingCallback(Protocol):
     """Receives the events of a training."""
@@ -39,6 +42,16 @@ class TrainingCallback(Protocol):
             what: The step, in words.
             done: Jobs done so far; 0 as the step begins.
             total: Jobs of the step.
+        """
+        ...
+
+    def on_left_out(self, use: str, index: int, reason: str) -> None:
+        """A task has no plan, and training goes on without it.
+
+        Args:
+            use: What it was for: validation or exploration.
+            index: Of the task, with the seed of training tasks.
+            reason: Why it has no plan.
         """
         ...
 
@@ -142,6 +155,7 @@ class Training:
     workers: Workers
     callback: TrainingCallback
     _shortcuts: list[Shortcut] = field(default_factory=list, init=False)
+    _validation: list[int] = field(default_factory=list, init=False)  # tasks that have a plan
 
     def __post_init__(self) -> None:
         self._work = WorkFolder(self.folder)
@@ -152,14 +166,14 @@ class Training:
         Raises:
             ChildProcessError: A process that stepped environments has ended.
             InvalidParameterError: The folder has a training with other settings, or is damaged.
-            UnsolvableError: A task to be explored has no plan.
+            UnsolvableError: No validation task has a plan, or no task to be explored has one.
         """
         self._require_same_settings()
+        length = baseline = self._validate_without()
         explored = self._explore()
         ranked = rank(explored)
         self.callback.on_ranked(ranked)
         operator_steps = mean_steps(explored)
-        length = baseline = self._plan_length(())
         tried: set[ProblemKey] = set()
         for group in ranked:
             key, expected = _problem_key(group.signature), baseline * (1.0 - group.relative_saving)
@@ -212,13 +226,48 @@ class Training:
             )
 
     def _explore(self) -> list[ExplorationResult]:
-        tasks = self.settings.exploration.tasks
-        work = [(self.distribution, i, self.settings.exploration) for i in range(tasks)]
         return self._work.cached(
             "explored",
-            lambda: self._run("exploring tasks", jobs.explore, work),
+            self._explore_what_can_be,
             lambda data: [ExplorationResult.from_json(result) for result in data],
         )
+
+    def _explore_what_can_be(self) -> list[Any]:
+        tasks = self.settings.exploration.tasks
+        work = [(self.distribution, i, self.settings.exploration) for i in range(tasks)]
+        found = self._run("exploring tasks", jobs.try_to_explore, work)
+        self._leave_out("exploration", jobs.EXPLORATION, found)
+        return [result for result in found if not isinstance(result, str)]
+
+    def _leave_out(self, use: str, first: int, found: Sequence[Any]) -> None:
+        """Name the tasks of which no more is found than why they have no plan.
+
+        Args:
+            use: What the tasks are for.
+            first: Index of the first of them.
+            found: What was found of each, or why nothing was.
+
+        Raises:
+            UnsolvableError: That is so for all.
+        """
+        reasons = {i: reason for i, reason in enumerate(found) if isinstance(reason, str)}
+        for i, reason in reasons.items():
+            self.callback.on_left_out(use, first + i, reason)
+        if len(reasons) == len(found):
+            raise UnsolvableError(
+                f"none of {len(found)} tasks for {use} has a plan, so there is nothing to shorten. "
+                f"The first: {reasons[0]}. `slap plan {self.distribution.domain} --preset "
+                f"{self.distribution.preset} --seed {self.distribution.task_seed} --index {first}` "
+                "plans for it"
+            )
+
+    def _validate_without(self) -> float:
+        """Mean plan length without shortcuts; validation tasks without a plan are left out."""
+        lengths = self._plan(range(self.settings.validation), ())
+        self._leave_out("validation", jobs.VALIDATION, lengths)
+        solved = {i: length for i, length in enumerate(lengths) if isinstance(length, int)}
+        self._validation = list(solved)
+        return fmean(solved.values())
 
     def _starts(
         self, group: CandidateGroup, operator_steps: dict[str, float]
@@ -244,15 +293,15 @@ class Training:
 
     def _plan_length(self, shortcuts: tuple[Shortcut, ...]) -> float:
         """Mean on validation tasks, environment steps; infinite where one was not solved."""
-        work = [
-            (self.distribution, i, shortcuts, self.settings.sampling)
-            for i in range(self.settings.validation)
-        ]
+        lengths = self._plan(self._validation, shortcuts)
+        return fmean(length if isinstance(length, int) else math.inf for length in lengths)
+
+    def _plan(self, tasks: Sequence[int], shortcuts: tuple[Shortcut, ...]) -> list[int | str]:
+        """Steps of a plan for each of these validation tasks, or why it has none."""
+        work = [(self.distribution, i, shortcuts, self.settings.sampling) for i in tasks]
         name = "+".join(["plans", *(shortcut.name for shortcut in shortcuts)])
         return self._work.cached(
-            name,
-            lambda: self._run("planning", jobs.plan_length, work),
-            lambda lengths: float("inf") if None in lengths else fmean(lengths),
+            name, lambda: self._run("planning", jobs.plan_length, work), _decode_lengths
         )
 
     def _run(self, what: str, function: Any, work: Sequence[tuple[Any, ...]]) -> list[Any]:
@@ -279,6 +328,15 @@ class Training:
             "settings": self.settings.as_json(),
             "versions": dict(versions()),
         }
+
+
+def _decode_lengths(data: Any) -> list[int | str]:
+    """Plan lengths, or why there is none; no more than that there is none in version 0.1.0."""
+    lengths = [UNRECORDED if length is None else length for length in data]
+    for length in lengths:
+        if isinstance(length, bool) or not isinstance(length, int | str):
+            raise TypeError(f"{length!r} is no plan length")
+    return lengths
 
 
 def mean_steps(explored: Sequence[ExplorationResult]) -> dict[str, float]:

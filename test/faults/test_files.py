@@ -246,7 +246,7 @@ def test_damaged_pddl_is_planned_for_or_refused(tmp_path, name, count):
 
 PLACE = TaskDistribution("obstacle2d", "fair", 3)
 BRIEF = replace(
-    training_settings("ours", "obstacle2d"),
+    training_settings("ours", get_domain("obstacle2d")),
     exploration=ExplorationSettings(tasks=1, rollouts=60, length=30, action_repeat=4),
     shortcuts=0,  # nothing is learned: what is there is read
 )

@@ -21,7 +21,7 @@ from slap_ros.shortcuts.training import Training, rank
 from slap_ros.shortcuts.workers import SequentialWorkers, ray_workers
 
 TASKS = TaskDistribution("obstacle2d", "fair", 5)
-OURS = training_settings("ours", "obstacle2d")
+OURS = training_settings("ours", get_domain("obstacle2d"))
 SMALL = replace(
     OURS,
     exploration=ExplorationSettings(tasks=2, rollouts=60, length=30, action_repeat=4),
@@ -41,6 +41,9 @@ class Recorder:
     def on_progress(self, what, done, total):
         if (what, done) == self.interrupt_at:
             raise KeyboardInterrupt
+
+    def on_left_out(self, use, index, reason):
+        raise AssertionError((use, index, reason))
 
     def on_ranked(self, ranked):
         self.ranked = ranked

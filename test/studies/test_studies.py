@@ -231,7 +231,7 @@ def training(tmp_path):
         line(1, 150, 0.7), line(1, 250, 0.8, 7.0),
     ):  # fmt: skip
         kept.append(entry)
-    how = training_settings("ours", "obstacle2d")
+    how = training_settings("ours", get_domain("obstacle2d"))
     settings = {"place": vars(TaskDistribution("obstacle2d", "fair", 3)), **how.as_json()}
     (folder / "settings.json").write_text(json.dumps(settings))
     return folder
@@ -303,7 +303,7 @@ def test_a_folder_without_a_training_or_with_another_domains_is_refused(tmp_path
 
 def test_pruning_counts_what_a_training_has_explored(tmp_path, training):
     distribution = TaskDistribution("obstacle2d", "fair", 3)
-    how = training_settings("ours", "obstacle2d").exploration
+    how = training_settings("ours", get_domain("obstacle2d")).exploration
     explored = [jobs.explore(distribution, index, how) for index in range(2)]
     (training / "explored.json").write_text(json.dumps(explored))
     data = study(tmp_path / "kept", "pruning", "obstacle2d", "--work", training)

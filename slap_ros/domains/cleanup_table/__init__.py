@@ -15,7 +15,7 @@ from types import MappingProxyType
 
 from slap_ros.core import Display, Domain, Execution, Learning, presets
 from slap_ros.domains.cleanup_table import features, operators, predicates, skills, tasks
-from slap_ros.domains.cleanup_table.learner_interface import LEARNER_INTERFACE
+from slap_ros.domains.cleanup_table.learner_interface import LEARNER_INTERFACE, TRAINING_SETTINGS
 from slap_ros.domains.cleanup_table.scene import scene_of
 from slap_ros.domains.cleanup_table.shapes import shipped
 from slap_ros.domains.tabletop.presets import ACTION_SPACES, TIMINGS
@@ -85,6 +85,7 @@ def make(
         ),
         learning=Learning(
             interface=LEARNER_INTERFACE,
+            settings=TRAINING_SETTINGS,
             actions=ACTION_SPACE,
         ),
         configuration=settings.as_configuration(),

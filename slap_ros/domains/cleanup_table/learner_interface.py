@@ -4,9 +4,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from slap_ros.core import LearnerInterface
+from slap_ros.core import LearnerInterface, SettingValue
 from slap_ros.domains.cleanup_table.features import BLOCK, HALF, CleanupObjectIndex
 from slap_ros.domains.cleanup_table.predicates import GRIPPER_EMPTY, HOLDING, NOT_HOLDING
 from slap_ros.domains.tabletop import observation
@@ -79,3 +81,18 @@ LEARNER_INTERFACE = LearnerInterface(
     joint_limit_penalty=observation.joint_limit_penalty,
     grasping=frozenset({HOLDING, NOT_HOLDING, GRIPPER_EMPTY}),
 )
+# Where a training in this domain differs; see `slap train --settings`.
+TRAINING_SETTINGS: Mapping[str, Mapping[str, SettingValue]] = {
+    "ours": {
+        # Nodes: everything over which the hand can be, that it can grasp, and lift.
+        "exploration.tasks": 3,
+        "exploration.rollouts": 32,
+        "exploration.length": 40,
+        "exploration.nodes": 13,
+        "ppo.total_steps": 120_000,
+        "polish.total_steps": 200_000,
+        "horizon": 40,
+        "starts": 200,
+        "shortcuts": 2,
+    },
+}

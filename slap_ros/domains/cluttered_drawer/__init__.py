@@ -16,7 +16,7 @@ from types import MappingProxyType
 from slap_ros.core import Display, Domain, Execution, Learning, presets
 from slap_ros.domains.cluttered_drawer import features, operators, skills, tasks
 from slap_ros.domains.cluttered_drawer.blocking import FingerClearance
-from slap_ros.domains.cluttered_drawer.learner_interface import LEARNER_INTERFACE
+from slap_ros.domains.cluttered_drawer.learner_interface import LEARNER_INTERFACE, TRAINING_SETTINGS
 from slap_ros.domains.cluttered_drawer.predicates import HAND_PREDICATES, predicates
 from slap_ros.domains.cluttered_drawer.scene import scene_of
 from slap_ros.domains.tabletop.presets import ACTION_SPACES, TIMINGS
@@ -68,6 +68,7 @@ def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Doma
         ),
         learning=Learning(
             interface=LEARNER_INTERFACE,
+            settings=TRAINING_SETTINGS,
             actions=ACTION_SPACE,
         ),
         configuration=settings.as_configuration(),

@@ -4,9 +4,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from slap_ros.core import LearnerInterface
+from slap_ros.core import LearnerInterface, SettingValue
 from slap_ros.domains.cluttered_drawer.blocking import SIDES
 from slap_ros.domains.cluttered_drawer.features import BLOCK, SURFACE, TARGET
 from slap_ros.domains.cluttered_drawer.predicates import GRASPING
@@ -77,3 +79,7 @@ LEARNER_INTERFACE = LearnerInterface(
     grasping=GRASPING,
     length_m=0.05,
 )
+# Where a training in this domain differs; see `slap train --settings`.
+TRAINING_SETTINGS: Mapping[str, Mapping[str, SettingValue]] = {
+    "ours": {"polish.total_steps": 200_000, "horizon": 50, "starts": 600},
+}

@@ -22,7 +22,7 @@ from slap_ros.domains.obstacle2d.dynamics import (
     Obstacle2DWorld,
     settle,
 )
-from slap_ros.domains.obstacle2d.learner_interface import LEARNER_INTERFACE
+from slap_ros.domains.obstacle2d.learner_interface import LEARNER_INTERFACE, TRAINING_SETTINGS
 from slap_ros.domains.variation import varied
 
 
@@ -52,6 +52,7 @@ def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Doma
         ),
         learning=Learning(
             interface=LEARNER_INTERFACE,
+            settings=TRAINING_SETTINGS,
             make_vector_world=Obstacle2DVectorWorld,
         ),
         configuration=settings.as_configuration(),

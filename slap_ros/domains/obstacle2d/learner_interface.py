@@ -4,9 +4,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from slap_ros.core import LearnerInterface
+from slap_ros.core import LearnerInterface, SettingValue
 from slap_ros.domains.obstacle2d.model import BLOCK, BLOCK_SIZE, GRIPPER_EMPTY, HOLDING, ROBOT
 from slap_ros.relational import Column, Object, State
 from slap_ros.relational.state import Array
@@ -64,3 +66,30 @@ LEARNER_INTERFACE = LearnerInterface(
     separation=_separation,
     grasping=frozenset({HOLDING, GRIPPER_EMPTY}),
 )
+# Where a training in this domain differs; see `slap train --settings`.
+TRAINING_SETTINGS: Mapping[str, Mapping[str, SettingValue]] = {
+    "ours": {
+        # Its worlds are stepped together, so that many cost little.
+        "exploration.tasks": 6,
+        "exploration.rollouts": 6000,
+        "exploration.length": 16,
+        "exploration.action_repeat": 4,
+        "ppo.environments": 128,
+        "ppo.rollout_steps": 32,
+        "ppo.batch_size": 512,
+        "ppo.total_steps": 400_000,
+        "polish": None,
+        "horizon": 30,
+    },
+    "paper": {
+        "exploration.rollouts": 1000,
+        "exploration.length": 100,
+        "exploration.hits": 1,
+        "ppo.rollout_steps": 50,
+        "ppo.total_steps": 50_000,
+        "rewards.step": -0.5,
+        "rewards.success": 10.0,
+        "horizon": 50,
+        "sampling.horizon": 50,
+    },
+}

@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 from slap_ros.core import Display, Domain, Execution, Learning, presets
 from slap_ros.domains.obstacle_tower import features, operators, predicates, skills, tasks
-from slap_ros.domains.obstacle_tower.learner_interface import LEARNER_INTERFACE
+from slap_ros.domains.obstacle_tower.learner_interface import LEARNER_INTERFACE, TRAINING_SETTINGS
 from slap_ros.domains.obstacle_tower.scene import scene_of
 from slap_ros.domains.tabletop.presets import ACTION_SPACES, TIMINGS
 from slap_ros.domains.tabletop.settling import settling
@@ -58,6 +58,7 @@ def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Doma
         ),
         learning=Learning(
             interface=LEARNER_INTERFACE,
+            settings=TRAINING_SETTINGS,
             actions=ACTION_SPACE,
         ),
         configuration=settings.as_configuration(),

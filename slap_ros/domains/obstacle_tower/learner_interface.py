@@ -4,9 +4,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from slap_ros.core import LearnerInterface
+from slap_ros.core import LearnerInterface, SettingValue
 from slap_ros.domains.obstacle_tower.features import BLOCK, SURFACE
 from slap_ros.domains.obstacle_tower.predicates import (
     GRIPPER_EMPTY,
@@ -110,3 +112,20 @@ LEARNER_INTERFACE = LearnerInterface(
     success_tolerance=_success_tolerance,
     grasping=frozenset({HOLDING, NOT_HOLDING, GRIPPER_EMPTY}),
 )
+# Where a training in this domain differs; see `slap train --settings`.
+TRAINING_SETTINGS: Mapping[str, Mapping[str, SettingValue]] = {
+    "ours": {
+        "ppo.environments": 32,
+        "ppo.parts": 2,
+        "ppo.batch_size": 512,
+        "ppo.total_steps": 300_000,
+        "polish.environments": 32,
+        "polish.parts": 2,
+        "polish.batch_size": 1024,
+        "polish.total_steps": 1_500_000,
+        "polish_rewards.failure": -30.0,
+        "horizon": 50,
+        "starts": 4000,
+        "shortcuts": 1,  # all that is found is the slap, from the one or the other state
+    },
+}
