@@ -7,9 +7,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from slap_ros.core import ActionSpace, Domain, World
-from slap_ros.errors import SkillNotApplicableError
+from slap_ros.errors import ErrorCode, SkillNotApplicableError
 from slap_ros.planning.options import Option, OptionExecution, OptionResult
 from slap_ros.relational import AtomSpace, State
+
+REACHED = OptionResult(ErrorCode.NONE)
 
 
 @dataclass(frozen=True)
@@ -20,11 +22,15 @@ class Rollout:
         reached: Whether it ended in its target abstract state.
         steps: Environment steps taken.
         final: The state in which it ended.
+        abstract: Its abstract state, a mask.
+        result: How it ended, with the reason where its target was not reached.
     """
 
     reached: bool
     steps: int
     final: State
+    abstract: int = 0
+    result: OptionResult = REACHED
 
 
 class Model:
@@ -74,10 +80,12 @@ class Model:
         self._world.reset(state)
         try:
             execution = OptionExecution(option, target, self._actions, state)
-        except SkillNotApplicableError:
-            return Rollout(False, 0, state)
+        except SkillNotApplicableError as error:
+            result = OptionResult(error.code, str(error))
+            return Rollout(False, 0, state, self.space.abstract(state), result)
         while True:
-            action = execution.advance(state, self.space.abstract(state))
+            abstract = self.space.abstract(state)
+            action = execution.advance(state, abstract)
             if isinstance(action, OptionResult):
-                return Rollout(action.reached, execution.steps, state)
+                return Rollout(action.reached, execution.steps, state, abstract, action)
             state = self._world.step(action)

@@ -11,6 +11,7 @@ from typing import Protocol
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError, PlanningLimitError, UnsolvableError
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
+from slap_ros.planning.failures import Failures, list_atoms, unreachable_atoms
 from slap_ros.planning.ff import find_operator_sequence
 from slap_ros.planning.model import Model
 from slap_ros.planning.options import Option, given_option
@@ -53,6 +54,14 @@ class Problem:
             ),
         )
 
+    def why_not(self, start: int, goal: int) -> str:
+        """Why operators alone do not lead from an abstract state to a goal, both masks."""
+        space = self.model.space
+        never = unreachable_atoms(start, goal, [ground for ground, _ in self.operators])
+        if never:
+            return f"no operator leads to {list_atoms(space, never)}"
+        return f"{list_atoms(space, goal)} never hold all together"
+
 
 class ShortcutSource(Protocol):
     """Gives shortcut edges for an abstract graph."""
@@ -91,7 +100,7 @@ class GraphPlanner:
         model = self.problem.model
         before, start = model.executed, model.space.abstract(state)
         for extra_depth in range(self.max_extra_depth + 1):
-            graph = build_abstract_graph(start, goal, self.problem.operators, extra_depth)
+            graph = self._graph(start, goal, extra_depth)
             if self.shortcuts is not None:
                 graph.edges.extend(self.shortcuts.edges(graph))
             try:
@@ -102,6 +111,13 @@ class GraphPlanner:
                 continue
             return PlanningResult(plan, len(graph.nodes), len(graph.edges), model.executed - before)
         raise InvalidParameterError(f"max_extra_depth must not be negative: {self}")
+
+    def _graph(self, start: int, goal: int, extra_depth: int) -> AbstractGraph:
+        """The top level; an error says which atoms of the goal cannot be had."""
+        try:
+            return build_abstract_graph(start, goal, self.problem.operators, extra_depth)
+        except UnsolvableError as error:
+            raise UnsolvableError(f"{error}: {self.problem.why_not(start, goal)}") from error
 
 
 @dataclass(frozen=True)
@@ -124,9 +140,14 @@ class FFPlanner:
         before, start = model.executed, model.space.abstract(state)
         grounds = [ground for ground, _ in self.problem.operators]
         forbidden: set[tuple[int, int]] = set()
+        failures = Failures()
         for _ in range(self.max_attempts):
-            sequence = find_operator_sequence(start, goal, grounds, forbidden)
-            edges, failed = self._refine(state, start, sequence)
+            try:
+                sequence = find_operator_sequence(start, goal, grounds, forbidden)
+            except UnsolvableError as error:
+                why = failures.in_words(model.space) or self.problem.why_not(start, goal)
+                raise UnsolvableError(f"{error}: {why}") from error
+            edges, failed = self._refine(state, start, sequence, failures)
             if failed is None:
                 return PlanningResult(
                     Plan(tuple(edges)),
@@ -136,11 +157,12 @@ class FFPlanner:
                 )
             forbidden.add(failed)
         raise PlanningLimitError(
-            f"none of {self.max_attempts} abstract plans could be executed; raise max_attempts"
+            f"none of {self.max_attempts} abstract plans could be executed; raise max_attempts: "
+            f"{failures.in_words(model.space)}"
         )
 
     def _refine(
-        self, state: State, abstract: int, sequence: list[int]
+        self, state: State, abstract: int, sequence: list[int], failures: Failures
     ) -> tuple[list[PlanEdge], tuple[int, int] | None]:
         """Roll the operators out one after the other; second, the one that failed."""
         edges: list[PlanEdge] = []
@@ -148,6 +170,7 @@ class FFPlanner:
             ground, option = self.problem.operators[number]
             target = ground.apply(abstract)
             rollout = self.problem.model.roll_out(option, state, target)
+            failures.add(option, target, rollout)
             if not rollout.reached:
                 return edges, (abstract, number)
             edges.append(PlanEdge(option, target, rollout.steps))

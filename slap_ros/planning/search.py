@@ -39,6 +39,7 @@ from itertools import count
 
 from slap_ros.errors import UnsolvableError
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge
+from slap_ros.planning.failures import Failures
 from slap_ros.planning.model import Model, Rollout
 from slap_ros.planning.options import Option
 from slap_ros.planning.plan import Plan, PlanEdge
@@ -79,10 +80,12 @@ class LowLevelGraph:
         start: The vertex to start from.
         successors: Of each vertex: edge, environment steps, and the vertex reached, whose own
             cost is not used.
+        failures: What was tried, and what of it failed.
     """
 
     start: Vertex
     successors: dict[VertexKey, list[tuple[Edge, int, Vertex]]] = field(default_factory=dict)
+    failures: Failures = field(default_factory=Failures)
 
 
 def build_bottom_level(graph: AbstractGraph, state: State, model: Model) -> LowLevelGraph:
@@ -109,7 +112,7 @@ def build_bottom_level(graph: AbstractGraph, state: State, model: Model) -> LowL
         for vertex in vertices.values():
             found = bottom.successors.setdefault(vertex.key, [])
             for each in forward[node]:
-                for edge, rollout in _attempts(each, vertex.state, graph, model):
+                for edge, rollout in _attempts(each, vertex.state, graph, model, bottom.failures):
                     successor = Vertex(edge.target, rollout.final, 0)
                     reached[edge.target].setdefault(successor.key, successor)
                     found.append((edge, rollout.steps, successor))
@@ -117,12 +120,14 @@ def build_bottom_level(graph: AbstractGraph, state: State, model: Model) -> LowL
 
 
 def _attempts(
-    edge: Edge, state: State, graph: AbstractGraph, model: Model
+    edge: Edge, state: State, graph: AbstractGraph, model: Model, failures: Failures
 ) -> Iterator[tuple[Edge, Rollout]]:
     """All rollouts of an edge's option that reach its target, the shortest first."""
     option: Option | None = edge.option
     while option is not None:
         rollout = model.roll_out(option, state, graph.nodes[edge.target])
+        if option.attempt == edge.option.attempt:
+            failures.add(option, graph.nodes[edge.target], rollout)
         if not rollout.reached:
             return
         yield replace(edge, option=option), rollout
@@ -157,7 +162,7 @@ def search_exhaustively(graph: AbstractGraph, state: State, model: Model) -> Pla
         for edge, steps, successor in bottom.successors[vertex.key]:
             reached = Vertex(successor.node, successor.state, cost + steps, vertex, edge)
             heapq.heappush(queue, (reached.cost, next(tie), reached))
-    raise _infeasible(graph)
+    raise _infeasible(graph, model, bottom.failures)
 
 
 @dataclass(order=True)
@@ -253,6 +258,7 @@ class _LazySearch:
         self._frontier = _Frontier(graph)
         start = Vertex(0, state, 0)
         self._cheapest = {start.key: 0}
+        self._failures = Failures()
         self._frontier.push(start)
 
     def run(self) -> Plan:
@@ -265,7 +271,7 @@ class _LazySearch:
                 return _plan(self._graph, vertex)
             elif vertex.cost == self._cheapest[vertex.key]:
                 self._expand(vertex)
-        raise _infeasible(self._graph)
+        raise _infeasible(self._graph, self._model, self._failures)
 
     def _expand(self, vertex: Vertex) -> None:
         """Queue the edges out of a vertex, each with its bound."""
@@ -278,7 +284,10 @@ class _LazySearch:
         """Roll an edge out, and queue where it leads and its next attempt."""
         if edge.option.given_up():
             return
-        rollout = self._model.roll_out(edge.option, vertex.state, self._graph.nodes[edge.target])
+        target = self._graph.nodes[edge.target]
+        rollout = self._model.roll_out(edge.option, vertex.state, target)
+        if edge.option.attempt == 0:
+            self._failures.add(edge.option, target, rollout)
         if rollout.reached:
             cost = vertex.cost + rollout.steps
             reached = Vertex(edge.target, rollout.final, cost, vertex, edge)
@@ -321,7 +330,7 @@ def _path(vertex: Vertex) -> Iterator[tuple[Vertex, Vertex, Edge]]:
         vertex = vertex.parent
 
 
-def _infeasible(graph: AbstractGraph) -> UnsolvableError:
-    return UnsolvableError(
-        f"no path through the {len(graph.nodes)} abstract states can be executed from here"
-    )
+def _infeasible(graph: AbstractGraph, model: Model, failures: Failures) -> UnsolvableError:
+    what = f"no path through the {len(graph.nodes)} abstract states can be executed from here"
+    why = failures.in_words(model.space)
+    return UnsolvableError(f"{what}: {why}" if why else what)

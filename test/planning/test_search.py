@@ -3,6 +3,7 @@
 """Search: the lazy one costs what the exhaustive one costs, on tasks and on made-up graphs."""
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -45,6 +46,8 @@ class MadeUpSkill:
 
 class MadeUpModel:
     """Roll-outs by table: deterministic, path-dependent, some infeasible."""
+
+    space = SimpleNamespace(decode=lambda mask: ())
 
     def __init__(self):
         self.executed = 0
