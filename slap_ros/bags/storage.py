@@ -178,7 +178,9 @@ def _contradicted_counts(
         by_name[channel.topic] += count
     told: Counter[str] = Counter()
     for entry in topics if isinstance(topics, list) else ():
-        with suppress(KeyError, TypeError, ValueError):  # of other software: says nothing
+        with suppress(
+            LookupError, TypeError, ValueError, OverflowError
+        ):  # of other software: says nothing
             told[str(entry["topic_metadata"]["name"])] += int(entry["message_count"])
     for topic in sorted(told):
         if by_name[topic] != told[topic]:

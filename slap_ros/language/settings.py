@@ -126,7 +126,7 @@ def _read_file(path: Path) -> LanguageSettings:
             _check_fields(path, data["retry"], RetryPolicy)
             data["retry"] = RetryPolicy(**data["retry"])
         return LanguageSettings(**data)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidParameterError(f"{path}: {error}") from error
 
 

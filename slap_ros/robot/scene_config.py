@@ -42,7 +42,14 @@ MAX_SCENE_BYTES = 2**20
 DETECTED = "detected_"  # prefix of detection frames where no scene file names them
 PARKED = 10.0  # m from the base: where what was not yet detected is out of everything's way
 KEYS = frozenset({"type", "frame", "offset", "pose", "features"})
-MALFORMED = (AttributeError, KeyError, TypeError, ValueError, InvalidMeasurementError)
+MALFORMED = (
+    AttributeError,
+    LookupError,
+    TypeError,
+    ValueError,
+    OverflowError,
+    InvalidMeasurementError,
+)
 
 
 @dataclass(frozen=True)

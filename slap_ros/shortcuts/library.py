@@ -39,6 +39,7 @@ from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.signature import Signature
 
 FORMAT = 1
+MAX_SHORTEST = 1_000_000  # environment steps; attempts are a multiple of them long
 LIBRARY, SHORTCUT, POLICY = "library.json", "shortcut.json", "policy.safetensors"
 
 Record = Mapping[str, Any]
@@ -171,7 +172,9 @@ def load_shortcut(folder: Path) -> Shortcut:
         signature = Signature.from_json(about["signature"])
         shortest, record = int(about["shortest"]), dict(about["record"])
         checksum = str(about["sha256"])
-    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        if not 1 <= shortest <= MAX_SHORTEST:
+            raise ValueError(f"its shortest success has {shortest:.3g} steps")
+    except (LookupError, TypeError, ValueError, OverflowError) as error:
         raise InvalidLibraryError(f"{folder / SHORTCUT}: damaged: {error!r}") from error
     if signature.name != folder.name:
         raise InvalidLibraryError(
@@ -199,6 +202,10 @@ def _load_policy(path: Path, checksum: str) -> MlpPolicy:
         tensors = load(content)
     except (OSError, SafetensorError) as error:
         raise InvalidLibraryError(f"{path}: cannot be read: {error}") from error
+    except (KeyError, TypeError, ValueError) as error:  # of formats that numpy does not have
+        raise InvalidLibraryError(f"{path}: a tensor of a kind unknown here: {error}") from error
+    if odd := sorted(name for name, tensor in tensors.items() if tensor.dtype != np.float32):
+        raise InvalidLibraryError(f"{path}: {', '.join(odd)[:80]}: not of 32-bit floats")
     if sha256(content).hexdigest() != checksum:
         raise InvalidLibraryError(f"{path}: damaged: its checksum is not the one in {SHORTCUT}")
     try:

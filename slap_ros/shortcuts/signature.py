@@ -179,9 +179,13 @@ class Signature:
 
         context = frozenset(str(name) for name in data["context"])
         signature = cls(roles, atoms(data["add"]), atoms(data["delete"]), context)
-        for _, about in signature.add | signature.delete:
-            if not all(0 <= i < len(roles) for i in about):
-                raise ValueError(f"an atom is about a role that is not among the {len(roles)}")
+        used = {i for _, about in signature.add | signature.delete for i in about}
+        if not used <= set(range(len(roles))):
+            raise ValueError(f"an atom is about a role that is not among the {len(roles)}")
+        if len(used) < len(roles):
+            raise ValueError(f"of {len(roles)} roles, atoms are about {len(used)} only")
+        if not signature.add | signature.delete:
+            raise ValueError("it changes no atom")
         return signature
 
     @cached_property

@@ -27,7 +27,7 @@ from slap_ros.files import parse_json, read_text
 
 Result = TypeVar("Result")
 # What decoding raises where JSON is not what was written.
-DECODING_ERRORS = (OSError, AttributeError, KeyError, TypeError, ValueError, OverflowError)
+DECODING_ERRORS = (OSError, AttributeError, LookupError, TypeError, ValueError, OverflowError)
 
 
 @dataclass(frozen=True)

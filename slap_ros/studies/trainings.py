@@ -14,6 +14,7 @@ from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, read_text
 from slap_ros.shortcuts.explore import ExplorationResult
 from slap_ros.shortcuts.settings import ExplorationSettings
+from slap_ros.shortcuts.work_folder import DECODING_ERRORS
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ class TrainingFolder:
         settings = self._setting("exploration")
         try:
             return ExplorationSettings.from_json(settings)
-        except TypeError as error:
+        except DECODING_ERRORS as error:
             raise _damaged(self.path / "settings.json", error) from error
 
     def explored(self) -> tuple[ExplorationResult, ...]:
@@ -88,7 +89,7 @@ class TrainingFolder:
         tasks = _read(path)
         try:
             return tuple(ExplorationResult.from_json(task) for task in tasks)
-        except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
+        except DECODING_ERRORS as error:
             raise _damaged(path, error) from error
 
     def curves(self) -> tuple[LearningCurve, ...]:
@@ -153,7 +154,7 @@ def _parse(line: str, where: str) -> tuple[int, LearningPoint]:
             int(data["stage"]),
             LearningPoint(int(data["steps"]), float(data["success"]), length),
         )
-    except (KeyError, TypeError, ValueError, OverflowError) as error:
+    except (LookupError, TypeError, ValueError, OverflowError) as error:
         raise _damaged(where, error) from error
     numbers = [point.success, *([] if length is None else [length])]
     if not all(map(math.isfinite, numbers)) or not 0.0 <= point.success <= 1.0 or point.steps < 0:
