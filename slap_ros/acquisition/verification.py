@@ -59,8 +59,8 @@ def verify(operators: Sequence[LiftedOperator], problem: AcquisitionProblem) -> 
     if duplicates := _duplicates(operators):
         complaints, blamed = duplicates
         return Verification(None, complaints, blamed)
-    grounded = ground_operators(operators, problem.space)
     try:
+        grounded = ground_operators(operators, problem.space)
         sequence = find_shortest_sequence(
             problem.start_mask, problem.goal_mask, grounded, _most_states(grounded)
         )

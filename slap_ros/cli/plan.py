@@ -15,15 +15,18 @@ from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose, sampling
 from slap_ros.core import Domain, Task
 from slap_ros.domains import get_domain
 from slap_ros.drawing import draw_abstract_graph
-from slap_ros.errors import InvalidParameterError, StorageFullError
+from slap_ros.errors import InvalidParameterError, PlanningLimitError, StorageFullError
 from slap_ros.evaluation.approaches import approaches
 from slap_ros.files import read_text, require_writable
 from slap_ros.planning.abstract_graph import AbstractGraph, build_abstract_graph
-from slap_ros.planning.ff import find_operator_sequence
+from slap_ros.planning.ff import MAX_EXPANSIONS, MAX_TESTS, find_operator_sequence
 from slap_ros.planning.plan import PlanningResult
 from slap_ros.planning.planner import Problem
 from slap_ros.relational import AtomSpace, GroundAtom, ground_operators
+from slap_ros.relational.grounding import MAX_BINDINGS
 from slap_ros.relational.pddl import (
+    PddlDomain,
+    PddlProblem,
     parse_domain,
     parse_goal,
     parse_problem,
@@ -48,6 +51,12 @@ def plan(
     output: Annotated[
         Path | None, typer.Option(help="Folder for domain.pddl, problem.pddl and graph.svg.")
     ] = None,
+    effort: Annotated[
+        int,
+        typer.Option(
+            min=1, max=10**6, help="With PDDL files: multiplies the limits of planning, time too."
+        ),
+    ] = 1,
     json: Json = False,
 ) -> None:
     """Plan one task without executing it; write its PDDL and draw its abstract graph.
@@ -55,7 +64,7 @@ def plan(
     With two PDDL files: plan symbolically, with the FF heuristic.
     """
     if problem is not None:
-        _plan_pddl(Path(domain), problem, json)
+        _plan_pddl(Path(domain), problem, effort, json)
         return
     if output is not None:
         require_writable(output)
@@ -123,21 +132,51 @@ def _graph(
     return build_abstract_graph(space.abstract(task.initial_state), space.mask(goal), operators)
 
 
-def _plan_pddl(domain_file: Path, problem_file: Path, json: bool) -> None:
+def _plan_pddl(domain_file: Path, problem_file: Path, effort: int, json: bool) -> None:
     domain = parse_domain(_read(domain_file), str(domain_file))
     problem = parse_problem(_read(problem_file), domain, str(problem_file))
     space = problem.atom_space(domain)
-    operators = ground_operators(domain.operators, space)
-    sequence = find_operator_sequence(
-        problem.initial_mask(space), problem.goal_mask(space), operators
-    )
-    names = [str(operators[number]) for number in sequence]
+    try:
+        names = _plan_symbolically(domain, problem, space, effort)
+    except PlanningLimitError as error:
+        raise PlanningLimitError(
+            f"{error}; --effort {10 * effort} allows ten times as much"
+        ) from error
     if json:
         print_json({"plan": names})
         return
     for name in names:
         console.print(name)
     console.print(f"{len(names)} operators")
+
+
+def _plan_symbolically(
+    domain: PddlDomain, problem: PddlProblem, space: AtomSpace, effort: int
+) -> list[str]:
+    """The names of operators that lead to the goal.
+
+    Args:
+        domain: Types, predicates and operators.
+        problem: Objects, start and goal.
+        space: The atoms over the objects.
+        effort: What the limits are multiplied with.
+
+    Returns:
+        Operators with their objects, in order.
+
+    Raises:
+        UnsolvableError: The goal cannot be reached.
+        PlanningLimitError: A limit was reached first.
+    """
+    operators = ground_operators(domain.operators, space, effort * MAX_BINDINGS)
+    sequence = find_operator_sequence(
+        problem.initial_mask(space),
+        problem.goal_mask(space),
+        operators,
+        max_expansions=effort * MAX_EXPANSIONS,
+        max_tests=effort * MAX_TESTS,
+    )
+    return [str(operators[number]) for number in sequence]
 
 
 def _read(path: Path) -> str:

@@ -22,6 +22,7 @@ from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.relational import GroundOperator
 
 MAX_EXPANSIONS = 100_000  # abstract states; some ten seconds with two hundred operators
+MAX_TESTS = 80_000_000  # whether an operator is applicable; some ten seconds
 
 
 def find_operator_sequence(
@@ -30,6 +31,7 @@ def find_operator_sequence(
     operators: Sequence[GroundOperator],
     forbidden: Collection[tuple[int, int]] = (),
     max_expansions: int = MAX_EXPANSIONS,
+    max_tests: int = MAX_TESTS,
 ) -> list[int]:
     """A sequence of operators that leads from an abstract state to the goal.
 
@@ -42,18 +44,20 @@ def find_operator_sequence(
         forbidden: Pairs of an abstract state and the index of an operator that must not be
             applied there, because it is known that it cannot be carried out.
         max_expansions: Abstract states to expand before giving up.
+        max_tests: How often to look whether an operator is applicable before giving up.
 
     Returns:
         Indices into ``operators``; none where the goal holds already.
 
     Raises:
         UnsolvableError: No sequence leads to the goal.
-        PlanningLimitError: None was found within ``max_expansions``.
+        PlanningLimitError: None was found within ``max_expansions`` and ``max_tests``.
     """
     heuristic = _FFHeuristic(goal, operators)
     if heuristic.relaxed_plan(start) is None:
         raise UnsolvableError("the goal is out of reach, even if operators deleted nothing")
-    return _best_first(start, goal, operators, heuristic, frozenset(forbidden), max_expansions)
+    limits = max_expansions, max_tests
+    return _best_first(start, goal, operators, heuristic, frozenset(forbidden), limits)
 
 
 def _best_first(
@@ -62,11 +66,12 @@ def _best_first(
     operators: Sequence[GroundOperator],
     heuristic: _FFHeuristic,
     forbidden: frozenset[tuple[int, int]],
-    max_expansions: int,
+    limits: tuple[int, int],
 ) -> list[int]:
     """Greedy best-first search with deferred evaluation; see :func:`find_operator_sequence`."""
     arrivals: dict[int, tuple[int, int] | None] = {start: None}  # previous state, operator
     queue = [(False, 0, 0, start)]  # unhelpful, estimate, order of discovery, state
+    max_expansions, max_tests = limits
     expansions = 0
     while queue:
         *_, state = heapq.heappop(queue)
@@ -76,6 +81,11 @@ def _best_first(
             raise PlanningLimitError(
                 f"no plan within {max_expansions} expansions of abstract states; raise the limit "
                 "or give a goal nearer by"
+            )
+        if heuristic.tests + expansions * len(operators) > max_tests:
+            raise PlanningLimitError(
+                f"no plan after {max_tests} tests of operators, in {expansions} expansions of "
+                "abstract states; raise the limit or give a goal nearer by"
             )
         expansions += 1
         plan = heuristic.relaxed_plan(state)
@@ -123,6 +133,7 @@ class _FFHeuristic:
     def __init__(self, goal: int, operators: Sequence[GroundOperator]) -> None:
         self._goal = goal
         self._operators = [(op.preconditions, op.add_effects) for op in operators]
+        self.tests = 0  # of operators so far
 
     def relaxed_plan(self, state: int) -> _RelaxedPlan | None:
         """A plan for the relaxed task; None where there is none, hence none for the task either.
@@ -133,6 +144,7 @@ class _FFHeuristic:
         missing, waiting, first_layer = ~state, self._operators, 0
         while self._goal & missing:
             layer = 0
+            self.tests += len(waiting)
             for preconditions, add_effects in waiting:
                 if not preconditions & missing and (fresh := add_effects & missing & ~layer):
                     layer |= fresh

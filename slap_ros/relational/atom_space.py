@@ -4,18 +4,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import permutations
+from itertools import islice, permutations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.errors import MismatchedAtomError, UnknownPredicateError
+from slap_ros.errors import MismatchedAtomError, PlanningLimitError, UnknownPredicateError
 from slap_ros.relational.objects import Column, Object, Type
 from slap_ros.relational.predicates import Classifier, GroundAtom, Margin, Predicate
 from slap_ros.relational.state import Layout, State
 
+MAX_ATOMS = 50_000  # of a task; masks of them then take 150 MB
+MAX_TUPLES = 10_000_000  # of objects that are tried for the arguments of a predicate
 MAX_CACHED_STATES = 1024
 
 
@@ -46,14 +49,23 @@ class AtomSpace:
             rarely_read: Types of objects whose features few predicates read, the robot as a rule:
                 for states that differ only there, all other predicates are evaluated once.
             readers: These few predicates.
+
+        Raises:
+            PlanningLimitError: There are more than ``MAX_ATOMS``.
         """
         self.layout = layout
         self.predicates = {predicate.name: predicate for predicate in predicates}
-        self.atoms = tuple(
+        atoms = (
             predicate(*objects)
             for predicate in predicates
             for objects in _type_consistent(predicate, layout.objects)
         )
+        self.atoms = tuple(islice(atoms, MAX_ATOMS + 1))
+        if len(self.atoms) > MAX_ATOMS:
+            raise PlanningLimitError(
+                f"more than {MAX_ATOMS} atoms over {len(layout.objects)} objects; give fewer "
+                "objects, or predicates with fewer arguments"
+            )
         self._bits = {atom: 1 << i for i, atom in enumerate(self.atoms)}
         self.static_predicates = frozenset(static)
         statics = {atom: bit for atom, bit in self._bits.items() if atom.predicate in static}
@@ -227,6 +239,11 @@ def _columns_of(layout: Layout, left_out: Collection[Type]) -> NDArray[np.intp]:
 def _type_consistent(
     predicate: Predicate, objects: tuple[Object, ...]
 ) -> Iterator[tuple[Object, ...]]:
+    if math.perm(len(objects), len(predicate.types)) > MAX_TUPLES:
+        raise PlanningLimitError(
+            f"more than {MAX_TUPLES} tuples of {len(predicate.types)} from {len(objects)} objects "
+            f"for {predicate.name}; give fewer objects, or predicates with fewer arguments"
+        )
     for chosen in permutations(objects, len(predicate.types)):
         if all(obj.type.is_a(t) for obj, t in zip(chosen, predicate.types, strict=True)):
             yield chosen

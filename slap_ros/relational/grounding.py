@@ -6,13 +6,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
+from slap_ros.errors import PlanningLimitError
 from slap_ros.relational.atom_space import AtomSpace
 from slap_ros.relational.objects import Object
 from slap_ros.relational.operators import GroundOperator, LiftedAtom, LiftedOperator, Variable
 
+MAX_BINDINGS = 300_000  # of parameters, partial ones included; some seconds
+
 
 def ground_operators(
-    operators: Iterable[LiftedOperator], space: AtomSpace
+    operators: Iterable[LiftedOperator], space: AtomSpace, max_bindings: int = MAX_BINDINGS
 ) -> tuple[GroundOperator, ...]:
     """Every application of the operators to different objects that could ever be applicable.
 
@@ -20,14 +23,31 @@ def ground_operators(
     are bound, so that whole branches fall away: grounding first and filtering afterwards costs
     seconds in domains with many objects.
 
+    Args:
+        operators: To be applied.
+        space: The atoms over the objects.
+        max_bindings: Partial and complete bindings to look at before giving up.
+
     Returns:
         Ground operators, in the order of operators, then of objects.
+
+    Raises:
+        PlanningLimitError: There are more than ``max_bindings`` bindings.
     """
-    return tuple(
-        _ground(operator, binding, space)
-        for operator in operators
-        for binding in _bindings(operator, space)
-    )
+    found: list[GroundOperator] = []
+    left = max_bindings
+    for operator in operators:
+        for binding in _bindings(operator, space):
+            left -= 1
+            if left < 0:
+                raise PlanningLimitError(
+                    f"more than {max_bindings} bindings of operators' parameters to objects, at "
+                    f"{operator.name} with {len(operator.parameters)} of them; give fewer "
+                    "parameters or objects"
+                )
+            if len(binding) == len(operator.parameters):
+                found.append(_ground(operator, binding, space))
+    return tuple(found)
 
 
 def _ground(
@@ -46,11 +66,12 @@ def _ground(
 
 
 def _bindings(operator: LiftedOperator, space: AtomSpace) -> Iterator[dict[Variable, Object]]:
+    """Bindings as they grow, one parameter more each; a complete one is in use until the next."""
     tests = _static_tests(operator, space)
 
     def extend(depth: int, binding: dict[Variable, Object]) -> Iterator[dict[Variable, Object]]:
+        yield binding
         if depth == len(operator.parameters):
-            yield dict(binding)
             return
         variable = operator.parameters[depth]
         for obj in space.layout.of_type(variable.type):

@@ -13,9 +13,11 @@ from typing import Any, cast
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from typer.testing import CliRunner
 
+from slap_ros.cli import app
 from slap_ros.domains.registry import get_domain
-from slap_ros.errors import PlanningLimitError, UnsolvableError
+from slap_ros.errors import ErrorCode, PlanningLimitError, UnsolvableError
 from slap_ros.planning.abstract_graph import build_abstract_graph
 from slap_ros.planning.ff import find_operator_sequence
 from slap_ros.planning.options import Option, OptionKind
@@ -220,3 +222,84 @@ def test_plain_pddl_has_an_abstract_graph() -> None:
     graph = build_abstract_graph(start, goal, paired)
     depth = graph.depth[graph.goal_nodes[0]]
     assert len(find_operator_sequence(start, goal, operators)) >= depth > 0
+
+
+# -- limits ---------------------------------------------------------------------------------------
+
+
+def hanoi(discs):
+    """The towers of Hanoi: a plan of 2^discs - 1 moves, PDDL."""
+    domain = """(define (domain hanoi)
+      (:predicates (clear ?x) (on ?x ?y) (smaller ?x ?y))
+      (:action move :parameters (?disc ?from ?to)
+       :precondition (and (smaller ?to ?disc) (on ?disc ?from) (clear ?disc) (clear ?to))
+       :effect (and (clear ?from) (on ?disc ?to) (not (on ?disc ?from)) (not (clear ?to)))))"""
+    names, pegs = [f"d{i}" for i in range(discs)], ["p1", "p2", "p3"]
+    atoms = [f"(smaller {peg} {disc})" for peg in pegs for disc in names]
+    atoms += [f"(smaller {b} {a})" for i, a in enumerate(names) for b in names[i + 1 :]]
+    tower = [f"(on {a} {b})" for a, b in pairwise(names)]
+    start = [*tower, f"(on {names[-1]} p1)", f"(clear {names[0]})", "(clear p2)", "(clear p3)"]
+    goal = [*tower, f"(on {names[-1]} p3)"]
+    problem = f"""(define (problem hanoi{discs}) (:domain hanoi)
+      (:objects {" ".join(names + pegs)}) (:init {" ".join(atoms + start)})
+      (:goal (and {" ".join(goal)})))"""
+    return domain, problem
+
+
+def wide(parameters, predicate=1):
+    """An operator of so many parameters, and a predicate of so many arguments."""
+    variables = [f"?x{i}" for i in range(parameters)]
+    arguments = " ".join(f"?x{i}" for i in range(predicate))
+    domain = f"""(define (domain wide) (:predicates (a {arguments}) (b))
+      (:action go :parameters ({" ".join(variables)}) :precondition () :effect (b)))"""
+    objects = " ".join(f"o{i}" for i in range(20))
+    return (
+        domain,
+        f"""(define (problem wide) (:domain wide) (:objects {objects})
+      (:init) (:goal (b)))""",
+    )
+
+
+def plan_files(tmp_path, texts, *options):
+    for name, text in zip(("domain.pddl", "problem.pddl"), texts, strict=True):
+        (tmp_path / name).write_text(text)
+    files = [str(tmp_path / "domain.pddl"), str(tmp_path / "problem.pddl")]
+    return CliRunner().invoke(app, ["plan", *files, *options])
+
+
+@pytest.mark.parametrize(
+    ("texts", "advice"),
+    [
+        (hanoi(14), "--effort 10"),
+        (wide(13), "--effort 10"),
+        (wide(1, predicate=13), "fewer objects"),  # memory: no effort is of use
+        (wide(1, predicate=4), "fewer objects"),
+    ],
+    ids=["hanoi", "operator", "predicate", "atoms"],
+)
+def test_planning_without_end_is_given_up_and_says_what_helps(tmp_path, monkeypatch, texts, advice):
+    monkeypatch.setattr("slap_ros.cli.plan.MAX_TESTS", 400_000)  # else ten seconds, or four
+    monkeypatch.setattr("slap_ros.cli.plan.MAX_BINDINGS", 20_000)
+    result = plan_files(tmp_path, texts)
+    assert result.exit_code == ErrorCode.PLANNING_LIMIT, result.stderr
+    assert advice in result.stderr
+
+
+def test_more_effort_goes_further(tmp_path, monkeypatch):
+    monkeypatch.setattr("slap_ros.cli.plan.MAX_TESTS", 1_000)
+    assert plan_files(tmp_path, hanoi(4)).exit_code == ErrorCode.PLANNING_LIMIT
+    result = plan_files(tmp_path, hanoi(4), "--effort", "100")
+    assert result.exit_code == 0
+    assert "operators" in result.stderr
+
+
+def test_the_limits_are_those_that_are_stated():
+    """Some seconds each; grounding and atoms are bounded wherever they are made."""
+    domain, problem = hanoi(14)
+    stated = parse_domain(domain)
+    task = parse_problem(problem, stated)
+    space = task.atom_space(stated)
+    with pytest.raises(PlanningLimitError, match="more than 1000 bindings"):
+        ground_operators(stated.operators, space, max_bindings=1_000)
+    whole = ground_operators(stated.operators, space)
+    assert whole == ground_operators(stated.operators, space, max_bindings=10_000)
