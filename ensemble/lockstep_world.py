@@ -19,6 +19,7 @@ from slap_msgs.msg import RobotCommand
 from slap_msgs.srv import ResetTask
 
 from ensemble import encode
+from ensemble.answering import error_to_answer
 from ensemble.diagnostics import DiagnosticsPublisher
 from ensemble.interfaces import COMMAND, DOMAIN, RESET_TASK, STATE, TASK, VOLATILE
 from ensemble.parameters import read_parameters
@@ -173,7 +174,8 @@ class LockstepWorld(Node, ABC, Generic[P]):
     ) -> ResetTask.Response:
         try:
             self._reset(request)
-        except SlapError as error:
+        except Exception as raised:  # of a domain's code, for a state that it never thought of
+            error = error_to_answer(self, raised)
             response.error_code, response.error_msg = int(error.code), str(error)
         else:
             response.error_code = int(ErrorCode.NONE)

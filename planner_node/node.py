@@ -37,6 +37,7 @@ from rclpy.action.server import ServerGoalHandle
 from rclpy.node import Node
 from slap_msgs.action import SolveTask
 
+from ensemble.answering import error_to_answer
 from ensemble.diagnostics import DiagnosticsPublisher
 from ensemble.entry_point import run_node
 from ensemble.futures import run_in_executor
@@ -52,7 +53,6 @@ from slap_ros.errors import (
     BusyError,
     InvalidParameterError,
     NoTaskError,
-    SlapError,
     TaskCanceledError,
 )
 from slap_ros.messages.decode import decode_goal
@@ -114,7 +114,8 @@ class PlannerNode(Node):
         self._counts["tried"] += 1
         try:
             result = await self._solve(goal)
-        except SlapError as error:
+        except Exception as raised:
+            error = error_to_answer(self, raised)
             result = SolveTask.Result(error_code=int(error.code), error_msg=str(error))
         if result.success:
             self._counts["solved"] += 1

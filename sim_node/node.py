@@ -29,6 +29,7 @@ Services:
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from typing import Any
 
@@ -43,7 +44,7 @@ from ensemble.steady_time import create_timer
 from ensemble.visualization import Visualizer
 from ensemble.world_parameters import WorldParameters
 from slap_ros.core import Action, Task, World
-from slap_ros.errors import InvalidParameterError
+from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.messages.decode import decode_goal, decode_state
 from slap_ros.relational import State
 
@@ -124,8 +125,28 @@ class SimNode(LockstepWorld[SimParameters]):
 
     def _given_task(self, request: ResetTask.Request) -> Task:
         initial = decode_state(request.initial_state, self._domain.types_by_name)
-        goal = decode_goal(request.goal, self._domain.atom_space(initial))
+        self._require_objects(initial)
+        space = self._domain.atom_space(initial)
+        goal = decode_goal(request.goal, space)
+        space.mask(goal)
         return Task(initial, goal or self._domain.default_goal(initial), self._domain.step_limit)
+
+    def _require_objects(self, initial: State) -> None:
+        """Refuse a state that lacks what every task of the domain has, or has two robots.
+
+        Raises:
+            InvalidStateError: It does.
+        """
+        sampled = self._domain.task(0).initial_state
+        wanted = Counter(obj.type.name for obj in sampled.objects)
+        found = Counter(obj.type.name for obj in initial.objects)
+        robots = {kind.name for kind in self._domain.robot_types}
+        for name, number in wanted.items():
+            if found[name] == 0 or (name in robots and found[name] != number):
+                raise InvalidStateError(
+                    f"an initial state with {found[name]} objects of type {name}; a task of "
+                    f"{self._domain.name} has {number}"
+                )
 
 
 def main() -> int:

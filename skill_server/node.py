@@ -38,6 +38,7 @@ from slap_msgs.action import ExecuteSkill
 from slap_msgs.srv import ListSkills
 
 from ensemble import encode
+from ensemble.answering import error_to_answer
 from ensemble.diagnostics import DiagnosticsPublisher
 from ensemble.entry_point import run_node
 from ensemble.futures import run_in_executor
@@ -51,7 +52,7 @@ from ensemble.steady_time import create_timer
 from skill_server.requested_option import requested_option
 from skill_server.skill_execution import SkillExecution, result
 from skill_server.skill_publisher import SkillPublisher
-from slap_ros.errors import ErrorCode, NoStateError, SlapError
+from slap_ros.errors import ErrorCode, NoStateError
 from slap_ros.planning.options import OptionExecution, OptionResult
 
 CHECK_PERIOD = 0.1  # s, between two looks at whether a skill is to be given up
@@ -120,7 +121,8 @@ class SkillServer(Node):
         self._busy = True
         try:
             self._execution = await self._begin(goal)
-        except SlapError as error:
+        except Exception as raised:  # of a policy, or of a skill given objects it never thought of
+            error = error_to_answer(self, raised)
             goal.abort()
             return result(OptionResult(error.code, str(error)), 0)
         else:

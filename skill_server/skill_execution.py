@@ -14,9 +14,11 @@ from slap_msgs.action import ExecuteSkill
 from slap_msgs.msg import SkillEvent
 
 from ensemble import encode
+from ensemble.answering import error_to_answer
 from ensemble.node_liveness import NodeLiveness
 from ensemble.observation import Observation
 from skill_server.skill_publisher import SkillPublisher
+from slap_ros.core import Action
 from slap_ros.errors import ErrorCode
 from slap_ros.planning.options import Option, OptionExecution, OptionResult
 
@@ -83,15 +85,22 @@ class SkillExecution:
             self._hold()
             return
         self.goal.publish_feedback(ExecuteSkill.Feedback(step=self._steps, atoms=self._atoms()))
-        action = self.execution.advance(
-            observation.state, observation.abstract, observation.missing
-        )
+        action = self._next(observation)
         if isinstance(action, OptionResult):
             self._ended.set_result(action)
         elif self._steps >= self.step_budget:
             self._stop(ErrorCode.STEP_LIMIT, f"not done within {self.step_budget} steps")
         else:
             self.publisher.command(action, self.latest)
+
+    def _next(self, observation: Observation) -> Action | OptionResult:
+        try:
+            return self.execution.advance(
+                observation.state, observation.abstract, observation.missing
+            )
+        except Exception as raised:  # of a skill's policy
+            error = error_to_answer(self.node, raised)
+            return OptionResult(error.code, f"{self.option}: {error}")
 
     def check(self, state_timeout_s: float) -> None:
         """End if no state has come for ``state_timeout_s``, or the planner is gone."""

@@ -103,6 +103,12 @@ def error_from(code: int, message: str) -> SlapError:
     return error
 
 
+class InternalError(SlapError):
+    """What a node's code did not foresee; its log has the traceback."""
+
+    code = ErrorCode.INTERNAL_ERROR
+
+
 class UnknownDomainError(SlapError):
     """No domain of that name is registered."""
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 
 from control_msgs.action import FollowJointTrajectory, GripperCommand
@@ -17,6 +18,9 @@ from ensemble.robot_parameters import MockRobotParameters, action_name, arm_join
 from ensemble.steady_time import create_timer
 from robot_bridge.mock.noise_model import NoiseModel
 from robot_bridge.mock.plant import Plant
+from slap_ros.physics.panda import JOINT_HIGH, JOINT_LOW, JOINTS
+
+LONGEST_PAUSE = 1.0  # s
 
 
 class MockControllers:
@@ -61,6 +65,8 @@ class MockControllers:
             GripperCommand,
             action_name(settings.gripper_action, settings.arm),
             self._grip,
+            goal_callback=self._on_grip,
+            cancel_callback=lambda _: CancelResponse.ACCEPT,
         )
 
     def destroy(self) -> None:
@@ -75,7 +81,13 @@ class MockControllers:
 
     def _on_motion(self, goal: FollowJointTrajectory.Goal) -> GoalResponse:
         known = list(goal.trajectory.joint_names) == self._joints
-        if self.busy or self._fails("reject") or not known:
+        if self.busy or self._fails("reject") or not known or not _possible(goal):
+            self._counts["refused"] += 1
+            return GoalResponse.REJECT
+        return GoalResponse.ACCEPT
+
+    def _on_grip(self, goal: GripperCommand.Goal) -> GoalResponse:
+        if self.busy or not math.isfinite(goal.command.position):
             self._counts["refused"] += 1
             return GoalResponse.REJECT
         return GoalResponse.ACCEPT
@@ -103,7 +115,11 @@ class MockControllers:
     ) -> FollowJointTrajectory.Result:
         lasts_s = point.time_from_start.sec + point.time_from_start.nanosec * 1e-9
         ignored = self._fails("ignore")
-        periods = self._plant.periods_to(point.positions)
+        # A cancel is noticed within LONGEST_PAUSE.
+        periods = max(
+            self._plant.periods_to(point.positions),
+            math.ceil(lasts_s / self._settings.pace / LONGEST_PAUSE),
+        )
         done = 0
         while ignored or done < periods:
             await pause(self._node, lasts_s / periods / self._settings.pace)
@@ -133,6 +149,21 @@ class MockControllers:
             stalled=self._plant.holding,
             reached_goal=not self._plant.holding,
         )
+
+
+def _possible(goal: FollowJointTrajectory.Goal) -> bool:
+    """Whether a real arm could follow a trajectory to its end."""
+    if not goal.trajectory.points:
+        return False
+    end = goal.trajectory.points[-1]
+    return (
+        end.time_from_start.sec >= 0
+        and len(end.positions) == JOINTS
+        and all(
+            low <= q <= high
+            for low, q, high in zip(JOINT_LOW, end.positions, JOINT_HIGH, strict=True)
+        )
+    )
 
 
 async def pause(node: Node, duration_s: float) -> None:

@@ -16,7 +16,7 @@ from slap_ros.core.learner_interface import Learning
 from slap_ros.core.skill import Skill
 from slap_ros.core.task import Task
 from slap_ros.core.world import SyncVectorWorld, VectorWorld, World
-from slap_ros.errors import InvalidDomainError
+from slap_ros.errors import InvalidDomainError, InvalidParameterError
 from slap_ros.relational import (
     AtomSpace,
     GroundAtom,
@@ -157,5 +157,11 @@ class Domain:
         return SyncVectorWorld(self.make_world, states)
 
     def task(self, seed: int, index: int = 0) -> Task:
-        """The ``index``-th task of a seed; every (seed, index) has a stream of its own."""
+        """The ``index``-th task of a seed; every (seed, index) has a stream of its own.
+
+        Raises:
+            InvalidParameterError: A negative seed or index.
+        """
+        if min(seed, index) < 0:
+            raise InvalidParameterError(f"seed {seed} and index {index} must not be negative")
         return self.sample_task(np.random.default_rng([seed, index]))

@@ -1,0 +1,211 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Every field of every service and action at its limits: always an answer with a code."""
+
+from contextlib import contextmanager
+from copy import deepcopy
+
+import pytest
+import rclpy
+from action_msgs.msg import GoalStatus
+from control_msgs.action import FollowJointTrajectory, GripperCommand
+from rclpy.action import ActionClient
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
+from slap_msgs.action import ExecuteSkill, SolveTask
+from slap_msgs.msg import GroundAtom
+from slap_msgs.srv import ListSkills, ResetTask
+from trajectory_msgs.msg import JointTrajectoryPoint
+
+from ensemble.client import RunClient
+from ensemble.interfaces import (
+    CLOSE_BAG,
+    EXECUTE_SKILL,
+    LIST_SKILLS,
+    PLAN,
+    RESET_TASK,
+    SOLVE_TASK,
+)
+from ensemble.nodes import RunSettings, node_class, node_parameters
+from ensemble.spinner import Spinner
+from slap_ros.errors import ErrorCode
+from slap_ros.messages.interfaces import TASK
+
+LIMIT = 60.0  # s, far more than anything here takes
+# What is waited for in vain is waited for less long than in a laboratory.
+HASTY = {"planner_node": {"observation_timeout": 1.0}, "skill_server": {"state_timeout": 1.0}}
+FLOATS = [-1.0, 0.0, 1e308, -1e308, float("inf"), float("-inf"), float("nan")]
+BOUNDARIES = {
+    "boolean": [False, True],
+    "string": ["", "nobody", "x" * 100_000, "é\n{}[/x]\x1b[2J"],
+    "double": FLOATS,
+    "float": [-1.0, 0.0, 3e38, float("inf"), float("nan")],
+    **{f"int{n}": [-(2 ** (n - 1)), -1, 0, 2 ** (n - 1) - 1] for n in (8, 16, 32, 64)},
+    **{f"uint{n}": [0, 1, 2**n - 1] for n in (8, 16, 32, 64)},
+}
+
+
+def variants(message):
+    """Copies of a message, each with one of its fields, however deep, at one of its limits."""
+    for name, kind in message.get_fields_and_field_types().items():
+        value = getattr(message, name)
+        for changed in field_variants(value, kind.removesuffix("]").partition("[")[0]):
+            copy = deepcopy(message)
+            setattr(copy, name, changed)
+            yield copy
+
+
+def field_variants(value, kind):
+    if kind.startswith("sequence<") or (isinstance(value, list) and not isinstance(value, str)):
+        items = list(value)
+        yield []
+        if items:
+            yield items + items
+            yield items[:-1]
+            inner = kind.removeprefix("sequence<").partition(",")[0].removesuffix(">")
+            for item in field_variants(items[0], inner):
+                yield [item, *items[1:]]
+    elif hasattr(value, "get_fields_and_field_types"):
+        yield from variants(value)
+    else:
+        yield from BOUNDARIES[kind]
+
+
+class Bench:
+    """Nodes and a client on one executor: what a callback raises comes out here."""
+
+    def __init__(self, executor, client, heard):
+        self.client, self.heard, self.spinner = client, heard, Spinner(executor)
+        self.client.create_subscription(PLAN.type, PLAN.name, self.on_plan, PLAN.qos)
+        self.plans = []
+
+    def on_plan(self, message):
+        self.plans.append(message)
+
+    def until(self, condition):
+        assert self.spinner.spin_until(condition, LIMIT), "hung"
+
+    def call(self, service, request):
+        client = self.client.create_client(service.type, service.name)
+        self.until(client.service_is_ready)
+        answer = client.call_async(request)
+        self.until(answer.done)
+        self.client.destroy_client(client)
+        return answer.result()
+
+    def ask(self, client, goal):
+        """Its status and result; none where it is rejected. What lasts is canceled."""
+        sent = client.send_goal_async(goal)
+        self.until(sent.done)
+        if not sent.result().accepted:
+            return None
+        ended = sent.result().get_result_async()
+        if not self.spinner.spin_until(ended.done, 3.0):
+            sent.result().cancel_goal_async()
+            self.until(ended.done)
+        return ended.result()
+
+
+@contextmanager
+def bench(parameters):
+    heard = []
+    rclpy.init()
+    executor, nodes = SingleThreadedExecutor(), []
+    try:
+        nodes.append(client := RunClient(lambda *message: heard.append(message)))
+        for name, given in parameters.items():
+            values = given | HASTY.get(name, {})
+            overrides = [Parameter(key, value=value) for key, value in values.items()]
+            nodes.append(node_class(name)(parameter_overrides=overrides))
+        for node in nodes:
+            executor.add_node(node)
+        yield Bench(executor, client, heard)
+    finally:
+        for node in reversed(nodes):
+            node.destroy_node()
+        executor.shutdown()
+        rclpy.shutdown()
+
+
+@pytest.fixture
+def ensemble(network, tmp_path):
+    settings = RunSettings("obstacle2d", "fair", 3, 0, "lazy", tmp_path / "bag", shortcuts="none")
+    with bench(node_parameters(settings)) as found:
+        found.until(lambda: found.client.ready(True) and found.task)
+        yield found
+
+
+Bench.task = property(lambda self: next((m for kind, m in self.heard[::-1] if kind == TASK), None))
+
+
+def answered(result):
+    """It has a code of its own, which is not that of a bug."""
+    assert ErrorCode(result.error_code) is not ErrorCode.INTERNAL_ERROR, result.error_msg
+    assert bool(result.error_code) == bool(result.error_msg)
+
+
+def test_whatever_a_reset_is_asked_it_answers(ensemble):
+    task = ensemble.task
+    sampled = ResetTask.Request(seed=1, index=1)
+    given = ResetTask.Request(initial_state=task.initial_state, goal=task.goal)
+    for request in (*variants(sampled), *variants(given)):
+        answered(ensemble.call(RESET_TASK, request))
+    refused = ensemble.call(RESET_TASK, ResetTask.Request(seed=-1))
+    assert refused.error_code == ErrorCode.INVALID_PARAMETER
+    again = ensemble.call(RESET_TASK, ResetTask.Request(seed=5))
+    goal = SolveTask.Goal(episode=again.episode)
+    assert ensemble.ask(ensemble.client._solve, goal).result.success
+
+
+def test_whatever_planner_and_skill_server_are_asked_they_answer(ensemble):
+    solver = ActionClient(ensemble.client, SOLVE_TASK.type, SOLVE_TASK.name)
+    skills = ActionClient(ensemble.client, EXECUTE_SKILL.type, EXECUTE_SKILL.name)
+    ensemble.until(lambda: solver.server_is_ready() and skills.server_is_ready())
+    goal = SolveTask.Goal(goal=ensemble.task.goal, max_replans=1)
+    for request in (*variants(goal), SolveTask.Goal(goal=2 * list(itself(ensemble.task)))):
+        answered(ensemble.ask(solver, request).result)
+    ensemble.until(lambda: ensemble.plans)
+    edge = ensemble.plans[0].edges[0]
+    for request in variants(ExecuteSkill.Goal(episode=1, edge=edge, step_budget=5)):
+        answered(ensemble.ask(skills, request).result)
+    answered(ensemble.call(LIST_SKILLS, ListSkills.Request()))
+    for client in (solver, skills):
+        client.destroy()
+
+
+def itself(task):
+    """Atoms that relate an object to itself, and to what is no block."""
+    names = [obj.name for obj in task.initial_state.objects]
+    return [GroundAtom(predicate="On", objects=[name, name]) for name in names]
+
+
+def test_a_bag_can_be_closed_again_and_again(ensemble):
+    for _ in range(3):
+        assert ensemble.call(CLOSE_BAG, CLOSE_BAG.type.Request()).message
+
+
+def test_whatever_the_controllers_are_asked_they_answer(network):
+    pytest.importorskip("pybullet")
+    settings = RunSettings(
+        "obstacle_tower", "fair", 1, 0, "lazy", None, world="mock", mock={"pace": 50.0}
+    )
+    only = {"robot_bridge.mock": node_parameters(settings)["robot_bridge.mock"]}
+    with bench(only) as found:
+        arm = ActionClient(
+            found.client, FollowJointTrajectory, "panda_arm_controller/follow_joint_trajectory"
+        )
+        gripper = ActionClient(found.client, GripperCommand, "franka_gripper/gripper_action")
+        found.until(lambda: arm.server_is_ready() and gripper.server_is_ready())
+        motion = FollowJointTrajectory.Goal()
+        motion.trajectory.joint_names = [f"panda_joint{i + 1}" for i in range(7)]
+        motion.trajectory.points = [
+            JointTrajectoryPoint(positions=[0.0, -0.5, 0.0, -2.0, 0.0, 1.5, 0.8])
+        ]
+        for request in variants(motion):
+            found.ask(arm, request)
+        for request in variants(GripperCommand.Goal()):
+            found.ask(gripper, request)
+        motion.trajectory.points[0].time_from_start.sec = 1
+        assert found.ask(arm, motion).status == GoalStatus.STATUS_SUCCEEDED
+        for client in (arm, gripper):
+            client.destroy()
