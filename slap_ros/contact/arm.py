@@ -126,12 +126,10 @@ def share_in_time(joints: Sequence[float], goal: Sequence[float]) -> float:
     return share
 
 
-def follow(joints: Joints, goal: Joints) -> Joints:
-    """Where the arm is after a control period: at the goal, or as near as each joint can get."""
-    return tuple(
-        min(max(wanted, q - step), q + step)
-        for q, wanted, step in zip(joints, goal, MAX_JOINT_STEP, strict=True)
-    )
+def in_time(joints: Joints, goal: Joints) -> bool:
+    """Whether the arm can go from one configuration to another in a control period."""
+    ways = zip(joints, goal, MAX_JOINT_STEP, strict=True)
+    return all(abs(wanted - q) <= step for q, wanted, step in ways)
 
 
 def _in_plane(ahead: float, above: float) -> tuple[float, float] | None:

@@ -20,8 +20,7 @@ from slap_ros.physics.panda import FINGER_CLOSED, FINGER_OPEN, JOINT_HIGH, JOINT
 OVERLAP = 0.01  # m
 UNIT_TOLERANCE = 1e-6  # 1, of a quaternion's length
 LIMIT_TOLERANCE = 1e-9  # rad
-ARM_TOLERANCE = 0.02  # m, how far the arm may lag behind a hand that was shoved
-ARM_TURN_TOLERANCE = 0.15  # rad, the same of its turn
+ARM_TOLERANCE = 1e-6  # m and rad, between the hand and where the arm's joints have it
 TARGET_TOLERANCE = 2.0  # times the leash
 TILTED = 0.5  # rad, from pointing straight down
 FAR = 50.0  # m, from the base: nothing gets there
@@ -123,7 +122,7 @@ def _require_arm(snapshot: ContactSnapshot) -> None:
         raise InvalidStateError(f"the arm cannot have its hand at {hand.pose.position} m")
     at = grasp_pose(snapshot.joints)
     off, turn = math.dist(at.position, hand.pose.position), at.angle_to(hand.pose)
-    if off > ARM_TOLERANCE or turn > ARM_TURN_TOLERANCE:
+    if max(off, turn) > ARM_TOLERANCE:
         raise InvalidStateError(
             f"the hand is {off} m and {turn} rad off from where the arm's joints have it"
         )

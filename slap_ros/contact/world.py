@@ -12,7 +12,7 @@ from __future__ import annotations
 import weakref
 from types import TracebackType
 
-from slap_ros.contact.arm import arm_joints, follow, share_in_time
+from slap_ros.contact.arm import Joints, arm_joints, in_time, share_in_time
 from slap_ros.contact.contacts import ContactPoint
 from slap_ros.contact.dynamics import ContactDynamics
 from slap_ros.contact.features import GRIPPER, ROBOT
@@ -23,7 +23,7 @@ from slap_ros.contact.snapshot import ContactSnapshot, StateIndex
 from slap_ros.contact.validation import require_possible
 from slap_ros.core import Action, ActionSpace, GripperAxis
 from slap_ros.errors import InvalidStateError
-from slap_ros.geometry.pose import Pose, from_rotation_vector, multiply
+from slap_ros.geometry.pose import ORIGIN, Pose, from_rotation_vector, multiply
 from slap_ros.relational import Feature, State
 
 MAX_SHIFT = 0.02  # m along each axis in a control step: 0.4 m/s
@@ -38,6 +38,8 @@ ACTION_SPACE = ActionSpace(
     high=(MAX_SHIFT, MAX_SHIFT, MAX_SHIFT, MAX_TURN, 1.0),
     gripper=GripperAxis("gripper"),
 )
+# Where an arm is nearly stretched, its joints go further than in proportion to the hand's way.
+PARTS = (1.0, 0.25, 0.06)  # of the way that seems to be possible, until it is
 ACTING = 0.5  # 1, beyond which the gripper is told something new
 
 
@@ -120,7 +122,8 @@ class ContactWorld:
         """Act for one control period.
 
         A target that the arm cannot reach is refused: the old one stays. Where the arm could not
-        be in time, the hand is pulled only part of the way in this period.
+        be in time, the hand is pulled only part of the way in this period. Where forces would
+        take the hand to where the arm cannot be in time, it is held back, and its target with it.
 
         Raises:
             InvalidCommandError: The action is not in the action space; nothing moved.
@@ -135,11 +138,19 @@ class ContactWorld:
         if joints is None:
             told = now.hand._replace(closing=told.closing)
             joints = arm_joints(told.target_pose)
-        pull = told.pose
-        if joints is not None:
-            pull = _part_way(told.pose, told.target_pose, share_in_time(now.joints, joints))
-        after, self._contacts = self._dynamics.after(now._replace(hand=told), pull)
-        self._snapshot = after._replace(joints=_followed(now, after))
+        share = 0.0 if joints is None else share_in_time(now.joints, joints)
+        held_back = told._replace(target=told.pose.position, target_yaw=told.yaw)
+        tries = [(told, part * share) for part in PARTS] + [(held_back, 0.0)]
+        for hand, part in tries:
+            way = _part_way(told.pose, told.target_pose, part)
+            after, self._contacts = self._dynamics.after(now._replace(hand=hand), way)
+            followed = _followed(now, after)
+            if followed is not None:
+                self._snapshot = after._replace(joints=followed)
+                break
+        else:  # not even held back did the hand stay where the arm can be: it stops at once
+            stopped = held_back._replace(velocity=ORIGIN, angular_velocity=ORIGIN)
+            self._snapshot = after._replace(joints=now.joints, hand=stopped, held=None)
         self._state = self._index.write(self._state, self._snapshot)
         return self._state
 
@@ -165,9 +176,9 @@ def _part_way(start: Pose, goal: Pose, share: float) -> Pose:
     return Pose((x, y, z), multiply(from_rotation_vector((u, v, w)), start.quaternion))
 
 
-def _followed(before: ContactSnapshot, after: ContactSnapshot) -> tuple[float, ...]:
-    """The arm's joints with the hand where it is now; as they were if the arm cannot be there."""
+def _followed(before: ContactSnapshot, after: ContactSnapshot) -> Joints | None:
+    """The arm's joints with the hand where it is now; None if they cannot be there in time."""
     if after.hand.pose == before.hand.pose:
         return before.joints
     joints = arm_joints(after.hand.pose)
-    return before.joints if joints is None else follow(before.joints, joints)
+    return joints if joints is not None and in_time(before.joints, joints) else None
