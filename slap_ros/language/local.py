@@ -31,7 +31,7 @@ ADVICE = (
     "dependencies would compile llama.cpp, which is not needed here)"
 )
 MAX_ITEMS = 6  # of a list
-NEVER_EMPTY = ("actions", "terms")  # lists whose emptiness would be no answer
+NEVER_EMPTY = ("actions", "add_effects", "terms")  # lists whose emptiness would be no answer
 MAX_WORD = 16  # characters of a name
 WEIGHTS = tuple(f"{i / 20:.2f}" for i in range(1, 20))
 DEFAULT_TEMPERATURE = 0.7

@@ -8,11 +8,10 @@ import json
 from pathlib import Path
 
 import pytest
-from click.testing import Result
 from model_answers import good_script, operator_json
 from paper_problems import peg_in_hole, printed_insert
 from scripted_server import Step, serving
-from typer.testing import CliRunner
+from typer.testing import CliRunner, Result
 
 from slap_ros.cli import app
 from slap_ros.errors import ErrorCode
