@@ -13,6 +13,7 @@ import json
 import os
 import stat
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -117,6 +118,21 @@ def read_text(path: Path, limit: int = MAX_BYTES) -> str:
     """
     text = read_bytes(path, limit).decode("utf-8")
     return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a file in UTF-8: at every moment there is the old one, or the new one, whole.
+
+    Raises:
+        OSError: It cannot be written; the old one is untouched.
+    """
+    draft = path.with_name(f".{path.name}.tmp")
+    try:
+        draft.write_text(text, encoding="utf-8")
+        draft.replace(path)
+    finally:  # after Ctrl-C too
+        with suppress(OSError):
+            draft.unlink(missing_ok=True)
 
 
 def parse_json(text: str | bytes) -> Any:

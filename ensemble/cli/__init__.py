@@ -1,21 +1,15 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""``slap``: the commands of the core, and those that bring nodes up."""
+"""``slap``: where it begins. The commands are in :mod:`ensemble.cli.application`."""
 
 from __future__ import annotations
 
-from ensemble.cli.commands import replay, run
-from slap_ros.cli import app
-from slap_ros.cli.bag import app as bag_app
-from slap_ros.cli.console import exits, open_closed_streams
-from slap_ros.cli.options import flat_options
-
-app.command("run")(exits(flat_options(run)))
-app.registered_commands.sort(key=lambda command: command.name != "run")  # the first in --help
-bag_app.command("replay")(exits(flat_options(replay)))
+from slap_ros.signals import exit_at_once_on_signals
 
 
 def main() -> None:
     """Run a command of ``slap``."""
-    open_closed_streams()
-    app()
+    exit_at_once_on_signals()
+    from ensemble.cli.application import run  # seconds, on a busy machine
+
+    run()

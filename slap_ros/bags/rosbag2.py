@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -139,9 +140,9 @@ def write_metadata(folder: Path, information: Mapping[str, Any]) -> None:
             file.flush()
             os.fsync(file.fileno())
         draft.replace(folder / FILE_NAME)
-    except OSError:
-        draft.unlink(missing_ok=True)
-        raise
+    finally:  # after Ctrl-C too
+        with suppress(OSError):
+            draft.unlink(missing_ok=True)
 
 
 def read_metadata(folder: Path) -> dict[str, Any]:

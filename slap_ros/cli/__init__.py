@@ -16,8 +16,8 @@ app = typer.Typer(
     name="slap",
     help="Task-and-motion planning with learned shortcuts: run it, measure it, look into it.",
     epilog=(
-        "Exit codes: 0 done, 2 wrong usage, 130 interrupted; any other is an error code of "
-        "slap_msgs/ErrorCode. With --json, stdout has JSON and nothing else."
+        "Exit codes: 0 done, 2 wrong usage, 130 interrupted, 143 terminated; any other is an error "
+        "code of slap_msgs/ErrorCode. With --json, stdout has JSON and nothing else."
     ),
     no_args_is_help=True,
     pretty_exceptions_enable=False,

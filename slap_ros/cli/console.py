@@ -33,9 +33,9 @@ from rich.segment import Segment
 from rich.text import Text
 
 from slap_ros.errors import ErrorCode, SlapError
+from slap_ros.signals import TerminatedError, exit_code, signals_raised
 
 P = ParamSpec("P")
-INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 FILE_WIDTH = 120  # columns, where stderr is no terminal: tables must not be cut there
 # Controls, invisible formatting (it reverses the writing direction), halves of characters.
 HIDDEN_CATEGORIES = ("Cc", "Cf", "Cs", "Zl", "Zp")
@@ -110,13 +110,14 @@ def exits(command: Callable[P, int | None]) -> Callable[P, None]:
     @wraps(command)
     def run(*args: P.args, **kwargs: P.kwargs) -> None:
         try:
-            code = command(*args, **kwargs)
-            sys.stdout.flush()
+            with signals_raised():
+                code = command(*args, **kwargs)
+                sys.stdout.flush()
         except SlapError as error:
             _fail(error.code, " ".join(str(error).split()), error)
-        except KeyboardInterrupt:
-            _say("interrupted")
-            raise typer.Exit(INTERRUPTED) from None
+        except KeyboardInterrupt as error:
+            _say("terminated" if isinstance(error, TerminatedError) else "interrupted")
+            raise typer.Exit(exit_code(error)) from None
         except BrokenPipeError as error:  # whoever read stdout has seen enough
             _silence_stdout()
             raise typer.Exit(int(ErrorCode.INPUT_OUTPUT)) from error

@@ -17,7 +17,7 @@ from slap_ros.domains import get_domain
 from slap_ros.drawing import draw_abstract_graph
 from slap_ros.errors import InvalidParameterError, PlanningLimitError, StorageFullError
 from slap_ros.evaluation.approaches import approaches
-from slap_ros.files import read_text, require_writable
+from slap_ros.files import read_text, require_writable, write_whole
 from slap_ros.planning.abstract_graph import AbstractGraph, build_abstract_graph
 from slap_ros.planning.ff import MAX_EXPANSIONS, MAX_TESTS, find_operator_sequence
 from slap_ros.planning.plan import PlanningResult
@@ -119,7 +119,7 @@ def _write(
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in files.items():
-            (folder / name).write_text(text, encoding="utf-8")
+            write_whole(folder / name, text)
             console.print(f"wrote {folder / name}")
     except OSError as error:
         raise StorageFullError(f"cannot write to {folder}: {error.strerror}") from error

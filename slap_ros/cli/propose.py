@@ -32,7 +32,7 @@ from slap_ros.cli.options import Goal, Index, Json, Preset, Seed
 from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError, StorageFullError
-from slap_ros.files import read_text, require_writable
+from slap_ros.files import read_text, require_writable, write_whole
 from slap_ros.language.budget import Budget, BudgetLimits
 from slap_ros.language.cassette import open_client, with_recorded
 from slap_ros.language.settings import read_settings
@@ -249,7 +249,7 @@ def _write(folder: Path, proposal: Proposal, problem: AcquisitionProblem) -> lis
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in files.items():
-            (folder / name).write_text(text, encoding="utf-8")
+            write_whole(folder / name, text)
     except OSError as error:
         raise StorageFullError(f"cannot write to {folder}: {error.strerror}") from error
     return [str(folder / name) for name in (*files, "attempts.jsonl")]

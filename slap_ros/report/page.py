@@ -12,7 +12,6 @@ import re
 from base64 import b64encode
 from collections import Counter
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -25,7 +24,7 @@ from slap_ros.drawing.svg import clean_value
 from slap_ros.drawing.words import counted
 from slap_ros.errors import InvalidParameterError, StorageFullError
 from slap_ros.evaluation.metrics import known
-from slap_ros.files import require_writable
+from slap_ros.files import require_writable, write_whole
 from slap_ros.report.animation import Drawing, draw
 from slap_ros.report.content import PURE_PLANNING, BagReport, RunReport
 
@@ -67,14 +66,10 @@ def write_page(path: Path, text: str) -> None:
     Raises:
         StorageFullError: It cannot be written; what was there before is left alone.
     """
-    draft = path.with_name(f".{path.name}.tmp")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        draft.write_text(text, encoding="utf-8")
-        draft.replace(path)
+        write_whole(path, text)
     except OSError as error:
-        with suppress(OSError):  # there may not even be a folder
-            draft.unlink()
         raise StorageFullError(f"cannot write {path}: {error.strerror}") from error
 
 

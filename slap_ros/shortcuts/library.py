@@ -80,16 +80,21 @@ def save_library(path: Path, library: Library) -> None:
     path = path.resolve()
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_name(f".{path.name}.{os.getpid()}.draft")
-    shutil.rmtree(draft, ignore_errors=True)
-    draft.mkdir()
-    for shortcut in library.shortcuts:
-        save_shortcut(draft / shortcut.name, shortcut)
-    _write(draft / LIBRARY, {"format": FORMAT, "domain": library.domain, **library.record})
     old = path.with_name(f".{path.name}.{os.getpid()}.old")
-    if path.exists():
-        path.rename(old)
-    draft.rename(path)
-    shutil.rmtree(old, ignore_errors=True)
+    shutil.rmtree(draft, ignore_errors=True)
+    try:
+        draft.mkdir()
+        for shortcut in library.shortcuts:
+            save_shortcut(draft / shortcut.name, shortcut)
+        _write(draft / LIBRARY, {"format": FORMAT, "domain": library.domain, **library.record})
+        if path.exists():
+            path.rename(old)
+        draft.rename(path)
+    finally:  # after Ctrl-C too
+        if old.exists() and not path.exists():
+            old.rename(path)
+        for left in (draft, old):
+            shutil.rmtree(left, ignore_errors=True)
 
 
 def load_library(path: Path, domain: Domain) -> Library:

@@ -9,7 +9,6 @@ processes share the parts: each part draws from a generator of its own.
 from __future__ import annotations
 
 import os
-import signal
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, fields
@@ -32,6 +31,7 @@ from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.starts import StartRecord, restore_starts
 from slap_ros.shortcuts.vec_env import VecEnv, VecEnvStep
 from slap_ros.shortcuts.workers import exit_with_parent
+from slap_ros.signals import interrupts_held_back
 
 PATIENCE_S = 5.0  # for a process to end by itself
 CLOSED = (EOFError, ConnectionError)  # raised by a pipe whose other end is closed
@@ -131,7 +131,8 @@ def make_vec_env(specs: Sequence[VecEnvSpec], processes: int) -> Iterator[VecEnv
         for share in shares:
             mine, theirs = context.Pipe()
             process = context.Process(target=_step_until_closed, args=(theirs, share, os.getpid()))
-            process.start()
+            with interrupts_held_back():
+                process.start()
             theirs.close()  # or nobody would notice its end
             stack.callback(_end, process, mine)
             links.append(mine)
@@ -147,7 +148,6 @@ def _end(process: BaseProcess, link: Connection) -> None:
 
 def _step_until_closed(link: Connection, specs: Sequence[VecEnvSpec], parent: int) -> None:
     """What such a process does, until the other end of its link is closed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # its parent handles it
     exit_with_parent(parent)
     try:
         envs = [spec.make() for spec in specs]

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from slap_ros.errors import InvalidParameterError
-from slap_ros.files import parse_json, read_text
+from slap_ros.files import parse_json, read_text, write_whole
 
 Result = TypeVar("Result")
 # What decoding raises where JSON is not what was written.
@@ -56,9 +56,7 @@ class WorkFolder:
         if not path.exists():
             data = compute()
             path.parent.mkdir(parents=True, exist_ok=True)
-            draft = path.with_suffix(".draft")
-            draft.write_text(json.dumps(data), encoding="utf-8")
-            draft.rename(path)
+            write_whole(path, json.dumps(data))
             return decode(data)
         try:
             return decode(parse_json(read_text(path)))

@@ -14,6 +14,7 @@ from time import sleep
 from typing import Any, Protocol, TypeVar
 
 from slap_ros.errors import InvalidParameterError
+from slap_ros.signals import interrupts_held_back
 
 Result = TypeVar("Result")
 PARENT_POLL_S = 1.0
@@ -65,7 +66,8 @@ class LocalWorkers:
         self, function: Callable[..., Result], jobs: Sequence[tuple[Any, ...]]
     ) -> Iterator[tuple[int, Result]]:
         """See :class:`Workers`."""
-        numbers = {self._pool.submit(function, *job): i for i, job in enumerate(jobs)}
+        with interrupts_held_back():  # the first one starts the processes
+            numbers = {self._pool.submit(function, *job): i for i, job in enumerate(jobs)}
         for future in as_completed(numbers):
             yield numbers[future], future.result()
 
@@ -114,7 +116,7 @@ def local_workers(count: int) -> Iterator[LocalWorkers]:
     except BaseException:
         for process in list((pool._processes or {}).values()):
             process.terminate()
-        pool.shutdown(wait=False, cancel_futures=True)
+        pool.shutdown(cancel_futures=True)  # waits, or semaphores would be left to the tracker
         raise
     pool.shutdown()
 

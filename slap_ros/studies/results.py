@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from slap_ros.files import write_whole
 from slap_ros.shortcuts.library import Library
 from slap_ros.studies.figures import Size, picture
 from slap_ros.versions import versions
@@ -109,7 +110,7 @@ def write(folder: Path, report: StudyReport, origin: Provenance) -> list[Path]:
     paths = []
     for ending, content in contents.items():
         paths.append(folder / f"{name}.{ending}")
-        paths[-1].write_text(content, encoding="utf-8")
+        write_whole(paths[-1], content)
     return paths
 
 

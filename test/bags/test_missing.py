@@ -14,7 +14,7 @@ import yaml
 from truthful_run import Published, Script, record, without
 from typer.testing import CliRunner
 
-from ensemble.cli import app
+from ensemble.cli.application import app
 from slap_ros.bags import bag_info, evaluate_bag, read_bag, replay_bag
 from slap_ros.bags.rosbag2 import ROOT
 from slap_ros.errors import ErrorCode

@@ -12,7 +12,7 @@ from typing import get_args
 import pytest
 from typer.testing import CliRunner
 
-from ensemble.cli import app
+from ensemble.cli.application import app
 from ensemble.nodes import node_class
 from ensemble.parameters import _require_within, parse_parameters
 from ensemble.robot_parameters import MockRobotParameters, PlayerParameters, RobotBridgeParameters

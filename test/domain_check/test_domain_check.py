@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from ensemble.cli import app
+from ensemble.cli.application import app
 from slap_ros.core import Task
 from slap_ros.domain_check import check_domain
 from slap_ros.domains import domain_names, get_domain

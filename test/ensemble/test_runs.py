@@ -13,7 +13,7 @@ import psutil
 import pytest
 from typer.testing import CliRunner
 
-from ensemble.cli import app
+from ensemble.cli.application import app
 from ensemble.cli.event_printer import EventPrinter
 from ensemble.nodes import RunSettings
 from ensemble.run import RunRequest, run

@@ -15,7 +15,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from truthful_run import Script, record
 from typer.testing import CliRunner
 
-from ensemble.cli import app
+from ensemble.cli.application import app
 from ensemble.entry_point import run_node
 from sim_node.node import SimNode
 from slap_ros.bags import bag_digest, bag_info, evaluate_bag, read_bag, replay_bag

@@ -10,7 +10,7 @@ import sys
 import pytest
 from typer.testing import CliRunner
 
-from ensemble.cli import app
+from ensemble.cli.application import app
 from slap_ros.core import Domain, DomainFactory, presets
 from slap_ros.doctor import domains as doctor
 from slap_ros.domains import domain_names, get_domain, preset_names

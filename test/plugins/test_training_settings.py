@@ -8,7 +8,7 @@ import patchy
 import pytest
 from typer.testing import CliRunner
 
-from ensemble.cli import app
+from ensemble.cli.application import app
 from slap_ros.core import Learning
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode, InvalidDomainError, InvalidParameterError, UnsolvableError

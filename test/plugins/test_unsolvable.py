@@ -9,7 +9,7 @@ import pytest
 import sweeping
 from typer.testing import CliRunner
 
-from ensemble.cli import app
+from ensemble.cli.application import app
 from ensemble.nodes import RunSettings
 from ensemble.run import RunRequest, run
 from slap_ros.bags import evaluate_bag, read_bag

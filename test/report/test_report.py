@@ -17,7 +17,7 @@ from staged_runs import HOSTILE, with_markers
 from truthful_run import Script, record
 from typer.testing import CliRunner
 
-from ensemble.cli import app
+from ensemble.cli.application import app
 from slap_ros.bags import evaluate_bag
 from slap_ros.errors import InvalidParameterError, StorageFullError
 from slap_ros.messages.interfaces import ATOMS, DOMAIN_INFO, MARKERS

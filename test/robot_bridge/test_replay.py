@@ -14,7 +14,7 @@ import pytest
 import rclpy
 from typer.testing import CliRunner
 
-from ensemble.cli import app
+from ensemble.cli.application import app
 from ensemble.nodes import RunSettings
 from ensemble.run import RunRequest, run
 from slap_ros.bags import read_bag

@@ -1,0 +1,78 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Ctrl-C and SIGTERM, at whatever moment they come: one line, a code, and files that are whole.
+
+While a command starts or ends there is nothing to clean up, and it ends at once. While it runs,
+the signal is raised as an error, so that what is open is closed. Imports little: it is the first
+thing that a command does.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from types import FrameType
+
+WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
+
+
+class TerminatedError(KeyboardInterrupt):
+    """SIGTERM arrived. Whatever cleans up after Ctrl-C cleans up after it too."""
+
+
+def exit_code(error: KeyboardInterrupt) -> int:
+    """The exit code after a signal, as shells have it: 128 and the signal's number."""
+    return 128 + (signal.SIGTERM if isinstance(error, TerminatedError) else signal.SIGINT)
+
+
+def exit_at_once_on_signals() -> None:
+    """Let a signal end the process with a line and a code, from now on.
+
+    A signal that is ignored, as by ``nohup``, stays so.
+    """
+    for number in WORDS:
+        if signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, _exit_at_once)
+
+
+@contextmanager
+def signals_raised() -> Iterator[None]:
+    """Let a signal raise an error in between, where it would end the process.
+
+    Raises:
+        KeyboardInterrupt: SIGINT arrived.
+        TerminatedError: SIGTERM arrived.
+    """
+    ours = [number for number in WORDS if signal.getsignal(number) is _exit_at_once]
+    for number in ours:
+        signal.signal(number, _raise)
+    try:
+        yield
+    finally:
+        for number in ours:
+            signal.signal(number, _exit_at_once)
+
+
+@contextmanager
+def interrupts_held_back() -> Iterator[None]:
+    """Hold SIGINT back in between, and for good in processes that are started meanwhile.
+
+    The terminal sends Ctrl-C to all of them. It is the parent that ends its workers.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _exit_at_once(number: int, _: FrameType | None) -> None:
+    with suppress(OSError):  # a closed stderr
+        os.write(2, f"{WORDS[signal.Signals(number)]}\n".encode())
+    os._exit(128 + number)
+
+
+def _raise(number: int, _: FrameType | None) -> None:
+    raise TerminatedError if number == signal.SIGTERM else KeyboardInterrupt

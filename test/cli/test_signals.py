@@ -1,0 +1,149 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Ctrl-C and SIGTERM at any moment: a line, a code, no process left, and files that are whole."""
+
+import itertools
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import psutil
+import pytest
+
+from slap_ros.bags import evaluate_bag
+
+LIBRARY = Path(__file__).parents[1] / "shortcuts" / "data" / "obstacle2d"
+LIMIT_S = 60.0  # far more than anything here takes
+ENDINGS = {signal.SIGINT: ("interrupted", 130), signal.SIGTERM: ("terminated", 143)}
+EVALUATE = ("evaluate", "obstacle2d", "--tasks", "10000", "--jobs", "2", "--shortcuts", "none")
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+
+
+def handles_signals(pid):
+    """Whether a process has begun to handle SIGTERM: before, it is the interpreter that starts."""
+    status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
+    caught = int(re.search(r"SigCgt:\s*(\w+)", status)[1], 16)
+    return bool(caught >> (signal.SIGTERM - 1) & 1)
+
+
+def wait_until(condition):
+    end = time.monotonic() + LIMIT_S
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.005)
+
+
+@contextmanager
+def started(*arguments, folder):
+    """A command in a session of its own, as in a terminal of its own; all of it ends."""
+    command = [sys.executable, "-m", "ensemble.cli", *map(str, arguments)]
+    process = subprocess.Popen(
+        command, cwd=folder, text=True, start_new_session=True,
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+    )  # fmt: skip
+    try:
+        wait_until(lambda: handles_signals(process.pid))
+        yield process
+    finally:
+        for left in in_session(process.pid):
+            left.kill()
+        process.kill()
+        process.communicate()
+
+
+def in_session(leader):
+    """The processes of a session besides its leader."""
+    found = []
+    for process in psutil.process_iter():
+        try:
+            if os.getsid(process.pid) == leader != process.pid:
+                found.append(process)
+        except (ProcessLookupError, PermissionError):
+            continue
+    return found
+
+
+def ends_well(process, number, to_all):
+    (os.killpg if to_all else os.kill)(process.pid, number)
+    _, told = process.communicate(timeout=LIMIT_S)
+    word, code = ENDINGS[number]
+    assert process.returncode == code, told
+    assert "Traceback" not in told
+    assert "leaked" not in told  # semaphores
+    assert told.rstrip().splitlines()[-1] == word
+    wait_until(lambda: not in_session(process.pid))
+    return told
+
+
+@pytest.mark.parametrize("attempt", range(20))
+def test_ctrl_c_in_the_first_second(tmp_path, attempt):
+    with started(*EVALUATE, folder=tmp_path) as process:
+        time.sleep(attempt / 20)
+        ends_well(process, signal.SIGINT, to_all=True)
+
+
+@pytest.mark.parametrize("after_s", [0.5, 1.5])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        EVALUATE,
+        ("study", "goals", "obstacle2d", "--tasks", "500", "--jobs", "2", "--output", "results"),
+        ("train", "obstacle2d", "--output", "library"),
+        ("check", "obstacle2d", "--tasks", "10000"),
+        ("plan", "domain.pddl", "problem.pddl", "--effort", "1000"),
+    ],
+    ids=lambda arguments: arguments[0],
+)
+def test_sigterm_in_the_middle(tmp_path, arguments, after_s):
+    if arguments[0] == "plan":
+        hanoi(tmp_path)
+    with started(*arguments, folder=tmp_path) as process:
+        time.sleep(after_s)
+        ends_well(process, signal.SIGTERM, to_all=False)
+    assert not list(tmp_path.rglob("*.draft"))
+    assert not (tmp_path / "library").exists()
+
+
+def hanoi(folder):
+    """A problem that takes hours."""
+    names, pegs = [f"d{i}" for i in range(14)], ["p1", "p2", "p3"]
+    order = [*names, *pegs]
+    smaller = [f"(s {b} {a})" for i, a in enumerate(names) for b in order[i + 1 :]]
+    tower = [f"(on {a} {b})" for a, b in itertools.pairwise(names)]
+    clear = ["(clear d0)", "(clear p2)", "(clear p3)", "(on d13 p1)"]
+    (folder / "domain.pddl").write_text("""(define (domain h)
+      (:predicates (clear ?x) (on ?x ?y) (s ?x ?y)) (:action move :parameters (?d ?f ?t)
+      :precondition (and (s ?t ?d) (on ?d ?f) (clear ?d) (clear ?t))
+      :effect (and (clear ?f) (on ?d ?t) (not (on ?d ?f)) (not (clear ?t)))))""")
+    (folder / "problem.pddl").write_text(f"""(define (problem p) (:domain h)
+      (:objects {" ".join(order)}) (:init {" ".join(smaller + tower + clear)})
+      (:goal (and {" ".join(tower)} (on d13 p3))))""")
+
+
+@pytest.mark.parametrize("number", ENDINGS)
+def test_a_run_closes_its_bag(network, tmp_path, number):
+    arguments = ("run", "obstacle2d", "--record", "bag", "--pace", "20", "--shortcuts", "none")
+    with started(*arguments, folder=tmp_path) as process:
+        recorded = tmp_path / "bag" / "bag_0.mcap"
+        wait_until(lambda: recorded.exists() and recorded.stat().st_size > 15_000)
+        ends_well(process, number, to_all=False)
+    found = evaluate_bag(tmp_path / "bag")
+    assert found.damage is None
+    assert not found.runs[-1].success
+
+
+def test_what_is_ignored_stays_ignored(tmp_path):
+    """As by nohup, and by a shell that runs something in the background."""
+    code = (
+        "import signal, sys; signal.signal(signal.SIGINT, signal.SIG_IGN);"
+        "from slap_ros.signals import exit_at_once_on_signals, signals_raised;"
+        "exit_at_once_on_signals()\n"
+        "with signals_raised(): signal.raise_signal(signal.SIGINT)\n"
+        "sys.exit(7)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], timeout=LIMIT_S).returncode == 7
