@@ -121,7 +121,7 @@ def _check_planning(options: RunOptions, domain: Domain, task: Task) -> frozense
     make_planner(options.planner, domain, task.initial_state)
     chosen_library(options.shortcuts, domain, options.planner)
     if options.render is not None:
-        check_renderable(domain, options.render)
+        check_renderable(domain, task.initial_state, options.render)
     return goal
 
 

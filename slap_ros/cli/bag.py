@@ -113,9 +113,11 @@ def render(
     domain = recording.domain()
     if domain is None:
         raise DamagedBagError(f"{bag} breaks off before it names its domain")
-    check_renderable(domain, output)
     messages = [m for e in recording.episodes.values() for _, m in sorted(e.states.items())]
     states = [decode_state(message, domain.types_by_name) for message in messages]
+    if not states:
+        raise DamagedBagError(f"{bag} has no states, so there is nothing to render")
+    check_renderable(domain, states[0], output)
     write_animation(domain, states, output)
     return _warn(found.damage)
 

@@ -8,23 +8,31 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from slap_ros.cli.console import console, progress
-from slap_ros.core import Domain
+from slap_ros.core import Animate, Domain
+from slap_ros.drawing.body_pictures import visible, write_body_animation
 from slap_ros.errors import InvalidParameterError, StorageFullError
 from slap_ros.files import require_writable
 from slap_ros.physics.animation import WRITERS
 from slap_ros.relational import State
 
 
-def check_renderable(domain: Domain, path: Path) -> None:
+def check_renderable(domain: Domain, state: State, path: Path) -> None:
     """Refuse what could not be rendered before anything is run.
 
+    Args:
+        domain: Whose states are to be rendered.
+        state: One of them.
+        path: The file to write.
+
     Raises:
-        InvalidParameterError: The domain has no pictures, or the file another ending than those
-            of animations.
+        InvalidParameterError: The domain displays no bodies, or the file has another ending than
+            those of animations.
         OSError: It cannot be written.
     """
-    if domain.display.animate is None:
-        raise InvalidParameterError(f"{domain.name} has no pictures; leave out rendering")
+    if domain.display.animate is None and not visible(domain.display, state):
+        raise InvalidParameterError(
+            f"{domain.name} displays no bodies (Display.bodies), so there is nothing to render"
+        )
     if path.suffix not in WRITERS:
         raise InvalidParameterError(
             f"an animation is a file that ends in {' or '.join(WRITERS)}, not {path.name!r}"
@@ -41,15 +49,22 @@ def render(domain: Domain, states: Sequence[State], path: Path) -> None:
         path: The file; its ending gives the format.
 
     Raises:
-        InvalidParameterError: The domain has no pictures.
         StorageFullError: It cannot be written.
     """
-    if domain.display.animate is None:
-        raise InvalidParameterError(f"{domain.name} has no pictures")
     with progress() as bar:
         task = bar.add_task("rendering", total=len(states))
         try:
-            domain.display.animate(path, states, lambda done: bar.update(task, completed=done))
+            _animation(domain)(path, states, lambda done: bar.update(task, completed=done))
         except OSError as error:
             raise StorageFullError(f"cannot write {path}: {error.strerror or error}") from error
     console.print(f"animation: {path}")
+
+
+def _animation(domain: Domain) -> Animate:
+    """What writes an animation: the domain's own, or a plain drawing of its bodies."""
+    if domain.display.animate is not None:
+        return domain.display.animate
+    period_s = domain.execution.control_period_s
+    return lambda path, states, progress: write_body_animation(
+        path, domain.display, states, period_s, progress
+    )

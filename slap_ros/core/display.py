@@ -35,7 +35,7 @@ class Display:
     Args:
         bodies: The bodies of a state, in an order that does not change.
         arm: The robot's own shapes in a state, unless it is one of the bodies.
-        animate: Writes an animation; without it the domain cannot be rendered.
+        animate: Writes an animation; without it, the bodies are drawn plainly.
     """
 
     bodies: Callable[[State], Sequence[VisibleBody]] = lambda _: ()

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from slap_ros.core import VisibleBody
-from slap_ros.geometry.pose import Vector
-from slap_ros.report.projection import (
+from slap_ros.drawing.projection import (
     OBLIQUE,
     SIDE,
     TOP,
@@ -20,6 +19,7 @@ from slap_ros.report.projection import (
     box_paths,
     corners,
 )
+from slap_ros.geometry.pose import Vector
 from slap_ros.report.scene import RecordedScene, SceneFrame
 
 MARGIN = 0.08  # around what moves, of its extent

@@ -7,10 +7,11 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Iterable
 from dataclasses import dataclass
-from math import hypot, nan
+from math import nan
 
 from slap_ros.bags.recording import RecordedEpisode, Recording
 from slap_ros.core import Domain, VisibleBody
+from slap_ros.drawing.projection import drawable, is_near
 from slap_ros.evaluation.metrics import RunTrace
 from slap_ros.geometry.pose import Vector
 from slap_ros.messages.decode import decode_state, stamp_ns
@@ -22,8 +23,6 @@ from slap_ros.report.traces import ROBOT
 
 CUBE = 1  # Marker.CUBE
 MAX_BODIES = 64  # a frame
-FARTHEST_M = 1e4
-LEAST_LENGTH = 0.5  # of a quaternion that is meant to be one
 MAX_FRAMES = 600  # a run; of a longer one, every second or third step and so on
 WRIST_M = 0.04  # m, above the hand's frame: where the round end of the arm meets the hand
 METAL = (0.62, 0.65, 0.69, 1.0)  # of the hand
@@ -97,7 +96,7 @@ class _BodyFinder:
             shown = _of_markers(self._markers[newest])
         elif self._domain is not None:
             shown = self._domain.display.bodies(decode_state(state, self._domain.types_by_name))
-        return tuple(_drawable(shown))[:MAX_BODIES]
+        return tuple(drawable(shown))[:MAX_BODIES]
 
 
 def _of_markers(message: MarkersMessage) -> Iterable[VisibleBody]:
@@ -113,19 +112,6 @@ def _of_markers(message: MarkersMessage) -> Iterable[VisibleBody]:
             )
 
 
-def _is_near(number: float) -> bool:
-    """Whether something in m, or of magnitude 1, can be drawn; False for NaN."""
-    return abs(number) <= FARTHEST_M
-
-
-def _drawable(bodies: Iterable[VisibleBody]) -> Iterable[VisibleBody]:
-    """Those that can be drawn: anyone may have recorded anything."""
-    for body in bodies:
-        numbers = (*body.position, *body.quaternion, *body.size, *body.colour)
-        if all(map(_is_near, numbers)) and hypot(*body.quaternion) > LEAST_LENGTH:
-            yield body
-
-
 # The hand and the fingers; the links before them are drawn as lines.
 HAND_SHAPES = tuple(shape for shape in LINK_SHAPES if shape.link >= HAND)
 
@@ -136,7 +122,7 @@ def _arm(
     """The hand's parts and the points of the arm, of a robot that has the Panda's joints."""
     features = _robot_features(state, recording)
     names = [*(f"joint{i + 1}" for i in range(JOINTS)), "finger"]
-    if not all(_is_near(features.get(name, nan)) for name in names):
+    if not all(is_near(features.get(name, nan)) for name in names):
         return (), ()
     *joints, finger = (features[name] for name in names)
     links = link_poses(joints, finger)

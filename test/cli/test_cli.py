@@ -240,7 +240,6 @@ def test_usage_errors_are_code_2():
 
 def test_what_cannot_be_rendered_is_refused_before_anything_runs(tmp_path):
     for arguments, words in (
-        (["obstacle2d", "--render", tmp_path / "a.gif"], "obstacle2d has no pictures"),
         (["obstacle_tower", "--render", tmp_path / "a.avi"], "ends in .gif or .mp4, not 'a.avi'"),
         (["obstacle_tower", "--render", tmp_path / "a"], "ends in .gif or .mp4, not 'a'"),
     ):

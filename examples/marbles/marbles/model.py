@@ -28,6 +28,8 @@ from slap_ros.relational.state import Array
 
 STEP_LIMIT = 150  # environment steps
 MARBLE = 0.03  # m, for pictures
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+WOOD, GREY = (0.72, 0.6, 0.47, 1.0), (0.6, 0.6, 0.6, 1.0)
 X, Y, Z = (Feature(axis, "m") for axis in ("x", "y", "z"))
 ROBOT = Type("robot", (X, Y, Z))
 MARBLE_TYPE = Type("marble", (X, Y, Feature("held", "1")))
@@ -118,12 +120,17 @@ def _task(places: list[tuple[float, float]]) -> Task:
 
 
 def visible_bodies(state: State) -> list[VisibleBody]:
-    """The hand and the marbles, as small boxes."""
-    shown = []
+    """The hand and the marbles, as small boxes, on the tray beside the gutter."""
+    shown = [
+        VisibleBody("tray", (GUTTER / 2, 0.5, -0.025), UPRIGHT, (GUTTER, 1.0, 0.02), WOOD),
+        VisibleBody(
+            "gutter", ((GUTTER + 1.0) / 2, 0.5, -0.035), UPRIGHT, (1.0 - GUTTER, 1.0, 0.02), GREY
+        ),
+    ]
     for obj in state.layout.objects:
         x, y, z = state[obj].tolist()
         is_hand = obj.type == ROBOT
-        colour = (0.6, 0.6, 0.6, 1.0) if is_hand else (0.3, 0.45, 0.75, 1.0)
+        colour = GREY if is_hand else (0.3, 0.45, 0.75, 1.0)
         place = (x, y, z if is_hand else 0.0)
-        shown.append(VisibleBody(obj.name, place, (0.0, 0.0, 0.0, 1.0), (MARBLE,) * 3, colour))
+        shown.append(VisibleBody(obj.name, place, UPRIGHT, (MARBLE,) * 3, colour))
     return shown

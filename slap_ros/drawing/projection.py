@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Boxes seen from a direction, as SVG paths: lengths in m on one side, drawing units on the other.
+"""Boxes seen from a direction, and as SVG paths; lengths in m, and in drawing units.
 
 A drawing is UNITS wide; a box is drawn as those of its faces that can be seen, in three lights.
 """
@@ -19,6 +19,8 @@ UNITS = 1000  # width of a drawing; whole units are fine enough on any screen
 EDGE_ON = 1e-6  # cosine at which a face can no longer be seen
 LIGHT = (-0.35, -0.5, 0.79)  # where it comes from
 LIT, SHADED = 0.6, 0.2  # cosines of a face's normal with it
+FARTHEST_M = 1e4  # from the origin, of what is drawn
+LEAST_LENGTH = 0.5  # of a quaternion that is meant to be one
 AXES: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 Point = tuple[float, float]  # m, to the right and up
@@ -116,27 +118,57 @@ def box_paths(body: VisibleBody, view: Projection, canvas: Canvas) -> tuple[str,
 def corners(body: VisibleBody) -> list[Vector]:
     """The corners of a box."""
     x, y, z = (size / 2 for size in body.size)
-    pose = _pose(body)
+    pose = pose_of(body)
     return [pose.apply(corner) for corner in product((-x, x), (-y, y), (-z, z))]
 
 
+def box_triangles(body: VisibleBody) -> list[tuple[Vector, Vector, Vector]]:
+    """The twelve triangles of a box, the two of a face after one another, m."""
+    pose, half = pose_of(body), [size / 2 for size in body.size]
+    found = []
+    for axis, sign in product(range(3), (-1.0, 1.0)):
+        a, b, c, d = map(pose.apply, _face(half, axis, sign))
+        found += [(a, b, c), (a, c, d)]
+    return found
+
+
+def _face(half: Sequence[float], axis: int, sign: float) -> list[Vector]:
+    """The corners of a face of a box in order, in its own frame, m."""
+    across, along = (axis + 1) % 3, (axis + 2) % 3
+    local = []
+    for u, v in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
+        corner = [0.0, 0.0, 0.0]
+        corner[axis] = sign * half[axis]
+        corner[across], corner[along] = u * half[across], v * half[along]
+        local.append((corner[0], corner[1], corner[2]))
+    return local
+
+
+def drawable(bodies: Iterable[VisibleBody]) -> Iterator[VisibleBody]:
+    """Those that can be drawn: anyone may have recorded or displayed anything."""
+    for body in bodies:
+        numbers = (*body.position, *body.quaternion, *body.size, *body.colour)
+        if all(map(is_near, numbers)) and hypot(*body.quaternion) > LEAST_LENGTH:
+            yield body
+
+
+def is_near(number: float) -> bool:
+    """Whether something in m, or of magnitude 1, can be drawn; False for NaN."""
+    return abs(number) <= FARTHEST_M
+
+
 def _seen(body: VisibleBody, view: Projection) -> Iterator[Face]:
-    pose, toward = _pose(body), view.toward
+    pose, toward = pose_of(body), view.toward
     half = [size / 2 for size in body.size]
     for axis, sign in product(range(3), (-1.0, 1.0)):
         normal = rotate(pose.quaternion, _scaled(AXES[axis], sign))
         if _dot(normal, toward) > EDGE_ON:
-            across, along = (axis + 1) % 3, (axis + 2) % 3
-            local = []
-            for u, v in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
-                corner = [0.0, 0.0, 0.0]
-                corner[axis] = sign * half[axis]
-                corner[across], corner[along] = u * half[across], v * half[along]
-                local.append((corner[0], corner[1], corner[2]))
+            local = _face(half, axis, sign)
             yield _dot(normal, LIGHT), [pose.apply(corner) for corner in local]
 
 
-def _pose(body: VisibleBody) -> Pose:
+def pose_of(body: VisibleBody) -> Pose:
+    """Where a body is, with a quaternion of length 1."""
     length = hypot(*body.quaternion)  # colours and poses of markers are what someone recorded
     x, y, z, w = (part / length for part in body.quaternion)
     return Pose(body.position, (x, y, z, w))
