@@ -1,16 +1,25 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Every test that opens a network gets a DDS domain of its own."""
+"""Every test that opens a network gets a DDS domain of its own; what it starts ends with it."""
 
 import itertools
+import os
 import socket
+import sys
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))  # for the helpers of all tests
+
+import leftovers
 
 # Apart from those of embedded_ros' own tests, and within what UDP ports allow.
 DOMAIN_IDS = range(150, 200)
 _next_ids = itertools.cycle(DOMAIN_IDS)
+_numbers = itertools.count()
+PORTS = 250  # UDP ports of a DDS domain, domain 0 from 7400 on
 
 
 def pytest_addoption(parser):
@@ -20,6 +29,23 @@ def pytest_addoption(parser):
         default=0,
         help="how many cases of each kind of fault to inject; by default a few",
     )
+
+
+def pytest_configure(config):
+    if sys.platform == "linux":
+        config.guard = leftovers.start_guard()
+
+
+@pytest.fixture(autouse=True)
+def nothing_is_left(monkeypatch):
+    """Whatever a test starts ends with it, also where it failed."""
+    if sys.platform != "linux":
+        yield
+        return
+    mark, newest = f"{os.getpid()}-{next(_numbers)}", leftovers.newest_pid()
+    monkeypatch.setenv(leftovers.TEST, mark)
+    yield
+    leftovers.kill_marked(leftovers.TEST, mark, newest)
 
 
 @pytest.fixture
@@ -51,8 +77,20 @@ def _domain():
 
 def _claims(claim, number):
     # An abstract address: gone with its process, and shared by whoever shares the loopback.
+    # It does not tell of other programs, but the kernel does of their sockets.
+    if is_inhabited(number):
+        return False
     try:
         claim.bind(f"\0slap_ros.tests.domain.{number}")
     except OSError:
         return False
     return True
+
+
+def is_inhabited(number):
+    """Whether a program on this host has a UDP port of a DDS domain."""
+    first = 7400 + PORTS * number
+    tables = (Path("/proc/net/udp"), Path("/proc/net/udp6"))
+    rows = [row for table in tables if table.exists() for row in table.read_text().split("\n")[1:]]
+    ports = [int(row.split()[1].rpartition(":")[2], 16) for row in rows if row]
+    return any(first <= port < first + PORTS for port in ports)

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import itertools
 import os
 import signal
@@ -27,6 +28,16 @@ _DOMAINS = range(100, 149)
 _next_domains = itertools.cycle(_DOMAINS)
 
 
+_LIBC = ctypes.CDLL(None)  # opened here: between fork and exec nothing may be loaded
+_PR_SET_PDEATHSIG = 1  # <sys/prctl.h>
+
+
+def _die_with_parent() -> None:
+    """Let a process end when pytest does, by SIGKILL too."""
+    if sys.platform == "linux":
+        _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
 class Process:
     """Another Python process."""
 
@@ -39,6 +50,7 @@ class Process:
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
+            preexec_fn=_die_with_parent,
         )
         self.pid = self._process.pid
 
@@ -83,6 +95,12 @@ def claimed_domain() -> Iterator[int]:
 
 
 def _claims(claim: socket.socket, number: int) -> bool:
+    # Sockets of other programs, whose DDS domain N has 250 UDP ports from 7400 + 250 N on.
+    first = 7400 + 250 * number
+    rows = Path("/proc/net/udp").read_text().split("\n")[1:] if sys.platform == "linux" else []
+    ports = [int(row.split()[1].rpartition(":")[2], 16) for row in rows if row]
+    if any(first <= port < first + 250 for port in ports):
+        return False
     # An abstract address: gone with its process, and shared by whoever shares the loopback.
     try:
         claim.bind(f"\0embedded_ros.tests.domain.{number}")
