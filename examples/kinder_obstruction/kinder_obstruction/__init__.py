@@ -15,6 +15,7 @@ from kinder_obstruction import model, skills
 from kinder_obstruction.display import visible_bodies
 from kinder_obstruction.environment import ACTIONS, BRIDGE, PERIOD
 from kinder_obstruction.learner_interface import LEARNED_ACTIONS, LEARNER_INTERFACE
+from kinder_obstruction.training import TRAINING
 from slap_ros.core import Display, Domain, Execution, Learning
 from slap_ros.core.rebuild_each_step import RebuildEachStep
 
@@ -36,5 +37,7 @@ def make() -> Domain:
         robot_types=frozenset({model.ROBOT}),
         execution=Execution(control_period_s=PERIOD),
         display=Display(bodies=visible_bodies),
-        learning=Learning(interface=LEARNER_INTERFACE, actions=LEARNED_ACTIONS),
+        learning=Learning(
+            interface=LEARNER_INTERFACE, actions=LEARNED_ACTIONS, settings={"ours": TRAINING}
+        ),
     )

@@ -47,12 +47,15 @@ def _tip(state: State) -> Array:
 
 
 def _robot(state: State, hand: Array) -> Array:
+    """The robot, and the target even where it plays no role: it must not be knocked over."""
     names = ("x", "y", "theta", "finger_gap")
     own = state.gather(state.layout.column_of(ROBOT), names)[:, 0]
     held = state.gather(state.layout.column_of(BLOCK), ("held",))[..., 0].max(axis=-1)
     middle = (CONFIG.world_min_x + CONFIG.world_max_x) / 2
     scaled = (own - [middle, 1.0, 0.0, 0.2]) / [1.0, SCALE, 1.5, 0.2]
-    return np.concatenate([scaled, hand - [middle, SCALE], held[:, None]], -1)
+    target = state.gather(state.layout.column_of(TARGET), ("x", "y", "height"))[:, 0]
+    relative = (target - np.pad(hand, ((0, 0), (0, 1)))) / SCALE
+    return np.concatenate([scaled, hand - [middle, SCALE], held[:, None], relative], -1)
 
 
 def _objects(state: State, hand: Array, column: Column) -> Array:
