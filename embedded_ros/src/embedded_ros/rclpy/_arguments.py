@@ -180,6 +180,8 @@ def _split_node(text: str) -> tuple[str | None, str]:
 
 
 def _parameter_file(path: str) -> Iterator[ParameterRule]:
+    if Path(path).exists() and not Path(path).is_file():  # a pipe would be waited for
+        raise RCLInvalidROSArgsError(f"Parameter file {path!r} cannot be read: it is no file")
     try:
         text = Path(path).read_text(encoding="utf-8")
     except OSError as error:
