@@ -53,7 +53,7 @@ class EpisodeTracker(Generic[T]):
         on_episode: Callable[[Episode, T], None],
         refusals: Refusals,
     ) -> None:
-        """Subscribe.
+        """Follow both topics from now on.
 
         Args:
             node: Who subscribes.

@@ -12,6 +12,7 @@ from ensemble.observation import Episode
 from ensemble.parameters import parameter
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError
+from slap_ros.relational import Layout, State
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
 from slap_ros.shortcuts.library import Library
 from slap_ros.shortcuts.shipped import chosen_library, require_usable
@@ -50,7 +51,8 @@ class ShortcutProvider:
         self.sampling = replace(DEFAULT, samples=settings.samples)
         self._node, self._choice, self._planner = node, settings.shortcuts, planner
         self._libraries: dict[str, Library | None] = {}  # by domain
-        self._made: tuple[Episode, GroundedShortcuts] | None = None
+        self._made: dict[Layout, GroundedShortcuts] = {}  # of one episode
+        self._made_for: Episode | None = None
 
     def load(self, episode: Episode) -> None:
         """Load the library of an episode's domain, once.
@@ -76,16 +78,20 @@ class ShortcutProvider:
         digest = library.digest if library is not None else ""
         return {"library": digest, "samples": self.sampling.samples}
 
-    def grounded(self, episode: Episode) -> GroundedShortcuts | None:
-        """What there is in an episode; None without shortcuts.
+    def grounded(self, episode: Episode, known: State) -> GroundedShortcuts | None:
+        """What there is in an episode over the objects of a state; None without shortcuts.
 
         It has a world of its own, so make it in the worker thread that uses it.
         """
         shortcuts = self.shortcuts(episode.domain)
         if not shortcuts:
             return None
-        if self._made is None or self._made[0] is not episode:
+        if self._made_for is not episode:
+            self._made, self._made_for = {}, episode
+        if known.layout not in self._made:
             initial = episode.task.initial_state
-            grounded = GroundedShortcuts(episode.domain, shortcuts, initial, self.sampling)
-            self._made = (episode, grounded)
-        return self._made[1]
+            start = initial if known.layout == initial.layout else known
+            self._made[known.layout] = GroundedShortcuts(
+                episode.domain, shortcuts, start, self.sampling
+            )
+        return self._made[known.layout]

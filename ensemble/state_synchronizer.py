@@ -19,6 +19,7 @@ from ensemble.observation import Episode, Observation
 from ensemble.refusals import Refusals
 from slap_ros.errors import SlapError
 from slap_ros.messages.decode import decode_atoms, decode_seen, decode_state, stamp_ns
+from slap_ros.perception.percept import known_part
 
 WAITING = 100  # messages kept until their counterpart, or their episode, is known
 
@@ -143,10 +144,11 @@ class StateSynchronizer:
 
 def _decoded(episode: Episode, pair: Pair) -> Observation:
     state, atoms = pair
+    whole = decode_seen(atoms.seen, decode_state(state, episode.domain.types_by_name))
     return Observation(
         episode,
         state.step,
-        decode_seen(atoms.seen, decode_state(state, episode.domain.types_by_name)),
+        known_part(whole, atoms.missing),
         decode_atoms(atoms.atoms, episode.space),
         frozenset(atoms.missing),
         bool(atoms.exact),

@@ -11,7 +11,8 @@ ROS Parameters:
     threshold_noise (double, 0.0): standard deviation of predicates' thresholds, in the unit of the
         predicate's metric: m or rad.
     dropout (double, 0.0): share of the detections of an object that are lost.
-    hidden (string, ""): objects that are never detected, separated by blanks.
+    hidden (string, ""): objects that are never detected, separated by blanks; they are missing
+        unless they are in the hand.
     memory (int, 40): environment steps for which an object that is not detected is taken to be
         where it was; then it is missing, and a skill that is about it ends with NO_DETECTION.
     debounce (int, 1): how many times in a row an atom must be perceived as changed to change.

@@ -30,6 +30,7 @@ from __future__ import annotations
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from rclpy.action import ActionClient, ActionServer, CancelResponse
@@ -42,7 +43,7 @@ from ensemble.diagnostics import DiagnosticsPublisher
 from ensemble.entry_point import run_node
 from ensemble.futures import run_in_executor
 from ensemble.interfaces import EXECUTE_SKILL, SOLVE_TASK
-from ensemble.observation import Observation
+from ensemble.observation import Episode, Observation
 from ensemble.parameters import parameter, read_parameters
 from ensemble.shortcuts import ShortcutParameters, ShortcutProvider
 from ensemble.state_synchronizer import StateSynchronizer
@@ -56,7 +57,9 @@ from slap_ros.errors import (
     TaskCanceledError,
 )
 from slap_ros.messages.decode import decode_goal
-from slap_ros.planning.planner import PLANNERS, make_planner
+from slap_ros.planning.partial import PartialPlanner
+from slap_ros.planning.planner import PLANNERS, Planner, make_planner
+from slap_ros.relational import State
 
 
 @dataclass(frozen=True)
@@ -143,12 +146,10 @@ class PlannerNode(Node):
     async def _prepare(self, goal: ServerGoalHandle, start: Observation) -> TaskExecution:
         episode, name = start.episode, self._settings.planner
         atoms = decode_goal(goal.request.goal, episode.space) or episode.task.goal
-        planner = await run_in_executor(
-            self._workers,
-            lambda: make_planner(
-                name, episode.domain, start.state, self._shortcuts.grounded(episode)
-            ),
+        planner = PartialPlanner(
+            episode.space, episode.domain.atom_space, partial(self._planner_over, episode)
         )
+        await run_in_executor(self._workers, partial(planner.prepare, start.state))
         timeout_s = self._settings.server_timeout
         return TaskExecution(
             node=self,
@@ -163,6 +164,11 @@ class PlannerNode(Node):
             goal_mask=episode.space.mask(atoms),
             step_limit=goal.request.step_limit or episode.task.step_limit,
         )
+
+    def _planner_over(self, episode: Episode, known: State) -> Planner:
+        """A planner over the objects of a state."""
+        shortcuts = self._shortcuts.grounded(episode, known)
+        return make_planner(self._settings.planner, episode.domain, known, shortcuts)
 
 
 def main() -> int:

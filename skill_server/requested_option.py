@@ -56,11 +56,17 @@ def _shortcut(
     """The shortcut that an edge names, from where the robot is."""
     episode, name = start.episode, edge.name
     known = [shortcut.name for shortcut in provider.shortcuts(episode.domain)]
-    grounded = provider.grounded(episode)
+    grounded = provider.grounded(episode, start.state)
     if grounded is None or name not in known:
         loaded = f"there are {', '.join(known)}" if known else "no shortcut library is loaded"
         raise UnknownSkillError(f"unknown shortcut {name!r}: {loaded}")
-    option = grounded.option(name, start.abstract, target, edge.attempt)
+    space, known = episode.space, episode.domain.atom_space(start.state)
+    option = grounded.option(
+        name,
+        space.project(start.abstract, known),
+        space.project(target, known),
+        edge.attempt,
+    )
     if option is None:
         raise UnknownSkillError(
             f"{name} does not lead from here to the expected atoms: what they change is not what "

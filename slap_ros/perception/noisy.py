@@ -9,16 +9,16 @@ atoms: its model has predicates of its own, and the two must agree where a plan 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from slap_ros.core import Domain
 from slap_ros.perception.debounce import Debouncer
-from slap_ros.perception.percept import Percept
+from slap_ros.perception.percept import Percept, known_part
 from slap_ros.perception.pose_sensor_model import PoseSensorModel
 from slap_ros.perception.quality import Quality
-from slap_ros.relational import AtomSpace, State
+from slap_ros.relational import AtomSpace, Layout, State
 
 
 @dataclass
@@ -31,6 +31,7 @@ class NoisyPerceiver:
     rng: np.random.Generator
     sensor: PoseSensorModel
     debouncer: Debouncer
+    _spaces: dict[Layout, AtomSpace] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def of(
@@ -65,12 +66,25 @@ class NoisyPerceiver:
 
         See :class:`~slap_ros.perception.percept.Perceiver`.
         """
-        seen = self.domain.execution.settle(self.sensor.measure(state))
+        measured = self.sensor.measure(state)
+        missing = self.sensor.missing
+        seen = self.domain.execution.settle(known_part(measured, missing))
         abstract = self.debouncer.add(self._abstract(seen))
-        return Percept(seen, abstract, self.sensor.missing, self.quality.exact)
+        return Percept(seen, abstract, missing, self.quality.exact)
 
     def _abstract(self, seen: State) -> int:
+        """The atoms of the whole task that hold among the objects that are known."""
+        space = self._space_of(seen)
         if self.quality.threshold_noise == 0.0:
-            return self.space.abstract(seen)
-        shifts = self.quality.threshold_noise * self.rng.standard_normal(len(self.space.atoms))
-        return self.space.abstract_within(seen, shifts)
+            abstract = space.abstract(seen)
+        else:
+            shifts = self.quality.threshold_noise * self.rng.standard_normal(len(space.atoms))
+            abstract = space.abstract_within(seen, shifts)
+        return abstract if space is self.space else space.project(abstract, self.space)
+
+    def _space_of(self, seen: State) -> AtomSpace:
+        if seen.layout == self.space.layout:
+            return self.space
+        if seen.layout not in self._spaces:
+            self._spaces[seen.layout] = self.domain.atom_space(seen)
+        return self._spaces[seen.layout]

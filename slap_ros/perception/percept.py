@@ -4,20 +4,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Protocol
 
-from slap_ros.relational import State
+from slap_ros.relational import Layout, State
 
 
 @dataclass(frozen=True)
 class Percept:
     """A state as it is perceived."""
 
-    state: State  # with poses as they are taken to be
-    abstract: int  # atoms as they are taken to hold
-    missing: frozenset[str] = frozenset()  # objects of which nobody knows any more where they are
+    state: State  # of the known objects, with poses as they are taken to be
+    abstract: int  # atoms as they are taken to hold; none about a missing object does
+    missing: frozenset[str] = frozenset()  # objects of which nobody knows where they are
     exact: bool = True  # whether another look would find the same
+
+
+def known_part(state: State, missing: Collection[str]) -> State:
+    """A state without the objects that are missing.
+
+    If all objects of a type are, the state stays whole: predicates need one of each.
+
+    Args:
+        state: Of every object of the task.
+        missing: Names of objects.
+    """
+    known = tuple(obj for obj in state.objects if obj.name not in missing)
+    if {obj.type for obj in known} != {obj.type for obj in state.objects}:
+        return state
+    return state.over(Layout.of(known))
 
 
 class Perceiver(Protocol):

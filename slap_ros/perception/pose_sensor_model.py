@@ -49,7 +49,9 @@ class PoseSensorModel:
             A sensor that has measured nothing yet.
         """
         movable = [obj for obj in initial.objects if HELD in obj.type.column]
-        return cls(quality, rng, {obj: _pose(initial, obj) for obj in movable})
+        # What is never detected was not detected before either, whatever the task says.
+        unseen = {obj: quality.memory_steps for obj in movable if obj.name in quality.hidden}
+        return cls(quality, rng, {obj: _pose(initial, obj) for obj in movable}, unseen)
 
     def measure(self, state: State) -> State:
         """The state as measured; to be called once for each environment step."""
@@ -71,7 +73,7 @@ class PoseSensorModel:
 
     @property
     def missing(self) -> frozenset[str]:
-        """Objects that were not seen for longer than ``memory_steps``."""
+        """Objects that were not seen for longer than ``memory_steps``, or never."""
         memory = self.quality.memory_steps
         return frozenset(obj.name for obj, steps in self._unseen.items() if steps > memory)
 

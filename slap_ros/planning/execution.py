@@ -14,6 +14,7 @@ from slap_ros.core import Action, Domain, World
 from slap_ros.errors import (
     ErrorCode,
     InvalidStateError,
+    NoDetectionError,
     PlanningLimitError,
     SkillNotApplicableError,
     UnsolvableError,
@@ -25,6 +26,8 @@ from slap_ros.planning.planner import Planner
 from slap_ros.relational import AtomSpace, State
 
 MAX_REPLANS = 5  # default; a deterministic world needs none
+# What keeps a plan from being made. What was perceived wrongly may be perceived better next time.
+UNPLANNED = (UnsolvableError, PlanningLimitError, InvalidStateError, NoDetectionError)
 FINAL = frozenset({ErrorCode.STEP_LIMIT, ErrorCode.NO_DETECTION})  # another plan is no help
 
 
@@ -115,7 +118,7 @@ class Executor:
         """One plan, up to its end or divergence; second, whether there was no plan."""
         try:
             plan = self._plan(episode)
-        except (UnsolvableError, PlanningLimitError, InvalidStateError) as error:
+        except UNPLANNED as error:
             return OptionResult(error.code, str(error)), True
         return self._execute(plan, episode), False
 

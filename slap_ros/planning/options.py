@@ -146,7 +146,8 @@ class OptionExecution:
         option: What is executed.
         target: The abstract state in which it ends, a mask.
         actions: What the robot can do; any other action of the policy ends the option.
-        state: Where it starts.
+        state: Where it starts; then the newest state, of the same objects: what is not detected any
+            more stays where it was, and what was not detected at the start is left out.
         patience: Environment steps for which to hold at its end where the target is not perceived
             yet, as debounced atoms are late.
         steps: Environment steps commanded so far.
@@ -181,6 +182,7 @@ class OptionExecution:
         Returns:
             An action within ``actions``, or the result.
         """
+        self.state = state = state.over(self.state.layout, self.state)
         if unseen := [obj.name for obj in self.option.objects if obj.name in missing]:
             return OptionResult(
                 ErrorCode.NO_DETECTION,

@@ -172,6 +172,16 @@ class AtomSpace:
             mask |= self.bit(atom)
         return mask
 
+    def project(self, mask: int, space: AtomSpace) -> int:
+        """A mask over another space of the same domain, with the atoms that it has as well.
+
+        Args:
+            mask: Over this space.
+            space: Over more or fewer objects.
+        """
+        shared = (space._bits.get(atom, 0) for atom in self.decode(mask))
+        return sum(shared)
+
     def decode(self, mask: int) -> Iterator[GroundAtom]:
         """The atoms of a mask, in the space's order."""
         while mask:

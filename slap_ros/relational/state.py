@@ -221,6 +221,25 @@ class State:
             data[..., self.layout.column(obj, feature)] = value
         return State(self.layout, data)
 
+    def over(self, layout: Layout, otherwise: State | None = None) -> State:
+        """The features of other objects, in the order of a layout.
+
+        Args:
+            layout: Which objects.
+            otherwise: A state of ``layout`` with the features of those that this state lacks.
+
+        Raises:
+            UnknownObjectError: An object that neither state has.
+        """
+        if layout is self.layout:
+            return self
+        parts = []
+        for obj in layout.objects:
+            source = self if obj in self.layout.slices or otherwise is None else otherwise
+            source.layout.object(obj.name)
+            parts.append(source[obj])
+        return State(layout, np.concatenate(parts, axis=-1))
+
     @property
     def objects(self) -> tuple[Object, ...]:
         """The objects, in layout order."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,7 @@ import numpy as np
 from slap_ros.evaluation.summary import Spread
 from slap_ros.perception import NoisyPerceiver, Quality
 from slap_ros.planning.execution import EpisodeResult, Executor
+from slap_ros.planning.partial import PartialPlanner
 from slap_ros.studies.comparison import (
     Comparison,
     PlanningSetup,
@@ -218,9 +220,11 @@ def solve_perceived(
     space, world = chosen.atom_space(initial), chosen.make_world(initial)
     goal = space.mask(task.goal)
     rng = np.random.default_rng([seed, index])
+    planner = PartialPlanner(space, chosen.atom_space, partial(setup.make_planner, chosen))
+    planner.prepare(initial)
     episode = Executor(
         chosen,
-        setup.make_planner(chosen, initial),
+        planner,
         world,
         space,
         goal,
