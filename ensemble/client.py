@@ -87,9 +87,10 @@ class RunClient(Node):
         ]
 
     def ready(self, recording: bool) -> bool:
-        """Whether everything that a run needs is there."""
+        """Whether everything that a run needs is there, its domain imported."""
         return (
             self._solve.server_is_ready()
+            and self.count_publishers(ATOMS.name) > 0
             and self._skills.server_is_ready()
             and (not recording or self._close_bag.service_is_ready())
         )

@@ -48,6 +48,7 @@ class RunSettings:
     pace: float = 0.0  # environment steps per second; 0: as fast as commands come
     shortcuts: str = ""  # a library's folder, or none; empty: the shipped one
     samples: int = DEFAULT.samples  # attempts of a shortcut in the model
+    patience: float = 1.0  # factor of all deadlines
     world: str = SIM  # the simulator, a robot, or the bridge with a mock robot behind it
     scene: str = ""  # a robot's scene file; empty: the objects of the sampled task
     # Parameters of the mock robot, of the bridge and of perception that are not the default.
@@ -65,12 +66,17 @@ def node_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int |
     if settings.world != SIM:
         waiting["state_timeout"] = ROBOT_STATE_TIMEOUT
     if "debounce" in settings.perception:  # what is debounced is late
-        waiting["patience"] = int(settings.perception["debounce"]) - 1
+        waiting["hold_steps"] = int(settings.perception["debounce"]) - 1
+    common: dict[str, str | int | float] = {
+        "domain": settings.domain,
+        "preset": settings.preset,
+        "patience": settings.patience,
+    }
     nodes: dict[str, Mapping[str, str | int | float]] = {
         **_world_parameters(settings),
-        "perception_node": settings.perception,
-        "skill_server": learned | waiting,
-        "planner_node": {"planner": settings.planner, **learned},
+        "perception_node": {**settings.perception, **common},
+        "skill_server": learned | waiting | common,
+        "planner_node": {"planner": settings.planner, **learned, **common},
     }
     if settings.record is not None:
         nodes["recorder_node"] = {"bag": str(settings.record)}

@@ -30,6 +30,7 @@ from slap_ros.relational import GroundAtom
 
 DISCOVERY = 0.3  # s, after which nodes that are there already are known
 READY_TIMEOUT = 30.0  # s, for all nodes to come up
+IMPORTS = 10  # as many times as long as here an import may take: all nodes import at once
 CANCEL_TIMEOUT = 5.0  # s, for the robot to hold after a cancel
 LOG_TIMEOUT = 5.0  # s, for the last messages of a run to arrive
 CLOSE_TIMEOUT = 10.0  # s, for the recorder to finish
@@ -43,7 +44,8 @@ class RunRequest:
     goal: Collection[GroundAtom] = ()  # empty: the task's own
     step_limit: int = 0  # environment steps; 0: the task's own
     max_replans: int = 5
-    timeout_s: float = 600.0
+    timeout_s: float = 600.0  # whatever the patience
+    import_s: float = 0.0  # s that importing the domain took, which every node does as well
     in_process: bool = False
     shown: Collection[Topic] = ()  # to be followed as well, for the eye
 
@@ -91,9 +93,13 @@ def _drive(
 ) -> RunMetrics:
     spinner.check = launcher.check
     recording = request.settings.record is not None
-    patience = min(READY_TIMEOUT, request.timeout_s)
-    if not spinner.spin_until(lambda: client.ready(recording), patience):
-        raise NotReadyError(f"the ensemble did not come up within {patience} s; try `slap doctor`")
+    ready_s = READY_TIMEOUT + IMPORTS * request.import_s
+    ready_s = min(ready_s * request.settings.patience, request.timeout_s)
+    if not spinner.spin_until(lambda: client.ready(recording), ready_s):
+        raise NotReadyError(
+            f"the ensemble did not come up within {ready_s:.0f} s; try `slap doctor`, or "
+            "--patience if the domain or the machine is slow"
+        )
     failure: SlapError | None = None
     try:
         _solve(request, client, spinner)
@@ -101,7 +107,7 @@ def _drive(
         failure = error
     finally:
         if recording:
-            failure = _close_bag(client, spinner, launcher) or failure
+            failure = _close_bag(client, spinner, launcher, request.settings.patience) or failure
     runs = client.log.runs()
     if not runs:
         raise failure or NotReadyError("the planner ended the run without an event")
@@ -120,30 +126,36 @@ def _solve(request: RunRequest, client: RunClient, spinner: Spinner) -> None:
         if not spinner.spin_until(result.done, end - monotonic()):
             raise RunTimeoutError(f"the task was not done within {request.timeout_s} s")
     except (KeyboardInterrupt, RunTimeoutError):
-        _cancel(sent, spinner)
+        _cancel(sent, spinner, request.settings.patience)
         raise
     outcome = result.result().result
-    complete = spinner.spin_until(lambda: client.log.complete, LOG_TIMEOUT)
+    complete = spinner.spin_until(
+        lambda: client.log.complete, LOG_TIMEOUT * request.settings.patience
+    )
     if not complete and outcome.error_code:
         raise error_from(outcome.error_code, outcome.error_msg)
 
 
-def _cancel(sent: Future, spinner: Spinner) -> None:
+def _cancel(sent: Future, spinner: Spinner, patience: float) -> None:
     """Make the robot hold."""
+    limit_s = CANCEL_TIMEOUT * patience
     if sent.done():
         canceled: Any = sent.result().cancel_goal_async()
-        if spinner.spin_until(canceled.done, CANCEL_TIMEOUT):  # else the planner is away
+        if spinner.spin_until(canceled.done, limit_s):  # else the planner is away
             ended = sent.result().get_result_async()
-            spinner.spin_until(ended.done, CANCEL_TIMEOUT)
+            spinner.spin_until(ended.done, limit_s)
 
 
-def _close_bag(client: RunClient, spinner: Spinner, launcher: NodeLauncher) -> SlapError | None:
+def _close_bag(
+    client: RunClient, spinner: Spinner, launcher: NodeLauncher, patience: float
+) -> SlapError | None:
     """Have the bag finished; the error where the recorder is gone."""
+    limit_s = CLOSE_TIMEOUT * patience
     spinner.check = lambda: launcher.require("recorder_node")  # who else is gone is known by now
     closed = client.close_bag()
     try:
-        if not spinner.spin_until(closed.done, CLOSE_TIMEOUT):
-            return RunTimeoutError(f"the recorder did not finish its bag within {CLOSE_TIMEOUT} s")
+        if not spinner.spin_until(closed.done, limit_s):
+            return RunTimeoutError(f"the recorder did not finish its bag within {limit_s} s")
     except NodeDiedError as error:
         return error
     return None

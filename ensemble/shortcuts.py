@@ -54,16 +54,19 @@ class ShortcutProvider:
         self._made: dict[Layout, GroundedShortcuts] = {}  # of one episode
         self._made_for: Episode | None = None
 
-    def load(self, episode: Episode) -> None:
-        """Load the library of an episode's domain, once.
+    def prepare_episode(self, episode: Episode) -> None:
+        """See :meth:`prepare`."""
+        self.prepare(episode.domain)
+
+    def prepare(self, domain: Domain | None) -> None:
+        """Load the library of a domain, once; does nothing where there is no domain yet.
 
         Raises:
             InvalidLibraryError: It cannot be used as a whole, or is another domain's.
         """
-        name = episode.domain.name
-        if name not in self._libraries:
-            library = chosen_library(self._choice, episode.domain, self._planner)
-            self._libraries[name] = library
+        if domain is not None and domain.name not in self._libraries:
+            library = chosen_library(self._choice, domain, self._planner)
+            self._libraries[domain.name] = library
             for reason in library.refused if library is not None else ():
                 self._node.get_logger().warning(f"a shortcut is left out: {reason}")
 

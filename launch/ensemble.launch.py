@@ -39,6 +39,7 @@ ARGUMENTS = {
     "pose_noise": ("0.002", "m, the mock robot's"),
     "dropout": ("0.0", "share of detections that the mock robot loses"),
     "pace": ("0.0", "environment steps per second, for watching; 0: at full speed"),
+    "patience": ("1.0", "factor of all deadlines, for slow domains and machines"),
     "record": ("", "folder of the bag to record; empty: none"),
     "rviz": ("false", "open RViz as well"),
     "namespace": ("", "of every node: /robot1 gives /robot1/slap/state"),
@@ -96,10 +97,12 @@ def _solvers() -> list[Node]:
         PythonExpression(["2.0 if '", LaunchConfiguration("world"), "' == 'sim' else 8.0"]),
         value_type=float,
     )
+    common = {name: _value(name, str) for name in ("domain", "preset")}
+    common |= {"patience": _value("patience", float)}
     return [
-        _node("perception_node", {}),
-        _node("skill_server", shortcuts | {"state_timeout": state_timeout}),
-        _node("planner_node", {"planner": _value("planner", str)} | shortcuts),
+        _node("perception_node", common),
+        _node("skill_server", common | shortcuts | {"state_timeout": state_timeout}),
+        _node("planner_node", common | shortcuts | {"planner": _value("planner", str)}),
     ]
 
 

@@ -17,6 +17,9 @@ ROS Parameters:
         where it was; then it is missing, and a skill that is about it ends with NO_DETECTION.
     debounce (int, 1): how many times in a row an atom must be perceived as changed to change.
     noise_seed (int, 0): noise is a function of it, of the episode and of its states.
+    domain (string, ""), preset (string, ""): imported before the node has servers; empty: whichever
+        the simulator announces, in a thread.
+    patience (double, 1.0): factor of all deadlines, for slow domains and machines.
 
 Publishers:
     slap/atoms (slap_msgs/AbstractState): the ground atoms of each state, and what else is perceived
@@ -38,6 +41,7 @@ from rclpy.node import Node
 from slap_msgs.msg import ObjectCentricState
 
 from ensemble import encode
+from ensemble.common_parameters import CommonParameters
 from ensemble.diagnostics import DiagnosticsPublisher
 from ensemble.entry_point import run_node
 from ensemble.episode_tracker import EpisodeTracker, subscribe
@@ -60,6 +64,7 @@ class PerceptionNode(Node):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("perception_node", **kwargs)
         parameters = read_parameters(self, PerceptionParameters)
+        read_parameters(self, CommonParameters).imported()
         self._quality, self._seed = parameters.quality, parameters.noise_seed
         self._perceiver: Perceiver
         self._perceived = 0

@@ -8,6 +8,9 @@ ROS Parameters:
     samples (int, 16): attempts of a shortcut in the model; the shortest is used.
     observation_timeout (double, 10.0): seconds to wait for a perceived state.
     server_timeout (double, 5.0): seconds without a skill server after which a run fails.
+    domain (string, ""), preset (string, ""): imported before the node has servers; empty: whichever
+        the simulator announces, in a thread.
+    patience (double, 1.0): factor of all deadlines, for slow domains and machines.
 
 Publishers:
     slap/plan (slap_msgs/Plan): the plan under execution; latched.
@@ -39,6 +42,7 @@ from rclpy.node import Node
 from slap_msgs.action import SolveTask
 
 from ensemble.answering import error_to_answer
+from ensemble.common_parameters import CommonParameters
 from ensemble.diagnostics import DiagnosticsPublisher
 from ensemble.entry_point import run_node
 from ensemble.futures import run_in_executor
@@ -90,11 +94,16 @@ class PlannerNode(Node):
                 f"parameter planner must be one of {', '.join(PLANNERS)}, "
                 f"not {self._settings.planner!r}"
             )
+        common = read_parameters(self, CommonParameters)
+        self._patience = common.patience
         self._shortcuts = ShortcutProvider(self, self._settings, self._settings.planner)
+        self._shortcuts.prepare(common.imported())
         self._busy = False
         self._counts = Counter(tried=0, solved=0)
         self._workers = ThreadPoolExecutor(1, thread_name_prefix="planning")
-        self._synchronizer = StateSynchronizer(self, lambda _: None, self._shortcuts.load)
+        self._synchronizer = StateSynchronizer(
+            self, lambda _: None, self._shortcuts.prepare_episode
+        )
         self._publisher = PlanPublisher(self)
         self._skills = ActionClient(self, EXECUTE_SKILL.type, EXECUTE_SKILL.name)
         self._actions = ActionServer(
@@ -134,7 +143,8 @@ class PlannerNode(Node):
             raise BusyError("another task is being solved; cancel it first")
         self._busy = True
         try:
-            episode, timeout_s = goal.request.episode, self._settings.observation_timeout
+            episode = goal.request.episode
+            timeout_s = self._settings.observation_timeout * self._patience
             start = await self._synchronizer.observe(episode, timeout_s, NoTaskError)
             if episode:
                 start.require_episode(episode)
@@ -150,7 +160,7 @@ class PlannerNode(Node):
             episode.space, episode.domain.atom_space, partial(self._planner_over, episode)
         )
         await run_in_executor(self._workers, partial(planner.prepare, start.state))
-        timeout_s = self._settings.server_timeout
+        timeout_s = self._settings.server_timeout * self._patience
         return TaskExecution(
             node=self,
             goal=goal,
@@ -163,6 +173,7 @@ class PlannerNode(Node):
             provenance={"planner": name, **self._shortcuts.provenance(episode.domain)},
             goal_mask=episode.space.mask(atoms),
             step_limit=goal.request.step_limit or episode.task.step_limit,
+            patience=self._patience,
         )
 
     def _planner_over(self, episode: Episode, known: State) -> Planner:

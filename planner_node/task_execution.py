@@ -72,6 +72,7 @@ class TaskExecution:
         provenance: What makes the plans, as their messages have it.
         goal_mask: What to reach.
         step_limit: Environment steps.
+        patience: Factor of all deadlines.
     """
 
     node: Node
@@ -85,6 +86,7 @@ class TaskExecution:
     provenance: Mapping[str, str | int]
     goal_mask: int
     step_limit: int
+    patience: float = 1.0
 
     def __post_init__(self) -> None:
         self._start = self._latest
@@ -185,8 +187,8 @@ class TaskExecution:
             step_budget=budget,
         )
         sent = self.skills.send_goal_async(request)
-        if not await self._wait(sent, ANSWER_TIMEOUT):
-            raise NodeDiedError(f"skill_server did not accept {edge} within {ANSWER_TIMEOUT} s")
+        if not await self._wait(sent, ANSWER_TIMEOUT * self.patience):
+            raise NodeDiedError(f"skill_server did not accept {edge} in time")
         handle = sent.result()
         if not handle.accepted:
             raise SkillRejectedError(
@@ -216,7 +218,7 @@ class TaskExecution:
 
     async def _wait_for_hold(self, ended: Future) -> None:
         """Wait for a canceled skill to end, unless the skill server is gone."""
-        deadline = monotonic() + ANSWER_TIMEOUT
+        deadline = monotonic() + ANSWER_TIMEOUT * self.patience
         await wait_for_first(
             self.node,
             ended,
@@ -231,8 +233,9 @@ class TaskExecution:
         """
         if self._latest.step >= step:
             return
-        if not await self._wait(Future(), OBSERVE_TIMEOUT, lambda: self._latest.step >= step):
-            raise NoStateError(f"step {step} was not perceived within {OBSERVE_TIMEOUT} s")
+        timeout_s = OBSERVE_TIMEOUT * self.patience
+        if not await self._wait(Future(), timeout_s, lambda: self._latest.step >= step):
+            raise NoStateError(f"step {step} was not perceived within {timeout_s} s")
 
     async def _wait(
         self,

@@ -6,8 +6,11 @@ ROS Parameters:
     shortcuts (string, ""): folder of a shortcut library, or none; empty: the shipped one.
     samples (int, 16): attempts of a shortcut in the model; the shortest is used.
     state_timeout (double, 2.0): seconds without a new state after which a skill is given up.
-    patience (int, 0): environment steps for which a skill holds at its end until its target is
+    hold_steps (int, 0): environment steps for which a skill holds at its end until its target is
         perceived; perception that debounces takes its time.
+    domain (string, ""), preset (string, ""): imported before the node has servers; empty: whichever
+        the simulator announces, in a thread.
+    patience (double, 1.0): factor of all deadlines, for slow domains and machines.
 
 Publishers:
     slap/command (slap_msgs/RobotCommand): the robot's next step.
@@ -39,6 +42,7 @@ from slap_msgs.srv import ListSkills
 
 from ensemble import encode
 from ensemble.answering import error_to_answer
+from ensemble.common_parameters import CommonParameters
 from ensemble.diagnostics import DiagnosticsPublisher
 from ensemble.entry_point import run_node
 from ensemble.futures import run_in_executor
@@ -63,7 +67,7 @@ class SkillServerParameters(ShortcutParameters):
     """See the module's docstring."""
 
     state_timeout: float = parameter(2.0, "s without a new state after which a skill is given up")
-    patience: int = parameter(0, "steps to hold at a skill's end until its target is perceived")
+    hold_steps: int = parameter(0, "steps to hold at a skill's end until its target is perceived")
 
 
 class SkillServer(Node):
@@ -72,11 +76,16 @@ class SkillServer(Node):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("skill_server", **kwargs)
         self._settings = read_parameters(self, SkillServerParameters)
+        common = read_parameters(self, CommonParameters)
+        self._state_timeout_s = self._settings.state_timeout * common.patience
         self._shortcuts = ShortcutProvider(self, self._settings)
+        self._shortcuts.prepare(common.imported())
         self._execution: SkillExecution | None = None
         self._busy = False  # from the acceptance of a goal to its end
         self._workers = ThreadPoolExecutor(1, thread_name_prefix="skill_start")
-        self._synchronizer = StateSynchronizer(self, self._on_observation, self._shortcuts.load)
+        self._synchronizer = StateSynchronizer(
+            self, self._on_observation, self._shortcuts.prepare_episode
+        )
         self._publisher = SkillPublisher(self)
         self.create_service(LIST_SKILLS.type, LIST_SKILLS.name, self._on_list)
         self._actions = ActionServer(
@@ -133,8 +142,8 @@ class SkillServer(Node):
 
     async def _begin(self, goal: ServerGoalHandle) -> SkillExecution:
         planner = NodeLiveness(self, PLAN_EVENTS)
-        episode, timeout_s = goal.request.episode, self._settings.state_timeout
-        start = await self._synchronizer.observe(episode, timeout_s, NoStateError)
+        episode = goal.request.episode
+        start = await self._synchronizer.observe(episode, self._state_timeout_s, NoStateError)
         # Starting a skill may take a while (motion planning, sampling), so not here.
         execution = await run_in_executor(self._workers, lambda: self._start(goal.request, start))
         budget = goal.request.step_budget or execution.option.skill.step_limit
@@ -142,8 +151,8 @@ class SkillServer(Node):
 
     def _start(self, request: ExecuteSkill.Goal, start: Observation) -> OptionExecution:
         option, target = requested_option(request, start, self._shortcuts)
-        actions, patience = start.episode.domain.action_space, self._settings.patience
-        return OptionExecution(option, target, actions, start.state, patience)
+        actions, hold_steps = start.episode.domain.action_space, self._settings.hold_steps
+        return OptionExecution(option, target, actions, start.state, hold_steps)
 
     def _on_observation(self, observation: Observation) -> None:
         if self._execution is not None:
@@ -151,7 +160,7 @@ class SkillServer(Node):
 
     def _check(self) -> None:
         if self._execution is not None:
-            self._execution.check(self._settings.state_timeout)
+            self._execution.check(self._state_timeout_s)
 
 
 def main() -> int:

@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from ensemble.common_parameters import IMPATIENT, PATIENT
 from slap_ros.bags.writer import require_new
 from slap_ros.cli.options import MAX_INDEX, DomainName, Goal, Index, Json, Planner, Preset, Seed
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts
@@ -54,6 +55,14 @@ class RunOptions:
     timeout: Annotated[
         float, typer.Option(min=0.1, max=1e9, help="Give up after so many seconds.")
     ] = 600.0
+    patience: Annotated[
+        float,
+        typer.Option(
+            min=IMPATIENT,
+            max=PATIENT,
+            help="Factor of every deadline but --timeout, for slow domains and machines.",
+        ),
+    ] = 1.0
     render: Annotated[
         Path | None, typer.Option(help="Write an animation of the run: a .gif or .mp4.")
     ] = None

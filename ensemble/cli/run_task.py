@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import sleep
+from time import monotonic, sleep
 from typing import Any
 
 from ensemble.cli.event_printer import EventPrinter
@@ -50,9 +50,11 @@ def run_task(options: RunOptions) -> int:
         SlapError: Nothing was run, or what was run cannot be written; the code says why.
     """
     # Everything that can be refused is refused before a node is started.
+    began = monotonic()
     domain = get_domain(options.domain, options.preset)
+    imported_s = monotonic() - began
     task = domain.task(options.seed, options.index)
-    request = _request(options, domain, task)
+    request = replace(_request(options, domain, task), import_s=imported_s)
     states: list[StateMessage] = []
 
     def keep_states(type_name: str, message: Any) -> None:
@@ -94,6 +96,7 @@ def _request(options: RunOptions, domain: Domain, task: Task) -> RunRequest:
         options.planner,
         record=None,
         pace=options.pace,
+        patience=options.patience,
         shortcuts=options.shortcuts or "",
         samples=options.samples,
         world=options.world,

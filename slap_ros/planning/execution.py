@@ -74,7 +74,7 @@ class Executor:
         step_limit: Environment steps.
         max_replans: How often a diverged plan may be replaced.
         perceiver: Gives what is known of the world; without one, everything is.
-        patience: See :class:`OptionExecution`.
+        hold_steps: See :class:`OptionExecution`.
     """
 
     domain: Domain
@@ -85,7 +85,7 @@ class Executor:
     step_limit: int
     max_replans: int = MAX_REPLANS
     perceiver: Perceiver | None = None
-    patience: int = 0
+    hold_steps: int = 0
     _percept: Percept = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -145,7 +145,7 @@ class Executor:
                 edge.target,
                 self.domain.action_space,
                 self._percept.state,
-                self.patience,
+                self.hold_steps,
             )
         except SkillNotApplicableError as error:
             return OptionResult(error.code, str(error))

@@ -148,7 +148,7 @@ class OptionExecution:
         actions: What the robot can do; any other action of the policy ends the option.
         state: Where it starts; then the newest state, of the same objects: what is not detected any
             more stays where it was, and what was not detected at the start is left out.
-        patience: Environment steps for which to hold at its end where the target is not perceived
+        hold_steps: Environment steps for which to hold at its end where the target is not perceived
             yet, as debounced atoms are late.
         steps: Environment steps commanded so far.
 
@@ -160,7 +160,7 @@ class OptionExecution:
     target: int
     actions: ActionSpace
     state: State
-    patience: int = 0
+    hold_steps: int = 0
     steps: int = 0
     _policy: Policy = field(init=False, repr=False)
     _held_steps: int = field(default=0, init=False)  # at its end
@@ -209,9 +209,9 @@ class OptionExecution:
         return action
 
     def _next(self, state: State) -> Action | None:
-        """The policy's next action; at its end, none after ``patience`` steps of holding."""
+        """The policy's next action; at its end, none after ``hold_steps`` steps of holding."""
         action = self._policy(state) if self._held_steps == 0 else None
-        if action is None and self._held_steps < self.patience:
+        if action is None and self._held_steps < self.hold_steps:
             self._held_steps += 1
             return self.actions.hold
         return action

@@ -152,7 +152,7 @@ def observed():
 def provider(observation, choice=DATA):
     node = SimpleNamespace(get_logger=lambda: None)
     made = ShortcutProvider(node, ShortcutParameters(shortcuts=str(choice)))
-    made.load(observation.episode)
+    made.prepare(observation.episode.domain)
     return made
 
 

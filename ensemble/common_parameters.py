@@ -1,0 +1,34 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The ROS parameters of perception, planner and skill server alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ensemble.parameters import parameter
+from slap_ros.core import Domain
+from slap_ros.domains import get_domain
+
+IMPATIENT, PATIENT = 0.01, 1e4  # the least and the most patience
+
+
+@dataclass(frozen=True)
+class CommonParameters:
+    """Which domain to prepare for, and how long to wait for anything."""
+
+    domain: str = parameter("", "imported at the start; empty: whichever the simulator announces")
+    preset: str = parameter("", "the domain's; empty: its first")
+    patience: float = parameter(
+        1.0, "factor of all deadlines, for slow domains and machines", IMPATIENT, PATIENT
+    )
+
+    def imported(self) -> Domain | None:
+        """The domain, if it is named; to be called before anybody sees the node's servers.
+
+        Raises:
+            UnknownDomainError: There is no such domain.
+            InvalidParameterError: The domain has no such preset.
+            InvalidDomainError: The domain's own code fails.
+        """
+        return get_domain(self.domain, self.preset) if self.domain else None

@@ -1,0 +1,118 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A domain that takes seconds to import and to step: waited for, and never in a callback."""
+
+import importlib
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
+from slap_msgs.msg import DomainInfo
+
+from ensemble.interfaces import ATOMS, DOMAIN
+from ensemble.spinner import Spinner
+from perception_node.node import PerceptionNode
+from slap_ros.domains import forget_domains
+
+LIMIT = 60.0  # s, far more than anything here takes
+SLOW = '''
+import sys, threading, time
+from dataclasses import replace
+from slap_ros.domains import get_domain
+
+IMPORTED_IN = threading.current_thread().name
+time.sleep(2.0)
+IN_SIMULATOR = "sim_node" in sys.argv[0]
+
+
+class SlowWorld:
+    """Obstacle 2D, which in the simulator takes longer for a step than a skill waits for one."""
+
+    def __init__(self, world):
+        self._world, self._slow = world, IN_SIMULATOR
+
+    def step(self, action):
+        if self._slow:
+            time.sleep(3.0)
+            self._slow = False
+        return self._world.step(action)
+
+    def __getattr__(self, name):
+        return getattr(self._world, name)
+
+
+def make():
+    made = get_domain("obstacle2d")
+    world = lambda state: SlowWorld(made.make_world(state))
+    return replace(made, name="slow", preset="default", make_world=world)
+'''
+
+
+@pytest.fixture
+def slow_domain(tmp_path, monkeypatch):
+    """A distribution of somebody's, installed in a folder."""
+    (tmp_path / "slow_domain.py").write_text(SLOW)
+    info = tmp_path / "slow_domain-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: slow_domain\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[slap_ros.domains]\nslow = slow_domain:make\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    monkeypatch.setenv("PYTHONPATH", path)
+    importlib.invalidate_caches()
+    forget_domains()
+    yield "slow"
+    forget_domains()
+    sys.modules.pop("slow_domain", None)
+
+
+def test_a_slow_domain_is_waited_for(network, slow_domain):
+    done = subprocess.run(
+        [sys.executable, "-m", "ensemble.cli", "run", slow_domain, "--seed", "3",
+         "--patience", "20", "--shortcuts", "none", "--json"],
+        capture_output=True,
+        text=True,
+        timeout=4 * LIMIT,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["success"]
+
+
+def test_what_the_simulator_announces_is_imported_in_a_thread(network, slow_domain):
+    rclpy.init()
+    executor, source = SingleThreadedExecutor(), rclpy.create_node("source")
+    node = PerceptionNode()
+    try:
+        for each in (node, source):
+            executor.add_node(each)
+        publisher = source.create_publisher(DOMAIN.type, DOMAIN.name, DOMAIN.qos)
+        publisher.publish(DomainInfo(name=slow_domain))
+        spinner = Spinner(executor)
+        assert spinner.spin_until(
+            lambda: hasattr(sys.modules.get("slow_domain"), "IMPORTED_IN"), LIMIT
+        )
+        assert sys.modules["slow_domain"].IMPORTED_IN.startswith("episode")
+        # Callbacks run meanwhile: the import is not over yet.
+        assert not hasattr(sys.modules["slow_domain"], "make")
+        assert spinner.spin_until(lambda: hasattr(sys.modules["slow_domain"], "make"), LIMIT)
+    finally:
+        node.destroy_node()
+        source.destroy_node()
+        executor.shutdown()
+        rclpy.shutdown()
+
+
+def test_what_is_named_is_imported_before_anybody_sees_the_node(network, slow_domain):
+    rclpy.init()
+    try:
+        node = PerceptionNode(parameter_overrides=[Parameter("domain", value=slow_domain)])
+        assert sys.modules["slow_domain"].IMPORTED_IN == "MainThread"
+        assert node.count_publishers(ATOMS.name) == 1
+        node.destroy_node()
+    finally:
+        rclpy.shutdown()
