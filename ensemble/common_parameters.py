@@ -7,10 +7,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ensemble.parameters import parameter
+from ensemble.patience import IMPATIENT, PATIENT
 from slap_ros.core import Domain
 from slap_ros.domains import get_domain
-
-IMPATIENT, PATIENT = 0.01, 1e4  # the least and the most patience
 
 
 @dataclass(frozen=True)

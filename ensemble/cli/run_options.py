@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from ensemble.common_parameters import IMPATIENT, PATIENT
+from ensemble.patience import IMPATIENT, PATIENT
 from slap_ros.bags.writer import require_new
 from slap_ros.cli.options import MAX_INDEX, DomainName, Goal, Index, Json, Planner, Preset, Seed
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts

@@ -147,7 +147,7 @@ def test_an_object_that_nobody_sees_ends_a_run_with_its_own_code(network):
     arguments = ["--seed", "3", "--shortcuts", "none", "--in-process"]
     live = slap("run", "obstacle2d", *arguments, "--perception", "hidden=block1,memory=5")
     assert live.returncode == 77, live.stderr
-    assert "not seen for too long: block1" in live.stderr
+    assert "the goal is about what is not detected: block1" in live.stderr
 
 
 @pytest.mark.parametrize(
