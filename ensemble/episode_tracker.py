@@ -76,6 +76,10 @@ class EpisodeTracker(Generic[T]):
         subscribe(node, TASK, self._on_task)
         create_timer(node, RIVAL_PERIOD, self._check_rival)
 
+    def destroy(self) -> None:
+        """Stop the thread."""
+        self._workers.shutdown(wait=False, cancel_futures=True)
+
     # What is latched is sent again when two nodes find each other again after a moment of silence.
     # That is no new episode.
 

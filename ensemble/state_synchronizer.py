@@ -73,6 +73,10 @@ class StateSynchronizer:
         """What was refused, for diagnostics."""
         return self._refusals.counts
 
+    def destroy(self) -> None:
+        """Stop the thread in which episodes are prepared."""
+        self._episodes.destroy()
+
     async def observe(
         self, episode: int, timeout_s: float, missing: type[SlapError]
     ) -> Observation:

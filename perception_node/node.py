@@ -76,6 +76,11 @@ class PerceptionNode(Node):
         subscribe(self, STATE, self._on_state)
         DiagnosticsPublisher(self, lambda: {"states": self._perceived, **self._refusals.counts})
 
+    def destroy_node(self) -> None:
+        """Stop the thread as well."""
+        self._episodes.destroy()
+        super().destroy_node()
+
     def _open(self, episode: Episode, perceiver: Perceiver) -> None:
         self._perceiver = perceiver
         self._step = BEFORE_FIRST

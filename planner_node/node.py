@@ -116,8 +116,9 @@ class PlannerNode(Node):
         DiagnosticsPublisher(self, lambda: {**self._counts, **self._synchronizer.counts})
 
     def destroy_node(self) -> None:
-        """Stop the planning thread as well."""
+        """Stop the threads as well."""
         self._workers.shutdown(wait=False, cancel_futures=True)
+        self._synchronizer.destroy()
         self._actions.destroy()
         self._skills.destroy()
         super().destroy_node()

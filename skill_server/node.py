@@ -99,8 +99,9 @@ class SkillServer(Node):
         DiagnosticsPublisher(self, lambda: {**self._publisher.counts, **self._synchronizer.counts})
 
     def destroy_node(self) -> None:
-        """Stop the worker thread as well."""
+        """Stop the threads as well."""
         self._workers.shutdown(wait=False, cancel_futures=True)
+        self._synchronizer.destroy()
         self._actions.destroy()
         super().destroy_node()
 
