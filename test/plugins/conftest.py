@@ -19,7 +19,7 @@ def install(tmp_path, monkeypatch):
 
     It is seen in this process and in those that it starts.
     """
-    folders = []
+    folders, before = [], os.environ.get("PYTHONPATH")
 
     def install(entry_points, distribution="strangers", **modules):
         folder = tmp_path / "site" / distribution
@@ -34,7 +34,7 @@ def install(tmp_path, monkeypatch):
         folders.append(folder)
         monkeypatch.syspath_prepend(folder)
         path = [*map(str, folders), str(Path(__file__).parent)]
-        monkeypatch.setenv("PYTHONPATH", os.pathsep.join([*path, os.environ["PYTHONPATH"]]))
+        monkeypatch.setenv("PYTHONPATH", os.pathsep.join([*path, *filter(None, [before])]))
         forget_domains()
 
     yield install
