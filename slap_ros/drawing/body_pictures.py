@@ -15,7 +15,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from slap_ros.core import Display, VisibleBody
 from slap_ros.drawing.projection import (
@@ -137,6 +136,8 @@ def draw_bodies(bodies: Sequence[VisibleBody], view: Projection, canvas: Canvas)
     sheet = _Sheet.empty(WIDTH * SMOOTHING, HEIGHT * SMOOTHING)
     for body in sorted(bodies, key=lambda body: _rank(body, view)):
         _draw_body(sheet, body, view, canvas)
+    from PIL import Image  # with the physics: those who render nothing need none of it
+
     large = Image.fromarray(sheet.outlined())
     return np.asarray(large.resize((WIDTH, HEIGHT), Image.Resampling.BOX))
 

@@ -306,21 +306,21 @@ def test_settings_of_a_preset_can_be_changed():
     assert [b.name for b in blocks] == [*TOYS, *(f"{toy}2" for toy in TOYS), WIPER]
     state = domain.task(0).initial_state
     assert {float(state.get(b, "mass")) for b in blocks} == {0.05}
-    crowded = get_domain("cleanup_table", "fair:toys=30")
-    with pytest.raises(InvalidParameterError, match="room for 30 toys"):
+    crowded = get_domain("cleanup_table", "fair:toys=20")
+    with pytest.raises(InvalidParameterError, match="room for 20 toys"):
         crowded.task(0)
 
 
 def test_toys_of_any_shape_will_do():
     shapes = {"brick": Solid.of([cuboid((0.03, 0.02, 0.025))]), WIPER: shipped()[WIPER]}
-    domain = make("fair", {"toys": "1"}, shapes)
+    domain = make("fair", {"toys": "1"}, shapes=shapes)
     episode = solve(domain.task(0), domain)
     assert episode.success
 
 
 def test_what_the_fingers_do_not_fit_around_is_left_and_said_so():
     shapes = {"slab": Solid.of([cuboid((0.06, 0.06, 0.025))]), WIPER: shipped()[WIPER]}
-    domain = make("fair", {"toys": "1"}, shapes)
+    domain = make("fair", {"toys": "1"}, shapes=shapes)
     episode = solve(domain.task(0), domain)
     assert episode.error.code == ErrorCode.UNSOLVABLE
 

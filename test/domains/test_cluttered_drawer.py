@@ -320,8 +320,8 @@ def test_a_hand_that_turns_around_the_block_frees_two_sides_and_holds_nothing():
 
 
 def test_a_drawer_that_is_too_full_is_refused():
-    with pytest.raises(InvalidParameterError, match="no room for 30 obstacles"):
-        RandomDrawerTasks(obstacles=(30, 30)).sample(np.random.default_rng(0))
+    with pytest.raises(InvalidParameterError, match="no room for 20 obstacles"):
+        RandomDrawerTasks(obstacles=(20, 20)).sample(np.random.default_rng(0))
 
 
 @pytest.mark.parametrize(

@@ -155,7 +155,7 @@ def test_an_object_that_nobody_sees_ends_a_run_with_its_own_code(network):
     [
         ("debounce=0", "debounce is at least 1"),
         ("hidden=block9", "block9 cannot be hidden"),
-        ("noise_seed=-1", "noise_seed is 0 or more"),
+        ("noise_seed=-1", "noise_seed is -1; it must be from 0"),
         ("acuity=6", "perception has no parameter"),
         ("dropout=often", "dropout is a number"),
     ],
