@@ -36,7 +36,6 @@ from slap_ros.messages.protocols import StateMessage
 from slap_ros.planning.planner import make_planner
 from slap_ros.relational import GroundAtom
 from slap_ros.relational.pddl import parse_goal
-from slap_ros.robot.robot_world import require_robot
 from slap_ros.robot.worlds import SIM
 from slap_ros.shortcuts.shipped import chosen_library
 
@@ -84,6 +83,9 @@ def _request(options: RunOptions, domain: Domain, task: Task) -> RunRequest:
     """
     goal = _check_planning(options, domain, task)
     if options.world != SIM:
+        # Physics is needed only here: planar domains run without it.
+        from slap_ros.robot.robot_world import require_robot
+
         require_robot(domain, task.initial_state)
     perception = parse_parameters(options.perception, PerceptionParameters, "perception")
     quality = PerceptionParameters(**perception).quality
