@@ -11,7 +11,8 @@ import time
 
 import pytest
 
-from slap_ros.domains import domain_names, get_domain
+from slap_ros.domains import get_domain
+from slap_ros.domains.registry import OURS
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_yaml
 
@@ -42,7 +43,7 @@ def count(request):
 def test_settings_of_tasks(count):
     rng = random.Random(1)
     for _ in range(20 * count):
-        name = rng.choice(domain_names())
+        name = rng.choice(sorted(OURS))  # others may be installed, and have no settings
         setting = rng.choice(sorted(get_domain(name).configuration))
         value = rng.choice(NUMBERS) or str(rng.lognormvariate(0, 20) * rng.choice((-1, 1)))
         try:

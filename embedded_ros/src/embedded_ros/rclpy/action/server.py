@@ -381,6 +381,8 @@ class ActionServer(Generic[ActT]):
         try:
             result = await _outcome(execute_callback(goal))
         except Exception as error:
+            if not self._node.context.ok():
+                return  # shut down meanwhile: the callback failed at that, and nobody can be told
             # As rclpy: the goal is aborted, the server goes on.
             self._logger.error(f"Error raised in execute callback: {error!r}")
             traceback.print_exc()
