@@ -11,10 +11,13 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 
+AGAIN_S = 0.05  # s, after which a signal is sent again that fell where nothing can be raised
 WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 
 
@@ -46,11 +49,14 @@ def signals_raised() -> Iterator[None]:
         TerminatedError: SIGTERM arrived.
     """
     ours = [number for number in WORDS if signal.getsignal(number) is _exit_at_once]
+    hook = sys.unraisablehook
     for number in ours:
         signal.signal(number, _raise)
+    sys.unraisablehook = _send_again
     try:
         yield
     finally:
+        sys.unraisablehook = hook
         for number in ours:
             signal.signal(number, _exit_at_once)
 
@@ -76,3 +82,15 @@ def _exit_at_once(number: int, _: FrameType | None) -> None:
 
 def _raise(number: int, _: FrameType | None) -> None:
     raise TerminatedError if number == signal.SIGTERM else KeyboardInterrupt
+
+
+def _send_again(unraisable: sys.UnraisableHookArgs) -> None:
+    """Deliver a signal once more that arrived in a destructor, from which nothing can be raised."""
+    error = unraisable.exc_value
+    if not isinstance(error, KeyboardInterrupt):
+        sys.__unraisablehook__(unraisable)
+        return
+    number = signal.SIGTERM if isinstance(error, TerminatedError) else signal.SIGINT
+    timer = threading.Timer(AGAIN_S, os.kill, (os.getpid(), number))
+    timer.daemon = True
+    timer.start()

@@ -138,6 +138,35 @@ def test_a_run_closes_its_bag(network, tmp_path, number):
     assert not found.runs[-1].success
 
 
+IN_A_DESTRUCTOR = """
+import os, signal, time
+from slap_ros.signals import exit_at_once_on_signals, exit_code, signals_raised
+
+class Last:
+    def __del__(self):
+        os.kill(os.getpid(), {number})
+        for _ in range(1000):  # somewhere here the signal is noticed
+            pass
+
+exit_at_once_on_signals()
+try:
+    with signals_raised():
+        Last()
+        time.sleep(60)
+except KeyboardInterrupt as error:
+    raise SystemExit(exit_code(error))
+"""
+
+
+@pytest.mark.parametrize("number", ENDINGS)
+def test_a_signal_that_falls_into_a_destructor_is_not_lost(number):
+    """Python drops what is raised there, and would go on."""
+    code = IN_A_DESTRUCTOR.format(number=int(number))
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=30)
+    assert run.returncode == ENDINGS[number][1]
+    assert not run.stderr
+
+
 def test_what_is_ignored_stays_ignored(tmp_path):
     """As by nohup, and by a shell that runs something in the background."""
     code = (
