@@ -16,7 +16,8 @@ from ensemble.cli.application import app
 from ensemble.nodes import node_class
 from ensemble.parameters import _require_within, parse_parameters
 from ensemble.robot_parameters import MockRobotParameters, PlayerParameters, RobotBridgeParameters
-from slap_ros.domains import domain_names, get_domain
+from slap_ros.domains import get_domain
+from slap_ros.domains.registry import OURS
 from slap_ros.domains.variation import TaskSettings
 from slap_ros.errors import ErrorCode, InvalidParameterError
 
@@ -35,7 +36,7 @@ def slap(*arguments):
 
 
 def settings_of_domains():
-    for name in domain_names():
+    for name in list(OURS):
         get_domain(name)
     return [kind for kind in TaskSettings.__subclasses__() if kind.__module__.startswith("slap_")]
 
@@ -48,14 +49,14 @@ def of_numbers(value):
 
 def test_every_number_of_every_domain_has_limits():
     kinds = settings_of_domains()
-    assert len(kinds) == 2 * len(domain_names())
+    assert len(kinds) == 2 * len(list(OURS))
     for kind in kinds:
         numbers = {f.name for f in fields(kind) if of_numbers(getattr(kind(), f.name))}
         assert numbers == set(kind.limits), kind
 
 
 @pytest.mark.parametrize("value", NO_SETTINGS, ids=lambda text: text[:12])
-@pytest.mark.parametrize("name", domain_names())
+@pytest.mark.parametrize("name", list(OURS))
 def test_a_setting_is_finite_and_within_its_limits(name, value):
     kinds = [kind for kind in settings_of_domains() if f".{name}." in kind.__module__]
     for preset, kind in zip(("fair", "paper"), sorted(kinds, key=preset_of), strict=True):
@@ -69,7 +70,7 @@ def preset_of(kind):
     return "fair" if kind.__name__.startswith("Random") else "paper"
 
 
-@pytest.mark.parametrize("name", domain_names())
+@pytest.mark.parametrize("name", list(OURS))
 def test_what_is_within_the_limits_is_a_task_or_an_error(name, monkeypatch):
     # Where there is no room, thousands of scenes are drawn; here a few will do.
     monkeypatch.setattr(import_module(f"slap_ros.domains.{name}.tasks"), "TRIES", 50)
