@@ -21,7 +21,10 @@ from slap_ros.core.kinder_world import KinderBridge  # noqa: E402
 from slap_ros.domain_check import Experience, markov  # noqa: E402
 from slap_ros.domain_check.experience import Transition  # noqa: E402
 from slap_ros.errors import InvalidDomainError, InvalidStateError  # noqa: E402
+from slap_ros.evaluation.approaches import approaches  # noqa: E402
 from slap_ros.relational import Feature  # noqa: E402
+from slap_ros.shortcuts.library import load_library  # noqa: E402
+from slap_ros.shortcuts.shortcut import Sampling  # noqa: E402
 
 DOMAIN = kinder_obstruction.make()
 TASK = DOMAIN.task(7)  # evaluation begins at seed 0
@@ -121,3 +124,25 @@ def test_what_does_not_fit_is_refused():
         BRIDGE.type("gear")
     with pytest.raises(InvalidDomainError, match="1 axes are named; there are 5"):
         BRIDGE.action_space([Feature("x", "m")])
+
+
+def test_the_shortcut_of_the_example_makes_a_plan_shorter():
+    library = load_library(EXAMPLE / "models", DOMAIN)
+    task = next(task for task in map(DOMAIN.task, range(7, 50)) if obstruction_comes_first(task))
+    space = DOMAIN.atom_space(task.initial_state)
+    pure, *_, slap = (
+        approach.planner("lazy", DOMAIN, task.initial_state)
+        .plan(task.initial_state, space.mask(task.goal))
+        .plan.predicted_steps
+        for approach in approaches(library, Sampling(samples=4))
+    )
+    assert slap < 0.85 * pure
+
+
+def obstruction_comes_first(task):
+    """It is in the way, and the target is far behind it."""
+    state, objects = task.initial_state, task.initial_state.layout.object
+    obstruction, surface = objects("obstruction0"), objects("target_surface")
+    first, second = (state.get(o, "x") for o in (obstruction, objects("target_block")))
+    blocked = not kinder_obstruction.model.CLEAR(obstruction, surface).holds(state)
+    return blocked and state.get(objects("robot"), "x") < first < second - 0.8  # m
