@@ -301,7 +301,9 @@ class Training:
         work = [(self.distribution, i, shortcuts, self.settings.sampling) for i in tasks]
         name = "+".join(["plans", *(shortcut.name for shortcut in shortcuts)])
         return self._work.cached(
-            name, lambda: self._run("planning", jobs.plan_length, work), _decode_lengths
+            name,
+            lambda: self._run("planning", jobs.plan_length, work),
+            lambda data: _decode_lengths(data, len(work)),
         )
 
     def _run(self, what: str, function: Any, work: Sequence[tuple[Any, ...]]) -> list[Any]:
@@ -330,8 +332,10 @@ class Training:
         }
 
 
-def _decode_lengths(data: Any) -> list[int | str]:
+def _decode_lengths(data: Any, count: int) -> list[int | str]:
     """Plan lengths, or why there is none; no more than that there is none in version 0.1.0."""
+    if not isinstance(data, list) or len(data) != count:
+        raise TypeError(f"{data!r} is no list of {count} plan lengths")
     lengths = [UNRECORDED if length is None else length for length in data]
     for length in lengths:
         if isinstance(length, bool) or not isinstance(length, int | str):
