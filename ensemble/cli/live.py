@@ -157,7 +157,7 @@ class Dashboard:
         """Take a message of the run."""
         self._view.add(type_name, message)
         if type_name == PLAN_EVENT and not self._live.is_started:
-            self._live.start()
+            self._live.start(refresh=True)  # at once: a run can be over before the next one
 
     def __enter__(self) -> Self:
         return self

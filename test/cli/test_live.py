@@ -89,7 +89,7 @@ def test_on_a_terminal_it_is_drawn_in_place(network: int) -> None:
         assert process.wait(60) == 0
     os.close(ours)
     text = written.decode()
-    assert "\x1b[1A" in text  # back up, to draw again
+    assert "\r\x1b[2K" in text  # what was drawn is erased and drawn again
     assert "\x1b[?25h" in text[text.rindex("\x1b[?25l") :]  # the cursor is back
     assert "solved" in text
 
