@@ -15,7 +15,7 @@ from functools import partial
 from slap_ros.acquisition.drafts import DECOMPOSITION, check_decomposition, check_operator
 from slap_ros.acquisition.inquiry import Answer, Inquiry, Question, Rejected
 from slap_ros.acquisition.problem import AcquisitionProblem
-from slap_ros.acquisition.proposal import Proposal, ProposalProvenance, RewardTemplate
+from slap_ros.acquisition.proposal import Proposal, ProposalProvenance
 from slap_ros.acquisition.proposers import Templates
 from slap_ros.acquisition.rewards import check_rewards
 from slap_ros.acquisition.verification import Verification, verify
@@ -30,7 +30,7 @@ from slap_ros.language.formats import (
 )
 from slap_ros.language.prompts import decomposition_question, operator_question, reward_question
 from slap_ros.language.schema import decomposition_schema, operator_schema, reward_schema
-from slap_ros.relational import LiftedOperator
+from slap_ros.relational import LiftedOperator, RewardTemplate
 
 ROUNDS = 4  # verifications of one decomposition in a row that may fail
 

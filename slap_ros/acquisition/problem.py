@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -65,7 +65,6 @@ class AcquisitionProblem:
         domain: Domain,
         task: Task,
         goal: Collection[GroundAtom] = (),
-        metrics: Sequence[Metric] = (),
     ) -> AcquisitionProblem:
         """The problem of a domain's task.
 
@@ -73,14 +72,13 @@ class AcquisitionProblem:
             domain: With a world; its operators are left out.
             task: Where to start.
             goal: What to reach; the task's goal if left out.
-            metrics: What rewards may be made of beside the metrics that predicates rest on.
         """
         space = domain.atom_space(task.initial_state)
         return cls(
             domain.name,
             domain.types,
             domain.predicates,
-            tuple(dict.fromkeys((*metrics_of(domain.predicates), *metrics))),
+            tuple(dict.fromkeys((*metrics_of(domain.predicates), *domain.metrics))),
             domain.static_predicates,
             space.layout,
             frozenset(space.decode(space.abstract(task.initial_state))),

@@ -10,37 +10,10 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from slap_ros.acquisition.problem import AcquisitionProblem
-from slap_ros.relational import LiftedAtom, LiftedOperator, Metric, Variable
+from slap_ros.relational import LiftedAtom, LiftedOperator, RewardTemplate
 from slap_ros.relational.pddl import write_domain, write_problem
 
 VERSION = 1
-
-
-@dataclass(frozen=True)
-class RewardTerm:
-    """A weighted metric of the operator's parameters."""
-
-    metric: Metric
-    arguments: tuple[Variable, ...]  # one per type of the metric
-    weight: float  # in [0, 1]
-
-    def __str__(self) -> str:
-        names = ", ".join(variable.name for variable in self.arguments)
-        return f"{self.weight:g} {self.metric.name}({names})"
-
-
-@dataclass(frozen=True)
-class RewardTemplate:
-    """The dense part of an operator's reward, for all its groundings: Σ weight · normalised metric.
-
-    The sparse part is no template's: 1 where all of EFF+ hold and none of EFF- (LG-SAIL Eq. 4).
-    """
-
-    operator: str
-    terms: tuple[RewardTerm, ...]
-
-    def __str__(self) -> str:
-        return f"{self.operator}: {' + '.join(map(str, self.terms))}"
 
 
 @dataclass(frozen=True)

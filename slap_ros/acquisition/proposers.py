@@ -10,11 +10,11 @@ from typing import Protocol
 
 from slap_ros.acquisition.complaints import serious
 from slap_ros.acquisition.problem import AcquisitionProblem
-from slap_ros.acquisition.proposal import Proposal, ProposalProvenance, RewardTemplate
+from slap_ros.acquisition.proposal import Proposal, ProposalProvenance
 from slap_ros.acquisition.rewards import compose_reward
 from slap_ros.acquisition.verification import verify
 from slap_ros.errors import InvalidDomainError, ProposalRejectedError
-from slap_ros.relational import LiftedOperator
+from slap_ros.relational import LiftedOperator, RewardTemplate
 
 Templates = Mapping[str, RewardTemplate]  # by operator name
 

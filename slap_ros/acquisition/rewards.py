@@ -10,10 +10,16 @@ from itertools import permutations
 
 from slap_ros.acquisition.complaints import Complaint, ComplaintClass, serious
 from slap_ros.acquisition.problem import AcquisitionProblem
-from slap_ros.acquisition.proposal import RewardTemplate, RewardTerm
 from slap_ros.errors import InvalidDomainError
 from slap_ros.language.formats import RewardDraft, TermDraft, shown
-from slap_ros.relational import LiftedAtom, LiftedOperator, Metric, Variable
+from slap_ros.relational import (
+    LiftedAtom,
+    LiftedOperator,
+    Metric,
+    RewardTemplate,
+    RewardTerm,
+    Variable,
+)
 
 DENSE_SUM = 0.8  # of composed weights: success itself, which is paid 1, stays the best
 METRES = "m"

@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The contract between domains and everything that plans, learns, executes or shows."""
 
+from slap_ros.core.acquisition import Acquisition, Approach, Script
 from slap_ros.core.action_space import Action, ActionSpace, GripperAxis
 from slap_ros.core.display import Animate, Display, VisibleBody
-from slap_ros.core.domain import Domain, Execution
+from slap_ros.core.domain import Domain, Execution, Goal
 from slap_ros.core.domain_factory import DomainFactory, presets
 from slap_ros.core.learner_interface import LearnerInterface, Learning, SettingValue
 from slap_ros.core.skill import Policy, Skill
@@ -12,18 +13,22 @@ from slap_ros.core.task import Task
 from slap_ros.core.world import MakeVectorWorld, SyncVectorWorld, VectorWorld, World
 
 __all__ = [
+    "Acquisition",
     "Action",
     "ActionSpace",
     "Animate",
+    "Approach",
     "Display",
     "Domain",
     "DomainFactory",
     "Execution",
+    "Goal",
     "GripperAxis",
     "LearnerInterface",
     "Learning",
     "MakeVectorWorld",
     "Policy",
+    "Script",
     "SettingValue",
     "Skill",
     "SyncVectorWorld",

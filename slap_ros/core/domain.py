@@ -10,6 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
+from slap_ros.core.acquisition import Acquisition
 from slap_ros.core.action_space import ActionSpace
 from slap_ros.core.display import Display
 from slap_ros.core.learner_interface import Learning
@@ -22,12 +23,15 @@ from slap_ros.relational import (
     GroundAtom,
     GroundOperator,
     LiftedOperator,
+    Metric,
     Predicate,
     State,
     Type,
     ground_operators,
     static_predicates,
 )
+
+Goal = Callable[[State], frozenset[GroundAtom]]  # of a task that begins in a state
 
 
 @dataclass(frozen=True)
@@ -46,25 +50,34 @@ class Execution:
 
 @dataclass(frozen=True)
 class Domain:
-    """A planning domain together with its world."""
+    """A planning domain together with its world.
+
+    Operators and skills may be missing: ``acquisition`` says what they are acquired with.
+    """
 
     name: str
     preset: str
     types: tuple[Type, ...]
     predicates: tuple[Predicate, ...]
-    operators: tuple[LiftedOperator, ...]
-    skills: Mapping[str, Skill]  # by operator name
     action_space: ActionSpace
     sample_task: Callable[[np.random.Generator], Task]
     make_world: Callable[[State], World]  # in that state; others of the same objects by reset
-    default_goal: Callable[[State], frozenset[GroundAtom]]  # of a state given without a goal
+    default_goal: Goal  # of a state given without a goal
     step_limit: int  # environment steps of a task
     execution: Execution
+    operators: tuple[LiftedOperator, ...] = ()
+    skills: Mapping[str, Skill] = field(default_factory=dict)  # by operator name
+    # What rewards can be made of, beside the metrics that predicates rest on.
+    metrics: tuple[Metric, ...] = ()
+    # Predicates that nothing changes; None: those that no operator changes.
+    static: frozenset[Predicate] | None = None
+    goals: Mapping[str, Goal] = field(default_factory=dict)  # by name; the first is trained for
     # Types of the robot itself: no predicate depends on their features, but for those below.
     robot_types: frozenset[Type] = frozenset()
     robot_predicates: frozenset[Predicate] = frozenset()
     display: Display = field(default_factory=Display)
     learning: Learning | None = None  # without it there are no shortcuts
+    acquisition: Acquisition | None = None  # without it no skills are acquired
     configuration: Mapping[str, str | int | float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -72,7 +85,9 @@ class Domain:
 
         Raises:
             InvalidDomainError: A name occurs twice, an operator uses an unknown predicate or
-                type, or has no skill; or learned actions have other axes than the robot.
+                type, or has no skill; an operator changes what is called static, or there are
+                neither operators nor static predicates; or learned actions have other axes than
+                the robot.
         """
         for kind, names in (
             ("type", [t.name for t in self.types]),
@@ -90,7 +105,31 @@ class Domain:
                 )
         for operator in self.operators:
             self._check_operator(operator)
+            if operator.name not in self.skills:
+                raise InvalidDomainError(
+                    f"domain {self.name}, operator {operator.name}: no skill; add one to the "
+                    "domain's skills"
+                )
+        for operator in self.acquisition.operators if self.acquisition else ():
+            self._check_operator(operator)
+        self._check_static_predicates()
         self._check_learned_actions()
+
+    def _check_static_predicates(self) -> None:
+        if self.static is None:
+            if not self.operators:
+                raise InvalidDomainError(
+                    f"domain {self.name}: without operators nothing tells which predicates are "
+                    "static; name them, frozenset() for none"
+                )
+            return
+        written = self.acquisition.operators if self.acquisition else ()
+        never_changed = static_predicates(self.predicates, (*self.operators, *written))
+        if changed := sorted(p.name for p in self.static - never_changed):
+            raise InvalidDomainError(
+                f"domain {self.name}: {', '.join(changed)} cannot be static: an operator changes "
+                "it, or the domain does not have it"
+            )
 
     def _check_learned_actions(self) -> None:
         own, learned = self.action_space, self.learned_actions
@@ -112,8 +151,6 @@ class Domain:
         for variable in operator.parameters:
             if variable.type not in self.types:
                 raise InvalidDomainError(f"{where}: unknown type {variable.type.name!r}")
-        if operator.name not in self.skills:
-            raise InvalidDomainError(f"{where}: no skill; add one to the domain's skills")
 
     @property
     def learned_actions(self) -> ActionSpace:
@@ -133,7 +170,9 @@ class Domain:
 
     @cached_property
     def static_predicates(self) -> frozenset[Predicate]:
-        """The predicates that no operator changes."""
+        """The predicates that nothing changes."""
+        if self.static is not None:
+            return self.static
         return static_predicates(self.predicates, self.operators)
 
     def atom_space(self, initial: State) -> AtomSpace:

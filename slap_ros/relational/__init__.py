@@ -14,6 +14,7 @@ from slap_ros.relational.operators import (
     static_predicates,
 )
 from slap_ros.relational.predicates import GroundAtom, Predicate
+from slap_ros.relational.rewards import RewardTemplate, RewardTerm
 from slap_ros.relational.state import Layout, State
 
 __all__ = [
@@ -30,6 +31,8 @@ __all__ = [
     "NormalisedForm",
     "Object",
     "Predicate",
+    "RewardTemplate",
+    "RewardTerm",
     "State",
     "Type",
     "Variable",

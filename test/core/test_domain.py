@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from slap_ros.core import Acquisition
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidDomainError
 from slap_ros.relational import LiftedAtom, LiftedOperator, Predicate, State, Type, Variable
@@ -68,3 +69,24 @@ def test_what_is_said_to_be_unread_changes_no_atom(name):
     assert space.abstract_each(State(initial.layout, data)) == [
         space.abstract(State(initial.layout, row)) for row in data
     ]
+
+
+def test_without_operators_static_predicates_are_named():
+    with pytest.raises(InvalidDomainError, match="without operators nothing tells"):
+        replace(DOMAIN, operators=(), skills={})
+    bare = replace(DOMAIN, operators=(), skills={}, static=DOMAIN.static_predicates)
+    assert bare.static_predicates == DOMAIN.static_predicates
+    start = DOMAIN.task(0).initial_state
+    assert list(map(str, bare.atom_space(start).atoms)) == list(
+        map(str, DOMAIN.atom_space(start).atoms)
+    )
+
+
+def test_nothing_static_is_changed_by_an_operator():
+    changed = DOMAIN.operators[0]
+    predicate = next(iter(changed.add_effects)).predicate
+    with pytest.raises(InvalidDomainError, match=f"{predicate} cannot be static"):
+        replace(DOMAIN, static=frozenset({predicate}))
+    written = Acquisition(approach=lambda state, objects: lambda _: None, operators=(changed,))
+    with pytest.raises(InvalidDomainError, match=f"{predicate} cannot be static"):
+        replace(DOMAIN, operators=(), skills={}, static=frozenset({predicate}), acquisition=written)

@@ -1,0 +1,39 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a domain offers to those who acquire its skills, and to those who show how it is solved."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from slap_ros.core.skill import Policy
+from slap_ros.relational import LiftedOperator, Object, RewardTemplate, State
+
+# (state, an operator's objects) to what brings the hand to where its skill begins: 0.04 m from
+# the object or placement that the last of the objects names (LG-SAIL §5.1). The policy gives None
+# once the hand is there.
+Approach = Callable[[State, tuple[Object, ...]], Policy]
+
+# (state, an operator's objects) to a closed loop that does what the operator says, knowing all of
+# the state. It shows that a task can be solved; no plan ever uses it as a skill.
+Script = Callable[[State, tuple[Object, ...]], Policy]
+
+
+@dataclass(frozen=True)
+class Acquisition:
+    """What skills are acquired with, where none are given.
+
+    Args:
+        approach: Brings the hand to where a skill begins; a function of its arguments.
+        operators: Written by hand, what LEAGUE starts from.
+        rewards: Written by hand, by operator name.
+        scripts: What the demonstrator does, by operator name.
+        horizon: Environment steps of a skill, approach not counted.
+    """
+
+    approach: Approach
+    operators: tuple[LiftedOperator, ...] = ()
+    rewards: Mapping[str, RewardTemplate] = field(default_factory=dict)
+    scripts: Mapping[str, Script] = field(default_factory=dict)
+    horizon: int = 50
