@@ -21,7 +21,7 @@ FLOORS = (
     ("report", "studies"),
     ("robot", "bags", "evaluation"),
     ("acquisition", "shortcuts"),
-    ("language",),
+    ("learning", "language"),
     ("drawing", "planning"),
     ("perception", "messages"),
     ("domains",),
