@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,7 +18,7 @@ from slap_ros.core.learner_interface import Learning
 from slap_ros.core.skill import Skill
 from slap_ros.core.task import Task
 from slap_ros.core.world import SyncVectorWorld, VectorWorld, World
-from slap_ros.errors import InvalidDomainError, InvalidParameterError
+from slap_ros.errors import InvalidDomainError, InvalidParameterError, UnknownObjectError
 from slap_ros.relational import (
     AtomSpace,
     GroundAtom,
@@ -31,7 +32,9 @@ from slap_ros.relational import (
     static_predicates,
 )
 
-Goal = Callable[[State], frozenset[GroundAtom]]  # of a task that begins in a state
+# Of a task that begins in a state; an UnknownObjectError where that lacks an object of the goal.
+Goal = Callable[[State], frozenset[GroundAtom]]
+MOST_DRAWN = 1_000  # tasks, until one has the objects of a named goal
 
 
 @dataclass(frozen=True)
@@ -195,12 +198,34 @@ class Domain:
             return self.learning.make_vector_world(states)
         return SyncVectorWorld(self.make_world, states)
 
-    def task(self, seed: int, index: int = 0) -> Task:
+    def task(self, seed: int, index: int = 0, goal: str | None = None) -> Task:
         """The ``index``-th task of a seed; every (seed, index) has a stream of its own.
 
+        Args:
+            seed: At least 0.
+            index: At least 0.
+            goal: One of ``goals``: the first task of the stream that has its objects, with this
+                goal. None for the goal that comes with the task.
+
         Raises:
-            InvalidParameterError: A negative seed or index.
+            InvalidParameterError: A negative seed or index, or no such goal.
+            UnknownObjectError: No task has the objects of that goal.
         """
         if min(seed, index) < 0:
             raise InvalidParameterError(f"seed {seed} and index {index} must not be negative")
-        return self.sample_task(np.random.default_rng([seed, index]))
+        rng = np.random.default_rng([seed, index])
+        if goal is None:
+            return self.sample_task(rng)
+        if goal not in self.goals:
+            raise InvalidParameterError(
+                f"domain {self.name} has no goal {goal!r}; there are "
+                f"{', '.join(self.goals) or 'none with a name'}"
+            )
+        for _ in range(MOST_DRAWN - 1):
+            with suppress(UnknownObjectError):
+                return self._posed(self.sample_task(rng), goal)
+        return self._posed(self.sample_task(rng), goal)
+
+    def _posed(self, task: Task, goal: str) -> Task:
+        """The task with a goal that goes by a name."""
+        return replace(task, goal=self.goals[goal](task.initial_state))

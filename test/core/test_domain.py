@@ -9,7 +9,7 @@ import pytest
 
 from slap_ros.core import Acquisition
 from slap_ros.domains import get_domain
-from slap_ros.errors import InvalidDomainError
+from slap_ros.errors import InvalidDomainError, InvalidParameterError, UnknownObjectError
 from slap_ros.relational import LiftedAtom, LiftedOperator, Predicate, State, Type, Variable
 
 DOMAIN = get_domain("obstacle2d")
@@ -90,3 +90,38 @@ def test_nothing_static_is_changed_by_an_operator():
     written = Acquisition(approach=lambda state, objects: lambda _: None, operators=(changed,))
     with pytest.raises(InvalidDomainError, match=f"{predicate} cannot be static"):
         replace(DOMAIN, operators=(), skills={}, static=frozenset({predicate}), acquisition=written)
+
+
+def on_the_ground(block):
+    """A goal about one block, which some tasks lack."""
+    on = next(p for p in DOMAIN.predicates if p.name == "On")
+
+    def goal(state):
+        return frozenset({on(state.layout.object(block), state.layout.object("table"))})
+
+    return goal
+
+
+def test_tasks_of_a_named_goal_have_its_objects():
+    domain = get_domain("obstacle2d", "fair:obstacles=1..4")
+    domain = replace(
+        domain, goals={"few": on_the_ground("block1"), "many": on_the_ground("block5")}
+    )
+    own = [domain.task(seed) for seed in range(20)]
+    assert [domain.task(s, goal="few").initial_state for s in range(20)] == [
+        task.initial_state for task in own
+    ]
+    lacking = [s for s in range(20) if "block4" not in own[s].initial_state.layout.by_name]
+    assert 0 < len(lacking) < 20
+    for seed in lacking:
+        task = domain.task(seed, goal="many")
+        assert {str(atom) for atom in task.goal} == {"On(block4, table)"}
+        assert task == domain.task(seed, goal="many")
+
+
+def test_a_goal_that_no_task_can_have():
+    domain = replace(DOMAIN, goals={"ghost": on_the_ground("ghost")})
+    with pytest.raises(UnknownObjectError, match="unknown object 'ghost'"):
+        domain.task(0, goal="ghost")
+    with pytest.raises(InvalidParameterError, match="no goal 'host'; there are ghost"):
+        domain.task(0, goal="host")
