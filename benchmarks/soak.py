@@ -32,8 +32,9 @@ from ensemble.nodes import RunSettings, node_parameters
 from ensemble.spinner import Spinner, temporary_node
 from slap_ros.cli.console import progress
 from slap_ros.evaluation.metrics import RunLog
+from slap_ros.files import pretty_json
 from slap_ros.studies.figures import LINES, picture, require_matplotlib
-from slap_ros.studies.results import MarkdownTable, pretty
+from slap_ros.studies.results import MarkdownTable
 from slap_ros.versions import versions
 
 if TYPE_CHECKING:
@@ -266,7 +267,7 @@ def write(folder: Path, soaked: Soaked) -> None:
     )
     data = {"domain": DOMAIN, "versions": dict(versions()), "found": soaked.as_json()}
     drawing = picture(lambda figure: draw(figure, soaked), SIZE)
-    for ending, content in {"md": page, "json": pretty(data) + "\n", "svg": drawing}.items():
+    for ending, content in {"md": page, "json": pretty_json(data) + "\n", "svg": drawing}.items():
         (folder / f"soak.{ending}").write_text(content, encoding="utf-8")
 
 

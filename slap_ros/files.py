@@ -13,6 +13,7 @@ import json
 import os
 import stat
 import tempfile
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -145,6 +146,26 @@ def parse_json(text: str | bytes) -> Any:
         return json.loads(text)
     except RecursionError:
         raise ValueError("nested too deep") from None
+
+
+def pretty_json(value: Any, indent: str = "") -> str:
+    """JSON, indented down to the innermost objects and lists, which have a line each."""
+    deeper = indent + "  "
+    parts: list[str]
+    if isinstance(value, Mapping) and any(map(_is_nested, value.values())):
+        parts = [f"{json.dumps(key)}: {pretty_json(part, deeper)}" for key, part in value.items()]
+        opening, closing = "{", "}"
+    elif isinstance(value, list | tuple) and any(map(_is_nested, value)):
+        parts = [pretty_json(part, deeper) for part in value]
+        opening, closing = "[", "]"
+    else:
+        return json.dumps(value, allow_nan=False, ensure_ascii=False)
+    lines = f",\n{deeper}".join(parts)
+    return f"{opening}\n{deeper}{lines}\n{indent}{closing}"
+
+
+def _is_nested(value: object) -> bool:
+    return isinstance(value, Mapping | list | tuple)
 
 
 def parse_yaml(text: str) -> Any:

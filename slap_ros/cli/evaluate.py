@@ -5,20 +5,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.table import Table
 
+from slap_ros.cli.command_line import command_line
 from slap_ros.cli.console import console, print_json, progress
 from slap_ros.cli.options import DomainName, Jobs, Json, Planner, Preset
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose, sampling
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode
 from slap_ros.evaluation.approaches import Approach, approaches
+from slap_ros.evaluation.evaluation_file import require_replaceable, write_evaluation
 from slap_ros.evaluation.experiment import Experiment, Trial, run_all
 from slap_ros.evaluation.summary import Spread, Summary
+from slap_ros.files import require_writable
 from slap_ros.planning.planner import make_planner
+from slap_ros.shortcuts.shipped import shipped_library
+from slap_ros.studies.results import describe_library
 from slap_ros.versions import versions
 
 
@@ -38,6 +44,9 @@ def evaluate(
     samples: Samples = SAMPLES,
     planner: Planner = "lazy",
     jobs: Jobs = 1,
+    output: Annotated[
+        Path | None, typer.Option(help="JSON file for every trial and what it was made from.")
+    ] = None,
     json: Json = False,
 ) -> int:
     """Plan and execute many tasks in the world and sum up: success, plan length, planning time.
@@ -46,10 +55,28 @@ def evaluate(
     with --samples, on the same tasks. Spreads are mean ± sample standard deviation over all tasks.
     """
     chosen = get_domain(domain, preset)
+    settings = {
+        "preset": chosen.preset,
+        "tasks": tasks,
+        "seeds": seeds,
+        "first_seed": first_seed,
+        "samples": samples,
+        "planner": planner,
+    }
+    command = command_line("evaluate", domain, shortcuts=shortcuts, **settings)
+    if output is not None:
+        require_writable(output)
+        require_replaceable(output, command)
     library = choose(shortcuts, chosen, planner)
     make_planner(planner, chosen, chosen.task(first_seed).initial_state)
     experiment = Experiment(chosen, tasks, seeds, first_seed, planner)
-    summaries = _run(experiment, approaches(library, sampling(samples)), jobs)
+    results = _run(experiment, approaches(library, sampling(samples)), jobs)
+    summaries = [summary for summary, _ in results]
+    if output is not None:
+        folder = Path(shortcuts) if shortcuts else shipped_library(domain)
+        described = describe_library(folder, library) if folder and library else None
+        origin = {"command": command, "domain": domain, **settings, "library": described}
+        write_evaluation(output, origin, results)
     if json:
         rows = [summary.as_row() for summary in summaries]
         made = {"approaches": rows, "versions": versions()}
@@ -60,9 +87,11 @@ def evaluate(
     return 0 if solved else int(ErrorCode.UNKNOWN)
 
 
-def _run(experiment: Experiment, compared: Sequence[Approach], jobs: int) -> list[Summary]:
+def _run(
+    experiment: Experiment, compared: Sequence[Approach], jobs: int
+) -> list[tuple[Summary, list[Trial]]]:
     """Approach by approach, pure planning first."""
-    summaries: list[Summary] = []
+    results: list[tuple[Summary, list[Trial]]] = []
     yardstick: list[Trial] = []
     with progress() as bar:
         watched = bar.add_task(experiment.domain.name, total=len(experiment) * len(compared))
@@ -75,8 +104,8 @@ def _run(experiment: Experiment, compared: Sequence[Approach], jobs: int) -> lis
                     console.print(_complaint(approach, trial))
             trials.sort(key=lambda trial: (trial.seed, trial.index))
             yardstick = yardstick or trials
-            summaries.append(Summary.of(experiment, approach.name, trials, yardstick))
-    return summaries
+            results.append((Summary.of(experiment, approach.name, trials, yardstick), trials))
+    return results
 
 
 def _complaint(approach: Approach, trial: Trial) -> str:
@@ -86,9 +115,9 @@ def _complaint(approach: Approach, trial: Trial) -> str:
 def _table(experiment: Experiment, summaries: Sequence[Summary]) -> Table:
     table = Table(
         "approach",
-        "success",
+        "success [95 %]",
         "plan length [steps]",
-        "relative length",
+        "relative length [95 %]",
         "planning [s]",
         "edges rolled out",
         "steps in shortcuts",
@@ -98,12 +127,12 @@ def _table(experiment: Experiment, summaries: Sequence[Summary]) -> Table:
         ),
     )
     for summary in summaries:
-        relative = summary.relative_length
+        success = summary.success_interval
         table.add_row(
             summary.approach,
-            f"{summary.success_rate:.0%}",
+            f"{summary.success_rate:.0%} [{success.low:.0%}, {success.high:.0%}]",
             _spread(summary.plan_length, 1),
-            "-" if relative is None else f"{relative:.2f}",
+            _relative(summary),
             _spread(summary.planning_seconds, 3),
             f"{summary.edges_rolled_out:.1f}",
             f"{summary.shortcut_share:.0%}",
@@ -113,3 +142,12 @@ def _table(experiment: Experiment, summaries: Sequence[Summary]) -> Table:
 
 def _spread(spread: Spread | None, digits: int) -> str:
     return "-" if spread is None else f"{spread.mean:.{digits}f} ± {spread.sd:.{digits}f}"
+
+
+def _relative(summary: Summary) -> str:
+    if summary.relative_length is None:
+        return "-"
+    interval = summary.relative_interval
+    if interval is None or interval.low == interval.high:
+        return f"{summary.relative_length:.2f}"
+    return f"{summary.relative_length:.2f} [{interval.low:.2f}, {interval.high:.2f}]"

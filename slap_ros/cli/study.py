@@ -4,15 +4,15 @@
 
 from __future__ import annotations
 
-import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from rich.progress import TaskID
 
+from slap_ros.cli.command_line import command_line
 from slap_ros.cli.console import console, exits, progress
 from slap_ros.cli.options import DomainName, Jobs, Preset, flat_options
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose, sampling
@@ -95,7 +95,7 @@ def dynamics_(domain: DomainName, work: Work, output: Output = RESULTS) -> None:
     get_domain(domain)
     folders = [TrainingFolder(folder) for folder in work]
     report = dynamics.study(domain, folders)
-    command = _command("dynamics", domain, work=work)
+    command = command_line("study", "dynamics", domain, work=work)
     _write(output, report, Provenance(domain, command, _trainings(folders)))
 
 
@@ -108,7 +108,9 @@ def generalisation_(domain: DomainName, vary: Vary = None, *, options: Compariso
     chosen = [parse_variation(text) for text in vary or ()] or offered(comparison.domain)
     with _StudyBars() as bars:
         report = generalisation.study(_ends(comparison), chosen, bars)
-    command = _command("generalisation", domain, vary=vary, **_given(options, settings))
+    command = command_line(
+        "study", "generalisation", domain, vary=vary, **_given(options, settings)
+    )
     _write(options.output, report, Provenance(domain, command, settings))
 
 
@@ -125,7 +127,7 @@ def goals_(
     comparison, settings = _compare(domain, options)
     with _StudyBars() as bars:
         report = sampled.study(_ends(comparison), goals, bars)
-    command = _command("goals", domain, goals=goals, **_given(options, settings))
+    command = command_line("study", "goals", domain, goals=goals, **_given(options, settings))
     _write(options.output, report, Provenance(domain, command, {"goals": goals, **settings}))
 
 
@@ -150,7 +152,9 @@ def pruning_(
     if work:
         folders = [TrainingFolder(folder) for folder in work]
         explored, how = pruning.explored_in(folders, domain)
-        origin = Provenance(domain, _command("pruning", domain, work=work), _trainings(folders))
+        origin = Provenance(
+            domain, command_line("study", "pruning", domain, work=work), _trainings(folders)
+        )
     else:
         how = training_settings(settings, chosen).exploration
         explored = _explore(chosen, options, how)
@@ -160,7 +164,7 @@ def pruning_(
             "seeds": options.seeds,
             "settings": settings,
         }
-        command = _command("pruning", domain, **sampled_from)
+        command = command_line("study", "pruning", domain, **sampled_from)
         origin = Provenance(domain, command, sampled_from)
     _write(options.output, pruning.study(domain, explored, how), origin)
 
@@ -179,7 +183,7 @@ def perception_(
     with _StudyBars() as bars:
         report = perception.study(_ends(comparison), max_replans, bars)
     settings = {"max_replans": max_replans, **settings}
-    command = _command("perception", domain, **_given(options, settings))
+    command = command_line("study", "perception", domain, **_given(options, settings))
     _write(options.output, report, Provenance(domain, command, settings))
 
 
@@ -200,7 +204,7 @@ def planning_time_(
     chosen = parse_variation(vary) if vary else offered(comparison.domain, NUMBERS)[0]
     with _StudyBars() as bars:
         report = planning_time.study(comparison, chosen, bars)
-    command = _command("planning_time", domain, vary=vary, **_given(options, settings))
+    command = command_line("study", "planning_time", domain, vary=vary, **_given(options, settings))
     _write(options.output, report, Provenance(domain, command, settings))
 
 
@@ -250,17 +254,6 @@ def _explore(
 def _trainings(folders: Sequence[TrainingFolder]) -> Data:
     """Whose work folders they are."""
     return {"trainings": [folder.distribution() for folder in folders]}
-
-
-def _command(study: str, domain: str, **options: Any) -> str:
-    """What makes a report again; options that say nothing are left out."""
-    parts = ["slap", "study", study, domain]
-    for name, value in options.items():
-        values = value if isinstance(value, list) else [value]
-        if not isinstance(value, Mapping) and value is not None:
-            flag = f"--{name.replace('_', '-')}"
-            parts += [part for one in values for part in (flag, str(one))]
-    return shlex.join(parts)
 
 
 def _write(output: Path, report: StudyReport, origin: Provenance) -> None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from slap_ros.core import Domain, Task
 from slap_ros.domains import get_domain
 from slap_ros.evaluation.approaches import PURE_PLANNING, Approach
-from slap_ros.planning.execution import EpisodeResult, Executor
+from slap_ros.planning.execution import EpisodeResult, ExecutedEdge, Executor
 from slap_ros.shortcuts.workers import local_workers
 
 
@@ -83,6 +83,9 @@ class Trial:
         planning_seconds: Of all plans together, s.
         edges_rolled_out: Options simulated while planning.
         reason: Why it failed; empty where it is a success.
+        replans: Plans that replaced a diverged one.
+        error_code: Why it failed, as the ensemble's messages have it; 0 where it is a success.
+        edges: What was executed, in order.
     """
 
     seed: int
@@ -93,6 +96,9 @@ class Trial:
     planning_seconds: float
     edges_rolled_out: int
     reason: str
+    replans: int = 0
+    error_code: int = 0
+    edges: tuple[ExecutedEdge, ...] = ()
 
     @classmethod
     def of(cls, seed: int, index: int, episode: EpisodeResult) -> Trial:
@@ -115,6 +121,9 @@ class Trial:
             episode.planning_seconds,
             episode.edges_rolled_out,
             episode.error.reason,
+            episode.replans,
+            int(episode.error.code),
+            tuple(episode.edges),
         )
 
 

@@ -5,11 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from statistics import fmean, stdev
 from typing import Any
 
+from slap_ros.errors import ErrorCode
 from slap_ros.evaluation.experiment import Experiment, Trial
+from slap_ros.evaluation.statistics import Interval, ratio_interval, wilson_interval
 
 
 @dataclass(frozen=True)
@@ -33,9 +35,12 @@ class Summary:
         experiment: Which tasks.
         approach: Its name.
         success_rate: Share of tasks that were solved.
+        success_interval: Its 95 % interval.
+        at_step_limit: Tasks that were given up at their step limit.
         plan_length: Environment steps executed, over solved tasks; None where there is none.
         relative_length: Plan length over that of pure planning, on tasks that both solved; None
             where there is none.
+        relative_interval: Its 95 % interval over tasks; None with fewer than two.
         planning_seconds: Per task, s.
         edges_rolled_out: Options simulated while planning, mean per task.
         shortcut_share: Share of the environment steps executed that shortcuts took.
@@ -44,8 +49,11 @@ class Summary:
     experiment: Experiment
     approach: str
     success_rate: float
+    success_interval: Interval
+    at_step_limit: int
     plan_length: Spread | None
     relative_length: float | None
+    relative_interval: Interval | None
     planning_seconds: Spread
     edges_rolled_out: float
     shortcut_share: float
@@ -71,12 +79,16 @@ class Summary:
         """
         lengths = [float(trial.plan_length) for trial in trials if trial.success]
         steps = sum(trial.plan_length for trial in trials)
+        own, other = _lengths_of_both(trials, baseline)
         return cls(
             experiment,
             approach,
             fmean(trial.success for trial in trials),
+            wilson_interval(len(lengths), len(trials)),
+            sum(trial.error_code == ErrorCode.STEP_LIMIT for trial in trials),
             Spread.of(lengths) if lengths else None,
-            _relative_length(trials, baseline),
+            sum(own) / sum(other) if sum(other) else None,
+            ratio_interval(own, other) if sum(other) else None,
             Spread.of([trial.planning_seconds for trial in trials]),
             fmean(trial.edges_rolled_out for trial in trials),
             sum(trial.shortcut_steps for trial in trials) / steps if steps else 0.0,
@@ -106,15 +118,21 @@ class Summary:
 
     def as_row(self) -> dict[str, Any]:
         """The JSON object of one of several approaches."""
-        return self.as_json() | {"shortcut_share": self.shortcut_share}
+        return self.as_json() | {
+            "success_interval": asdict(self.success_interval),
+            "at_step_limit": self.at_step_limit,
+            "relative_interval": asdict(self.relative_interval) if self.relative_interval else None,
+            "shortcut_share": self.shortcut_share,
+        }
 
 
-def _relative_length(trials: Sequence[Trial], baseline: Sequence[Trial]) -> float | None:
-    """Mean length over that of pure planning, on the tasks that both solved."""
+def _lengths_of_both(
+    trials: Sequence[Trial], baseline: Sequence[Trial]
+) -> tuple[list[int], list[int]]:
+    """The lengths of both, on the tasks that both solved and that took a step."""
     pairs = [
         (trial.plan_length, other.plan_length)
         for trial, other in zip(trials, baseline, strict=True)
-        if trial.success and other.success
+        if trial.success and other.success and other.plan_length
     ]
-    own, other = (sum(lengths) for lengths in zip(*pairs, strict=True)) if pairs else (0, 0)
-    return own / other if other else None
+    return [own for own, _ in pairs], [other for _, other in pairs]

@@ -20,7 +20,7 @@ from slap_ros.errors import (
     UnsolvableError,
 )
 from slap_ros.perception import ExactPerceiver, Perceiver, Percept
-from slap_ros.planning.options import OptionExecution, OptionKind, OptionResult
+from slap_ros.planning.options import Option, OptionExecution, OptionKind, OptionResult
 from slap_ros.planning.plan import Plan, PlanEdge
 from slap_ros.planning.planner import Planner
 from slap_ros.relational import AtomSpace, State
@@ -29,6 +29,25 @@ MAX_REPLANS = 5  # default; a deterministic world needs none
 # What keeps a plan from being made. What was perceived wrongly may be perceived better next time.
 UNPLANNED = (UnsolvableError, PlanningLimitError, InvalidStateError, NoDetectionError)
 FINAL = frozenset({ErrorCode.STEP_LIMIT, ErrorCode.NO_DETECTION})  # another plan is no help
+
+
+@dataclass(frozen=True)
+class ExecutedEdge:
+    """An edge of a plan as it was executed.
+
+    Args:
+        option: Name of the option.
+        objects: Names of what it was applied to.
+        kind: operator or shortcut.
+        steps: Environment steps executed.
+        reached: Whether its target was reached.
+    """
+
+    option: str
+    objects: tuple[str, ...]
+    kind: str
+    steps: int
+    reached: bool
 
 
 @dataclass
@@ -40,6 +59,7 @@ class EpisodeResult:
         states: All of them, the first the initial one.
         actions: All of them, one per environment step.
         shortcut_steps: Environment steps executed that shortcuts took.
+        edges: What was executed, in order, of all plans.
         replans: Plans that replaced a diverged one.
         planning_seconds: Of all plans together, s.
         edges_rolled_out: Options simulated while planning.
@@ -50,6 +70,7 @@ class EpisodeResult:
     states: list[State] = field(default_factory=list)
     actions: list[Action] = field(default_factory=list)
     shortcut_steps: int = 0
+    edges: list[ExecutedEdge] = field(default_factory=list)
     replans: int = 0
     planning_seconds: float = 0.0
     edges_rolled_out: int = 0
@@ -133,7 +154,10 @@ class Executor:
 
     def _execute(self, plan: Plan, episode: EpisodeResult) -> OptionResult:
         for edge in plan.edges:
+            before = episode.plan_length
             result = self._execute_edge(edge, episode)
+            steps = episode.plan_length - before
+            episode.edges.append(_executed(edge.option, steps, result.reached))
             if not result.reached:
                 return result
         return OptionResult(ErrorCode.NONE)
@@ -165,3 +189,8 @@ class Executor:
         episode.actions.append(action)
         episode.states.append(self.world.step(action))
         self._percept = self._perceiver.perceive(episode.states[-1])
+
+
+def _executed(option: Option, steps: int, reached: bool) -> ExecutedEdge:
+    objects = tuple(obj.name for obj in option.objects)
+    return ExecutedEdge(option.skill.name, objects, option.kind.name.lower(), steps, reached)

@@ -4,13 +4,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from slap_ros.files import write_whole
+from slap_ros.files import pretty_json, write_whole
 from slap_ros.shortcuts.library import Library
 from slap_ros.studies.figures import Size, picture
 from slap_ros.versions import versions
@@ -102,7 +101,7 @@ def write(folder: Path, report: StudyReport, origin: Provenance) -> list[Path]:
         "found": report.found,
     }
     contents = {
-        "json": pretty(data) + "\n",
+        "json": pretty_json(data) + "\n",
         "svg": picture(report.draw, report.size),
         "md": _page(name, report, origin),
     }
@@ -121,26 +120,6 @@ def describe_library(folder: Path, library: Library) -> dict[str, Any]:
         "digest": library.digest,
         "shortcuts": [shortcut.name for shortcut in library.shortcuts],
     }
-
-
-def pretty(value: Any, indent: str = "") -> str:
-    """JSON, indented down to the innermost objects and lists, which have a line each."""
-    deeper = indent + "  "
-    parts: list[str]
-    if isinstance(value, Mapping) and any(map(_is_nested, value.values())):
-        parts = [f"{json.dumps(key)}: {pretty(part, deeper)}" for key, part in value.items()]
-        opening, closing = "{", "}"
-    elif isinstance(value, list | tuple) and any(map(_is_nested, value)):
-        parts = [pretty(part, deeper) for part in value]
-        opening, closing = "[", "]"
-    else:
-        return json.dumps(value, allow_nan=False, ensure_ascii=False)
-    lines = f",\n{deeper}".join(parts)
-    return f"{opening}\n{deeper}{lines}\n{indent}{closing}"
-
-
-def _is_nested(value: object) -> bool:
-    return isinstance(value, Mapping | list | tuple)
 
 
 def _page(name: str, report: StudyReport, origin: Provenance) -> str:

@@ -20,6 +20,7 @@ from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation import experiment as experiments
 from slap_ros.evaluation.approaches import approaches
 from slap_ros.evaluation.experiment import Experiment
+from slap_ros.files import pretty_json
 from slap_ros.planning.planner import Problem, make_planner
 from slap_ros.shortcuts import jobs
 from slap_ros.shortcuts.library import load_library
@@ -28,7 +29,7 @@ from slap_ros.shortcuts.shortcut import Sampling
 from slap_ros.shortcuts.task_distribution import TaskDistribution
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 from slap_ros.shortcuts.workers import SequentialWorkers
-from slap_ros.studies import comparison, perception, pruning, results
+from slap_ros.studies import comparison, perception, pruning
 from slap_ros.studies.goals import sample_goals
 from slap_ros.studies.trainings import TrainingFolder, read_curve
 from slap_ros.studies.variations import Variation, offered, parse_variation
@@ -423,7 +424,7 @@ def test_noise_in_perception_is_measured_in_the_world(tmp_path, monkeypatch):
 @pytest.mark.parametrize("path", sorted(PUBLISHED.glob("*.json")), ids=lambda path: path.stem)
 def test_published_data_is_as_studies_write_it(path):
     text = path.read_text(encoding="utf-8")
-    assert results.pretty(json.loads(text)) + "\n" == text
+    assert pretty_json(json.loads(text)) + "\n" == text
 
 
 @pytest.mark.parametrize("path", sorted(PUBLISHED.glob("*_*.json")), ids=lambda path: path.stem)

@@ -1,0 +1,62 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How sure a figure is: intervals that hold the true one with 95 % confidence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+NORMAL_95 = 1.959963984540054  # within so many standard deviations are 95 % of a normal variable
+RESAMPLES = 10_000
+SEED = 95  # of the resampling: the same trials give the same interval
+
+
+@dataclass(frozen=True)
+class Interval:
+    """The lower and the upper bound."""
+
+    low: float
+    high: float
+
+
+def wilson_interval(successes: int, trials: int) -> Interval:
+    """Wilson's 95 % score interval of a success rate.
+
+    Args:
+        successes: How many trials succeeded.
+        trials: At least 1.
+
+    Returns:
+        Bounds in [0, 1].
+    """
+    z2 = NORMAL_95**2
+    rate = successes / trials
+    middle = (rate + z2 / (2 * trials)) / (1 + z2 / trials)
+    spread = math.sqrt(rate * (1 - rate) / trials + z2 / (4 * trials**2))
+    half = NORMAL_95 * spread / (1 + z2 / trials)
+    # With no failure, or nothing else, the bound is exact; rounding must not move it.
+    low = 0.0 if successes == 0 else middle - half
+    high = 1.0 if successes == trials else middle + half
+    return Interval(low, high)
+
+
+def ratio_interval(numerators: Sequence[float], denominators: Sequence[float]) -> Interval | None:
+    """The bootstrap's 95 % interval of a ratio of two sums over the same tasks.
+
+    Args:
+        numerators: One for each task.
+        denominators: One for each task, above 0.
+
+    Returns:
+        The 2.5th and 97.5th percentile over resampled tasks; None with fewer than two tasks.
+    """
+    own, other = np.array(numerators, dtype=float), np.array(denominators, dtype=float)
+    if len(own) < 2:
+        return None
+    drawn = np.random.default_rng(SEED).integers(0, len(own), (RESAMPLES, len(own)))
+    low, high = np.percentile(own[drawn].sum(axis=1) / other[drawn].sum(axis=1), (2.5, 97.5))
+    return Interval(float(low), float(high))

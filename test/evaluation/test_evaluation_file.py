@@ -1,0 +1,76 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What ``slap evaluate --output`` writes is every trial, and replaces nothing but itself."""
+
+import json
+import shlex
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from ensemble.cli.application import app
+from slap_ros.errors import ErrorCode
+
+LIBRARY = Path(__file__).parent.parent / "shortcuts" / "data" / "obstacle2d"
+COMMAND = ["evaluate", "obstacle2d", "--tasks", "2", "--seeds", "2", "--first-seed", "500"]
+WITH = ["--shortcuts", str(LIBRARY), "--samples", "2"]
+
+
+def evaluate(file, *options):
+    result = CliRunner().invoke(app, [*COMMAND, *options, "--output", str(file)])
+    return result.exit_code, " ".join(result.stderr.split())
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("evaluation") / "data.json"
+    code, said = evaluate(path, *WITH)
+    assert code == 0, said
+    return path
+
+
+def test_the_figures_are_those_of_the_trials(file):
+    data = json.loads(file.read_text())
+    for row in data["approaches"]:
+        trials = row["trials"]
+        assert [(t["seed"], t["index"]) for t in trials] == [(500, 0), (500, 1), (501, 0), (501, 1)]
+        lengths = [t["plan_length"] for t in trials if t["success"]]
+        assert row["plan_length"]["mean"] == pytest.approx(sum(lengths) / len(lengths))
+        for trial in trials:
+            assert sum(edge["steps"] for edge in trial["edges"]) == trial["plan_length"]
+            learned = [e["steps"] for e in trial["edges"] if e["kind"] == "shortcut"]
+            assert sum(learned) == trial["shortcut_steps"]
+    assert data["library"]["name"] == "obstacle2d"
+
+
+def test_its_command_makes_it_again(file, tmp_path):
+    command = json.loads(file.read_text())["command"]
+    again = tmp_path / "again.json"
+    arguments = [*shlex.split(command)[1:], "--output", str(again)]
+    assert CliRunner().invoke(app, arguments).exit_code == 0
+
+    def rows(path):
+        return [
+            [{k: v for k, v in t.items() if k != "planning_seconds"} for t in row["trials"]]
+            for row in json.loads(path.read_text())["approaches"]
+        ]
+
+    assert rows(again) == rows(file)
+
+
+def test_the_data_of_another_command_stays(file):
+    before = file.read_bytes()
+    code, said = evaluate(file, "--shortcuts", "none")
+    assert code == ErrorCode.INVALID_PARAMETER
+    assert "has the data of `slap evaluate obstacle2d" in said
+    assert file.read_bytes() == before
+
+
+def test_what_is_no_evaluation_stays(tmp_path):
+    other = tmp_path / "notes.json"
+    other.write_text("{}")
+    code, said = evaluate(other)
+    assert code == ErrorCode.INVALID_PARAMETER
+    assert "is no evaluation" in said
+    assert other.read_text() == "{}"
