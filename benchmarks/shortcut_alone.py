@@ -14,6 +14,7 @@ from statistics import fmean
 from benchmarks.printing import show
 from slap_ros.core import Domain
 from slap_ros.domains import get_domain
+from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.shortcuts import jobs
 from slap_ros.shortcuts.explore import ExplorationResult
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
@@ -21,7 +22,6 @@ from slap_ros.shortcuts.settings import training_settings
 from slap_ros.shortcuts.shipped import chosen_library
 from slap_ros.shortcuts.shortcut import DEFAULT, PAPER, Shortcut
 from slap_ros.shortcuts.starts import Start, find_start, restore_starts
-from slap_ros.shortcuts.task_distribution import TaskDistribution
 from slap_ros.shortcuts.training import mean_steps, rank
 
 FRESH = 3_000_000  # the first seed of its tasks

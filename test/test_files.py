@@ -20,11 +20,11 @@ from slap_ros.errors import SlapError
 from slap_ros.files import parse_json, parse_yaml, read_bytes, read_text
 from slap_ros.language.cassette import read_cassette
 from slap_ros.language.settings import read_settings
+from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.meshes.decomposition import load_mesh
 from slap_ros.robot.scene_config import read_scene_config
 from slap_ros.shortcuts.library import LIBRARY, load_library
 from slap_ros.shortcuts.shipped import require_usable
-from slap_ros.shortcuts.work_folder import WorkFolder
 from slap_ros.studies.trainings import TrainingFolder, read_curve
 
 pytestmark = pytest.mark.timeout(60)  # what waits for a writer waits for good

@@ -21,9 +21,9 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.approaches import approaches
 from slap_ros.files import require_writable
+from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.shortcuts.settings import ExplorationSettings, training_settings
 from slap_ros.shortcuts.shipped import shipped_library
-from slap_ros.shortcuts.task_distribution import TaskDistribution
 from slap_ros.studies import dynamics, generalisation, perception, planning_time, pruning
 from slap_ros.studies import goals as sampled
 from slap_ros.studies.comparison import Comparison

@@ -22,13 +22,13 @@ from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, read_text, require_writable
+from slap_ros.learning.setting_changes import changed, parse_changes
+from slap_ros.learning.task_distribution import TaskDistribution
+from slap_ros.learning.workers import Workers, local_workers, ray_workers
 from slap_ros.shortcuts.library import save_library
-from slap_ros.shortcuts.setting_changes import changed, parse_changes
 from slap_ros.shortcuts.settings import TrainingSettings, training_settings
-from slap_ros.shortcuts.task_distribution import TaskDistribution
 from slap_ros.shortcuts.training import CandidateGroup, Training
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
-from slap_ros.shortcuts.workers import Workers, local_workers, ray_workers
 
 REFRESH_S = 1.0
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from slap_ros.core import Domain, Task
 from slap_ros.domains import get_domain
 from slap_ros.evaluation.approaches import PURE_PLANNING, Approach
+from slap_ros.learning.workers import local_workers
 from slap_ros.planning.execution import EpisodeResult, ExecutedEdge, Executor
-from slap_ros.shortcuts.workers import local_workers
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from slap_ros.errors import PlanningLimitError, SlapError, UnsolvableError
+from slap_ros.learning.subproc_vec_env import make_vec_env
+from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.planning.planner import GraphPlanner, Problem
 from slap_ros.shortcuts.explore import Explorer, OperatorPath
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
@@ -19,10 +21,9 @@ from slap_ros.shortcuts.library import load_shortcut, save_shortcut
 from slap_ros.shortcuts.progress import ProgressRecorder
 from slap_ros.shortcuts.settings import ExplorationSettings, TrainingSettings
 from slap_ros.shortcuts.shortcut import Sampling, Shortcut
+from slap_ros.shortcuts.shortcut_env_spec import ShortcutEnvSpec
 from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.starts import StartRecord, find_start
-from slap_ros.shortcuts.subproc_vec_env import VecEnvSpec, make_vec_env
-from slap_ros.shortcuts.task_distribution import TaskDistribution
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 
 if TYPE_CHECKING:
@@ -172,7 +173,7 @@ def learn(
 
 
 def _learn_stages(
-    specs: Sequence[Sequence[VecEnvSpec]],
+    specs: Sequence[Sequence[ShortcutEnvSpec]],
     settings: TrainingSettings,
     seed: int,
     work: ShortcutWorkFolder,
@@ -205,11 +206,11 @@ def _parts(
     starts: tuple[StartRecord, ...],
     settings: TrainingSettings,
     stage: int,
-) -> list[VecEnvSpec]:
+) -> list[ShortcutEnvSpec]:
     """The parts of a stage's environments, each with a seed of its own."""
     ppo = settings.stages[stage]
     return [
-        VecEnvSpec(
+        ShortcutEnvSpec(
             distribution.domain,
             distribution.preset,
             signature,

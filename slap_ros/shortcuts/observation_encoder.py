@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from slap_ros.core import Domain, LearnerInterface
 from slap_ros.errors import InvalidDomainError
+from slap_ros.learning.action_map import ActionMap
 from slap_ros.relational import AtomSpace, Column, GroundAtom, Object, State
 from slap_ros.relational.predicates import Bools, Predicate
 from slap_ros.relational.state import Array
-from slap_ros.shortcuts.action_map import ActionMap
 from slap_ros.shortcuts.signature import Change, Kind, Signature, concerned, kinds
 
 # Terms of the potential, all against the hand being ``length_m`` away from its next object.

@@ -13,59 +13,35 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
-from stable_baselines3.common.vec_env import VecEnv as Sb3VecEnv
 
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import read_bytes
-from slap_ros.shortcuts.mlp_policy import MlpPolicy, ObservationNormalisation
+from slap_ros.learning.mlp_policy import MlpPolicy, ObservationNormalisation
+from slap_ros.learning.stable_baselines import StableBaselinesVecEnv
+from slap_ros.learning.vec_env import VecEnv, VecEnvStep
 from slap_ros.shortcuts.ppo_settings import PpoSettings
 from slap_ros.shortcuts.progress import Progress
-from slap_ros.shortcuts.vec_env import VecEnv, VecEnvStep
 
 MAX_CHECKPOINT_BYTES = 2**30
 RECENT = 200  # episodes over which success and length are taken
 ACTION_REPEAT = 8  # steps for which a random action is repeated before normalisation
 
 
-class _NormalisedVecEnv(Sb3VecEnv):
-    """A vectorised environment as stable-baselines3 wants it, with statistics of its episodes."""
+class _NormalisedVecEnv(StableBaselinesVecEnv):
+    """The environments of a shortcut, with normalised observations and statistics of episodes."""
 
     def __init__(self, env: VecEnv, normalisation: ObservationNormalisation) -> None:
-        self.env, self.normalisation = env, normalisation
+        super().__init__(env, normalisation)
         self.history: deque[tuple[bool, int, bool]] = deque(maxlen=RECENT)
         self.episodes = 0
         self.shortest = env.horizon
-        size = env.observations.shape[1]
-        super().__init__(
-            env.num_envs,
-            gym.spaces.Box(-np.inf, np.inf, (size,), np.float32),
-            gym.spaces.Box(-1.0, 1.0, (env.action_map.size,), np.float32),
-        )
 
-    def reset(self) -> Any:
-        return self.normalisation(self.env.observations)
-
-    def step_async(self, actions: Any) -> None:
-        self._actions = actions
-
-    def step_wait(self) -> Any:
-        step = self.env.step(self._actions)
-        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        final = self.normalisation(step.final_observations)
-        for i in np.flatnonzero(step.dones):
-            infos[i]["terminal_observation"] = final[i]
-            infos[i]["TimeLimit.truncated"] = bool(step.truncated[i])
-            self._count(step, int(i))
-        observations = self.normalisation(step.observations)
-        return observations, step.rewards.astype(np.float32), step.dones, infos
-
-    def _count(self, step: VecEnvStep, i: int) -> None:
+    def count(self, step: VecEnvStep, i: int) -> None:
         """Take note of an episode that ended."""
         success, length = bool(step.success[i]), int(step.lengths[i])
         self.history.append((success, length, bool(step.failure[i])))
@@ -84,21 +60,6 @@ class _NormalisedVecEnv(Sb3VecEnv):
             sum(failure for _, _, failure in self.history) / count,
             self.shortest,
         )
-
-    def close(self) -> None:
-        return None
-
-    def get_attr(self, attr_name: str, _: Any = None) -> list[Any]:
-        return [getattr(self, attr_name, None)] * self.num_envs
-
-    def set_attr(self, attr_name: str, *_: Any) -> None:
-        raise NotImplementedError(f"the environments have no attribute {attr_name} to be set")
-
-    def env_method(self, method_name: str, *_: Any, **__: Any) -> list[Any]:
-        raise NotImplementedError(f"the environments have no method {method_name}")
-
-    def env_is_wrapped(self, *_: Any) -> list[bool]:
-        return [False] * self.num_envs
 
 
 class _ProgressCallback(BaseCallback):

@@ -10,13 +10,11 @@ from typing import Any
 
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidDomainError, InvalidParameterError
+from slap_ros.learning.setting_changes import changed
 from slap_ros.shortcuts.ppo_settings import PpoSettings
 from slap_ros.shortcuts.rewards import Rewards
-from slap_ros.shortcuts.setting_changes import changed
 from slap_ros.shortcuts.shortcut import DEFAULT, PAPER, Sampling
 from slap_ros.shortcuts.stored_keys import restored, stored
-
-TRAINING_SEED = 1_000_000  # added to the seed: training never sees the tasks of evaluation
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from slap_ros.shortcuts.mlp_policy import MlpPolicy
+from slap_ros.learning.mlp_policy import MlpPolicy
 from slap_ros.shortcuts.signature import Signature
 
 

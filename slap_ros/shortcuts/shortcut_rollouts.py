@@ -12,8 +12,8 @@ from hashlib import sha256
 import numpy as np
 
 from slap_ros.core import Domain, VectorWorld
+from slap_ros.learning.mlp_policy import MlpPolicy, Weights
 from slap_ros.relational import State
-from slap_ros.shortcuts.mlp_policy import MlpPolicy, Weights
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.shortcut import Sampling, Shortcut
 from slap_ros.shortcuts.signature import Change

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slap_ros.core import Domain
+from slap_ros.learning.vec_env import VecEnvStep
 from slap_ros.relational import State
 from slap_ros.relational.predicates import Bools
 from slap_ros.relational.state import Array
@@ -23,7 +24,6 @@ from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.rewards import Rewards
 from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.starts import Start
-from slap_ros.shortcuts.vec_env import VecEnvStep
 
 
 class ShortcutVecEnv:
@@ -64,7 +64,7 @@ class ShortcutVecEnv:
         self.observations = np.concatenate([group.observations for group in self._groups])
 
     def step(self, actions: Array) -> VecEnvStep:
-        """See :meth:`slap_ros.shortcuts.vec_env.VecEnv.step`."""
+        """See :meth:`slap_ros.learning.vec_env.VecEnv.step`."""
         self._lengths += 1
         truncated = self._lengths >= self.horizon
         commands = self.action_map(actions)

@@ -17,6 +17,9 @@ from statistics import fmean
 from typing import Any, Protocol
 
 from slap_ros.errors import InvalidParameterError, UnsolvableError
+from slap_ros.learning.task_distribution import TaskDistribution
+from slap_ros.learning.work_folder import WorkFolder
+from slap_ros.learning.workers import Workers, in_order
 from slap_ros.shortcuts import jobs
 from slap_ros.shortcuts.explore import ExplorationResult, OperatorPath, ShortcutCandidate
 from slap_ros.shortcuts.library import Library
@@ -24,9 +27,6 @@ from slap_ros.shortcuts.settings import TrainingSettings
 from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.signature import Pattern, Signature
 from slap_ros.shortcuts.starts import StartRecord
-from slap_ros.shortcuts.task_distribution import TaskDistribution
-from slap_ros.shortcuts.work_folder import WorkFolder
-from slap_ros.shortcuts.workers import Workers, in_order
 from slap_ros.versions import versions
 
 UNRECORDED = "why was not recorded"  # in work folders of version 0.1.0

@@ -13,9 +13,9 @@ from slap_ros.domains import get_domain
 from slap_ros.evaluation.approaches import Approach
 from slap_ros.evaluation.experiment import Experiment, Trial, run_all
 from slap_ros.evaluation.summary import Spread, Summary
+from slap_ros.learning.workers import local_workers
 from slap_ros.planning.planner import Planner
 from slap_ros.relational import State
-from slap_ros.shortcuts.workers import local_workers
 
 Result = TypeVar("Result")
 

@@ -22,10 +22,10 @@ from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.evaluation.approaches import Approach
 from slap_ros.evaluation.experiment import Trial, solve
 from slap_ros.evaluation.summary import Summary
+from slap_ros.learning.workers import in_order
 from slap_ros.planning.abstract_graph import build_abstract_graph
 from slap_ros.planning.planner import Problem
 from slap_ros.relational import AtomSpace, GroundAtom
-from slap_ros.shortcuts.workers import in_order
 from slap_ros.studies.comparison import (
     Comparison,
     PlanningSetup,

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 from slap_ros.drawing.palette import MUTED, PLAN
 from slap_ros.errors import InvalidParameterError, PlanningLimitError, UnsolvableError
 from slap_ros.evaluation.summary import Spread
+from slap_ros.learning.task_distribution import TaskDistribution
+from slap_ros.learning.workers import in_order, local_workers
 from slap_ros.shortcuts import jobs as training_jobs
 from slap_ros.shortcuts.explore import ExplorationResult
 from slap_ros.shortcuts.settings import ExplorationSettings
-from slap_ros.shortcuts.task_distribution import TaskDistribution
-from slap_ros.shortcuts.workers import in_order, local_workers
 from slap_ros.studies.comparison import StudyProgress, format_spread
 from slap_ros.studies.figures import legend_above
 from slap_ros.studies.results import MarkdownTable, StudyReport

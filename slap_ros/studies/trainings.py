@@ -12,9 +12,9 @@ from typing import Any
 
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, read_text
+from slap_ros.learning.work_folder import DECODING_ERRORS
 from slap_ros.shortcuts.explore import ExplorationResult
 from slap_ros.shortcuts.settings import ExplorationSettings
-from slap_ros.shortcuts.work_folder import DECODING_ERRORS
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,8 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode, SlapError
 from slap_ros.evaluation.approaches import Approach
 from slap_ros.evaluation.experiment import Experiment
+from slap_ros.learning.task_distribution import TaskDistribution
+from slap_ros.learning.workers import SequentialWorkers
 from slap_ros.meshes.obj import from_obj
 from slap_ros.meshes.solid import Solid
 from slap_ros.messages.interfaces import definition, typestore
@@ -32,10 +34,8 @@ from slap_ros.robot.scene_config import read_scene_config
 from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.settings import ExplorationSettings, training_settings
 from slap_ros.shortcuts.shortcut import Sampling
-from slap_ros.shortcuts.task_distribution import TaskDistribution
 from slap_ros.shortcuts.training import Training
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
-from slap_ros.shortcuts.workers import SequentialWorkers
 from slap_ros.studies.trainings import TrainingFolder
 
 pytestmark = pytest.mark.timeout(3600)  # for as many cases as somebody may ask for

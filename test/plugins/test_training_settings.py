@@ -12,11 +12,11 @@ from ensemble.cli.application import app
 from slap_ros.core import Learning
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode, InvalidDomainError, InvalidParameterError, UnsolvableError
-from slap_ros.shortcuts.setting_changes import changed, parse_changes, setting_names
+from slap_ros.learning.setting_changes import changed, parse_changes, setting_names
+from slap_ros.learning.task_distribution import TaskDistribution
+from slap_ros.learning.workers import SequentialWorkers
 from slap_ros.shortcuts.settings import GENERAL, OURS, TrainingSettings, training_settings
-from slap_ros.shortcuts.task_distribution import TaskDistribution
 from slap_ros.shortcuts.training import Training
-from slap_ros.shortcuts.workers import SequentialWorkers
 
 PATCHY = patchy.make("some")
 WRONG = [

@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 
 from slap_ros.domains import get_domain
+from slap_ros.learning.task_distribution import TRAINING_SEED
 from slap_ros.planning.planner import Problem
 from slap_ros.shortcuts.library import Library, save_library
 from slap_ros.shortcuts.ppo import Learner, normalisation_of
 from slap_ros.shortcuts.ppo_settings import PpoSettings
 from slap_ros.shortcuts.progress import Progress
 from slap_ros.shortcuts.rewards import Rewards
-from slap_ros.shortcuts.settings import TRAINING_SEED
 from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.shortcut_vec_env import ShortcutVecEnv
 from slap_ros.shortcuts.signature import Change, Signature

@@ -14,9 +14,9 @@ from safetensors.numpy import load, save
 
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError
+from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.signature import Signature
-from slap_ros.shortcuts.work_folder import WorkFolder
 from slap_ros.studies.trainings import TrainingFolder
 
 DATA = Path(__file__).parent / "data" / "obstacle2d"

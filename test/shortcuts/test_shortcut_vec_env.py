@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from pushing import DOMAIN, SIGNATURE, STARTS, overlap
 
+from slap_ros.learning.action_map import ActionMap
 from slap_ros.relational import State
-from slap_ros.shortcuts.action_map import ActionMap
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.rewards import Rewards
 from slap_ros.shortcuts.shortcut_vec_env import ShortcutVecEnv

@@ -10,17 +10,18 @@ import pytest
 from pushing import SIGNATURE, STARTS
 
 from slap_ros.errors import InvalidStateError
+from slap_ros.learning.subproc_vec_env import make_vec_env
+from slap_ros.learning.vec_env import VecEnvStep
 from slap_ros.shortcuts.rewards import Rewards
+from slap_ros.shortcuts.shortcut_env_spec import ShortcutEnvSpec
 from slap_ros.shortcuts.starts import StartRecord
-from slap_ros.shortcuts.subproc_vec_env import VecEnvSpec, make_vec_env
-from slap_ros.shortcuts.vec_env import VecEnvStep
 
 RECORDS = tuple(
     StartRecord(21, index, tuple(start.state.data), start.change.add, start.change.delete)
     for index, start in enumerate(STARTS)
 )
 SPECS = [
-    VecEnvSpec("obstacle2d", "fair", SIGNATURE, RECORDS, 5, 12, Rewards(), (3, part))
+    ShortcutEnvSpec("obstacle2d", "fair", SIGNATURE, RECORDS, 5, 12, Rewards(), (3, part))
     for part in range(3)
 ]
 

@@ -12,13 +12,13 @@ import pytest
 
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
+from slap_ros.learning.task_distribution import TaskDistribution
+from slap_ros.learning.workers import SequentialWorkers, ray_workers
 from slap_ros.shortcuts.explore import ExplorationResult, ShortcutCandidate
 from slap_ros.shortcuts.library import load_library, save_library
 from slap_ros.shortcuts.settings import ExplorationSettings, training_settings
 from slap_ros.shortcuts.signature import Signature
-from slap_ros.shortcuts.task_distribution import TaskDistribution
 from slap_ros.shortcuts.training import Training, rank
-from slap_ros.shortcuts.workers import SequentialWorkers, ray_workers
 
 TASKS = TaskDistribution("obstacle2d", "fair", 5)
 OURS = training_settings("ours", get_domain("obstacle2d"))

@@ -21,14 +21,14 @@ from slap_ros.evaluation import experiment as experiments
 from slap_ros.evaluation.approaches import approaches
 from slap_ros.evaluation.experiment import Experiment
 from slap_ros.files import pretty_json
+from slap_ros.learning.task_distribution import TaskDistribution
+from slap_ros.learning.workers import SequentialWorkers
 from slap_ros.planning.planner import Problem, make_planner
 from slap_ros.shortcuts import jobs
 from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.settings import training_settings
 from slap_ros.shortcuts.shortcut import Sampling
-from slap_ros.shortcuts.task_distribution import TaskDistribution
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
-from slap_ros.shortcuts.workers import SequentialWorkers
 from slap_ros.studies import comparison, perception, pruning
 from slap_ros.studies.goals import sample_goals
 from slap_ros.studies.trainings import TrainingFolder, read_curve

@@ -10,9 +10,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from slap_ros.learning.action_map import ActionMap
 from slap_ros.relational.predicates import Bools
 from slap_ros.relational.state import Array
-from slap_ros.shortcuts.action_map import ActionMap
 
 
 @dataclass(frozen=True)

@@ -11,63 +11,47 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.domains import get_domain
 from slap_ros.errors import SlapError
+from slap_ros.learning.action_map import ActionMap
+from slap_ros.learning.vec_env import VecEnv, VecEnvStep
+from slap_ros.learning.workers import exit_with_parent
 from slap_ros.relational.state import Array
-from slap_ros.shortcuts.action_map import ActionMap
-from slap_ros.shortcuts.observation_encoder import make_action_map
-from slap_ros.shortcuts.rewards import Rewards
-from slap_ros.shortcuts.shortcut_vec_env import ShortcutVecEnv
-from slap_ros.shortcuts.signature import Signature
-from slap_ros.shortcuts.starts import StartRecord, restore_starts
-from slap_ros.shortcuts.vec_env import VecEnv, VecEnvStep
-from slap_ros.shortcuts.workers import exit_with_parent
 from slap_ros.signals import interrupts_held_back
 
 PATIENCE_S = 5.0  # for a process to end by itself
 CLOSED = (EOFError, ConnectionError)  # raised by a pipe whose other end is closed
 
 
-@dataclass(frozen=True)
-class VecEnvSpec:
-    """What a :class:`ShortcutVecEnv` is made from, as data that other processes can be sent.
+class VecEnvSpec(Protocol):
+    """What environments are made from, as data that other processes can be sent."""
 
-    Args:
-        domain: Its name.
-        preset: Of the domain.
-        signature: Of the shortcut.
-        starts: From which episodes draw.
-        num_envs: How many environments.
-        horizon: Environment steps after which an episode is truncated.
-        rewards: The reward function.
-        seed: Of the generator that draws the starts.
-    """
+    @property
+    def num_envs(self) -> int:
+        """How many environments."""
+        ...
 
-    domain: str
-    preset: str
-    signature: Signature
-    starts: tuple[StartRecord, ...]
-    num_envs: int
-    horizon: int
-    rewards: Rewards
-    seed: tuple[int, ...]
+    @property
+    def horizon(self) -> int:
+        """Environment steps after which an episode is truncated."""
+        ...
 
-    def make(self) -> ShortcutVecEnv:
+    @property
+    def action_map(self) -> ActionMap:
+        """From the policy's actions to the robot's."""
+        ...
+
+    def make(self) -> VecEnv:
         """The environments themselves, in this process."""
-        domain, rng = get_domain(self.domain, self.preset), np.random.default_rng(self.seed)
-        starts = restore_starts(domain, self.starts)
-        return ShortcutVecEnv(
-            domain, self.signature, starts, self.num_envs, self.horizon, self.rewards, rng
-        )
+        ...
 
 
 class SubprocVecEnv:
@@ -85,15 +69,14 @@ class SubprocVecEnv:
         """
         first = shares[0][0]
         self.horizon = first.horizon
-        domain = get_domain(first.domain, first.preset)
-        self.action_map: ActionMap = make_action_map(domain, first.signature)
+        self.action_map = first.action_map
         self._links = links
         sizes = [sum(spec.num_envs for spec in share) for share in shares]
         self.num_envs, self._bounds = sum(sizes), np.cumsum(sizes)[:-1]
         self.observations: NDArray[np.float32] = np.concatenate(self._receive_all())
 
     def step(self, actions: Array) -> VecEnvStep:
-        """See :meth:`slap_ros.shortcuts.vec_env.VecEnv.step`.
+        """See :meth:`slap_ros.learning.vec_env.VecEnv.step`.
 
         Raises:
             ChildProcessError: One of the processes has ended.
@@ -175,9 +158,7 @@ def _receive(link: Connection) -> Any:
 
 
 def _concatenated(steps: Sequence[VecEnvStep]) -> VecEnvStep:
-    return VecEnvStep(
-        *(
-            np.concatenate([getattr(step, field.name) for step in steps])
-            for field in fields(VecEnvStep)
-        )
+    kind = type(steps[0])  # it may be a step with more than every environment has
+    return kind(
+        *(np.concatenate([getattr(step, field.name) for step in steps]) for field in fields(kind))
     )

@@ -1,0 +1,55 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The environments of one shortcut as data: what another process makes them from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from slap_ros.domains import get_domain
+from slap_ros.learning.action_map import ActionMap
+from slap_ros.shortcuts.observation_encoder import make_action_map
+from slap_ros.shortcuts.rewards import Rewards
+from slap_ros.shortcuts.shortcut_vec_env import ShortcutVecEnv
+from slap_ros.shortcuts.signature import Signature
+from slap_ros.shortcuts.starts import StartRecord, restore_starts
+
+
+@dataclass(frozen=True)
+class ShortcutEnvSpec:
+    """What a :class:`ShortcutVecEnv` is made from, as data that other processes can be sent.
+
+    Args:
+        domain: Its name.
+        preset: Of the domain.
+        signature: Of the shortcut.
+        starts: From which episodes draw.
+        num_envs: How many environments.
+        horizon: Environment steps after which an episode is truncated.
+        rewards: The reward function.
+        seed: Of the generator that draws the starts.
+    """
+
+    domain: str
+    preset: str
+    signature: Signature
+    starts: tuple[StartRecord, ...]
+    num_envs: int
+    horizon: int
+    rewards: Rewards
+    seed: tuple[int, ...]
+
+    @property
+    def action_map(self) -> ActionMap:
+        """From the policy's actions to the robot's."""
+        return make_action_map(get_domain(self.domain, self.preset), self.signature)
+
+    def make(self) -> ShortcutVecEnv:
+        """The environments themselves, in this process."""
+        domain, rng = get_domain(self.domain, self.preset), np.random.default_rng(self.seed)
+        starts = restore_starts(domain, self.starts)
+        return ShortcutVecEnv(
+            domain, self.signature, starts, self.num_envs, self.horizon, self.rewards, rng
+        )
