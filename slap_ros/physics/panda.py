@@ -99,21 +99,28 @@ def grasp_pose(q: Sequence[float] | NDArray[np.float64]) -> Pose:
     return hand_pose(q).compose(_GRASP_FRAME)
 
 
-def link_poses(q: Sequence[float] | NDArray[np.float64], finger: float) -> list[Pose]:
-    """Poses of all links, in the order of :data:`LINKS`.
+def link_poses(
+    q: Sequence[float] | NDArray[np.float64], finger: float, right_finger: float | None = None
+) -> list[Pose]:
+    """Where all links are.
 
     The right finger is the left one turned by half a turn about the hand's z, so that both have
     the same shape in their own frames.
 
     Args:
         q: Joint positions, rad, shape (7,).
-        finger: Distance of each finger from the middle, m.
+        finger: Distance of each finger from the middle, m; or only of the left one.
+        right_finger: Of the right one, if it is another.
+
+    Returns:
+        A pose for each of :data:`LINKS`, in the frame of the base.
     """
     poses = _arm(q)
     hand = poses[-1].compose(_HAND_FRAME)
     left = Pose(hand.apply((0.0, finger, _FINGER_HEIGHT)), hand.quaternion)
+    right_y = -finger if right_finger is None else -right_finger
     right = Pose(
-        hand.apply((0.0, -finger, _FINGER_HEIGHT)), multiply(hand.quaternion, _HALF_TURN_Z)
+        hand.apply((0.0, right_y, _FINGER_HEIGHT)), multiply(hand.quaternion, _HALF_TURN_Z)
     )
     poses += [hand, left, right]
     return poses

@@ -11,30 +11,35 @@ from types import TracebackType
 import numpy as np
 
 from slap_ros.geometry.pose import Pose, Vector
-from slap_ros.meshes.solid import ConvexPiece, Solid
+from slap_ros.meshes.solid import ConvexPiece
 from slap_ros.physics.animation import Picture, write_pictures
 from slap_ros.physics.bullet import pybullet
-from slap_ros.physics.panda import CONTROL_PERIOD_S
-from slap_ros.physics.scene import Body, Box, Scene
+from slap_ros.physics.scene import GREY, Colour
 from slap_ros.physics.simulation import PANDA
-from slap_ros.physics.snapshot import SnapshotCodec
 from slap_ros.physics.viewpoint import Viewpoint
+from slap_ros.physics.visuals import Cylinder, Visuals, VisualShape
 from slap_ros.relational import State
 
 ARM_JOINTS = range(7)  # indices in the URDF
 FINGER_JOINTS = (9, 10)
-STAND = Box("stand", (0.1, 0.1, 0.2125), pose=Pose((0.0, 0.0, -0.2125)))  # what the base is on
+STAND = VisualShape((0.1, 0.1, 0.2125), GREY)  # what the base is on
+STAND_AT = Pose((0.0, 0.0, -0.2125))
 UP: Vector = (0.0, 0.0, 1.0)
 NEAR, FAR = 0.05, 5.0  # m, what is closer or further is not drawn
 
 
 class Camera:
-    """Draws states of a scene, in a client of its own; to be closed."""
+    """Draws states, in a client of its own; to be closed."""
 
-    def __init__(self, scene: Scene, view: Viewpoint | None = None) -> None:
-        """Look at ``scene``; by default from the front right, from above the arm."""
+    def __init__(self, visuals: Visuals, view: Viewpoint | None = None) -> None:
+        """Look at an arm and what is around it.
+
+        Args:
+            visuals: What is around it.
+            view: From where; by default from the front right, from above the arm.
+        """
         view = view or Viewpoint()
-        self._scene = scene
+        self._visuals = visuals
         self._size = (view.width, view.height)
         self.client: int = pybullet.connect(pybullet.DIRECT)
         self._view = pybullet.computeViewMatrix(view.eye, view.target, UP)
@@ -44,9 +49,8 @@ class Camera:
         self._robot: int = pybullet.loadURDF(
             str(PANDA / "panda.urdf"), useFixedBase=True, physicsClientId=self.client
         )
-        self._add(STAND)
-        self._free = [self._add(body) for body in scene.free]
-        self._fixed = [self._add(body) for body in scene.fixed]
+        pybullet.resetBasePositionAndOrientation(self._add(STAND), *STAND_AT, self.client)
+        self._shapes = [self._add(shape) for shape in visuals.shapes]
 
     def __enter__(self) -> Camera:
         return self
@@ -80,45 +84,42 @@ class Camera:
         return np.asarray(pixels, dtype=np.uint8).reshape(height, width, 4)[..., :3]
 
     def _place(self, state: State) -> None:
-        reader = SnapshotCodec.of(self._scene, state.layout)
-        snapshot = reader.read(state)
-        for joint, q in zip(ARM_JOINTS, snapshot.joints, strict=True):
+        joints, fingers, poses = self._visuals.configuration(state)
+        for joint, q in zip(ARM_JOINTS, joints, strict=True):
             pybullet.resetJointState(self._robot, joint, q, 0.0, self.client)
-        for joint in FINGER_JOINTS:
-            pybullet.resetJointState(self._robot, joint, snapshot.finger, 0.0, self.client)
-        poses = [motion.pose for motion in snapshot.bodies]
-        poses += reader.fixed_poses(self._scene, state)
-        for pieces, pose in zip([*self._free, *self._fixed], poses, strict=True):
-            for piece in pieces:
-                pybullet.resetBasePositionAndOrientation(piece, *pose, self.client)
+        for joint, q in zip(FINGER_JOINTS, fingers, strict=True):
+            pybullet.resetJointState(self._robot, joint, q, 0.0, self.client)
+        for shape, pose in zip(self._shapes, poses, strict=True):
+            pybullet.resetBasePositionAndOrientation(shape, *pose, self.client)
 
-    def _add(self, body: Body) -> list[int]:
-        """What a body looks like: one thing, or its pieces."""
-        if isinstance(body.shape, Solid):
-            looks = [self._piece(piece, body) for piece in body.shape.pieces]
+    def _add(self, shape: VisualShape) -> int:
+        geometry = shape.geometry
+        if isinstance(geometry, ConvexPiece):
+            look = self._piece(geometry, shape.colour)
+        elif isinstance(geometry, Cylinder):
+            radius, length = geometry
+            look = self._visual(shape.colour, pybullet.GEOM_CYLINDER, radius=radius, length=length)
         else:
-            looks = [self._visual(body, pybullet.GEOM_BOX, halfExtents=body.shape)]
-        return [
-            pybullet.createMultiBody(0.0, -1, look, *body.pose, physicsClientId=self.client)
-            for look in looks
-        ]
+            look = self._visual(shape.colour, pybullet.GEOM_BOX, halfExtents=geometry)
+        added: int = pybullet.createMultiBody(0.0, -1, look, physicsClientId=self.client)
+        return added
 
-    def _piece(self, piece: ConvexPiece, body: Body) -> int:
+    def _piece(self, piece: ConvexPiece, colour: Colour) -> int:
         """A piece with corners of their own for each triangle, so that faces look flat."""
         corners = np.array(piece.vertices)[np.array(piece.triangles)]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
         return self._visual(
-            body,
+            colour,
             pybullet.GEOM_MESH,
             vertices=corners.reshape(-1, 3).tolist(),
             indices=list(range(3 * len(corners))),
             normals=np.repeat(normals, 3, axis=0).tolist(),
         )
 
-    def _visual(self, body: Body, kind: int, **geometry: object) -> int:
+    def _visual(self, colour: Colour, kind: int, **geometry: object) -> int:
         shape: int = pybullet.createVisualShape(
-            kind, rgbaColor=body.colour, physicsClientId=self.client, **geometry
+            kind, rgbaColor=colour, physicsClientId=self.client, **geometry
         )
         return shape
 
@@ -127,14 +128,16 @@ def write_animation(
     path: Path,
     camera: Camera,
     states: Iterable[State],
+    period_s: float,
     progress: Callable[[int], None] | None = None,
 ) -> None:
-    """Write an animation in real time, one frame a control step.
+    """Write an animation in real time, one frame per control step.
 
     Args:
         path: The file; its ending says the format, see ``slap_ros.physics.animation``.
         camera: Draws the frames.
-        states: One a control step; not empty.
+        states: One per control step; not empty.
+        period_s: What a control step takes.
         progress: Told the number of frames drawn so far, after each.
     """
 
@@ -144,4 +147,4 @@ def write_animation(
             if progress is not None:
                 progress(done)
 
-    write_pictures(path, pictures(), CONTROL_PERIOD_S)
+    write_pictures(path, pictures(), period_s)

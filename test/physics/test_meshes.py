@@ -18,6 +18,7 @@ from slap_ros.physics.panda import HOME
 from slap_ros.physics.rendering import Camera
 from slap_ros.physics.scene import CUBE_EDGE, CUBE_MATERIAL, TABLE, TABLE_TOP, Mesh, Scene, cube
 from slap_ros.physics.simulation import Simulation, Stepping
+from slap_ros.physics.visuals import SceneVisuals
 from slap_ros.physics.world import PandaWorld
 
 CUBE = Solid.of([make.block((0.0, 0.0, 0.0), (CUBE_EDGE,) * 3)])
@@ -134,6 +135,9 @@ def test_an_arm_far_away_skips_what_rests_and_a_near_one_does_not():
 
 def test_pictures_show_toys_where_they_are():
     state = apart([0.05] * 4)
-    with Camera(TOYS) as camera, Camera(Scene((TABLE,), TOYS.floor_m)) as empty:
+    with (
+        Camera(SceneVisuals(TOYS)) as camera,
+        Camera(SceneVisuals(Scene((TABLE,), TOYS.floor_m))) as empty,
+    ):
         differ = (camera.picture(state) != empty.picture(state)).any(axis=-1)
     assert 200 < differ.sum() < 20_000  # pixels

@@ -15,8 +15,10 @@ from transitions import holding
 from benchmarks.physics_step import NAMES, tower
 from slap_ros.physics.animation import WRITERS
 from slap_ros.physics.bullet import pybullet
+from slap_ros.physics.panda import CONTROL_PERIOD_S
 from slap_ros.physics.rendering import Camera, Viewpoint, write_animation
 from slap_ros.physics.scene import TABLE, Scene, cube
+from slap_ros.physics.visuals import SceneVisuals
 from slap_ros.relational import State
 
 RED, BLUE = (0.9, 0.1, 0.1, 1.0), (0.1, 0.1, 0.9, 1.0)
@@ -26,7 +28,7 @@ VIEW = Viewpoint(width=160, height=120)
 
 @pytest.fixture
 def camera():
-    with Camera(SCENE, VIEW) as camera:
+    with Camera(SceneVisuals(SCENE), VIEW) as camera:
         yield camera
 
 
@@ -86,7 +88,7 @@ def frames_of(path: Path) -> list[np.ndarray]:
 def test_an_animation_has_a_frame_a_step_that_shows_it(camera, tmp_path, ending):
     states, told = falling(), []
     path = tmp_path / f"fall{ending}"
-    write_animation(path, camera, states, told.append)
+    write_animation(path, camera, states, CONTROL_PERIOD_S, told.append)
     assert told == [1, 2, 3, 4]
     assert list(tmp_path.iterdir()) == [path]  # nothing else is left
     frames = frames_of(path)
@@ -97,8 +99,8 @@ def test_an_animation_has_a_frame_a_step_that_shows_it(camera, tmp_path, ending)
 
 
 def test_animations_play_in_real_time(camera, tmp_path):
-    write_animation(tmp_path / "fall.gif", camera, falling())
-    write_animation(tmp_path / "fall.mp4", camera, falling())
+    write_animation(tmp_path / "fall.gif", camera, falling(), CONTROL_PERIOD_S)
+    write_animation(tmp_path / "fall.mp4", camera, falling(), CONTROL_PERIOD_S)
     with Image.open(tmp_path / "fall.gif") as image:
         assert image.info["duration"] in (120, 130)  # ms, in hundredths of a second
     assert cv2.VideoCapture(str(tmp_path / "fall.mp4")).get(cv2.CAP_PROP_FPS) == 8.0
@@ -115,7 +117,7 @@ def test_an_interrupted_animation_leaves_what_was_there(camera, tmp_path, ending
             raise error
 
     with pytest.raises(error):
-        write_animation(path, camera, falling(), interrupt)
+        write_animation(path, camera, falling(), CONTROL_PERIOD_S, interrupt)
     assert list(tmp_path.iterdir()) == [path]
     assert path.read_text() == "the last one"
 
@@ -123,12 +125,12 @@ def test_an_interrupted_animation_leaves_what_was_there(camera, tmp_path, ending
 @pytest.mark.parametrize("ending", WRITERS)
 def test_a_folder_that_is_not_there_is_an_error(camera, tmp_path, ending):
     with pytest.raises(OSError, match=r"folder|No such file"):
-        write_animation(tmp_path / "nowhere" / f"fall{ending}", camera, falling())
+        write_animation(tmp_path / "nowhere" / f"fall{ending}", camera, falling(), CONTROL_PERIOD_S)
 
 
 def test_a_closed_camera_leaks_no_client():
     before = sum(bool(pybullet.isConnected(client)) for client in range(64))
     for _ in range(3):
-        with Camera(SCENE, VIEW) as camera:
+        with Camera(SceneVisuals(SCENE), VIEW) as camera:
             camera.picture(tower())
     assert sum(bool(pybullet.isConnected(client)) for client in range(64)) == before

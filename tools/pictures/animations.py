@@ -24,6 +24,7 @@ from slap_ros.physics.panda import CONTROL_PERIOD_S
 from slap_ros.physics.rendering import Camera
 from slap_ros.physics.scene import Scene
 from slap_ros.physics.viewpoint import Viewpoint
+from slap_ros.physics.visuals import SceneVisuals
 from slap_ros.planning.options import OptionKind
 from slap_ros.relational import State
 from slap_ros.shortcuts.shipped import chosen_library
@@ -189,7 +190,7 @@ def draw_panels(subject: Subject, recording: Recording) -> list[Image.Image]:
     width, height = (OVERSAMPLING * size for size in SIZE_PX)
     viewpoint = replace(subject.viewpoint, width=width, height=height)
     panels = []
-    with Camera(subject.scene_of(recording.states[0]), viewpoint) as camera:
+    with Camera(SceneVisuals(subject.scene_of(recording.states[0])), viewpoint) as camera:
         for step, (state, caption) in enumerate(
             zip(recording.states, recording.captions, strict=True)
         ):

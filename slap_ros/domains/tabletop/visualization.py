@@ -4,20 +4,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Callable
 
 from slap_ros.core import Animate, VisibleBody
+from slap_ros.domains import visualization
 from slap_ros.domains.tabletop.state_access import finger_of, joints_of, pose_of
 from slap_ros.geometry.pose import IDENTITY
 from slap_ros.meshes.solid import Solid
-from slap_ros.motion.arm_shapes import ARM_SHAPES, BASE
-from slap_ros.physics.panda import LINKS, link_poses
+from slap_ros.physics.panda import CONTROL_PERIOD_S
 from slap_ros.physics.scene import Body, Scene
 from slap_ros.physics.viewpoint import Viewpoint
+from slap_ros.physics.visuals import SceneVisuals
 from slap_ros.relational import State
-
-METAL = (0.88, 0.9, 0.92, 1.0)  # of the arm
 
 SceneOf = Callable[[State], Scene]
 
@@ -29,22 +27,8 @@ def visible_bodies(scene: Scene, state: State) -> list[VisibleBody]:
 
 def visible_arm(state: State) -> list[VisibleBody]:
     """The arm: a box around each of its links."""
-    links = dict(zip(LINKS, link_poses(joints_of(state), finger_of(state)), strict=True))
-    shapes = [
-        ("base", IDENTITY.compose(BASE.pose), BASE.half),
-        *(
-            (
-                shape.link,
-                links[shape.link].compose(shape.box.pose),
-                tuple(half + shape.radius for half in shape.box.half),
-            )
-            for shape in ARM_SHAPES
-        ),
-    ]
-    return [
-        VisibleBody(f"panda_{name}", *pose, (2.0 * x, 2.0 * y, 2.0 * z), METAL)
-        for name, pose, (x, y, z) in shapes
-    ]
+    finger = finger_of(state)
+    return visualization.arm_bodies(joints_of(state).tolist(), (finger, finger))
 
 
 def _visible(body: Body, state: State) -> VisibleBody:
@@ -59,12 +43,7 @@ def _visible(body: Body, state: State) -> VisibleBody:
 
 
 def animation(scene_of: SceneOf, view: Viewpoint | None = None) -> Animate:
-    """What writes states, one a control step, as an animation, seen from somewhere."""
-
-    def animate(path: Path, states: Sequence[State], progress: Callable[[int], None]) -> None:
-        from slap_ros.physics.rendering import Camera, write_animation  # only here are they needed
-
-        with Camera(scene_of(states[0]), view) as camera:
-            write_animation(path, camera, states, progress)
-
-    return animate
+    """What writes states, one per control step, as an animation, seen from somewhere."""
+    return visualization.animation(
+        lambda state: SceneVisuals(scene_of(state)), CONTROL_PERIOD_S, view
+    )

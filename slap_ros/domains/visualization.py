@@ -1,0 +1,69 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What domains with a Panda show alike: the arm, and animations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from slap_ros.core import Animate, VisibleBody
+from slap_ros.geometry.pose import IDENTITY
+from slap_ros.motion.arm_shapes import ARM_SHAPES, BASE
+from slap_ros.physics.panda import LINKS, link_poses
+from slap_ros.physics.viewpoint import Viewpoint
+from slap_ros.physics.visuals import Visuals
+from slap_ros.relational import State
+
+METAL = (0.88, 0.9, 0.92, 1.0)  # of the arm
+
+
+def arm_bodies(joints: Sequence[float], fingers: tuple[float, float]) -> list[VisibleBody]:
+    """The arm: a box around each of its links.
+
+    Args:
+        joints: rad, seven.
+        fingers: Distance of the left and the right one from the middle, m.
+
+    Returns:
+        One for each link, named after it.
+    """
+    links = dict(zip(LINKS, link_poses(joints, *fingers), strict=True))
+    shapes = [
+        ("base", IDENTITY.compose(BASE.pose), BASE.half),
+        *(
+            (
+                shape.link,
+                links[shape.link].compose(shape.box.pose),
+                tuple(half + shape.radius for half in shape.box.half),
+            )
+            for shape in ARM_SHAPES
+        ),
+    ]
+    return [
+        VisibleBody(f"panda_{name}", *pose, (2.0 * x, 2.0 * y, 2.0 * z), METAL)
+        for name, pose, (x, y, z) in shapes
+    ]
+
+
+def animation(
+    visuals_of: Callable[[State], Visuals], period_s: float, view: Viewpoint | None = None
+) -> Animate:
+    """What writes states as an animation.
+
+    Args:
+        visuals_of: What there is to be seen, by the first of the states.
+        period_s: What a control step takes.
+        view: From where it is seen.
+
+    Returns:
+        The function that writes it, one frame per control step.
+    """
+
+    def animate(path: Path, states: Sequence[State], progress: Callable[[int], None]) -> None:
+        from slap_ros.physics.rendering import Camera, write_animation  # only here are they needed
+
+        with Camera(visuals_of(states[0]), view) as camera:
+            write_animation(path, camera, states, period_s, progress)
+
+    return animate

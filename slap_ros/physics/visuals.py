@@ -1,0 +1,83 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a camera sees of a state, as data: the arm's joints, and shapes with their poses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple, Protocol
+
+from slap_ros.geometry.pose import Pose, Vector
+from slap_ros.meshes.solid import ConvexPiece, Solid
+from slap_ros.physics.scene import Body, Colour, Scene
+from slap_ros.physics.snapshot import SnapshotCodec
+from slap_ros.relational import State
+
+
+class Cylinder(NamedTuple):
+    """A cylinder about its own z, with the origin in its middle."""
+
+    radius_m: float
+    length_m: float
+
+
+class VisualShape(NamedTuple):
+    """Something rigid to be drawn: a box by half its edges in m, a cylinder or a convex piece."""
+
+    geometry: Vector | Cylinder | ConvexPiece
+    colour: Colour
+
+
+class Configuration(NamedTuple):
+    """Where everything is that can be seen."""
+
+    joints: Sequence[float]  # of the arm, rad
+    fingers: tuple[float, float]  # m, distance of left and right from the middle
+    poses: Sequence[Pose]  # of each shape, in the base's frame
+
+
+class Visuals(Protocol):
+    """What there is to be seen around a Panda: shapes that stay the same, in states that differ."""
+
+    @property
+    def shapes(self) -> Sequence[VisualShape]:
+        """The shapes, in an order that does not change."""
+        ...
+
+    def configuration(self, state: State) -> Configuration:
+        """Where they are in a state."""
+        ...
+
+
+class SceneVisuals:
+    """The bodies of a :class:`~slap_ros.physics.scene.Scene`."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._looks = [tuple(_looks(body)) for body in (*scene.free, *scene.fixed)]
+
+    @property
+    def shapes(self) -> Sequence[VisualShape]:
+        """See :class:`Visuals`."""
+        return [shape for look in self._looks for shape in look]
+
+    def configuration(self, state: State) -> Configuration:
+        """See :class:`Visuals`."""
+        codec = SnapshotCodec.of(self._scene, state.layout)
+        snapshot = codec.read(state)
+        poses = [motion.pose for motion in snapshot.bodies]
+        poses += codec.fixed_poses(self._scene, state)
+        return Configuration(
+            snapshot.joints,
+            (snapshot.finger, snapshot.finger),
+            [pose for look, pose in zip(self._looks, poses, strict=True) for _ in look],
+        )
+
+
+def _looks(body: Body) -> Iterator[VisualShape]:
+    """What a body looks like: one shape, or its pieces."""
+    if isinstance(body.shape, Solid):
+        for piece in body.shape.pieces:
+            yield VisualShape(piece, body.colour)
+    else:
+        yield VisualShape(body.shape, body.colour)
