@@ -34,6 +34,7 @@ class ErrorCode(IntEnum):
     MISMATCHED_ATOM = 18
     INVALID_MESH = 19
     MESH_UNAVAILABLE = 20
+    UNKNOWN_GOAL = 21
 
     # 30-49: planner
     UNSOLVABLE = 30
@@ -44,6 +45,7 @@ class ErrorCode(IntEnum):
     EPISODE_CHANGED = 35
     BUSY = 36
     NO_TASK = 37
+    NO_SKILLS = 38
 
     # 50-69: skill server
     UNKNOWN_SKILL = 50
@@ -173,6 +175,18 @@ class MeshUnavailableError(SlapError):
     """A mesh that is not on this machine and cannot be had, or a library that it takes."""
 
     code = ErrorCode.MESH_UNAVAILABLE
+
+
+class UnknownGoalError(SlapError):
+    """A goal's name that the domain does not have."""
+
+    code = ErrorCode.UNKNOWN_GOAL
+
+
+class NoSkillsError(SlapError):
+    """A domain whose skills are still to be acquired cannot be planned in, nor run."""
+
+    code = ErrorCode.NO_SKILLS
 
 
 class UnsolvableError(SlapError):

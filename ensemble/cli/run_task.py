@@ -27,7 +27,7 @@ from slap_ros.cli.console import console, print_json, styled
 from slap_ros.cli.render import check_renderable
 from slap_ros.cli.render import render as write_animation
 from slap_ros.cli.report import write_report
-from slap_ros.core import Domain, Task
+from slap_ros.core import Domain, Task, task_with_goal
 from slap_ros.domains import get_domain
 from slap_ros.evaluation.metrics import RunMetrics, known
 from slap_ros.messages.decode import decode_state
@@ -35,7 +35,6 @@ from slap_ros.messages.interfaces import STATE
 from slap_ros.messages.protocols import StateMessage
 from slap_ros.planning.planner import make_planner
 from slap_ros.relational import GroundAtom
-from slap_ros.relational.pddl import parse_goal
 from slap_ros.robot.worlds import SIM
 from slap_ros.shortcuts.shipped import chosen_library
 
@@ -52,7 +51,7 @@ def run_task(options: RunOptions) -> int:
     began = monotonic()
     domain = get_domain(options.domain, options.preset)
     imported_s = monotonic() - began
-    task = domain.task(options.seed, options.index)
+    task = task_with_goal(domain, options.seed, options.index, options.goal)
     request = replace(_request(options, domain, task), import_s=imported_s)
     states: list[StateMessage] = []
 
@@ -121,13 +120,11 @@ def _check_planning(options: RunOptions, domain: Domain, task: Task) -> frozense
     Raises:
         SlapError: It is no goal of the task; or planner, library or pictures are not there.
     """
-    space = domain.atom_space(task.initial_state)
-    goal = parse_goal(options.goal, space) if options.goal else frozenset()
     make_planner(options.planner, domain, task.initial_state)
     chosen_library(options.shortcuts, domain, options.planner)
     if options.render is not None:
         check_renderable(domain, task.initial_state, options.render)
-    return goal
+    return task.goal if options.goal else frozenset()
 
 
 @contextmanager

@@ -28,13 +28,27 @@ Preset = Annotated[
     ),
 ]
 Planner = Annotated[
-    str, typer.Option(help="lazy, exhaustive (the paper's) or ff (greedy best-first, SLAP D.2).")
+    str,
+    typer.Option(
+        help="lazy, exhaustive (the paper's), ff (greedy best-first, SLAP D.2) or astar (fewest "
+        "operators, none of them tried in the model)."
+    ),
 ]
 Seed = Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Samples the task.")]
 Index = Annotated[int, typer.Option(min=0, max=MAX_INDEX, help="Which of the seed's tasks.")]
 Goal = Annotated[
     str | None,
-    typer.Option(help="Another goal, e.g. '(and (On block2 target) (GripperEmpty robot))'."),
+    typer.Option(
+        help="Another goal: a name that `slap domains DOMAIN` lists, or atoms, e.g. "
+        "'(and (On block2 target) (GripperEmpty robot))'."
+    ),
+]
+Skills = Annotated[
+    str,
+    typer.Option(
+        help="Whose: none, or demonstrator (scripts that show how tasks are solved). Default: the "
+        "domain's own."
+    ),
 ]
 Jobs = Annotated[int, typer.Option(min=1, help="Processes; the results are the same.")]
 

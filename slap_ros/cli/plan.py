@@ -4,31 +4,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from slap_ros.cli.console import console, print_json
-from slap_ros.cli.options import Goal, Index, Json, Planner, Preset, Seed
+from slap_ros.cli.options import Goal, Index, Json, Planner, Preset, Seed, Skills
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose, sampling
-from slap_ros.core import Domain, Task
-from slap_ros.domains import get_domain
+from slap_ros.core import Domain, Task, task_with_goal
 from slap_ros.drawing import draw_abstract_graph
 from slap_ros.errors import InvalidParameterError, PlanningLimitError, StorageFullError
 from slap_ros.evaluation.approaches import approaches
 from slap_ros.files import read_text, require_writable, write_whole
+from slap_ros.learning.domain_choice import SHIPPED, DomainChoice, open_domain
 from slap_ros.planning.abstract_graph import AbstractGraph, build_abstract_graph
 from slap_ros.planning.ff import MAX_EXPANSIONS, MAX_TESTS, find_operator_sequence
 from slap_ros.planning.plan import PlanningResult
-from slap_ros.planning.planner import Problem
-from slap_ros.relational import AtomSpace, GroundAtom, ground_operators
+from slap_ros.planning.planner import Problem, plan_symbolically
+from slap_ros.relational import AtomSpace, LiftedOperator, ground_operators
 from slap_ros.relational.grounding import MAX_BINDINGS
 from slap_ros.relational.pddl import (
     PddlDomain,
     PddlProblem,
     parse_domain,
-    parse_goal,
     parse_problem,
     write_domain,
     write_problem,
@@ -45,6 +45,7 @@ def plan(
     index: Index = 0,
     preset: Preset = None,
     goal: Goal = None,
+    skills: Skills = SHIPPED,
     shortcuts: Shortcuts = None,
     samples: Samples = SAMPLES,
     planner: Planner = "lazy",
@@ -61,24 +62,70 @@ def plan(
 ) -> None:
     """Plan one task without executing it; write its PDDL and draw its abstract graph.
 
-    With two PDDL files: plan symbolically, with the FF heuristic.
+    In a domain without skills: plan with its hand-written operators alone. With two PDDL files:
+    plan symbolically, with the FF heuristic.
     """
     if problem is not None:
         _plan_pddl(Path(domain), problem, effort, json)
         return
     if output is not None:
         require_writable(output)
-    chosen = get_domain(domain, preset)
-    task = chosen.task(seed, index)
+    chosen = open_domain(DomainChoice(domain, preset or "", skills))
+    task = task_with_goal(chosen, seed, index, goal)
+    if not chosen.operators and chosen.acquisition and chosen.acquisition.operators:
+        _plan_by_hand(chosen, chosen.acquisition.operators, task, output, json)
+        return
     space = chosen.atom_space(task.initial_state)
-    atoms = parse_goal(goal, space) if goal else task.goal
     approach = approaches(choose(shortcuts, chosen, planner), sampling(samples))[-1]
     result = approach.planner(planner, chosen, task.initial_state).plan(
-        task.initial_state, space.mask(atoms)
+        task.initial_state, space.mask(task.goal)
     )
     _show(result, json)
     if output is not None:
-        _write(output, chosen, task, atoms, result)
+        graph = draw_abstract_graph(
+            _graph(chosen, task, space), space, result.plan, f"{chosen.name}: plan"
+        )
+        _write(output, _pddl(chosen, chosen.operators, task) | {"graph.svg": graph})
+
+
+def _plan_by_hand(
+    domain: Domain,
+    operators: Sequence[LiftedOperator],
+    task: Task,
+    output: Path | None,
+    json: bool,
+) -> None:
+    """Plan without skills: a shortest sequence of operators that people wrote.
+
+    Args:
+        domain: Without operators of its own.
+        operators: Written by hand.
+        task: What to plan.
+        output: Folder for domain.pddl and problem.pddl, if they are wanted.
+        json: Whether stdout gets JSON.
+    """
+    space = domain.atom_space(task.initial_state)
+    grounds = ground_operators(operators, space)
+    start = space.abstract(task.initial_state)
+    sequence = plan_symbolically(space, start, space.mask(task.goal), grounds)
+    names = [str(grounds[number]) for number in sequence]
+    if json:
+        print_json(
+            {
+                "plan": [{"operator": name} for name in names],
+                "operators": "hand-written",
+                "versions": versions(),
+            }
+        )
+    else:
+        for name in names:
+            console.print(name)
+        console.print(
+            f"{len(names)} operators, the fewest; they are the domain's hand-written ones, as "
+            f"{domain.name} has no skills yet: steps are not predicted"
+        )
+    if output is not None:
+        _write(output, _pddl(domain, operators, task))
 
 
 def _show(result: PlanningResult, json: bool) -> None:
@@ -103,19 +150,19 @@ def _show(result: PlanningResult, json: bool) -> None:
     )
 
 
-def _write(
-    folder: Path, domain: Domain, task: Task, goal: frozenset[GroundAtom], result: PlanningResult
-) -> None:
+def _pddl(domain: Domain, operators: Sequence[LiftedOperator], task: Task) -> dict[str, str]:
+    """Domain and problem as files."""
     space = domain.atom_space(task.initial_state)
-    start = space.abstract(task.initial_state)
-    graph = _graph(domain, task, space, goal)
-    files = {
-        "domain.pddl": write_domain(domain.name, domain.types, domain.predicates, domain.operators),
-        "problem.pddl": write_problem(
-            "task", domain.name, space.layout.objects, tuple(space.decode(start)), goal
-        ),
-        "graph.svg": draw_abstract_graph(graph, space, result.plan, f"{domain.name}: plan"),
+    init = tuple(space.decode(space.abstract(task.initial_state)))
+    objects = space.layout.objects
+    return {
+        "domain.pddl": write_domain(domain.name, domain.types, domain.predicates, operators),
+        "problem.pddl": write_problem("task", domain.name, objects, init, task.goal),
     }
+
+
+def _write(folder: Path, files: Mapping[str, str]) -> None:
+    """Write texts by file name."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in files.items():
@@ -125,11 +172,10 @@ def _write(
         raise StorageFullError(f"cannot write to {folder}: {error.strerror}") from error
 
 
-def _graph(
-    domain: Domain, task: Task, space: AtomSpace, goal: frozenset[GroundAtom]
-) -> AbstractGraph:
+def _graph(domain: Domain, task: Task, space: AtomSpace) -> AbstractGraph:
     operators = Problem.of(domain, task.initial_state).operators
-    return build_abstract_graph(space.abstract(task.initial_state), space.mask(goal), operators)
+    start = space.abstract(task.initial_state)
+    return build_abstract_graph(start, space.mask(task.goal), operators)
 
 
 def _plan_pddl(domain_file: Path, problem_file: Path, effort: int, json: bool) -> None:

@@ -29,7 +29,7 @@ from slap_ros.bags.demonstrations import read_demonstrations
 from slap_ros.bags.reader import read_bag
 from slap_ros.cli.console import console, print_json
 from slap_ros.cli.options import Goal, Index, Json, Preset, Seed
-from slap_ros.core import Domain
+from slap_ros.core import Domain, task_with_goal
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError, StorageFullError
 from slap_ros.files import read_text, require_writable, write_whole
@@ -37,7 +37,7 @@ from slap_ros.language.budget import Budget, BudgetLimits
 from slap_ros.language.cassette import open_client, with_recorded
 from slap_ros.language.settings import read_settings
 from slap_ros.relational import LiftedOperator
-from slap_ros.relational.pddl import parse_domain, parse_goal, parse_problem
+from slap_ros.relational.pddl import parse_domain, parse_problem
 
 PROPOSERS = ("manual", "induced", "language")
 REWARDERS = ("none", "composed", "language")
@@ -153,10 +153,8 @@ def _problem(options: ProposeOptions) -> tuple[AcquisitionProblem, Sequence[Lift
         task = parse_problem(_read(options.problem), stated, str(options.problem))
         return AcquisitionProblem.of_pddl(stated, task), stated.operators
     domain = get_domain(options.domain, options.preset)
-    sampled = domain.task(options.seed, options.index)
-    space = domain.atom_space(sampled.initial_state)
-    goal = parse_goal(options.goal, space) if options.goal else sampled.goal
-    problem = AcquisitionProblem.of_task(domain, sampled, goal)
+    posed = task_with_goal(domain, options.seed, options.index, options.goal)
+    problem = AcquisitionProblem.of_task(domain, posed)
     return replace(problem, shown=tuple(_shown(options, domain))), domain.operators
 
 

@@ -7,6 +7,7 @@ from slap_ros.core.action_space import Action, ActionSpace, GripperAxis
 from slap_ros.core.display import Animate, Display, VisibleBody
 from slap_ros.core.domain import Domain, Execution, Goal
 from slap_ros.core.domain_factory import DomainFactory, presets
+from slap_ros.core.goals import task_with_goal
 from slap_ros.core.learner_interface import LearnerInterface, Learning, SettingValue
 from slap_ros.core.skill import Policy, Skill
 from slap_ros.core.task import Task
@@ -37,4 +38,5 @@ __all__ = [
     "VisibleBody",
     "World",
     "presets",
+    "task_with_goal",
 ]

@@ -18,7 +18,12 @@ from slap_ros.core.learner_interface import Learning
 from slap_ros.core.skill import Skill
 from slap_ros.core.task import Task
 from slap_ros.core.world import SyncVectorWorld, VectorWorld, World
-from slap_ros.errors import InvalidDomainError, InvalidParameterError, UnknownObjectError
+from slap_ros.errors import (
+    InvalidDomainError,
+    InvalidParameterError,
+    UnknownGoalError,
+    UnknownObjectError,
+)
 from slap_ros.relational import (
     AtomSpace,
     GroundAtom,
@@ -208,7 +213,8 @@ class Domain:
                 goal. None for the goal that comes with the task.
 
         Raises:
-            InvalidParameterError: A negative seed or index, or no such goal.
+            InvalidParameterError: A negative seed or index.
+            UnknownGoalError: No such goal.
             UnknownObjectError: No task has the objects of that goal.
         """
         if min(seed, index) < 0:
@@ -217,7 +223,7 @@ class Domain:
         if goal is None:
             return self.sample_task(rng)
         if goal not in self.goals:
-            raise InvalidParameterError(
+            raise UnknownGoalError(
                 f"domain {self.name} has no goal {goal!r}; there are "
                 f"{', '.join(self.goals) or 'none with a name'}"
             )

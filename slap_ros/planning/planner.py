@@ -9,15 +9,21 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from slap_ros.core import Domain
-from slap_ros.errors import InvalidParameterError, PlanningLimitError, UnsolvableError
+from slap_ros.errors import (
+    InvalidParameterError,
+    NoSkillsError,
+    PlanningLimitError,
+    UnsolvableError,
+)
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
+from slap_ros.planning.astar import find_shortest_sequence
 from slap_ros.planning.failures import Failures, list_atoms, unreachable_atoms
 from slap_ros.planning.ff import find_operator_sequence
 from slap_ros.planning.model import Model
 from slap_ros.planning.options import Option, given_option
 from slap_ros.planning.plan import Plan, PlanEdge, PlanningResult
 from slap_ros.planning.search import search_exhaustively, search_lazily
-from slap_ros.relational import GroundOperator, State
+from slap_ros.relational import AtomSpace, GroundOperator, State
 
 Search = Callable[[AbstractGraph, State, Model], Plan]
 
@@ -35,32 +41,69 @@ class Planner(Protocol):
         ...
 
 
+GroundedOptions = tuple[tuple[GroundOperator, Option], ...]
+
+
+def ground_options(domain: Domain, space: AtomSpace) -> GroundedOptions:
+    """The domain's operators over a task's objects, each with the option that carries it out.
+
+    Raises:
+        NoSkillsError: The domain has no operators.
+    """
+    if not domain.operators:
+        by_hand = domain.acquisition is not None and domain.acquisition.operators
+        advice = (
+            "its demonstrator has scripts in their place, for those who ask for it"
+            if by_hand
+            else "give it operators and skills"
+        )
+        raise NoSkillsError(
+            f"domain {domain.name} has no skills yet, so there is nothing to plan with: {advice}"
+        )
+    return tuple(
+        (ground, given_option(domain, ground.operator.name, ground.objects))
+        for ground in domain.ground(space)
+    )
+
+
 @dataclass(frozen=True)
 class Problem:
     """A domain over one set of objects: what planners share."""
 
     model: Model
-    operators: tuple[tuple[GroundOperator, Option], ...]
+    operators: GroundedOptions
 
     @classmethod
     def of(cls, domain: Domain, initial: State) -> Problem:
-        """The problem over the objects of ``initial``."""
-        model = Model.of(domain, initial)
-        return cls(
-            model,
-            tuple(
-                (ground, given_option(domain, ground.operator.name, ground.objects))
-                for ground in domain.ground(model.space)
-            ),
-        )
+        """The problem over the objects of ``initial``.
+
+        Raises:
+            NoSkillsError: The domain has no operators.
+        """
+        options = ground_options(domain, domain.atom_space(initial))
+        return cls(Model.of(domain, initial), options)
 
     def why_not(self, start: int, goal: int) -> str:
         """Why operators alone do not lead from an abstract state to a goal, both masks."""
-        space = self.model.space
-        never = unreachable_atoms(start, goal, [ground for ground, _ in self.operators])
-        if never:
-            return f"no operator leads to {list_atoms(space, never)}"
-        return f"{list_atoms(space, goal)} never hold all together"
+        grounds = [ground for ground, _ in self.operators]
+        return why_unreachable(self.model.space, start, goal, grounds)
+
+
+def why_unreachable(
+    space: AtomSpace, start: int, goal: int, operators: Sequence[GroundOperator]
+) -> str:
+    """Why operators alone do not lead from an abstract state to a goal.
+
+    Args:
+        space: The task's atoms.
+        start: A mask.
+        goal: A mask.
+        operators: Over that space.
+    """
+    never = unreachable_atoms(start, goal, operators)
+    if never:
+        return f"no operator leads to {list_atoms(space, never)}"
+    return f"{list_atoms(space, goal)} never hold all together"
 
 
 class ShortcutSource(Protocol):
@@ -178,6 +221,58 @@ class FFPlanner:
         return edges, None
 
 
+def plan_symbolically(
+    space: AtomSpace, start: int, goal: int, operators: Sequence[GroundOperator]
+) -> list[int]:
+    """A shortest sequence of operators, by A*; see :mod:`slap_ros.planning.astar`.
+
+    Args:
+        space: The task's atoms.
+        start: The abstract state to start from, a mask.
+        goal: Mask of atoms that must hold.
+        operators: Over that space.
+
+    Returns:
+        Indices into ``operators``.
+
+    Raises:
+        UnsolvableError: No sequence leads to the goal; the message says which atoms are missing.
+        PlanningLimitError: None was found within the limit of abstract states.
+    """
+    try:
+        return find_shortest_sequence(start, goal, operators)
+    except UnsolvableError as error:
+        why = why_unreachable(space, start, goal, operators)
+        raise UnsolvableError(f"{error}: {why}") from error
+
+
+@dataclass(frozen=True)
+class SymbolicPlanner:
+    """A shortest sequence of operators, by A*; nothing is rolled out in a model.
+
+    Where a rollout takes as long as doing it, doing it and planning again is as good; and a plan is
+    wanted before its skills can be had.
+
+    Args:
+        space: The task's atoms.
+        options: The operators over its objects.
+    """
+
+    space: AtomSpace
+    options: GroundedOptions
+
+    def plan(self, state: State, goal: int) -> PlanningResult:
+        """See :class:`Planner`; the steps that are predicted are the least that skills take."""
+        start = self.space.abstract(state)
+        grounds = [ground for ground, _ in self.options]
+        edges, abstract = [], start
+        for number in plan_symbolically(self.space, start, goal, grounds):
+            ground, option = self.options[number]
+            abstract = ground.apply(abstract)
+            edges.append(PlanEdge(option, abstract, option.skill.least_steps))
+        return PlanningResult(Plan(tuple(edges)), len(edges) + 1, len(edges), 0)
+
+
 def _lazy(problem: Problem, shortcuts: ShortcutSource | None) -> Planner:
     return GraphPlanner(problem, shortcuts=shortcuts)
 
@@ -192,10 +287,17 @@ def _ff(problem: Problem, shortcuts: ShortcutSource | None) -> Planner:
     return FFPlanner(problem)
 
 
+def _astar(problem: Problem, shortcuts: ShortcutSource | None) -> Planner:
+    if shortcuts is not None:
+        raise InvalidParameterError("the planner astar plans without shortcuts; use lazy")
+    return SymbolicPlanner(problem.model.space, problem.operators)
+
+
 PLANNERS: Mapping[str, Callable[[Problem, ShortcutSource | None], Planner]] = {
     "lazy": _lazy,
     "exhaustive": _exhaustive,
     "ff": _ff,
+    "astar": _astar,
 }
 WITH_SHORTCUTS = ("lazy", "exhaustive")  # planners that can use them
 
@@ -216,6 +318,7 @@ def make_planner(
 
     Raises:
         InvalidParameterError: No planner of that name, or none that can use shortcuts.
+        NoSkillsError: The domain has no operators.
     """
     if name not in PLANNERS:
         raise InvalidParameterError(f"unknown planner {name!r}; there are {', '.join(PLANNERS)}")

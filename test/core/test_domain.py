@@ -9,7 +9,7 @@ import pytest
 
 from slap_ros.core import Acquisition
 from slap_ros.domains import get_domain
-from slap_ros.errors import InvalidDomainError, InvalidParameterError, UnknownObjectError
+from slap_ros.errors import InvalidDomainError, UnknownGoalError, UnknownObjectError
 from slap_ros.relational import LiftedAtom, LiftedOperator, Predicate, State, Type, Variable
 
 DOMAIN = get_domain("obstacle2d")
@@ -121,5 +121,5 @@ def test_a_goal_that_no_task_can_have():
     domain = replace(DOMAIN, goals={"ghost": on_the_ground("ghost")})
     with pytest.raises(UnknownObjectError, match="unknown object 'ghost'"):
         domain.task(0, goal="ghost")
-    with pytest.raises(InvalidParameterError, match="no goal 'host'; there are ghost"):
+    with pytest.raises(UnknownGoalError, match="no goal 'host'; there are ghost"):
         domain.task(0, goal="host")

@@ -1,0 +1,150 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A domain without operators and skills: what can be done with it, and what is said where not."""
+
+import json
+from dataclasses import replace
+
+import pytest
+import untaught
+from typer.testing import CliRunner
+
+from ensemble.cli.application import app
+from slap_ros.core import task_with_goal
+from slap_ros.domains import get_domain
+from slap_ros.errors import (
+    ErrorCode,
+    InvalidParameterError,
+    NoSkillsError,
+    UnknownGoalError,
+    UnsolvableError,
+)
+from slap_ros.learning.demonstrator import demonstrate
+from slap_ros.learning.domain_choice import DomainChoice, open_domain
+from slap_ros.learning.scripted_skill import with_scripts
+from slap_ros.planning.planner import SymbolicPlanner, ground_options, make_planner
+
+DOMAIN = untaught.make()
+TAUGHT = get_domain("obstacle2d")
+
+
+@pytest.fixture
+def installed(install):
+    install({"untaught": "untaught:make"})
+
+
+def slap(*arguments):
+    return CliRunner().invoke(app, [*arguments])
+
+
+def test_a_choice_of_skills_changes_operators_and_nothing_that_is_perceived(installed):
+    state = DOMAIN.task(0).initial_state
+    seen = {}
+    for skills in ("", "none", "demonstrator"):
+        domain = open_domain(DomainChoice("untaught", skills=skills))
+        space = domain.atom_space(state)
+        seen[skills] = [str(atom) for atom in space.decode(space.abstract(state))]
+        assert bool(domain.operators) == (skills == "demonstrator") == bool(domain.skills)
+    assert seen[""] == seen["none"] == seen["demonstrator"]
+    bare = open_domain(DomainChoice("obstacle2d", skills="none"))
+    assert bare.static_predicates == TAUGHT.static_predicates
+
+
+def test_skills_that_do_not_exist_are_refused(installed):
+    with pytest.raises(InvalidParameterError, match="unknown skills 'some'; there are none, demon"):
+        DomainChoice("untaught", skills="some")
+    with pytest.raises(InvalidParameterError, match="obstacle2d has no demonstrator"):
+        open_domain(DomainChoice("obstacle2d", skills="demonstrator"))
+    without = replace(DOMAIN.acquisition, scripts={})
+    with pytest.raises(InvalidParameterError, match=r"no script for Pick, "):
+        with_scripts(replace(DOMAIN, acquisition=without))
+
+
+def test_the_demonstrator_does_what_the_scripts_do():
+    domain = with_scripts(DOMAIN)
+    for seed in range(5):
+        shown = demonstrate(domain, domain.task(seed))
+        assert shown.episode.success, shown.episode.error
+        assert len(shown.trace) == shown.episode.plan_length + 1
+        assert domain.task(seed).goal <= shown.trace[-1]
+
+
+def test_what_failed_is_told_and_planned_for_again():
+    """A script that ends at once the first two times, wherever it is begun."""
+    failed = []
+
+    def tired(state, objects):
+        if len(failed) < 2:
+            failed.append(objects)
+            return lambda _: None
+        return DOMAIN.acquisition.scripts["Pick"](state, objects)
+
+    scripts = {**DOMAIN.acquisition.scripts, "Pick": tired}
+    domain = with_scripts(replace(DOMAIN, acquisition=replace(DOMAIN.acquisition, scripts=scripts)))
+    episode = demonstrate(domain, domain.task(0)).episode
+    assert episode.success
+    assert episode.replans == 2
+    failures = [(edge.option, edge.steps) for edge in episode.edges if not edge.reached]
+    assert failures == [("Pick", 0)] * 2
+
+
+def test_astar_takes_the_fewest_operators_and_tries_none():
+    task = TAUGHT.task(0)
+    space = TAUGHT.atom_space(task.initial_state)
+    goal = space.mask(task.goal)
+    ours = SymbolicPlanner(space, ground_options(TAUGHT, space)).plan(task.initial_state, goal)
+    named = make_planner("astar", TAUGHT, task.initial_state).plan(task.initial_state, goal)
+    shortest = make_planner("exhaustive", TAUGHT, task.initial_state).plan(task.initial_state, goal)
+    assert list(map(str, ours.plan.edges)) == list(map(str, named.plan.edges))
+    assert len(ours.plan.edges) <= len(shortest.plan.edges)
+    assert ours.edges_rolled_out == 0
+    assert ours.plan.edges[-1].target & goal == goal
+    with pytest.raises(UnsolvableError, match="no operator leads to On"):
+        SymbolicPlanner(space, ()).plan(task.initial_state, goal)
+
+
+def test_planners_say_that_there_is_nothing_to_plan_with():
+    with pytest.raises(NoSkillsError, match="untaught has no skills yet"):
+        make_planner("lazy", DOMAIN, DOMAIN.task(0).initial_state)
+
+
+def test_goals_by_name_and_in_atoms():
+    by_name = task_with_goal(DOMAIN, 3, 0, "other")
+    assert {str(atom) for atom in by_name.goal} == {"On(block2, target)"}
+    in_atoms = task_with_goal(DOMAIN, 3, 0, "(On block2 target)")
+    assert in_atoms.goal == by_name.goal
+    assert task_with_goal(DOMAIN, 3).goal == DOMAIN.task(3).goal
+    with pytest.raises(UnknownGoalError, match="no goal 'tests'; there are training, other"):
+        task_with_goal(DOMAIN, 3, 0, "tests")
+
+
+def test_plan_with_hand_written_operators_alone(installed, tmp_path):
+    ran = slap("plan", "untaught", "--goal", "other", "--output", str(tmp_path / "plan"))
+    assert ran.exit_code == 0, ran.output
+    assert "hand-written ones, as untaught has no skills yet" in ran.stderr
+    files = [str(tmp_path / "plan" / name) for name in ("domain.pddl", "problem.pddl")]
+    symbolic = slap("plan", *files, "--json")
+    planned = slap("plan", "untaught", "--goal", "other", "--json")
+    steps = json.loads(planned.stdout)["plan"]
+    assert len(steps) == len(json.loads(symbolic.stdout)["plan"]) > 0
+
+
+def test_plan_with_the_scripts_predicts_steps(installed):
+    ran = slap("plan", "untaught", "--skills", "demonstrator", "--json")
+    own = slap("plan", "obstacle2d", "--shortcuts", "none", "--json")
+    assert json.loads(ran.stdout)["plan"] == json.loads(own.stdout)["plan"]
+
+
+@pytest.mark.parametrize("command", ["run", "evaluate"])
+def test_commands_that_need_skills_say_so_before_anything_starts(installed, command):
+    ran = slap(command, "untaught")
+    assert ran.exit_code == ErrorCode.NO_SKILLS
+    assert "untaught has no skills yet" in ran.stderr
+    assert "Traceback" not in ran.stderr
+
+
+def test_a_goal_that_no_domain_has_is_refused_by_name(installed):
+    for command in ("plan", "run", "propose"):
+        ran = slap(command, "untaught", "--goal", "nonsense")
+        assert ran.exit_code == ErrorCode.UNKNOWN_GOAL, ran.output
+        assert "there are training, other" in ran.stderr
