@@ -1,0 +1,101 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The approach: what brings the hand to where a skill begins (LG-SAIL's transition primitive).
+
+It ends 0.04 m before where the skill acts, and up to 25 mm aside of that: a real motion planner
+knows where things are to some millimetres, and what a skill finds must not be done already. It
+goes up to where nothing is in the way, over, and down, in closed loop.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from slap_ros.core import Approach, Policy
+from slap_ros.domains.benchtop.hand_motion import KEEP, OPEN, HandGoal
+from slap_ros.domains.benchtop.scripts import Move, follow, over, release, travel_height
+from slap_ros.domains.benchtop.state_access import held_thing
+from slap_ros.geometry.pose import Vector
+from slap_ros.relational import Object, State
+
+DISTANCE = 0.04  # m before where the skill acts (LG-SAIL §5.1)
+# Nearer than 10 mm, opening the fingers would already stack what they hold.
+ASIDE = (0.01, 0.025)  # m, least and most
+UP: Vector = (0.0, 0.0, 1.0)
+
+# Where an operator's skill acts: where the hand is to be when it touches what the last object
+# names, or when what it holds is at its place.
+ActsAt = Callable[[State, tuple[Object, ...]], HandGoal]
+# Of length 1: from there to where the skill is approached from.
+Outwards = Callable[[State, tuple[Object, ...]], Vector]
+
+
+def from_above(state: State, objects: tuple[Object, ...]) -> Vector:
+    """The direction straight up."""
+    del state, objects
+    return UP
+
+
+def make_approach(
+    acts_at: ActsAt,
+    outwards: Outwards = from_above,
+    height: Callable[[State], float] = travel_height,
+) -> Approach:
+    """The approach of a domain.
+
+    Args:
+        acts_at: Where a skill acts.
+        outwards: From there to where it begins.
+        height: Of the grasp point while it travels, m.
+    """
+
+    def approach(state: State, objects: tuple[Object, ...]) -> Policy:
+        goal = begin_at(state, objects, acts_at(state, objects), outwards(state, objects))
+        empty = held_thing(state) is None
+        gripper = OPEN if empty else KEEP
+        way = (*over(state, goal, gripper, height(state)), Move(goal, gripper))
+        return follow(release(), *way) if empty else follow(*way)
+
+    return approach
+
+
+def begin_at(
+    state: State, objects: tuple[Object, ...], goal: HandGoal, outwards: Vector
+) -> HandGoal:
+    """Where a skill begins: before where it acts, and somewhat aside.
+
+    Args:
+        state: In which the approach begins; how far aside, and to which side, is a function of it.
+        objects: The operator's.
+        goal: Where the skill acts.
+        outwards: Of length 1, from there to where it begins.
+
+    Returns:
+        A goal for the hand.
+    """
+    rng = np.random.default_rng(_seed(state, objects))
+    angle, far = rng.uniform(-math.pi, math.pi), rng.uniform(*ASIDE)
+    right, up = _across(outwards)
+    aside = far * (math.cos(angle) * np.array(right) + math.sin(angle) * np.array(up))
+    x, y, z = (np.array(goal.position) + DISTANCE * np.array(outwards) + aside).tolist()
+    return HandGoal((x, y, z), goal.yaw)
+
+
+def _seed(state: State, objects: tuple[Object, ...]) -> int:
+    """A number that the state and the objects decide, the same in every process."""
+    names = " ".join(obj.name for obj in objects)
+    return int.from_bytes(hashlib.sha256(state.key + names.encode()).digest()[:8], "little")
+
+
+def _across(axis: Vector) -> tuple[Vector, Vector]:
+    """Two directions at right angles to an axis and to one another."""
+    other = UP if abs(axis[2]) < 0.9 else (1.0, 0.0, 0.0)
+    right = np.cross(axis, other)
+    right /= np.linalg.norm(right)
+    x, y, z = right.tolist()
+    u, v, w = np.cross(right, axis).tolist()
+    return (x, y, z), (u, v, w)

@@ -1,0 +1,67 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Types that the domains derive theirs from: ``CUBE = Type("cube", THING.features, THING)``.
+
+A body's own frame has its axis, where it has one (of a peg, a hole, a handle), along x.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from slap_ros.contact.features import DRAWER_FEATURES, LID_FEATURES, opening_features
+from slap_ros.geometry.pose import Pose
+from slap_ros.physics.features import BODY_FEATURES, POSE_FEATURES, body_features, pose_features
+from slap_ros.relational import Feature, Type
+
+SUPPORT_HEIGHT = Feature("support_height", "m")  # from its origin up to where things stand on it
+REST_HEIGHT = Feature("rest_height", "m")  # from where it stands up to its origin
+
+PLACE = Type("place", (*POSE_FEATURES, SUPPORT_HEIGHT))  # anything with a pose
+THING = Type("thing", (*BODY_FEATURES, SUPPORT_HEIGHT, REST_HEIGHT), PLACE)  # a free body
+DRAWER = Type("drawer", (*PLACE.features, *DRAWER_FEATURES), PLACE)
+LID = Type("lid", (*PLACE.features, *LID_FEATURES), PLACE)
+
+
+def place_features(pose: Pose, support_height: float = 0.0) -> Mapping[str, float]:
+    """A place's features, for ``State.build``.
+
+    Args:
+        pose: In the base's frame.
+        support_height: From its origin up to where things stand on it, m; below 0 for a basket.
+
+    Returns:
+        A value for each feature of :data:`PLACE`, by name.
+    """
+    return {**pose_features(pose), SUPPORT_HEIGHT.name: support_height}
+
+
+def thing_features(pose: Pose, rest_height: float, support_height: float) -> Mapping[str, float]:
+    """The features of a thing at rest, for ``State.build``.
+
+    Args:
+        pose: In the base's frame.
+        rest_height: From where it stands up to its origin, m.
+        support_height: From its origin up to where things stand on it, m.
+
+    Returns:
+        A value for each feature of :data:`THING`, by name.
+    """
+    sizes = {SUPPORT_HEIGHT.name: support_height, REST_HEIGHT.name: rest_height}
+    return {**body_features(*pose), **sizes}
+
+
+def jointed_features(
+    pose: Pose, opening: float = 0.0, support_height: float = 0.0
+) -> Mapping[str, float]:
+    """The features of a drawer or a lid that does not move, for ``State.build``.
+
+    Args:
+        pose: Of its frame, in the base's.
+        opening: m or rad.
+        support_height: As for :func:`place_features`.
+
+    Returns:
+        A value for each feature of :data:`DRAWER` or :data:`LID`, by name.
+    """
+    return {**place_features(pose, support_height), **opening_features(opening)}

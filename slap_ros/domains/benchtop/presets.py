@@ -1,0 +1,98 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Putting a domain together: what all domains at a bench have in common is said once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from slap_ros.contact.arm import CONTROL_PERIOD_S
+from slap_ros.contact.features import ROBOT
+from slap_ros.contact.scene import ContactScene
+from slap_ros.contact.world import ACTION_SPACE, ContactWorld
+from slap_ros.core import Acquisition, Domain, Execution, Goal, Learning, Task
+from slap_ros.domains.benchtop.learner_interface import learner_interface
+from slap_ros.domains.benchtop.metrics import COMMON
+from slap_ros.relational import Metric, Predicate, State, Type
+
+STEP_LIMIT = 1_000  # environment steps of a task
+HORIZON = 50  # environment steps of a learned skill, approach not counted
+
+
+class BenchtopTasks(Protocol):
+    """What tasks are sampled from: a dataclass of settings, one for each preset."""
+
+    def sample(self, rng: np.random.Generator) -> Task:
+        """A task; no two are alike."""
+        ...
+
+    def as_configuration(self) -> Mapping[str, str]:
+        """The settings by name."""
+        ...
+
+
+@dataclass(frozen=True)
+class BenchtopModel:
+    """What a domain at a bench says of itself.
+
+    Args:
+        types: Beside the robot's, parents first.
+        predicates: All of them.
+        holding: The one of them that says what is held.
+        goals: By name; the first is trained for.
+        acquisition: Operators, rewards and scripts written by hand, and the approach.
+        scene_of: The bodies of a state.
+        metrics: Beside those that every domain has and those that predicates rest on.
+        static: Predicates that nothing changes.
+    """
+
+    types: tuple[Type, ...]
+    predicates: tuple[Predicate, ...]
+    holding: Predicate
+    goals: Mapping[str, Goal]
+    acquisition: Acquisition
+    scene_of: Callable[[State], ContactScene]
+    metrics: tuple[Metric, ...] = ()
+    static: frozenset[Predicate] = frozenset()
+
+
+def benchtop_domain(
+    name: str, preset: str, model: BenchtopModel, settings: BenchtopTasks
+) -> Domain:
+    """The domain; it has no operators and no skills, as these are acquired.
+
+    Args:
+        name: The domain's.
+        preset: By which its settings go.
+        model: What it says of itself.
+        settings: What tasks are sampled from.
+
+    Returns:
+        The domain.
+
+    Raises:
+        InvalidDomainError: Its parts do not fit.
+    """
+    return Domain(
+        name=name,
+        preset=preset,
+        types=(ROBOT, *model.types),
+        predicates=model.predicates,
+        action_space=ACTION_SPACE,
+        sample_task=settings.sample,
+        make_world=lambda state: ContactWorld(model.scene_of(state), state),
+        default_goal=next(iter(model.goals.values())),
+        step_limit=STEP_LIMIT,
+        execution=Execution(control_period_s=CONTROL_PERIOD_S),
+        metrics=(*COMMON, *model.metrics),
+        static=model.static,
+        goals=model.goals,
+        robot_types=frozenset({ROBOT}),
+        learning=Learning(interface=learner_interface(model.holding)),
+        acquisition=model.acquisition,
+        configuration=settings.as_configuration(),
+    )

@@ -1,0 +1,134 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Reading a state of a hand among bodies: single ones as plain floats, batches as arrays. SI units.
+
+What reads a batch takes a column of objects and gives one row per object.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from slap_ros.contact.features import ROBOT
+from slap_ros.contact.hand import wrapped
+from slap_ros.domains.benchtop.features import THING
+from slap_ros.geometry.pose import Pose, Vector, rotate
+from slap_ros.physics.features import POSE_FEATURES
+from slap_ros.relational import Column, Layout, Object, State
+from slap_ros.relational.state import Array
+
+POSITION = ("x", "y", "z")
+QUATERNION = ("qx", "qy", "qz", "qw")
+LINEAR = ("vx", "vy", "vz")
+ANGULAR = ("wx", "wy", "wz")
+TARGET = ("target_x", "target_y", "target_z")
+POSE_NAMES = tuple(feature.name for feature in POSE_FEATURES)
+
+
+# -- single states --------------------------------------------------------------------------------
+
+
+def robot_of(layout: Layout) -> Object:
+    """The robot, of which there is one."""
+    (robot,) = layout.of_type(ROBOT)
+    return robot
+
+
+def value(state: State, obj: Object, feature: str) -> float:
+    """One feature of an object.
+
+    Args:
+        state: A single one.
+        obj: Of its objects.
+        feature: By name.
+    """
+    return float(state.get(obj, feature))
+
+
+def position_of(state: State, obj: Object) -> Vector:
+    """Where an object's origin is, m."""
+    x, y, z = (float(state.get(obj, axis)) for axis in POSITION)
+    return (x, y, z)
+
+
+def pose_of(state: State, obj: Object) -> Pose:
+    """Where an object is, in the base's frame."""
+    x, y, z, qx, qy, qz, qw = (float(state.get(obj, name)) for name in POSE_NAMES)
+    return Pose((x, y, z), (qx, qy, qz, qw))
+
+
+def axis_of(state: State, obj: Object) -> Vector:
+    """The direction of its own x axis, of length 1."""
+    return rotate(pose_of(state, obj).quaternion, (1.0, 0.0, 0.0))
+
+
+def yaw_of(state: State, obj: Object) -> float:
+    """How its own x axis is turned about the vertical, rad."""
+    x, y, _ = axis_of(state, obj)
+    return math.atan2(y, x)
+
+
+def hand_position(state: State) -> Vector:
+    """Where the grasp point between the fingertips is, m."""
+    return position_of(state, robot_of(state.layout))
+
+
+def hand_pose(state: State) -> Pose:
+    """Where the hand is: its frame is the grasp point's, z downwards, fingers along y."""
+    return pose_of(state, robot_of(state.layout))
+
+
+def hand_target(state: State) -> tuple[Vector, float]:
+    """Where the hand is pulled: position in m, and yaw in rad."""
+    robot = robot_of(state.layout)
+    x, y, z = (float(state.get(robot, name)) for name in TARGET)
+    return (x, y, z), float(state.get(robot, "target_yaw"))
+
+
+def hand_yaw(state: State) -> float:
+    """How the hand is turned about the vertical, rad, within half a turn of its target."""
+    qx, qy, _, _ = hand_pose(state).quaternion
+    _, target = hand_target(state)
+    return target + wrapped(2.0 * math.atan2(qy, qx) - target)
+
+
+def finger_opening(state: State) -> float:
+    """The distance between the fingers' pads, m."""
+    robot = robot_of(state.layout)
+    return float(state.get(robot, "left_finger") + state.get(robot, "right_finger"))
+
+
+def things_of(layout: Layout) -> tuple[Object, ...]:
+    """The free bodies."""
+    return layout.of_type(THING)
+
+
+def held_thing(state: State) -> Object | None:
+    """What both fingers press on; None where they hold nothing."""
+    for thing in things_of(state.layout):
+        if state.get(thing, "held") > 0.5:
+            return thing
+    return None
+
+
+# -- batches --------------------------------------------------------------------------------------
+
+
+def hand_positions(state: State) -> Array:
+    """Where the grasp point is, m, shape (..., 1, 3)."""
+    return state.gather(state.layout.column_of(ROBOT), POSITION)
+
+
+def positions(state: State, column: Column) -> Array:
+    """Where objects are, m, shape (..., objects, 3)."""
+    return state.gather(column, POSITION)
+
+
+def axes(state: State, column: Column) -> Array:
+    """The directions of their own x axes, shape (..., objects, 3)."""
+    x, y, z, w = np.moveaxis(state.gather(column, QUATERNION), -1, 0)
+    return np.stack(
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)], axis=-1
+    )
