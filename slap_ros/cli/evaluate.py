@@ -74,7 +74,7 @@ def evaluate(
     summaries = [summary for summary, _ in results]
     if output is not None:
         folder = Path(shortcuts) if shortcuts else shipped_library(domain)
-        described = describe_library(folder, library) if folder and library else None
+        described = describe_library(folder.name, library) if folder and library else None
         origin = {"command": command, "domain": domain, **settings, "library": described}
         write_evaluation(output, origin, results)
     if json:

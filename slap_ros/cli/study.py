@@ -17,22 +17,32 @@ from slap_ros.cli.console import console, exits, progress
 from slap_ros.cli.options import DomainName, Jobs, Preset, flat_options
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose, sampling
 from slap_ros.core import Domain
-from slap_ros.domains import get_domain
+from slap_ros.domains import get_domain, preset_names
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.approaches import approaches
+from slap_ros.evaluation.experiment import Experiment
 from slap_ros.files import require_writable
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.shortcuts.settings import ExplorationSettings, training_settings
-from slap_ros.shortcuts.shipped import shipped_library
-from slap_ros.studies import dynamics, generalisation, perception, planning_time, pruning
+from slap_ros.shortcuts.shipped import shipped_libraries, shipped_library
+from slap_ros.studies import (
+    dynamics,
+    generalisation,
+    perception,
+    planning_time,
+    pruning,
+    table1,
+)
 from slap_ros.studies import goals as sampled
 from slap_ros.studies.comparison import Comparison
 from slap_ros.studies.figures import require_matplotlib
 from slap_ros.studies.results import Data, Provenance, StudyReport, describe_library, write
 from slap_ros.studies.trainings import TrainingFolder
+from slap_ros.studies.trial_log import TrialLog
 from slap_ros.studies.variations import NUMBERS, offered, parse_variation
 
 RESULTS = Path("docs/results")
+FRESH_SEED = 500  # development looks at no task seed from here on
 
 app = typer.Typer(
     help="Make a figure of the paper again: data, a picture and a page.",
@@ -208,6 +218,57 @@ def planning_time_(
     _write(options.output, report, Provenance(domain, command, settings))
 
 
+@app.command("table1")
+@exits
+def table1_(
+    domain: DomainName,
+    libraries: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--library",
+            help="A library's folder, one per training seed; may be repeated. Default: what ships.",
+        ),
+    ] = None,
+    tasks: Tasks = 10,
+    seeds: Seeds = 5,
+    first_seed: Annotated[int, typer.Option(min=0, help="The first task seed.")] = FRESH_SEED,
+    presets: Annotated[
+        list[str] | None, typer.Option("--preset", help="May be repeated. Default: all.")
+    ] = None,
+    samples: Samples = SAMPLES,
+    jobs: Jobs = 1,
+    output: Output = RESULTS,
+) -> None:
+    """SLAP Table 1: success and plan length on fresh tasks, over several trained libraries.
+
+    Whoever stops it goes on with the same command.
+    """
+    require_matplotlib()
+    require_writable(output)
+    chosen = [get_domain(domain, preset) for preset in presets or preset_names(domain)]
+    folders = libraries or shipped_libraries(domain)
+    trained = [
+        table1.TrainedLibrary(_library_name(folder), loaded)
+        for folder in folders
+        if (loaded := choose(str(folder), chosen[0], "lazy")) is not None
+    ]
+    settings = {"tasks": tasks, "seeds": seeds, "first_seed": first_seed, "samples": samples}
+    given = {"library": list(map(str, libraries or ())), "preset": list(presets or ())}
+    command = command_line("study", "table1", domain, **given, **settings)
+    log = TrialLog(output / f".table1_{domain}.jsonl", command)
+    experiments = [Experiment(one, tasks, seeds, first_seed) for one in chosen]
+    with _StudyBars() as bars:
+        report = table1.study(experiments, trained, sampling(samples), jobs, log, bars)
+    described = [describe_library(one.name, one.library) for one in trained]
+    _write(output, report, Provenance(domain, command, {**settings, "libraries": described}))
+    log.remove()
+
+
+def _library_name(folder: Path) -> str:
+    """As people tell libraries of a domain apart: by the folder, and the training's seed."""
+    return "/".join(folder.resolve().parts[-2:])
+
+
 def _compare(domain: str, options: ComparisonOptions) -> tuple[Comparison, Data]:
     """What to compare, and the settings that a report names."""
     require_matplotlib()
@@ -225,7 +286,7 @@ def _compare(domain: str, options: ComparisonOptions) -> tuple[Comparison, Data]
         "tasks": options.tasks,
         "seeds": options.seeds,
         "samples": options.samples,
-        "library": describe_library(folder, library),
+        "library": describe_library(folder.name, library),
     }
     comparison = Comparison(chosen, compared, options.tasks, options.seeds, options.jobs)
     return comparison, settings

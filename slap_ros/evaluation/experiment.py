@@ -5,33 +5,52 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from slap_ros.core import Domain, Task
 from slap_ros.domains import get_domain
+from slap_ros.errors import ErrorCode
 from slap_ros.evaluation.approaches import PURE_PLANNING, Approach
 from slap_ros.learning.workers import local_workers
 from slap_ros.planning.execution import EpisodeResult, ExecutedEdge, Executor
+from slap_ros.relational import GroundAtom
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """Which tasks: ``tasks`` of each of ``seeds`` seeds, the first of which is ``first_seed``."""
+    """Which tasks: ``tasks`` of each of ``seeds`` seeds, the first of which is ``first_seed``.
+
+    Of those, the ones in ``left_out`` are not solved, each a seed and an index.
+    """
 
     domain: Domain
     tasks: int
     seeds: int
     first_seed: int = 0
     planner: str = "lazy"
+    left_out: frozenset[tuple[int, int]] = frozenset()
 
     def __iter__(self) -> Iterator[tuple[int, int]]:
         """Seed and index of each task."""
         for seed in range(self.first_seed, self.first_seed + self.seeds):
             for index in range(self.tasks):
-                yield seed, index
+                if (seed, index) not in self.left_out:
+                    yield seed, index
 
     def __len__(self) -> int:
-        return self.tasks * self.seeds
+        return self.tasks * self.seeds - len(self.left_out)
+
+    def without_repetitions(self) -> Experiment:
+        """The same without tasks that are equal to an earlier one, in state and goal."""
+        known: set[tuple[bytes, frozenset[GroundAtom]]] = set()
+        left_out = set(self.left_out)
+        for seed, index in self:
+            task = self.domain.task(seed, index)
+            key = (task.initial_state.key, task.goal)
+            if key in known:
+                left_out.add((seed, index))
+            known.add(key)
+        return replace(self, left_out=frozenset(left_out))
 
     def run(self, seed: int, index: int, approach: Approach = PURE_PLANNING) -> EpisodeResult:
         """Solve one task, in a world of its own.
@@ -99,6 +118,11 @@ class Trial:
     replans: int = 0
     error_code: int = 0
     edges: tuple[ExecutedEdge, ...] = ()
+
+    @property
+    def at_step_limit(self) -> bool:
+        """Whether it was given up at the task's step limit."""
+        return self.error_code == ErrorCode.STEP_LIMIT
 
     @classmethod
     def of(cls, seed: int, index: int, episode: EpisodeResult) -> Trial:

@@ -9,7 +9,6 @@ from dataclasses import asdict, dataclass
 from statistics import fmean, stdev
 from typing import Any
 
-from slap_ros.errors import ErrorCode
 from slap_ros.evaluation.experiment import Experiment, Trial
 from slap_ros.evaluation.statistics import Interval, ratio_interval, wilson_interval
 
@@ -79,13 +78,13 @@ class Summary:
         """
         lengths = [float(trial.plan_length) for trial in trials if trial.success]
         steps = sum(trial.plan_length for trial in trials)
-        own, other = _lengths_of_both(trials, baseline)
+        own, other = lengths_of_both(trials, baseline)
         return cls(
             experiment,
             approach,
             fmean(trial.success for trial in trials),
             wilson_interval(len(lengths), len(trials)),
-            sum(trial.error_code == ErrorCode.STEP_LIMIT for trial in trials),
+            sum(trial.at_step_limit for trial in trials),
             Spread.of(lengths) if lengths else None,
             sum(own) / sum(other) if sum(other) else None,
             ratio_interval(own, other) if sum(other) else None,
@@ -126,7 +125,7 @@ class Summary:
         }
 
 
-def _lengths_of_both(
+def lengths_of_both(
     trials: Sequence[Trial], baseline: Sequence[Trial]
 ) -> tuple[list[int], list[int]]:
     """The lengths of both, on the tasks that both solved and that took a step."""

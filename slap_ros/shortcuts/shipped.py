@@ -28,6 +28,20 @@ def shipped_library(domain: str) -> Path | None:
     return next((folder for folder in folders if folder.is_dir()), None)
 
 
+def shipped_libraries(domain: str) -> list[Path]:
+    """The folders of all of a domain's shipped libraries: the one in use, and its siblings.
+
+    They were trained alike with other seeds, and show how much a training depends on its seed.
+    """
+    folders = [shipped_library(domain)]
+    for root in _roots():
+        siblings = sorted((root / "models" / "seeds" / domain).glob("[0-9]*"))
+        if siblings:
+            folders += siblings
+            break
+    return [folder for folder in folders if folder is not None]
+
+
 def _roots() -> Iterator[Path]:
     """Where models may be: beside the package in a checkout, else installed."""
     yield Path(slap_ros.__file__).resolve().parent.parent

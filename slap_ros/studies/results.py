@@ -113,10 +113,10 @@ def write(folder: Path, report: StudyReport, origin: Provenance) -> list[Path]:
     return paths
 
 
-def describe_library(folder: Path, library: Library) -> dict[str, Any]:
-    """Which library it is: the folder's name, the digest that bags have too, what it offers."""
+def describe_library(name: str, library: Library) -> dict[str, Any]:
+    """Which library it is: its name, the digest that bags have too, what it offers."""
     return {
-        "name": folder.name,
+        "name": name,
         "digest": library.digest,
         "shortcuts": [shortcut.name for shortcut in library.shortcuts],
     }

@@ -1,0 +1,309 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The main table: success and plan length with shortcuts that were trained several times.
+
+Each library is evaluated on the same tasks. A row is the mean over libraries, none of which was
+chosen by what it does here (SLAP Table 1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from statistics import fmean
+from typing import TYPE_CHECKING, Any
+
+from slap_ros.evaluation.approaches import Approach, approaches
+from slap_ros.evaluation.experiment import Experiment, Trial, run_all
+from slap_ros.evaluation.statistics import Interval, ratio_interval, wilson_interval
+from slap_ros.evaluation.summary import Spread, lengths_of_both
+from slap_ros.shortcuts.library import Library
+from slap_ros.shortcuts.shortcut import Sampling
+from slap_ros.studies.comparison import StudyProgress, complaint, format_spread, spread_of
+from slap_ros.studies.figures import APPROACH_STYLES, label
+from slap_ros.studies.results import MarkdownTable, StudyReport
+from slap_ros.studies.trial_log import TrialLog
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MEASURED = """\
+Every task is planned and executed in the world; length is the number of environment steps
+executed. Tasks that are equal to an earlier one are left out. A row with shortcuts is over all
+tasks and all libraries. Each library was trained with another seed, and no library was chosen by
+its figures here. Success has Wilson's 95 % interval. Length is the mean over solved tasks, with the
+sample standard deviation over tasks, and over the means of the libraries. Relative length is the
+sum of lengths over that of pure planning, on tasks that both solved, with the 95 % interval of a
+bootstrap over tasks. "At limit" counts tasks that were given up at the domain's step limit. Seconds
+of planning are per task, on whatever machine made this page."""
+
+
+@dataclass(frozen=True)
+class TrainedLibrary:
+    """A library and what it is called: that of its folder."""
+
+    name: str
+    library: Library
+
+
+@dataclass(frozen=True)
+class LibraryTrials:
+    """All tasks of a preset, with one library or without.
+
+    Args:
+        library: Its name; empty for pure planning.
+        approach: Name of the way to plan.
+        trials: By seed and index.
+    """
+
+    library: str
+    approach: str
+    trials: tuple[Trial, ...]
+
+
+@dataclass(frozen=True)
+class Row:
+    """A way to plan, over all tasks of a preset and all libraries.
+
+    Args:
+        preset: Of the domain.
+        approach: Name of the way to plan.
+        tasks: Number of different tasks.
+        results: One per library.
+        baseline: Pure planning's trials of the same tasks.
+    """
+
+    preset: str
+    approach: str
+    tasks: int
+    results: tuple[LibraryTrials, ...]
+    baseline: tuple[Trial, ...]
+
+    @property
+    def trials(self) -> list[Trial]:
+        """Of all libraries."""
+        return [trial for result in self.results for trial in result.trials]
+
+    @property
+    def success(self) -> tuple[float, Interval]:
+        """The rate and its interval."""
+        solved = sum(trial.success for trial in self.trials)
+        return solved / len(self.trials), wilson_interval(solved, len(self.trials))
+
+    @property
+    def at_step_limit(self) -> int:
+        """Trials given up at the step limit."""
+        return sum(trial.at_step_limit for trial in self.trials)
+
+    @property
+    def length(self) -> Spread | None:
+        """Over solved tasks; None where none was solved."""
+        return spread_of([float(t.plan_length) for t in self.trials if t.success])
+
+    @property
+    def length_over_libraries(self) -> Spread | None:
+        """Over the mean lengths of the libraries; None with fewer than two."""
+        means = [
+            fmean(lengths)
+            for result in self.results
+            if (lengths := [t.plan_length for t in result.trials if t.success])
+        ]
+        return Spread.of(means) if len(means) > 1 else None
+
+    @property
+    def relative(self) -> tuple[float, Interval | None] | None:
+        """Relative length and its interval; None where there are no common tasks.
+
+        A task's length is its mean over the libraries that solved it, as tasks are what is
+        resampled.
+        """
+        own, other = [], []
+        for i, pure in enumerate(self.baseline):
+            solved = [r.trials[i].plan_length for r in self.results if r.trials[i].success]
+            if solved and pure.success and pure.plan_length:
+                own.append(fmean(solved))
+                other.append(float(pure.plan_length))
+        return (sum(own) / sum(other), ratio_interval(own, other)) if other else None
+
+    @property
+    def planning_seconds(self) -> Spread:
+        """Seconds that planning took for a task."""
+        return Spread.of([trial.planning_seconds for trial in self.trials])
+
+    def as_json(self) -> dict[str, Any]:
+        """Every figure and every trial, for the report's JSON."""
+        rate, interval = self.success
+        relative = self.relative
+        return {
+            "preset": self.preset,
+            "approach": self.approach,
+            "tasks": self.tasks,
+            "success_rate": rate,
+            "success_interval": asdict(interval),
+            "at_step_limit": self.at_step_limit,
+            "plan_length": asdict(self.length) if self.length else None,
+            "plan_length_over_libraries": (
+                asdict(self.length_over_libraries) if self.length_over_libraries else None
+            ),
+            "relative_length": relative[0] if relative else None,
+            "relative_interval": asdict(relative[1]) if relative and relative[1] else None,
+            "planning_seconds": asdict(self.planning_seconds),
+            "libraries": [
+                {
+                    "library": result.library or None,
+                    "relative_length": _relative(result.trials, self.baseline),
+                    "trials": [asdict(trial) for trial in result.trials],
+                }
+                for result in self.results
+            ],
+        }
+
+
+def study(
+    experiments: Sequence[Experiment],
+    libraries: Sequence[TrainedLibrary],
+    sampling: Sampling,
+    jobs: int,
+    log: TrialLog,
+    progress: StudyProgress,
+) -> StudyReport:
+    """Evaluate every library under every preset.
+
+    Args:
+        experiments: The tasks of each preset.
+        libraries: Each evaluated under every preset.
+        sampling: How shortcuts are tried out.
+        jobs: Number of processes.
+        log: What is done already; gets what is done here.
+        progress: Is called as tasks end.
+
+    Returns:
+        The report.
+    """
+    rows: list[Row] = []
+    for experiment in experiments:
+        run = _Runner(experiment.without_repetitions(), jobs, log, progress)
+        rows += run.rows(libraries, sampling)
+    domain = experiments[0].domain
+    return StudyReport(
+        study="table1",
+        source="SLAP Table 1",
+        title=f"Success and plan length: {domain.name}",
+        measured=MEASURED,
+        table=MarkdownTable(COLUMNS, [cells(row) for row in rows]),
+        found={"rows": [row.as_json() for row in rows]},
+        draw=lambda figure: draw(figure, rows),
+        size=(7.0, 3.0),
+    )
+
+
+@dataclass(frozen=True)
+class _Runner:
+    """Solves what the log does not have yet."""
+
+    experiment: Experiment
+    jobs: int
+    log: TrialLog
+    progress: StudyProgress
+
+    def rows(self, libraries: Sequence[TrainedLibrary], sampling: Sampling) -> list[Row]:
+        compared = [approaches(trained.library, sampling) for trained in libraries]
+        pure = approaches(None, sampling)[0]
+        self.progress.begin(
+            self.experiment.domain.preset,
+            len(self.experiment) * (1 + sum(len(ways) - 1 for ways in compared)),
+        )
+        baseline = self._solve("", "", pure)
+        rows = [self._row(pure.name, [baseline], baseline)]
+        measured: dict[str, list[LibraryTrials]] = {}
+        for trained, (_, *learned) in zip(libraries, compared, strict=True):
+            for way in learned:
+                solved = self._solve(trained.name, trained.library.digest, way)
+                measured.setdefault(way.name, []).append(solved)
+        return rows + [self._row(name, found, baseline) for name, found in measured.items()]
+
+    def _row(self, name: str, results: list[LibraryTrials], baseline: LibraryTrials) -> Row:
+        preset, count = self.experiment.domain.preset, len(self.experiment)
+        return Row(preset, name, count, tuple(results), baseline.trials)
+
+    def _solve(self, library: str, digest: str, approach: Approach) -> LibraryTrials:
+        key = (self.experiment.domain.preset, f"{library} {digest}".strip(), approach.name)
+        trials = self.log.trials(key)
+        done = {(trial.seed, trial.index) for trial in trials}
+        for _ in done:
+            self.progress.advance()
+        left = replace(self.experiment, left_out=self.experiment.left_out | done)
+        for trial in run_all(left, approach, self.jobs) if len(left) else ():
+            trials.append(trial)
+            self.log.add(key, trial)
+            self.progress.advance()
+            if not trial.success:
+                said = complaint(approach, trial.seed, trial.index, trial.reason)
+                self.progress.report_failure(said)
+        trials.sort(key=lambda trial: (trial.seed, trial.index))
+        return LibraryTrials(library, approach.name, tuple(trials))
+
+
+COLUMNS = (
+    "preset",
+    "tasks × libraries",
+    "approach",
+    "success [95 %]",
+    "at limit",
+    "plan length [steps]",
+    "± over libraries",
+    "relative [95 %]",
+    "planning [s]",
+)
+
+
+def cells(row: Row) -> list[str]:
+    """A row of the page's table."""
+    rate, interval = row.success
+    libraries = row.length_over_libraries
+    count = len(row.results)
+    return [
+        f"`{row.preset}`",
+        f"{row.tasks}" if row.approach == "pure_planning" else f"{row.tasks} × {count}",
+        label(row.approach),
+        f"{rate:.0%} [{interval.low:.0%}, {interval.high:.0%}]",
+        str(row.at_step_limit),
+        format_spread(row.length, 1),
+        "-" if libraries is None else f"{libraries.sd:.1f}",
+        relative_cell(row),
+        format_spread(row.planning_seconds, 2),
+    ]
+
+
+def relative_cell(row: Row) -> str:
+    """Relative length with its interval."""
+    if row.approach == "pure_planning":
+        return "1"
+    if row.relative is None:
+        return "-"
+    value, interval = row.relative
+    return f"{value:.2f}" + (f" [{interval.low:.2f}, {interval.high:.2f}]" if interval else "")
+
+
+def draw(figure: Figure, rows: Sequence[Row]) -> None:
+    """A bar for each row's relative length, a dot for each library's."""
+    axes = figure.subplots()
+    for place, row in enumerate(rows):
+        style = APPROACH_STYLES[row.approach]
+        if row.relative is None:
+            continue
+        axes.bar(place, row.relative[0], color=style.colour, width=0.7)
+        dots = [_relative(result.trials, row.baseline) for result in row.results]
+        known = [dot for dot in dots if dot is not None]
+        if len(known) > 1:
+            axes.scatter([place] * len(known), known, color="white", edgecolors="black", s=18)
+    axes.set_xticks(
+        range(len(rows)), [f"{label(row.approach)}\n{row.preset}" for row in rows], fontsize=8
+    )
+    axes.set_ylabel("relative length; dots: libraries")
+    axes.grid(visible=False, axis="x")
+
+
+def _relative(trials: Sequence[Trial], baseline: Sequence[Trial]) -> float | None:
+    own, other = lengths_of_both(trials, baseline)
+    return sum(own) / sum(other) if other else None
