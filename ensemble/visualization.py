@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from builtin_interfaces.msg import Duration, Time
 from geometry_msgs.msg import Point, Pose, Quaternion, Transform, TransformStamped, Vector3
@@ -17,6 +17,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from ensemble import encode
 from ensemble.interfaces import JOINT_STATES, MARKERS, TF
 from slap_ros.core import Domain, VisibleBody
+from slap_ros.geometry import pose as geometry
 from slap_ros.messages.interfaces import BODIES
 from slap_ros.relational import State
 
@@ -37,11 +38,13 @@ class Visualizer:
 
     def show(self, state: State, stamp: Time) -> None:
         """Publish a state."""
-        bodies = self._domain.display.bodies(state)
+        display = self._domain.display
+        bodies = display.bodies(state)
         shown = markers(bodies, stamp)
-        shown.markers.extend(markers(self._domain.display.arm(state), stamp, ROBOT).markers)
+        shown.markers.extend(markers(display.arm(state), stamp, ROBOT).markers)
         self._markers.publish(shown)
-        self._frames.publish(frames(bodies, stamp))
+        poses = body_poses(bodies) if display.frames is None else display.frames(state)
+        self._frames.publish(frames(poses, stamp))
         joints = joint_state(state, stamp)
         if joints.name:
             self._joints.publish(joints)
@@ -66,7 +69,9 @@ def markers(bodies: Sequence[VisibleBody], stamp: Time, namespace: str = BODIES)
                 id=number,
                 type=Marker.TRIANGLE_LIST if body.triangles else Marker.CUBE,
                 action=Marker.ADD,
-                pose=Pose(position=Point(**_xyz(body.position)), orientation=_turn(body)),
+                pose=Pose(
+                    position=Point(**_xyz(body.position)), orientation=_turn(body.quaternion)
+                ),
                 scale=Vector3(**_xyz(UNSCALED if body.triangles else body.size)),
                 points=[Point(**_xyz(corner)) for corner in body.triangles],
                 color=ColorRGBA(**dict(zip("rgba", body.colour, strict=True))),
@@ -78,18 +83,23 @@ def markers(bodies: Sequence[VisibleBody], stamp: Time, namespace: str = BODIES)
     )
 
 
-def frames(bodies: Sequence[VisibleBody], stamp: Time) -> TFMessage:
-    """A frame for each body, in the world's."""
+def body_poses(bodies: Sequence[VisibleBody]) -> Mapping[str, geometry.Pose]:
+    """Where bodies are, by name, for a domain that names no frames."""
+    return {body.name: geometry.Pose(body.position, body.quaternion) for body in bodies}
+
+
+def frames(poses: Mapping[str, geometry.Pose], stamp: Time) -> TFMessage:
+    """Poses in the world's frame as transforms to frames of these names."""
     return TFMessage(
         transforms=[
             TransformStamped(
                 header=encode.header(stamp),
-                child_frame_id=body.name,
+                child_frame_id=name,
                 transform=Transform(
-                    translation=Vector3(**_xyz(body.position)), rotation=_turn(body)
+                    translation=Vector3(**_xyz(pose.position)), rotation=_turn(pose.quaternion)
                 ),
             )
-            for body in bodies
+            for name, pose in poses.items()
         ]
     )
 
@@ -113,5 +123,5 @@ def _xyz(values: Sequence[float]) -> dict[str, float]:
     return dict(zip("xyz", map(float, values), strict=True))
 
 
-def _turn(body: VisibleBody) -> Quaternion:
-    return Quaternion(**dict(zip("xyzw", map(float, body.quaternion), strict=True)))
+def _turn(quaternion: Sequence[float]) -> Quaternion:
+    return Quaternion(**dict(zip("xyzw", map(float, quaternion), strict=True)))

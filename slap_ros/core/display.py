@@ -4,16 +4,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from slap_ros.geometry.pose import Pose
 from slap_ros.relational import State
 
 
 @dataclass(frozen=True)
 class VisibleBody:
-    """A box to be shown, or a body of triangles; pose in the world frame."""
+    """A box to be shown, or a body of triangles; pose in the world frame.
+
+    Boxes that are parts of one thing have the same name.
+    """
 
     name: str
     position: tuple[float, float, float]  # m, of its centre
@@ -35,9 +39,11 @@ class Display:
     Args:
         bodies: The bodies of a state, in an order that does not change.
         arm: The robot's own shapes in a state, unless it is one of the bodies.
+        frames: Poses of a state by name, for TF; without it, those of the bodies.
         animate: Writes an animation; without it, the bodies are drawn plainly.
     """
 
     bodies: Callable[[State], Sequence[VisibleBody]] = lambda _: ()
     arm: Callable[[State], Sequence[VisibleBody]] = lambda _: ()
+    frames: Callable[[State], Mapping[str, Pose]] | None = None
     animate: Animate | None = None

@@ -116,10 +116,17 @@ def box_paths(body: VisibleBody, view: Projection, canvas: Canvas) -> tuple[str,
 
 
 def corners(body: VisibleBody) -> list[Vector]:
-    """The corners of a box."""
-    x, y, z = (size / 2 for size in body.size)
+    """The corners of a box, or of the one around a body of triangles."""
     pose = pose_of(body)
-    return [pose.apply(corner) for corner in product((-x, x), (-y, y), (-z, z))]
+    xs, ys, zs = _ranges(body)
+    return [pose.apply(corner) for corner in product(xs, ys, zs)]
+
+
+def _ranges(body: VisibleBody) -> list[tuple[float, float]]:
+    """From where to where it reaches along its own axes, m."""
+    if body.triangles:
+        return [(min(values), max(values)) for values in zip(*body.triangles, strict=True)]
+    return [(-size / 2, size / 2) for size in body.size]
 
 
 def box_triangles(body: VisibleBody) -> list[tuple[Vector, Vector, Vector]]:
@@ -147,7 +154,8 @@ def _face(half: Sequence[float], axis: int, sign: float) -> list[Vector]:
 def drawable(bodies: Iterable[VisibleBody]) -> Iterator[VisibleBody]:
     """Those that can be drawn: anyone may have recorded or displayed anything."""
     for body in bodies:
-        numbers = (*body.position, *body.quaternion, *body.size, *body.colour)
+        shape = (number for corner in body.triangles for number in corner)
+        numbers = (*body.position, *body.quaternion, *body.size, *body.colour, *shape)
         if all(map(is_near, numbers)) and hypot(*body.quaternion) > LEAST_LENGTH:
             yield body
 

@@ -200,6 +200,7 @@ class MarkerMessage(Protocol):
     pose: PoseMessage
     scale: PointMessage
     color: ColourMessage
+    points: Sequence[PointMessage]
     text: str
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from slap_ros.core import VisibleBody
+from slap_ros.drawing.meshes import body_paths
 from slap_ros.drawing.projection import (
     OBLIQUE,
     SIDE,
@@ -16,7 +17,6 @@ from slap_ros.drawing.projection import (
     Canvas,
     Point,
     Projection,
-    box_paths,
     corners,
 )
 from slap_ros.geometry.pose import Vector
@@ -117,7 +117,7 @@ def _draw(
         _shape(
             _hex(body),
             [
-                box_paths(frame.bodies[i], view, canvas) if i < len(frame.bodies) else NOTHING
+                body_paths(frame.bodies[i], view, canvas) if i < len(frame.bodies) else NOTHING
                 for frame in scene.frames
             ],
         )

@@ -21,10 +21,11 @@ from slap_ros.physics.links import LINK_SHAPES
 from slap_ros.physics.panda import HAND, JOINTS, LINKS, link_poses
 from slap_ros.report.traces import ROBOT
 
-CUBE = 1  # Marker.CUBE
+CUBE, TRIANGLE_LIST = 1, 11  # types of markers that are drawn
 MAX_BODIES = 64  # a frame
 MAX_FRAMES = 600  # a run; of a longer one, every second or third step and so on
 WRIST_M = 0.04  # m, above the hand's frame: where the round end of the arm meets the hand
+FINGERS = ("left_finger", "right_finger")
 METAL = (0.62, 0.65, 0.69, 1.0)  # of the hand
 
 
@@ -101,14 +102,16 @@ class _BodyFinder:
 
 def _of_markers(message: MarkersMessage) -> Iterable[VisibleBody]:
     for marker in message.markers:
-        if marker.ns == BODIES and marker.type == CUBE:
+        if marker.ns == BODIES and marker.type in (CUBE, TRIANGLE_LIST):
             p, q, s, c = marker.pose.position, marker.pose.orientation, marker.scale, marker.color
+            points = marker.points if marker.type == TRIANGLE_LIST else ()
             yield VisibleBody(
                 marker.text,
                 (float(p.x), float(p.y), float(p.z)),
                 (float(q.x), float(q.y), float(q.z), float(q.w)),
                 (float(s.x), float(s.y), float(s.z)),
                 (float(c.r), float(c.g), float(c.b), float(c.a)),
+                tuple((float(point.x), float(point.y), float(point.z)) for point in points),
             )
 
 
@@ -121,11 +124,13 @@ def _arm(
 ) -> tuple[tuple[VisibleBody, ...], tuple[Vector, ...]]:
     """The hand's parts and the points of the arm, of a robot that has the Panda's joints."""
     features = _robot_features(state, recording)
-    names = [*(f"joint{i + 1}" for i in range(JOINTS)), "finger"]
+    if "finger" in features:  # both are at the same distance from the middle
+        features |= dict.fromkeys(FINGERS, features["finger"])
+    names = [*(f"joint{i + 1}" for i in range(JOINTS)), *FINGERS]
     if not all(is_near(features.get(name, nan)) for name in names):
         return (), ()
-    *joints, finger = (features[name] for name in names)
-    links = link_poses(joints, finger)
+    *joints, left, right = (features[name] for name in names)
+    links = link_poses(joints, left, right)
     parts = []
     for shape in HAND_SHAPES:
         box = shape.at(links[shape.link])

@@ -7,7 +7,7 @@ import pytest
 from builtin_interfaces.msg import Time
 from visualization_msgs.msg import Marker
 
-from ensemble.visualization import frames, joint_state, markers
+from ensemble.visualization import body_poses, frames, joint_state, markers
 from slap_ros.domains import get_domain
 from slap_ros.physics.panda import grasp_pose
 
@@ -22,7 +22,7 @@ def test_every_object_but_the_arm_is_a_marker_and_a_frame(name):
     state = domain.task(0).initial_state
     bodies = domain.display.bodies(state)
     shown = {marker.text for marker in markers(bodies, STAMP).markers}
-    framed = {frame.child_frame_id for frame in frames(bodies, STAMP).transforms}
+    framed = {frame.child_frame_id for frame in frames(body_poses(bodies), STAMP).transforms}
     everything = {obj.name for obj in state.objects}
     assert shown == framed
     assert everything - shown <= {"robot", "bin"}  # a bin is shown by its parts
