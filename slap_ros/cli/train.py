@@ -25,6 +25,7 @@ from slap_ros.files import parse_json, read_text, require_writable
 from slap_ros.learning.setting_changes import changed, parse_changes
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.workers import Workers, local_workers, ray_workers
+from slap_ros.planning.planner import require_skills
 from slap_ros.shortcuts.library import save_library
 from slap_ros.shortcuts.settings import TrainingSettings, training_settings
 from slap_ros.shortcuts.training import CandidateGroup, Training
@@ -110,6 +111,7 @@ def train(options: TrainOptions) -> int:
     TensorBoard is in the work folder.
     """
     domain = get_domain(options.domain, options.preset)
+    require_skills(domain)
     options = replace(options, preset=domain.preset)
     settings = options.training_settings(domain)
     for folder in (options.library_folder, options.work_folder):

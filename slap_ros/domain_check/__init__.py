@@ -10,7 +10,7 @@ import numpy as np
 
 from slap_ros.core import Domain
 from slap_ros.doctor.check import Check
-from slap_ros.domain_check import atoms, cost, markov, skills, tasks
+from slap_ros.domain_check import acquisition, atoms, cost, markov, skills, tasks
 from slap_ros.domain_check.experience import Experience, gather
 
 __all__ = ["CHECK_SEED", "Experience", "check_domain", "gather"]
@@ -35,7 +35,13 @@ def check_domain(
     rng = np.random.default_rng([CHECK_SEED, seed])
     yield cost.import_time(domain)
     yield tasks.different(domain, CHECK_SEED + seed, task_count)
-    solved = tasks.Solved.of(domain, CHECK_SEED + seed, task_count)
+    if domain.acquisition is not None:
+        yield from acquisition.parts(domain, domain.acquisition)
+        yield acquisition.goals(domain, domain.acquisition, CHECK_SEED + seed)
+    solver, planner = domain, "lazy"
+    if not domain.operators:  # then a demonstrator shows whether tasks can be solved
+        solver, planner = acquisition.with_demonstrator(domain) or domain, "astar"
+    solved = tasks.Solved.of(solver, CHECK_SEED + seed, task_count, planner)
     yield solved.check()
     start = domain.task(CHECK_SEED + seed).initial_state
     experience = gather(domain, start, solved.episodes, state_count, rng)
@@ -43,6 +49,6 @@ def check_domain(
     yield markov.repeat(domain, experience, rng)
     yield atoms.margins(domain, experience)
     yield atoms.thresholds(domain, CHECK_SEED + seed, task_count)
-    yield skills.lower_bounds(domain, solved)
-    yield skills.deterministic(domain, solved)
+    yield skills.lower_bounds(solver, solved)
+    yield skills.deterministic(solver, solved)
     yield from cost.speed(domain, experience)

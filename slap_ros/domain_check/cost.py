@@ -60,6 +60,10 @@ def speed(domain: Domain, experience: Experience) -> Iterator[Check]:
         "warning" if steps < SLOW_STEPS else "ok",
         f"{steps:,.0f} steps, {resets:,.0f} resets, {atoms:,.0f} abstract states a second",
     )
+    if domain.learning is None and domain.acquisition is not None:
+        found = "no shortcuts are learned in this domain; skills are, from its metrics"
+        yield Check("training", "ok", found)
+        return
     settings = training_settings("ours", domain)
     wanted = settings.shortcuts * settings.total_steps
     hours = wanted / steps / 3600.0

@@ -65,7 +65,7 @@ def _rollouts(domain: Domain, solved: Solved) -> Iterator[tuple[Option, State, R
         task = domain.task(solved.seed, index)
         model = Model.of(domain, task.initial_state)
         state = task.initial_state
-        for edge in _plan(domain, state, model.space.mask(task.goal)).edges:
+        for edge in _plan(domain, state, model.space.mask(task.goal), solved.planner).edges:
             rollout = model.roll_out(edge.option, state, edge.target)
             if not rollout.reached:
                 break  # another finding's concern
@@ -73,8 +73,8 @@ def _rollouts(domain: Domain, solved: Solved) -> Iterator[tuple[Option, State, R
             state = rollout.final
 
 
-def _plan(domain: Domain, state: State, goal: int) -> Plan:
+def _plan(domain: Domain, state: State, goal: int, planner: str) -> Plan:
     try:
-        return PURE_PLANNING.planner("lazy", domain, state).plan(state, goal).plan
+        return PURE_PLANNING.planner(planner, domain, state).plan(state, goal).plan
     except SlapError:  # solved above, so that this cannot be; then there is nothing to look at
         return Plan(())

@@ -60,50 +60,66 @@ class Solved:
         episodes: Those that were executed, successful or not.
         failures: Reasons of those that were not solved, by task index.
         count: Tasks.
+        planner: By name.
     """
 
     seed: int
     episodes: tuple[EpisodeResult, ...]
     failures: dict[int, str]
     count: int
+    planner: str = "lazy"
 
     @classmethod
-    def of(cls, domain: Domain, seed: int, count: int) -> Solved:
+    def of(cls, domain: Domain, seed: int, count: int, planner: str = "lazy") -> Solved:
         """Plan and execute the first tasks of a seed.
 
         Args:
             domain: Whose tasks.
             seed: Whose tasks.
             count: How many.
+            planner: By name.
 
         Returns:
             What came of each.
         """
+        if not domain.operators:
+            return cls(seed, (), {}, 0, planner)
         episodes, failures = [], {}
         for index in range(count):
             try:
-                episode = solve(domain, domain.task(seed, index), PURE_PLANNING)
+                episode = solve(domain, domain.task(seed, index), PURE_PLANNING, planner)
             except SlapError as error:
                 failures[index] = f"{type(error).__name__}: {error}"
                 continue
             episodes.append(episode)
             if not episode.success:
                 failures[index] = episode.error.reason
-        return cls(seed, tuple(episodes), failures, count)
+        return cls(seed, tuple(episodes), failures, count, planner)
+
+    @property
+    def _name(self) -> str:
+        return "demonstrator" if self.planner == "astar" else "pure planning"
 
     def check(self) -> Check:
         """How many were solved, and why the others were not."""
         solved = self.count - len(self.failures)
+        if not self.count:
+            return Check(
+                self._name,
+                "warning",
+                "no task was tried, as there are neither skills nor scripts",
+                "Acquisition.scripts shows that the tasks can be solved",
+            )
         if not self.failures:
             steps = [episode.plan_length for episode in self.episodes]
             found = f"all {self.count} tasks, in {min(steps)} to {max(steps)} steps"
-            return Check("pure planning", "ok", found)
+            return Check(self._name, "ok", found)
         reasons = Counter(self.failures.values()).most_common(SHOWN)
         told = "; ".join(f"{number} x {reason}" for reason, number in reasons)
         return Check(
-            "pure planning",
+            self._name,
             "problem" if solved == 0 else "warning",
             f"{solved} of {self.count} tasks solved; not so: {told}",
-            f"look at one: slap run DOMAIN --seed {self.seed} --index {min(self.failures)} "
-            "--shortcuts none",
+            f"look at one: slap run DOMAIN --seed {self.seed} --index {min(self.failures)}"
+            f"{' --shortcuts none' if self.planner == 'lazy' else ''}",
         )

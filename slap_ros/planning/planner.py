@@ -44,22 +44,32 @@ class Planner(Protocol):
 GroundedOptions = tuple[tuple[GroundOperator, Option], ...]
 
 
-def ground_options(domain: Domain, space: AtomSpace) -> GroundedOptions:
-    """The domain's operators over a task's objects, each with the option that carries it out.
+def require_skills(domain: Domain) -> None:
+    """Refuse a domain whose skills are still to be acquired.
 
     Raises:
-        NoSkillsError: The domain has no operators.
+        NoSkillsError: The domain has no operators, and hence no skills.
     """
     if not domain.operators:
         by_hand = domain.acquisition is not None and domain.acquisition.operators
         advice = (
-            "its demonstrator has scripts in their place, for those who ask for it"
+            "`slap plan` plans with its hand-written operators, and its demonstrator has scripts "
+            "for skills (--skills demonstrator)"
             if by_hand
             else "give it operators and skills"
         )
         raise NoSkillsError(
             f"domain {domain.name} has no skills yet, so there is nothing to plan with: {advice}"
         )
+
+
+def ground_options(domain: Domain, space: AtomSpace) -> GroundedOptions:
+    """The domain's operators over a task's objects, each with the option that carries it out.
+
+    Raises:
+        NoSkillsError: The domain has no operators.
+    """
+    require_skills(domain)
     return tuple(
         (ground, given_option(domain, ground.operator.name, ground.objects))
         for ground in domain.ground(space)

@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 from ensemble.cli.application import app
 from slap_ros.core import task_with_goal
+from slap_ros.domain_check import check_domain
 from slap_ros.domains import get_domain
 from slap_ros.errors import (
     ErrorCode,
@@ -110,8 +111,8 @@ def test_planners_say_that_there_is_nothing_to_plan_with():
 
 def test_goals_by_name_and_in_atoms():
     by_name = task_with_goal(DOMAIN, 3, 0, "other")
-    assert {str(atom) for atom in by_name.goal} == {"On(block2, target)"}
-    in_atoms = task_with_goal(DOMAIN, 3, 0, "(On block2 target)")
+    assert {str(atom) for atom in by_name.goal} == {"Holding(robot, block2)"}
+    in_atoms = task_with_goal(DOMAIN, 3, 0, "(Holding robot block2)")
     assert in_atoms.goal == by_name.goal
     assert task_with_goal(DOMAIN, 3).goal == DOMAIN.task(3).goal
     with pytest.raises(UnknownGoalError, match="no goal 'tests'; there are training, other"):
@@ -135,7 +136,7 @@ def test_plan_with_the_scripts_predicts_steps(installed):
     assert json.loads(ran.stdout)["plan"] == json.loads(own.stdout)["plan"]
 
 
-@pytest.mark.parametrize("command", ["run", "evaluate"])
+@pytest.mark.parametrize("command", ["run", "evaluate", "train"])
 def test_commands_that_need_skills_say_so_before_anything_starts(installed, command):
     ran = slap(command, "untaught")
     assert ran.exit_code == ErrorCode.NO_SKILLS
@@ -148,3 +149,30 @@ def test_a_goal_that_no_domain_has_is_refused_by_name(installed):
         ran = slap(command, "untaught", "--goal", "nonsense")
         assert ran.exit_code == ErrorCode.UNKNOWN_GOAL, ran.output
         assert "there are training, other" in ran.stderr
+
+
+def test_domains_shows_what_skills_are_acquired_with(installed):
+    shown = slap("domains", "untaught").stderr
+    assert "training\n" in shown
+    assert "hand-written operators, without skills; a demonstrator has scripts" in shown
+    data = json.loads(slap("domains", "untaught", "--json").stdout)
+    assert set(data["goals"]) == {"training", "other"}
+    assert data["goals"]["other"] == "Holding(robot, block2)"
+    assert not data["operators"]
+    assert {one["name"] for one in data["hand_written_operators"]} == set(data["demonstrator"])
+    listed = json.loads(slap("domains", "--json").stdout)
+    assert data in listed
+
+
+def test_check_tries_the_demonstrator_and_the_goals():
+    found = {one.name: one for one in check_domain(DOMAIN, 0, 3, 40)}
+    assert found["demonstrator"].found.startswith("all 3 tasks, in ")
+    assert found["goals"].found.startswith("operators in a shortest plan: training ")
+    assert (found["rewards"].status, found["scripts"].status) == ("warning", "ok")
+    assert found["skills"].found != "0 roll-outs repeated, to the bit"
+    holding = replace(DOMAIN, goals={"now": lambda state: frozenset()})
+    wrong = {one.name: one for one in check_domain(holding, 0, 1, 10)}["goals"]
+    assert (wrong.status, wrong.found.split(" of ")[0]) == ("problem", "now holds at the start")
+    alone = replace(DOMAIN, acquisition=None)
+    nothing = {one.name: one for one in check_domain(alone, 0, 1, 10)}["demonstrator"]
+    assert (nothing.status, nothing.found[:17]) == ("warning", "no task was tried")

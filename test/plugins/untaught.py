@@ -8,13 +8,13 @@ from slap_ros.core import Acquisition, presets
 from slap_ros.domains import get_domain
 
 
-def on_target(block):
+def holding(block):
     """A goal about one block."""
 
     def goal(state):
         layout = state.layout
-        on = next(p for p in get_domain("obstacle2d").predicates if p.name == "On")
-        return frozenset({on(layout.object(block), layout.object("target"))})
+        held = next(p for p in get_domain("obstacle2d").predicates if p.name == "Holding")
+        return frozenset({held(layout.object("robot"), layout.object(block))})
 
     return goal
 
@@ -35,6 +35,6 @@ def make(preset, changes):
         operators=(),
         skills={},
         static=taught.static_predicates,
-        goals={"training": taught.default_goal, "other": on_target("block2")},
+        goals={"training": taught.default_goal, "other": holding("block2")},
         acquisition=by_hand,
     )
