@@ -83,6 +83,7 @@ class ErrorCode(IntEnum):
     ALREADY_RUNNING = 113
 
     # 130-149: acquisition; from 140 on, proposals and language models
+    INVALID_REWARD = 130
     PROPOSAL_REJECTED = 140
     MALFORMED_ANSWER = 141
     CASSETTE_MISS = 142
@@ -365,6 +366,12 @@ class AlreadyRunningError(SlapError):
     """Another ensemble uses the same domain id and namespace."""
 
     code = ErrorCode.ALREADY_RUNNING
+
+
+class InvalidRewardError(SlapError):
+    """A reward that does not fit its operator, or that cannot be weighed."""
+
+    code = ErrorCode.INVALID_REWARD
 
 
 class ProposalRejectedError(SlapError):

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,17 @@ LEAST_DEVIATION = 0.3  # features are of magnitude 1 or so
 # where cores are busy, and whose number changes the order of summation.
 MAX_BATCH = 64
 Weights = NDArray[np.float32]
+
+
+def _tanh(values: Weights) -> Weights:
+    return np.tanh(values)
+
+
+def _relu(values: Weights) -> Weights:
+    return np.maximum(values, np.float32(0.0))
+
+
+ACTIVATIONS: Mapping[str, Callable[[Weights], Weights]] = {"tanh": _tanh, "relu": _relu}
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,17 +55,21 @@ class ObservationNormalisation:
 
 @dataclass(frozen=True, eq=False)
 class MlpPolicy:
-    """A multi-layer perceptron with tanh between its layers, and Gaussian noise on its output.
+    """A multi-layer perceptron, and Gaussian noise on its output.
 
     Args:
         normalisation: Of observations.
         layers: Weights, shape (out, in), and biases, shape (out,).
         log_std: Of each action, shape (actions,).
+        activation: Between its layers, one of ``ACTIVATIONS``.
+        squashed: Whether the most likely actions are kept within (-1, 1) by tanh.
     """
 
     normalisation: ObservationNormalisation
     layers: tuple[tuple[Weights, Weights], ...]
     log_std: Weights
+    activation: str = "tanh"
+    squashed: bool = False
 
     def mean(self, observations: Weights) -> Weights:
         """The most likely actions, shape (n, actions), not yet clipped to [-1, 1]."""
@@ -61,12 +77,12 @@ class MlpPolicy:
         return np.concatenate([self._mean(observations[i : i + MAX_BATCH]) for i in rows])
 
     def _mean(self, observations: Weights) -> Weights:
-        hidden = self.normalisation(observations)
+        hidden, activate = self.normalisation(observations), ACTIVATIONS[self.activation]
         for weights, bias in self.layers[:-1]:
-            hidden = np.tanh(hidden @ weights.T + bias)
+            hidden = activate(hidden @ weights.T + bias)
         weights, bias = self.layers[-1]
         actions: Weights = hidden @ weights.T + bias
-        return actions
+        return np.tanh(actions) if self.squashed else actions
 
     def sample(
         self, observations: Weights, rng: np.random.Generator, temperature: float | Weights = 1.0

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slap_ros.core import Domain
+from slap_ros.learning.shares import proportional_shares
 from slap_ros.learning.vec_env import VecEnvStep
 from slap_ros.relational import State
 from slap_ros.relational.predicates import Bools
@@ -52,7 +53,7 @@ class ShortcutVecEnv:
         """
         self.horizon, self._rewards = horizon, rewards
         pools = _pools(starts)
-        shares = _shares([len(pool) for pool in pools], num_envs)
+        shares = proportional_shares([len(pool) for pool in pools], num_envs)
         self._groups = [
             _Group(domain, signature, pool, share, rng)
             for pool, share in zip(pools, shares, strict=True)
@@ -160,12 +161,3 @@ def _pools(starts: Sequence[Start]) -> list[list[Start]]:
     for start in starts:
         pools.setdefault((start.space.layout.objects, start.change), []).append(start)
     return list(pools.values())
-
-
-def _shares(sizes: Sequence[int], num_envs: int) -> list[int]:
-    """Environments for each pool, in proportion, the largest remainders rounded up."""
-    exact = np.array(sizes) * num_envs / sum(sizes)
-    shares = np.floor(exact).astype(int)
-    for i in np.argsort(shares - exact, kind="stable")[: num_envs - shares.sum()]:
-        shares[i] += 1
-    return [int(share) for share in shares]

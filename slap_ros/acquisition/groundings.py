@@ -1,0 +1,133 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""An operator's groundings, asked about side by side: each row of a batch has its own.
+
+One skill is learned for all groundings of a lifted operator. Rows of a batch differ in the objects
+that the operator is applied to, and maybe in the objects that there are at all; states of fewer
+objects are padded with zeros, so that all are rows of one array.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slap_ros.relational import Column, Layout, Object, State, Type
+from slap_ros.relational.state import Array
+
+Number = np.float64 | np.bool_
+N = TypeVar("N", bound=Number)
+Indices = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Grounding:
+    """What a skill is applied to.
+
+    Args:
+        layout: The objects that there are.
+        objects: Those for the operator's parameters, in order.
+    """
+
+    layout: Layout
+    objects: tuple[Object, ...]
+
+
+@dataclass(frozen=True)
+class GroundedStates:
+    """States over the same objects, and what the operator is applied to in each.
+
+    Args:
+        rows: Which rows of the whole batch these are, shape (n,).
+        state: A batch of n states.
+        columns: For each of the operator's parameters the objects of g groundings, all of one
+            type.
+        choice: Which of these groundings is that of each state, shape (n,).
+    """
+
+    rows: Indices
+    state: State
+    columns: tuple[Column, ...]
+    choice: Indices
+
+    @property
+    def types(self) -> tuple[Type, ...]:
+        """The type of each parameter's objects."""
+        return tuple(column.objects[0].type for column in self.columns)
+
+    def pick(self, values: NDArray[N]) -> NDArray[N]:
+        """Each state's own among the values for all groundings, shape (n, g, ...) to (n, ...)."""
+        return values[np.arange(len(values)), self.choice]
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """Groundings over the same objects, each parameter's of one type."""
+
+    layout: Layout
+    columns: tuple[Column, ...]
+    numbers: Indices  # of these groundings, ascending
+
+
+class Groundings:
+    """The groundings that one skill is learned for, by number."""
+
+    def __init__(self, groundings: Sequence[Grounding]) -> None:
+        """Number them in their order, which must be without repetition."""
+        self.groundings = tuple(groundings)
+        self._numbers = {grounding: i for i, grounding in enumerate(self.groundings)}
+
+    def number(self, grounding: Grounding) -> int:
+        """The number of a grounding, which must be one of them."""
+        return self._numbers[grounding]
+
+    @cached_property
+    def width(self) -> int:
+        """Numbers in a row: features of the state with the most."""
+        return max(grounding.layout.size for grounding in self.groundings)
+
+    @cached_property
+    def _kinds(self) -> tuple[_Kind, ...]:
+        members: dict[tuple[Layout, tuple[Type, ...]], list[int]] = {}
+        for i, grounding in enumerate(self.groundings):
+            types = tuple(obj.type for obj in grounding.objects)
+            members.setdefault((grounding.layout, types), []).append(i)
+        return tuple(
+            _Kind(
+                layout,
+                tuple(
+                    Column(objects)
+                    for objects in zip(*(self.groundings[i].objects for i in numbers), strict=True)
+                ),
+                np.array(numbers, dtype=np.intp),
+            )
+            for (layout, _), numbers in members.items()
+        )
+
+    def rows(self, states: Array) -> Array:
+        """States of one layout, shape (n, size), padded to shape (n, width)."""
+        missing = self.width - states.shape[-1]
+        return np.pad(states, ((0, 0), (0, missing))) if missing else states
+
+    def split(self, rows: Array, numbers: Indices) -> Iterator[GroundedStates]:
+        """Rows of states by what they are about.
+
+        Args:
+            rows: Shape (n, width).
+            numbers: Of the grounding of each, shape (n,).
+
+        Yields:
+            The parts; together they have every row once.
+        """
+        for kind in self._kinds:
+            choice = np.searchsorted(kind.numbers, numbers)
+            choice = np.minimum(choice, len(kind.numbers) - 1)
+            where = np.flatnonzero(kind.numbers[choice] == numbers)
+            if where.size:
+                state = State(kind.layout, rows[where, : kind.layout.size])
+                yield GroundedStates(where, state, kind.columns, choice[where])
