@@ -193,7 +193,7 @@ ACTIONS = ActionSpace(AXES, (-STEP, -STEP, -1.0), (STEP, STEP, 1.0), GripperAxis
 
 
 def approach(state, objects):
-    """Straight to a point at a distance from the last object, at an angle that the state decides."""
+    """Straight to a point before the last object, at an angle that the state decides."""
     seed = hashlib.sha256(state.key + objects[-1].name.encode()).digest()[:8]
     angle = np.random.default_rng(int.from_bytes(seed, "little")).uniform(0.0, 2.0 * np.pi)
     goal = state[objects[-1]][:2] + BEFORE * np.array([np.cos(angle), np.sin(angle)])
@@ -268,9 +268,7 @@ def _make(preset):
         goals={"train": goal_of, "swapped": swapped},
         robot_types=frozenset({HAND}),
         learning=Learning(
-            LearnerInterface(
-                lambda state: hand_xy(state), _robot, _objects, _distance, _separation
-            ),
+            LearnerInterface(hand_xy, _robot, _objects, _distance, _separation),
             make_vector_world=Points,
         ),
         acquisition=Acquisition(approach, (PICK, PUT), REWARDS, {}, HORIZON),

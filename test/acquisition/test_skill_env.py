@@ -3,11 +3,23 @@
 """The skill MDP: its reward, what is observed, and why no episode ends by success."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from points import AT, DIS_TO_OBJ, HOLDING, HORIZON, PICK, POINTS, PUT, REWARDS, P, T, hand_xy
+from points import (
+    AT,
+    DIS_TO_OBJ,
+    HOLDING,
+    HORIZON,
+    PICK,
+    POINTS,
+    PUT,
+    REWARDS,
+    P,
+    T,
+    hand_xy,
+    sample_task,
+)
 
 from slap_ros.acquisition.groundings import Grounding, Groundings
 from slap_ros.acquisition.observations import SIZE
@@ -21,7 +33,7 @@ from slap_ros.relational.operators import Variable
 def scattered(count, things=2, seed=0):
     """States of one task in which everything lies anywhere, and maybe in the hand."""
     rng = np.random.default_rng(seed)
-    state = replace(POINTS).sample_task(rng).initial_state
+    state = sample_task(rng).initial_state
     states = []
     for _ in range(count):
         data = state.data + rng.normal(0.0, 0.05, state.data.size)
@@ -92,8 +104,6 @@ def test_states_of_different_objects_are_rows_of_one_array():
 
 
 def make_three():
-    from points import sample_task
-
     return sample_task(np.random.default_rng(4), 3).initial_state
 
 
