@@ -30,6 +30,7 @@ OURS = {
     "obstacle_tower": "slap_ros.domains.obstacle_tower",
     "cluttered_drawer": "slap_ros.domains.cluttered_drawer",
     "cleanup_table": "slap_ros.domains.cleanup_table",
+    "stack_at_target": "slap_ros.domains.stack_at_target",
     "groceries": "slap_ros.domains.groceries",
 }
 CACHED = 64  # domains that are made once

@@ -3,7 +3,8 @@
 """What domains of a hand with contact forces at a table have in common.
 
 Read on in this order: ``features`` (types), ``state_access``, ``metrics``, ``predicates``,
-``operators``, ``goals``; then what moves: ``hand_motion``, ``approach``, ``scripts``; then
-``learner_interface``, and ``presets``, which puts a domain together. ``stack_at_target`` is the
-smallest domain that is made of all this.
+``operators``, ``goals``, ``tasks`` (where things are drawn); then what moves: ``hand_motion``,
+``scripts``, ``approach``; then ``learner_interface``, and ``presets``, which puts a domain
+together.
+``stack_at_target`` is the smallest domain that is made of all this.
 """

@@ -113,6 +113,22 @@ def held_thing(state: State) -> Object | None:
     return None
 
 
+def standing_on(state: State, thing: Object, place: Object) -> Vector:
+    """Where a thing's origin is when it stands on the middle of a place.
+
+    Args:
+        state: A single one.
+        thing: What stands there; it need not do so yet.
+        place: On what.
+
+    Returns:
+        Position, m.
+    """
+    x, y, z = position_of(state, place)
+    top = z + value(state, place, "support_height")
+    return (x, y, top + value(state, thing, "rest_height"))
+
+
 # -- batches --------------------------------------------------------------------------------------
 
 

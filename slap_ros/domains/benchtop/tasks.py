@@ -1,0 +1,55 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Sampling where things are. Lengths in m."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from slap_ros.errors import InvalidParameterError
+
+Range = tuple[float, float]
+Spot = tuple[float, float]  # x, y
+
+TRIES = 1_000  # arrangements drawn before there is said to be no room
+DARTS = 10  # for each thing of an arrangement
+BENCH_LIMITS = {
+    "x": (0.3, 0.8),  # what the hand reaches
+    "y": (-0.5, 0.5),
+    "yaw": (-math.pi, math.pi),
+    "apart": (0.0, 0.5),
+}
+
+
+def spread_out(
+    rng: np.random.Generator, count: int, x: Range, y: Range, apart: float
+) -> list[Spot]:
+    """Places that are not too near to one another.
+
+    Args:
+        rng: Draws them.
+        count: How many.
+        x: Within which range.
+        y: Within which range.
+        apart: Between any two, at least.
+
+    Returns:
+        One for each.
+
+    Raises:
+        InvalidParameterError: There is no room for them.
+    """
+    for _ in range(TRIES):
+        spots: list[Spot] = []
+        for _ in range(DARTS * count):
+            spot = (float(rng.uniform(*x)), float(rng.uniform(*y)))
+            if all(math.dist(spot, other) >= apart for other in spots):
+                spots.append(spot)
+            if len(spots) == count:
+                return spots
+    raise InvalidParameterError(
+        f"there is no room for {count} things {apart} m apart within x from {x[0]} to {x[1]} m "
+        f"and y from {y[0]} to {y[1]} m; give more room or fewer things"
+    )
