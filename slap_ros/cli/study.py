@@ -21,7 +21,7 @@ from slap_ros.domains import get_domain, preset_names
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.approaches import approaches
 from slap_ros.evaluation.experiment import Experiment
-from slap_ros.files import require_writable
+from slap_ros.files import read_text, require_writable, write_whole
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.shortcuts.settings import ExplorationSettings, training_settings
 from slap_ros.shortcuts.shipped import shipped_libraries, shipped_library
@@ -31,6 +31,7 @@ from slap_ros.studies import (
     perception,
     planning_time,
     pruning,
+    readme,
     table1,
 )
 from slap_ros.studies import goals as sampled
@@ -262,6 +263,23 @@ def table1_(
     described = [describe_library(one.name, one.library) for one in trained]
     _write(output, report, Provenance(domain, command, {**settings, "libraries": described}))
     log.remove()
+
+
+@app.command("readme")
+@exits
+def readme_(
+    pages: Annotated[
+        list[Path] | None, typer.Argument(help="Markdown pages. Default: README.md.")
+    ] = None,
+    results: Annotated[Path, typer.Option(help="Folder of the studies' data.")] = RESULTS,
+) -> None:
+    """Write the tables of pages again from the data of studies."""
+    for page in pages or [Path("README.md")]:
+        text = read_text(page)
+        written = readme.with_tables(text, results)
+        if written != text:
+            write_whole(page, written)
+        console.print(f"{page}: {'changed' if written != text else 'as it was'}")
 
 
 def _library_name(folder: Path) -> str:
