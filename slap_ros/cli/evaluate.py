@@ -17,7 +17,7 @@ from slap_ros.cli.options import DomainName, Jobs, Json, Planner, Preset
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose, sampling
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode
-from slap_ros.evaluation.approaches import Approach, approaches
+from slap_ros.evaluation.approaches import Approach, approaches, shooting
 from slap_ros.evaluation.evaluation_file import require_replaceable, write_evaluation
 from slap_ros.evaluation.experiment import Experiment, Trial, run_all
 from slap_ros.evaluation.summary import Spread, Summary
@@ -42,6 +42,14 @@ def evaluate(
     preset: Preset = None,
     shortcuts: Shortcuts = None,
     samples: Samples = SAMPLES,
+    with_shooting: Annotated[
+        bool,
+        typer.Option(
+            "--shooting",
+            help="Compare with a search that makes as many rollouts of random actions as SLAP of "
+            "its policies: what learning is worth.",
+        ),
+    ] = False,
     planner: Planner = "lazy",
     jobs: Jobs = 1,
     output: Annotated[
@@ -70,7 +78,10 @@ def evaluate(
     library = choose(shortcuts, chosen, planner)
     make_planner(planner, chosen, chosen.task(first_seed).initial_state)
     experiment = Experiment(chosen, tasks, seeds, first_seed, planner)
-    results = _run(experiment, approaches(library, sampling(samples)), jobs)
+    compared = list(approaches(library, sampling(samples)))
+    if with_shooting and library is not None:
+        compared.insert(1, shooting(library, chosen, sampling(samples)))
+    results = _run(experiment, compared, jobs)
     summaries = [summary for summary, _ in results]
     if output is not None:
         folder = Path(shortcuts) if shortcuts else shipped_library(domain)

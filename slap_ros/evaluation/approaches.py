@@ -11,6 +11,7 @@ from slap_ros.planning.planner import Planner, make_planner
 from slap_ros.relational import State
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
 from slap_ros.shortcuts.library import Library
+from slap_ros.shortcuts.shooting import exhaustive, unlearned
 from slap_ros.shortcuts.shortcut import DEFAULT, PAPER, Sampling, Shortcut
 
 
@@ -49,6 +50,21 @@ class Approach:
 
 
 PURE_PLANNING = Approach("pure_planning")
+
+
+def shooting(library: Library, domain: Domain, sampling: Sampling) -> Approach:
+    """Planning-time search alone, with as many rollouts as SLAP makes; nothing in it is learned.
+
+    Args:
+        library: Its shortcuts say between which abstract states to search.
+        domain: Of the library.
+        sampling: SLAP's.
+
+    Returns:
+        The approach, with the library's signatures and none of its policies.
+    """
+    searched = tuple(unlearned(shortcut, domain) for shortcut in library.shortcuts)
+    return Approach("shooting", searched, exhaustive(sampling))
 
 
 def approaches(library: Library | None, sampling: Sampling) -> tuple[Approach, ...]:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,28 @@ LEAST_DEVIATION = 0.3  # features are of magnitude 1 or so
 # where cores are busy, and whose number changes the order of summation.
 MAX_BATCH = 64
 Weights = NDArray[np.float32]
+
+# From a step and observations, shape (n, size), to actions, shape (n, actions).
+ActionSampler = Callable[[int, Weights], Weights]
+
+
+class SampledPolicy(Protocol):
+    """A policy that can be tried out with noise."""
+
+    def mean(self, observations: Weights) -> Weights:
+        """The most likely actions, shape (n, actions), not yet clipped to [-1, 1]."""
+        ...
+
+    def sampler(
+        self, rng: np.random.Generator, temperature: float | Weights = 1.0
+    ) -> ActionSampler:
+        """What samples actions through one rollout.
+
+        Args:
+            rng: Draws the noise.
+            temperature: Scale of the noise, a number or of shape (n, 1); 0 is none.
+        """
+        ...
 
 
 def _tanh(values: Weights) -> Weights:
@@ -101,3 +124,9 @@ class MlpPolicy:
         noise = rng.standard_normal(mean.shape, dtype=np.float32)
         actions = mean + temperature * np.exp(self.log_std) * noise
         return actions.astype(np.float32)
+
+    def sampler(
+        self, rng: np.random.Generator, temperature: float | Weights = 1.0
+    ) -> ActionSampler:
+        """See :class:`SampledPolicy`; steps are independent."""
+        return lambda _, observations: self.sample(observations, rng, temperature)

@@ -35,6 +35,7 @@ from slap_ros.learning.library_files import (
     save_policy,
     write_object,
 )
+from slap_ros.learning.mlp_policy import MlpPolicy
 from slap_ros.shortcuts.observation_encoder import make_action_map, observation_size
 from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.signature import Signature
@@ -69,7 +70,7 @@ class Library:
             return ""
         whole = sha256()
         for shortcut in self.shortcuts:
-            whole.update(shortcut.name.encode() + save(policy_tensors(shortcut.policy)))
+            whole.update(shortcut.name.encode() + save(policy_tensors(_learned(shortcut))))
         return whole.hexdigest()[:16]
 
 
@@ -124,18 +125,26 @@ def load_library(path: Path, domain: Domain) -> Library:
 def _require_fit(shortcut: Shortcut, folder: Path, domain: Domain) -> None:
     """Refuse a policy whose observations or actions are not those of the domain."""
     features = observation_size(domain, shortcut.signature)
-    size = shortcut.policy.normalisation.mean.size
+    size = _learned(shortcut).normalisation.mean.size
     if features is not None and features != size:
         raise InvalidLibraryError(
             f"{folder}: the policy has {size} observed features, {domain.name} has {features}: "
             "learned with another version of slap_ros; train again"
         )
     actions = make_action_map(domain, shortcut.signature).size
-    if shortcut.policy.log_std.size != actions:
+    commanded = _learned(shortcut).log_std.size
+    if commanded != actions:
         raise InvalidLibraryError(
-            f"{folder}: the policy has {shortcut.policy.log_std.size} actions, shortcuts of this "
+            f"{folder}: the policy has {commanded} actions, shortcuts of this "
             f"kind in {domain.name} have {actions}"
         )
+
+
+def _learned(shortcut: Shortcut) -> MlpPolicy:
+    """Its policy, which libraries have only if it was learned."""
+    if not isinstance(shortcut.policy, MlpPolicy):
+        raise InvalidLibraryError(f"{shortcut.name} has no learned policy that could be stored")
+    return shortcut.policy
 
 
 # -- one shortcut ---------------------------------------------------------------------------------
@@ -144,7 +153,7 @@ def _require_fit(shortcut: Shortcut, folder: Path, domain: Domain) -> None:
 def save_shortcut(folder: Path, shortcut: Shortcut) -> None:
     """Write one shortcut into a folder, which is made where there is none."""
     folder.mkdir(parents=True, exist_ok=True)
-    checksum = save_policy(folder / POLICY, shortcut.policy)
+    checksum = save_policy(folder / POLICY, _learned(shortcut))
     write_object(
         folder / SHORTCUT,
         {

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from slap_ros.learning.mlp_policy import MlpPolicy
+from slap_ros.learning.mlp_policy import SampledPolicy
 from slap_ros.shortcuts.signature import Signature
 
 
@@ -24,7 +24,7 @@ class Shortcut:
     """
 
     signature: Signature
-    policy: MlpPolicy
+    policy: SampledPolicy
     shortest: int
     record: Mapping[str, str | int | float] = field(default_factory=dict, compare=False)
 

@@ -5,14 +5,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from hashlib import sha256
 
 import numpy as np
 
 from slap_ros.core import Domain, VectorWorld
-from slap_ros.learning.mlp_policy import MlpPolicy, Weights
+from slap_ros.learning.mlp_policy import ActionSampler, SampledPolicy, Weights
 from slap_ros.relational import State
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.shortcut import Sampling, Shortcut
@@ -21,9 +21,6 @@ from slap_ros.shortcuts.signature import Change
 MAX_NET_FAILURES = 3  # failures, beyond as many for each success, before a shortcut is given up
 MAX_NOISE_SCALE = 2.0  # temperature of the last rollout of a batch against that of the first
 SPREAD_DECAY = 0.7  # of the spread of variations from one round to the next
-
-# From a step and observations, shape (n, size), to the policy's actions, shape (n, actions).
-ActionSampler = Callable[[int, Weights], Weights]
 
 
 @dataclass(frozen=True)
@@ -135,7 +132,7 @@ class ShortcutRollouts:
 
     def _sample(
         self,
-        policy: MlpPolicy,
+        policy: SampledPolicy,
         encoder: ObservationEncoder,
         state: State,
         rng: np.random.Generator,
@@ -148,9 +145,7 @@ class ShortcutRollouts:
         def deterministic(_: int, observations: Weights) -> Weights:
             return policy.mean(observations)
 
-        def noisy(_: int, observations: Weights) -> Weights:
-            return policy.sample(observations, rng, temperature)
-
+        noisy = policy.sampler(rng, temperature)
         found = self._roll_out(self._world, encoder, state, deterministic, sampling.horizon)
         best = _BestRollouts(sampling.alternatives, next(iter(found), None))
         for failures in range(0, self._count, self._at_once):

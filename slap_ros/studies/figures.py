@@ -56,6 +56,7 @@ class ApproachStyle:
 APPROACH_STYLES = {
     "pure_planning": ApproachStyle("pure planning", PLAN, "o"),
     "slap_1_sample": ApproachStyle("SLAP, 1 sample", MUTED, "^"),
+    "shooting": ApproachStyle("search without learning", "#e69f00", "D"),
     "slap": ApproachStyle("SLAP", SHORTCUT, "s"),
 }
 

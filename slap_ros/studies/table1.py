@@ -13,7 +13,8 @@ from dataclasses import asdict, dataclass, replace
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
-from slap_ros.evaluation.approaches import Approach, approaches
+from slap_ros.core import Domain
+from slap_ros.evaluation.approaches import PURE_PLANNING, Approach, approaches, shooting
 from slap_ros.evaluation.experiment import Experiment, Trial, run_all
 from slap_ros.evaluation.statistics import Interval, ratio_interval, wilson_interval
 from slap_ros.evaluation.summary import Spread, lengths_of_both
@@ -28,14 +29,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MEASURED = """\
-Every task is planned and executed in the world; length is the number of environment steps
-executed. Tasks that are equal to an earlier one are left out. A row with shortcuts is over all
-tasks and all libraries. Each library was trained with another seed, and no library was chosen by
-its figures here. Success has Wilson's 95 % interval. Length is the mean over solved tasks, with the
-sample standard deviation over tasks, and over the means of the libraries. Relative length is the
-sum of lengths over that of pure planning, on tasks that both solved, with the 95 % interval of a
-bootstrap over tasks. "At limit" counts tasks that were given up at the domain's step limit. Seconds
-of planning are per task, on whatever machine made this page."""
+Every task is planned and executed in the world; length is the number of environment steps executed.
+Tasks that are equal to an earlier one are left out. A row with shortcuts is over all tasks and all
+libraries. Each library was trained with another seed, and no library was chosen by its figures
+here. Success has Wilson's 95 % interval. Length is the mean over solved tasks, with the sample
+standard deviation over tasks, and over the means of the libraries. Relative length is the sum of
+lengths over that of pure planning, on tasks that both solved, with the 95 % interval of a bootstrap
+over tasks. "Search without learning" makes as many rollouts of random actions, between the same
+pairs of abstract states, as SLAP makes of its policies. "At limit" counts tasks that were given up
+at the domain's step limit. Seconds of planning are per task, on whatever machine made this page."""
 
 
 @dataclass(frozen=True)
@@ -207,17 +209,15 @@ class _Runner:
     progress: StudyProgress
 
     def rows(self, libraries: Sequence[TrainedLibrary], sampling: Sampling) -> list[Row]:
-        compared = [approaches(trained.library, sampling) for trained in libraries]
-        pure = approaches(None, sampling)[0]
-        self.progress.begin(
-            self.experiment.domain.preset,
-            len(self.experiment) * (1 + sum(len(ways) - 1 for ways in compared)),
-        )
-        baseline = self._solve("", "", pure)
-        rows = [self._row(pure.name, [baseline], baseline)]
+        domain = self.experiment.domain
+        compared = [_ways(trained.library, domain, sampling) for trained in libraries]
+        count = 1 + sum(len(ways) for ways in compared)
+        self.progress.begin(domain.preset, len(self.experiment) * count)
+        baseline = self._solve("", "", PURE_PLANNING)
+        rows = [self._row(PURE_PLANNING.name, [baseline], baseline)]
         measured: dict[str, list[LibraryTrials]] = {}
-        for trained, (_, *learned) in zip(libraries, compared, strict=True):
-            for way in learned:
+        for trained, ways in zip(libraries, compared, strict=True):
+            for way in ways:
                 solved = self._solve(trained.name, trained.library.digest, way)
                 measured.setdefault(way.name, []).append(solved)
         return rows + [self._row(name, found, baseline) for name, found in measured.items()]
@@ -242,6 +242,11 @@ class _Runner:
                 self.progress.report_failure(said)
         trials.sort(key=lambda trial: (trial.seed, trial.index))
         return LibraryTrials(library, approach.name, tuple(trials))
+
+
+def _ways(library: Library, domain: Domain, sampling: Sampling) -> tuple[Approach, ...]:
+    """To plan with a library, the one that learned nothing first."""
+    return (shooting(library, domain, sampling), *approaches(library, sampling)[1:])
 
 
 COLUMNS = (

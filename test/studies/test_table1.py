@@ -67,10 +67,10 @@ def test_figures_are_those_of_the_trials(written):
     assert [(row["preset"], row["approach"]) for row in found] == [
         (preset, approach)
         for preset in ("fair", "paper")
-        for approach in ("pure_planning", "slap_1_sample", "slap")
+        for approach in ("pure_planning", "shooting", "slap_1_sample", "slap")
     ]
     pure = found[0]["libraries"][0]["trials"]
-    for row in found[:3]:
+    for row in found[:4]:
         lengths = [t["plan_length"] for lib in row["libraries"] for t in lib["trials"]]
         assert row["plan_length"]["mean"] == pytest.approx(sum(lengths) / len(lengths))
         share = len(row["libraries"]) * sum(t["plan_length"] for t in pure)
