@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What scripts can do in the contact world: ``python -m benchmarks.contact_skills [--count N]``.
 
-Things are grasped, lifted and shaken for 100 steps; drawers are pulled open by their handles and
-pushed shut; a lid is turned down; a rod is pushed into a hole. Each from places drawn at random,
-with errors of some millimetres. Slip is how far a thing moved in the hand while it was shaken.
+Things, those of domains as well, are grasped, lifted and shaken for 100 steps; drawers are pulled
+open by their handles and pushed shut; a lid is turned down; a rod is pushed into a hole. Each from
+places drawn at random, with errors of some millimetres. Slip is how far a thing moved in the hand
+while it was shaken.
 """
 
 from __future__ import annotations
@@ -36,7 +37,17 @@ from slap_ros.contact.features import ROBOT, robot_features
 from slap_ros.contact.hand import hand_at, wrapped
 from slap_ros.contact.scene import TABLE, BoxPart, Compound, ContactScene, CylinderPart
 from slap_ros.contact.world import ACTION_SPACE, MAX_SHIFT, MAX_TURN, ContactWorld
-from slap_ros.geometry.pose import Pose, from_yaw, multiply, rotate
+from slap_ros.domains.groceries.scenery import GROCERIES
+from slap_ros.geometry.pose import (
+    NO_ROTATION,
+    ORIGIN,
+    Pose,
+    Quaternion,
+    Vector,
+    from_yaw,
+    multiply,
+    rotate,
+)
 from slap_ros.physics.features import body_features
 from slap_ros.relational import State
 
@@ -68,45 +79,50 @@ class Graspable:
         body: The thing.
         height: Of its origin above the table, m.
         lying: Its orientation when its yaw is 0.
-        at: Where it is grasped, along its x at yaw 0, m.
+        grip: Where it is grasped, from its origin, when its yaw is 0, m.
     """
 
     body: Compound
     height: float
-    lying: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
-    at: float = 0.0
+    lying: Quaternion = NO_ROTATION
+    grip: Vector = ORIGIN
 
 
 GRASPABLE = {
     "cube": Graspable(CUBE, 0.02),
     "rod": Graspable(ROD, 0.012, LYING),
-    "hammer": Graspable(HAMMER, 0.012, at=-0.03),
+    "hammer": Graspable(HAMMER, 0.012, grip=(-0.03, 0.0, 0.0)),
 }
+OF_DOMAINS = {
+    name: Graspable(thing.body, thing.rest_height, grip=(0.0, 0.0, thing.grasp_height))
+    for name, thing in GROCERIES.items()
+}
+EVERYTHING = GRASPABLE | OF_DOMAINS
 
 
 def grasped_world(name: str, seed: int) -> ContactWorld:
     """A world in which a script grasped the thing and lifted it, or tried to."""
     rng = np.random.default_rng([seed, len(name)])
-    thing = GRASPABLE[name]
+    thing = EVERYTHING[name]
     x, y, yaw = rng.uniform((0.42, -0.15, -1.2), (0.6, 0.15, 1.2)).tolist()
     pose = Pose((x, y, thing.height), multiply(from_yaw(yaw), thing.lying))
-    ahead = rotate(from_yaw(yaw), (thing.at, 0.0, 0.0))
+    ahead = rotate(from_yaw(yaw), thing.grip)
     off = rng.uniform(-OFF, OFF, 2)
     gx, gy = x + ahead[0] + float(off[0]), y + ahead[1] + float(off[1])
     turn = yaw + float(rng.uniform(-OFF_TURN, OFF_TURN))
     scene = ContactScene((TABLE, thing.body))
+    low = (gx, gy, thing.height + ahead[2])
     features = {
-        ROBOT("robot"): robot_features(hand_at((gx, gy, 0.12), turn)),
+        ROBOT("robot"): robot_features(hand_at((gx, gy, max(0.12, low[2] + 0.07)), turn)),
         THING(name): body_features(*pose),
     }
     world = ContactWorld(scene, State.build(features))
-    low = (gx, gy, thing.height)
     perform(
         world,
         [
             Move(low, 8, yaw=turn),
             Move(low, 6, close=True, yaw=turn),
-            Move((gx, gy, 0.22), 14, close=True, yaw=turn),
+            Move((gx, gy, max(0.22, low[2] + 0.2)), 14, close=True, yaw=turn),
         ],
     )
     return world
@@ -282,6 +298,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=200, metavar="N", help="of each")
     parser.add_argument("--json", action="store_true")
+    parser.add_argument("--only", default="", metavar="TEXT", help="rows with this in their name")
     arguments = parser.parse_args()
     count: int = arguments.count
     table: dict[str, Callable[[], Mapping[str, float]]] = {
@@ -289,8 +306,10 @@ def main() -> None:
         "drawer": lambda: drawers(count),
         "lid": lambda: lids(count),
         **{f"insert {c} mm": lambda c=c: insertions(c, count) for c in CLEARANCES_MM},
+        **{f"groceries: grasp {n}": lambda n=n: grasps(n, count) for n in OF_DOMAINS},
     }
-    show({name: measure() for name, measure in table.items()}, arguments.json)
+    rows = {name: measure for name, measure in table.items() if arguments.only in name}
+    show({name: measure() for name, measure in rows.items()}, arguments.json)
 
 
 if __name__ == "__main__":
