@@ -14,7 +14,7 @@ from rich.progress import TaskID
 
 from slap_ros.cli.command_line import command_line
 from slap_ros.cli.console import console, exits, progress
-from slap_ros.cli.options import DomainName, Jobs, Preset, flat_options
+from slap_ros.cli.options import MAX_SEED, DomainName, Jobs, Preset, flat_options
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose, sampling
 from slap_ros.core import Domain
 from slap_ros.domains import get_domain, preset_names
@@ -22,10 +22,12 @@ from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.approaches import approaches
 from slap_ros.evaluation.experiment import Experiment
 from slap_ros.files import read_text, require_writable, write_whole
+from slap_ros.learning.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.shortcuts.settings import ExplorationSettings, training_settings
 from slap_ros.shortcuts.shipped import shipped_libraries, shipped_library
 from slap_ros.studies import (
+    demonstrations,
     dynamics,
     generalisation,
     perception,
@@ -33,11 +35,13 @@ from slap_ros.studies import (
     pruning,
     readme,
     table1,
+    vacuity,
 )
 from slap_ros.studies import goals as sampled
 from slap_ros.studies.comparison import Comparison
 from slap_ros.studies.figures import require_matplotlib
 from slap_ros.studies.results import Data, Provenance, StudyReport, describe_library, write
+from slap_ros.studies.study_log import JobLog
 from slap_ros.studies.trainings import TrainingFolder
 from slap_ros.studies.trial_log import TrialLog
 from slap_ros.studies.variations import NUMBERS, offered, parse_variation
@@ -52,6 +56,7 @@ app = typer.Typer(
 
 Tasks = Annotated[int, typer.Option(min=1, help="Tasks per seed.")]
 Seeds = Annotated[int, typer.Option(min=1, help="How many seeds, from 0 on.")]
+FreshSeed = Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Of the tasks.")]
 Output = Annotated[Path, typer.Option(help="Folder for NAME_DOMAIN.json, .svg and .md.")]
 Vary = Annotated[
     list[str] | None,
@@ -217,6 +222,69 @@ def planning_time_(
         report = planning_time.study(comparison, chosen, bars)
     command = command_line("study", "planning_time", domain, vary=vary, **_given(options, settings))
     _write(options.output, report, Provenance(domain, command, settings))
+
+
+@app.command("demonstrations")
+@exits
+def demonstrations_(
+    domain: DomainName,
+    goal: Annotated[
+        list[str] | None,
+        typer.Option(help="A goal's name; may be repeated. Default: all of the domain's."),
+    ] = None,
+    tasks: Annotated[int, typer.Option(min=1, help="Of the first goal.")] = 100,
+    others: Annotated[int, typer.Option(min=1, help="Tasks of every other goal.")] = 50,
+    seed: FreshSeed = FRESH_SEED,
+    preset: Preset = None,
+    jobs: Jobs = 1,
+    output: Output = RESULTS,
+) -> None:
+    """Whether tasks can be solved: success of the domain's demonstrator, by goal.
+
+    Whoever stops it goes on with the same command.
+    """
+    choice = _demonstrator(domain, preset, output)
+    names = goal or list(open_domain(choice).goals) or [""]
+    counts = {name: others if i else tasks for i, name in enumerate(names)}
+    settings = {"preset": choice.preset, "tasks": tasks, "others": others, "seed": seed}
+    command = command_line("study", "demonstrations", domain, goal=goal, **settings)
+    log = JobLog(output / f".demonstrations_{domain}.jsonl", command)
+    with _StudyBars() as bars:
+        report = demonstrations.study(choice, counts, seed, log, jobs, bars)
+    _write(output, report, Provenance(domain, command, settings))
+    log.remove()
+
+
+@app.command("vacuity")
+@exits
+def vacuity_(
+    domain: DomainName,
+    starts: Annotated[int, typer.Option(min=1, help="Of each operator.")] = 200,
+    seed: FreshSeed = FRESH_SEED,
+    preset: Preset = None,
+    jobs: Jobs = 1,
+    output: Output = RESULTS,
+) -> None:
+    """Whether there is anything to learn: policies that see nothing, from where skills begin.
+
+    Whoever stops it goes on with the same command.
+    """
+    choice = _demonstrator(domain, preset, output)
+    settings = {"preset": choice.preset, "starts": starts, "seed": seed}
+    command = command_line("study", "vacuity", domain, **settings)
+    log = JobLog(output / f".vacuity_{domain}.jsonl", command)
+    with _StudyBars() as bars:
+        report = vacuity.study(choice, starts, seed, log, jobs, bars)
+    _write(output, report, Provenance(domain, command, settings))
+    log.remove()
+
+
+def _demonstrator(domain: str, preset: str | None, output: Path) -> DomainChoice:
+    """The domain with its demonstrator for skills, once it is known that there is one."""
+    require_matplotlib()
+    require_writable(output)
+    choice = DomainChoice(domain, preset or "", DEMONSTRATOR)
+    return replace(choice, preset=open_domain(choice).preset)
 
 
 @app.command("table1")

@@ -39,7 +39,7 @@ class StudyReport:
 
     Args:
         study: Its name, as in ``slap study``.
-        source: The figure or table of the paper that it makes again.
+        source: The figure or table of the paper that it makes again; empty where it is no paper's.
         title: Of the page.
         measured: What the numbers are, and whatever must be known to read them; Markdown.
         table: The numbers.
@@ -126,10 +126,15 @@ def _page(name: str, report: StudyReport, origin: Provenance) -> str:
     data = f"[{name}.json]({name}.json)"
     settings = [f"- {key}: {_said(value)}" for key, value in origin.settings.items()]
     listed = "\n".join([*settings, f"- versions and every number: {data}"])
+    after = (
+        f"After {report.source}. Numbers are this system's unless they are said to be the paper's."
+        if report.source
+        else "No paper has these figures: all numbers are this system's."
+    )
     return f"""\
 # {report.title}
 
-After {report.source}. Numbers are this system's unless they are said to be the paper's.
+{after}
 
 ![{report.title}]({name}.svg)
 

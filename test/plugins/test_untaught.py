@@ -176,3 +176,63 @@ def test_check_tries_the_demonstrator_and_the_goals():
     alone = replace(DOMAIN, acquisition=None)
     nothing = {one.name: one for one in check_domain(alone, 0, 1, 10)}["demonstrator"]
     assert (nothing.status, nothing.found[:17]) == ("warning", "no task was tried")
+
+
+def study(name, folder, *arguments):
+    """A study's data; the page is there too."""
+    ran = slap("study", name, "untaught", *arguments, "--output", str(folder))
+    assert ran.exit_code == 0, ran.output
+    assert (folder / f"{name}_untaught.md").read_text().startswith("# ")
+    assert not list(folder.glob(".*"))  # nothing is left of what it had done so far
+    return json.loads((folder / f"{name}_untaught.json").read_text())
+
+
+def test_study_of_demonstrations(installed, tmp_path):
+    counts = ["--tasks", "3", "--others", "2"]
+    data = study("demonstrations", tmp_path, *counts)
+    training, other = data["found"]["goals"]
+    assert (training["goal"], len(training["tasks"])) == ("training", 3)
+    assert (other["goal"], len(other["tasks"])) == ("other", 2)
+    assert training["success_rate"] == other["success_rate"] == 1.0
+    assert training["success_interval"]["low"] == pytest.approx(0.4385, abs=1e-4)
+    assert data == study("demonstrations", tmp_path, *counts, "--jobs", "2")
+    (alone,) = study("demonstrations", tmp_path, *counts, "--goal", "other")["found"]["goals"]
+    assert len(alone["tasks"]) == 3
+
+
+def test_a_study_goes_on_where_it_was_stopped(installed, tmp_path):
+    log = tmp_path / ".demonstrations_untaught.jsonl"
+    arguments = ["--goal", "other", "--preset", "fair", "--tasks", "2", "--others", "50"]
+    command = f"slap study demonstrations untaught {' '.join([*arguments, '--seed', '500'])}"
+    known = {"index": 0, "success": True, "steps": 777, "replans": 0, "begun": {}, "failed": {}}
+    entries = [{"command": command}, {"job": "other 0", "result": {**known, "reason": ""}}]
+    log.write_text("".join(json.dumps(entry) + "\n" for entry in entries) + '{"job": "oth')
+    (goal,) = study("demonstrations", tmp_path, *arguments)["found"]["goals"]
+    assert [task["steps"] == 777 for task in goal["tasks"]] == [True, False]
+    log.write_text(json.dumps({"command": "slap study demonstrations untaught --seed 9"}) + "\n")
+    ran = slap("study", "demonstrations", "untaught", "--output", str(tmp_path))
+    assert ran.exit_code == ErrorCode.INVALID_PARAMETER
+    assert "--seed 9` has done so far" in ran.stderr
+
+
+def test_study_of_vacuity_counts_what_policies_do_without_eyes(installed, tmp_path):
+    data = study("vacuity", tmp_path, "--starts", "4")
+    operators = {one["operator"]: one for one in data["found"]["operators"]}
+    assert "Pick" in operators
+    for one in operators.values():
+        assert 0 < one["starts"] <= 4
+        assert [policy["policy"] for policy in one["policies"]] == [
+            "nothing",
+            "open",
+            "close",
+            "random",
+        ]
+    assert not any(one["policies"][0]["successes"] for one in operators.values())
+    assert data == study("vacuity", tmp_path, "--starts", "4", "--jobs", "2")
+
+
+def test_studies_need_a_demonstrator(tmp_path):
+    for name in ("demonstrations", "vacuity"):
+        ran = slap("study", name, "obstacle2d", "--output", str(tmp_path))
+        assert ran.exit_code == ErrorCode.INVALID_PARAMETER
+        assert "obstacle2d has no demonstrator" in ran.stderr

@@ -1,0 +1,235 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Whether a domain's tasks can be solved: its demonstrator, on many tasks of each goal."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from slap_ros.drawing.palette import MUTED
+from slap_ros.evaluation.statistics import Interval, wilson_interval
+from slap_ros.evaluation.summary import Spread
+from slap_ros.learning.demonstrator import demonstrate
+from slap_ros.learning.domain_choice import DomainChoice, open_domain
+from slap_ros.studies.comparison import StudyProgress, format_spread, spread_of
+from slap_ros.studies.figures import LINES
+from slap_ros.studies.results import MarkdownTable, StudyReport
+from slap_ros.studies.study_log import JobLog
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MEASURED = """\
+The demonstrator plans with A* over the domain's hand-written operators, runs a script for each in
+the world, closed loop and knowing all of the state, and plans again from wherever a script has left
+the robot, up to five times. It is no skill and is learned by none: it shows that the tasks can be
+solved. Success is that all atoms of the goal hold within the domain's step limit, with Wilson's
+95 % interval. Steps are environment steps of solved tasks, mean ± sample standard deviation.
+Options that failed are counted by operator, of how many were begun; a task in which one failed may
+still be solved."""
+
+
+@dataclass(frozen=True)
+class DemonstratedTask:
+    """What came of one task.
+
+    Args:
+        index: Of the task among its seed's.
+        success: Whether the goal was reached.
+        steps: Environment steps executed.
+        replans: Plans after the first.
+        begun: Options begun, by operator.
+        failed: Of them, those that did not end in the abstract state that was expected.
+        reason: Why the goal was not reached; empty where it was.
+    """
+
+    index: int
+    success: bool
+    steps: int
+    replans: int
+    begun: dict[str, int]
+    failed: dict[str, int]
+    reason: str
+
+
+@dataclass(frozen=True)
+class GoalDemonstrations:
+    """All tasks of a goal; an empty name stands for the goal that comes with each task."""
+
+    goal: str
+    tasks: tuple[DemonstratedTask, ...]
+
+    @property
+    def solved(self) -> int:
+        """Tasks whose goal was reached."""
+        return sum(task.success for task in self.tasks)
+
+    @property
+    def rate(self) -> float:
+        """The share of solved tasks."""
+        return self.solved / len(self.tasks)
+
+    @property
+    def interval(self) -> Interval:
+        """Wilson's, of the rate."""
+        return wilson_interval(self.solved, len(self.tasks))
+
+    @property
+    def steps(self) -> Spread | None:
+        """Over solved tasks; None without any."""
+        return spread_of([float(task.steps) for task in self.tasks if task.success])
+
+    @property
+    def replans(self) -> Spread:
+        """Over all tasks."""
+        return Spread.of([float(task.replans) for task in self.tasks])
+
+    @property
+    def options(self) -> dict[str, tuple[int, int]]:
+        """How many options failed, and how many were begun, by operator."""
+        begun: Counter[str] = Counter()
+        failed: Counter[str] = Counter()
+        for task in self.tasks:
+            begun.update(task.begun)
+            failed.update(task.failed)
+        return {name: (failed[name], count) for name, count in sorted(begun.items())}
+
+    def as_json(self) -> dict[str, Any]:
+        """The summary and every task."""
+        return {
+            "goal": self.goal,
+            "success_rate": self.rate,
+            "success_interval": asdict(self.interval),
+            "steps": asdict(self.steps) if self.steps else None,
+            "replans": asdict(self.replans),
+            "options": {
+                name: {"failed": failed, "begun": begun}
+                for name, (failed, begun) in self.options.items()
+            },
+            "tasks": [asdict(task) for task in self.tasks],
+        }
+
+    def as_row(self) -> list[str]:
+        """Row of a table."""
+        failures = [
+            f"{name} {failed} of {begun}"
+            for name, (failed, begun) in self.options.items()
+            if failed
+        ]
+        return [
+            self.goal or "(the task's own)",
+            str(len(self.tasks)),
+            f"{self.rate:.0%}",
+            f"{self.interval.low:.0%} to {self.interval.high:.0%}",
+            format_spread(self.steps, 0),
+            format_spread(self.replans, 2),
+            ", ".join(failures) or "none",
+        ]
+
+
+def study(
+    choice: DomainChoice,
+    counts: Mapping[str, int],
+    seed: int,
+    log: JobLog,
+    processes: int,
+    progress: StudyProgress,
+) -> StudyReport:
+    """Let the demonstrator solve tasks.
+
+    Args:
+        choice: The domain, with its demonstrator for skills.
+        counts: Tasks of each goal, by name; an empty name for the goal that comes with each task.
+        seed: Of the tasks.
+        log: Keeps what is done.
+        processes: Tasks at a time.
+        progress: Is called as tasks end.
+
+    Returns:
+        The report.
+
+    Raises:
+        InvalidParameterError: The domain has no demonstrator.
+        UnknownGoalError: The domain has no goal of that name.
+    """
+    open_domain(choice)
+    goals = []
+    for goal, count in counts.items():
+        jobs = {f"{goal} {index}": (choice, goal, seed, index) for index in range(count)}
+        results = log.run(goal or choice.name, demonstrate_task, jobs, processes, progress)
+        tasks = tuple(DemonstratedTask(**result) for result in results.values())
+        for task in tasks:
+            if not task.success:
+                progress.report_failure(
+                    f"{goal}: seed {seed}, task {task.index} not solved: {task.reason}"
+                )
+        goals.append(GoalDemonstrations(goal, tasks))
+    return StudyReport(
+        study="demonstrations",
+        source="",
+        title=f"Demonstrations: {choice.name}",
+        measured=MEASURED,
+        table=MarkdownTable(
+            [
+                "goal",
+                "tasks",
+                "success",
+                "95 % interval",
+                "steps",
+                "replans",
+                "options that failed",
+            ],
+            [goal.as_row() for goal in goals],
+        ),
+        found={"goals": [goal.as_json() for goal in goals]},
+        draw=lambda figure: draw(figure, goals),
+        size=(8.6, 1.4 + 0.35 * len(goals)),
+    )
+
+
+def demonstrate_task(choice: DomainChoice, goal: str, seed: int, index: int) -> dict[str, Any]:
+    """Solve one task.
+
+    Args:
+        choice: The domain, with its demonstrator for skills.
+        goal: By name; empty for the task's own.
+        seed: Of the task.
+        index: Of the task.
+
+    Returns:
+        A :class:`DemonstratedTask`, as JSON has it.
+    """
+    domain = open_domain(choice)
+    episode = demonstrate(domain, domain.task(seed, index, goal or None)).episode
+    return asdict(
+        DemonstratedTask(
+            index,
+            episode.success,
+            episode.plan_length,
+            episode.replans,
+            dict(Counter(edge.option for edge in episode.edges)),
+            dict(Counter(edge.option for edge in episode.edges if not edge.reached)),
+            episode.error.reason,
+        )
+    )
+
+
+def draw(figure: Figure, goals: Sequence[GoalDemonstrations]) -> None:
+    """Draw success with its interval, and the steps of every solved task."""
+    success, steps = figure.subplots(1, 2, sharey=True)
+    places = range(len(goals))
+    for place, goal in zip(places, goals, strict=True):
+        low, high = goal.interval.low, goal.interval.high
+        success.plot([100 * low, 100 * high], [place, place], color=MUTED, linewidth=1)
+        success.plot([100 * goal.rate], [place], "o", color=LINES[0], markersize=5)
+        solved = [task.steps for task in goal.tasks if task.success]
+        steps.plot(solved, [place] * len(solved), "|", color=LINES[0], markersize=9)
+    success.set_yticks(places, [goal.goal or "task's own" for goal in goals])
+    success.set_ylim(len(goals) - 0.5, -0.5)
+    success.set_xlim(-3, 103)
+    success.set_xlabel("success [%], with 95 % interval")
+    steps.set_xlim(left=0)
+    steps.set_xlabel("environment steps of solved tasks")

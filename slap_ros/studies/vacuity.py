@@ -1,0 +1,379 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Whether there is anything to learn: constant and random policies from where skills begin.
+
+A skill that a policy without eyes does as well is none. Starts are those of demonstrations, after
+the approach; what happens there within the skill's horizon is judged by the operator's effects.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from slap_ros.core import Action, ActionSpace, Domain
+from slap_ros.drawing.palette import MUTED
+from slap_ros.errors import InvalidParameterError, SlapError
+from slap_ros.evaluation.statistics import Interval, wilson_interval
+from slap_ros.learning.demonstrator import Demonstration, demonstrate
+from slap_ros.learning.domain_choice import DomainChoice, open_domain
+from slap_ros.relational import GroundOperator, State, ground_operators
+from slap_ros.studies.comparison import StudyProgress
+from slap_ros.studies.figures import LINES
+from slap_ros.studies.results import MarkdownTable, StudyReport
+from slap_ros.studies.study_log import JobLog
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+ALLOWED = 0.10  # of starts, above which an operator's skill is called vacuous
+APPROACH_LIMIT = 300  # environment steps of an approach
+BATCH = 20  # tasks that are demonstrated before it is asked whether there are enough starts
+MOST_TASKS = 5  # as many times the wanted starts, of tasks, until there are enough
+RANDOM = 7_000_000  # tells the random numbers of policies from those of tasks
+MEASURED = """\
+Each start is a state in which the demonstrator was about to begin an operator, brought by the
+domain's approach to where a skill begins. From there each policy acts for the horizon of a learned
+skill ({horizon} environment steps): *nothing* is the action of zeros, *open* and *close* command
+the gripper and move nothing, *down* lowers the hand as fast as it can, *random* draws every axis
+uniformly in each step. A policy succeeds where, at the start or after any step, all atoms of the
+operator's EFF+ hold and none of its EFF-. So what is looked for is any moment of success; a skill
+has to end in one. The share of starts is given, with Wilson's 95 % interval in the data. An
+operator of which a policy succeeds in more than {allowed:.0%} of starts is vacuous. Approaches that
+did not arrive within {limit} steps, or after which the operator's preconditions did not hold any
+more, are no starts; they are counted."""
+
+Blind = Callable[[np.random.Generator], Action]  # a policy that sees nothing
+
+
+@dataclass(frozen=True)
+class BlindSuccess:
+    """How often a policy that sees nothing did what an operator says."""
+
+    policy: str
+    successes: int
+    starts: int
+
+    @property
+    def rate(self) -> float:
+        """The share of starts."""
+        return self.successes / self.starts
+
+    @property
+    def interval(self) -> Interval:
+        """Wilson's, of the rate."""
+        return wilson_interval(self.successes, self.starts)
+
+    def as_json(self) -> dict[str, Any]:
+        """The counts with their interval."""
+        return {**asdict(self), "rate": self.rate, "interval": asdict(self.interval)}
+
+
+@dataclass(frozen=True)
+class OperatorVacuity:
+    """All policies from all starts of an operator.
+
+    Args:
+        operator: Its name.
+        starts: How many.
+        lost: Approaches that did not lead to one.
+        policies: By policy.
+    """
+
+    operator: str
+    starts: int
+    lost: int
+    policies: tuple[BlindSuccess, ...]
+
+    @property
+    def vacuous(self) -> bool:
+        """Whether a policy that sees nothing succeeds too often."""
+        return any(policy.rate > ALLOWED for policy in self.policies)
+
+    def as_json(self) -> dict[str, Any]:
+        """Every count."""
+        return {
+            "operator": self.operator,
+            "starts": self.starts,
+            "lost": self.lost,
+            "vacuous": self.vacuous,
+            "policies": [policy.as_json() for policy in self.policies],
+        }
+
+    def as_row(self) -> list[str]:
+        """Row of a table."""
+        rates = [f"{policy.rate:.1%}" for policy in self.policies]
+        verdict = "**vacuous**" if self.vacuous else "no"
+        return [self.operator, str(self.starts), str(self.lost), *rates, verdict]
+
+
+def study(
+    choice: DomainChoice,
+    wanted: int,
+    seed: int,
+    log: JobLog,
+    processes: int,
+    progress: StudyProgress,
+) -> StudyReport:
+    """Let policies without eyes act where skills begin.
+
+    Args:
+        choice: The domain, with its demonstrator for skills.
+        wanted: Starts of each operator.
+        seed: Of the tasks that are demonstrated.
+        log: Keeps what is done.
+        processes: Jobs at a time.
+        progress: Is called as jobs end.
+
+    Returns:
+        The report.
+
+    Raises:
+        InvalidParameterError: The domain has no demonstrator, or none of its tasks has a start.
+    """
+    domain = open_domain(choice)
+    starts, lost = _gather(domain, choice, wanted, seed, log, processes, progress)
+    jobs = {
+        f"policies {name} {i}": (choice, i, start)
+        for name, found in starts.items()
+        for i, start in enumerate(found)
+    }
+    results = log.run(f"{choice.name}: policies", try_policies, jobs, processes, progress)
+    found = []
+    for name, own in starts.items():
+        outcomes = [results[f"policies {name} {i}"] for i in range(len(own))]
+        policies = tuple(
+            BlindSuccess(policy, sum(o[policy] is not None for o in outcomes), len(own))
+            for policy in blind_policies(domain.action_space)
+        )
+        found.append(OperatorVacuity(name, len(own), lost.get(name, 0), policies))
+    return _report(choice, _horizon(domain), found)
+
+
+def _report(choice: DomainChoice, horizon: int, found: Sequence[OperatorVacuity]) -> StudyReport:
+    if not found:
+        raise InvalidParameterError(
+            f"no operator of {choice.name} began in any demonstration; see `slap study "
+            "demonstrations`"
+        )
+    names = [policy.policy for policy in found[0].policies]
+    return StudyReport(
+        study="vacuity",
+        source="",
+        title=f"Is there anything to learn: {choice.name}",
+        measured=MEASURED.format(horizon=horizon, allowed=ALLOWED, limit=APPROACH_LIMIT),
+        table=MarkdownTable(
+            ["operator", "starts", "approaches lost", *names, "vacuous"],
+            [one.as_row() for one in found],
+        ),
+        found={"horizon": horizon, "operators": [one.as_json() for one in found]},
+        draw=lambda figure: draw(figure, found),
+        size=(7.6, 1.4 + 0.4 * len(found)),
+    )
+
+
+def _horizon(domain: Domain) -> int:
+    if domain.acquisition is None:
+        raise InvalidParameterError(f"no skills are to be acquired in domain {domain.name}")
+    return domain.acquisition.horizon
+
+
+# -- starts ----------------------------------------------------------------------------------------
+
+
+def _gather(
+    domain: Domain,
+    choice: DomainChoice,
+    wanted: int,
+    seed: int,
+    log: JobLog,
+    processes: int,
+    progress: StudyProgress,
+) -> tuple[dict[str, list[Any]], dict[str, int]]:
+    """Starts by operator, in the order of tasks; and how many approaches led to none.
+
+    Args:
+        domain: Opened.
+        choice: The domain, for other processes.
+        wanted: Starts of each operator.
+        seed: Of the tasks.
+        log: Keeps what is done.
+        processes: Jobs at a time.
+        progress: Is called as jobs end.
+    """
+    goals = list(domain.goals) or [""]
+    starts: dict[str, list[Any]] = {}
+    lost: dict[str, int] = {}
+    done = 0
+    while done < MOST_TASKS * wanted:
+        tasks = range(done, done + min(BATCH, wanted))
+        jobs = {f"starts {i}": (choice, goals[i % len(goals)], seed, i) for i in tasks}
+        title = f"{choice.name}: demonstrations from task {done} on"
+        for found in log.run(title, gather_starts, jobs, processes, progress).values():
+            for start in found:
+                own = starts.setdefault(start["operator"], [])
+                if start["state"] is None:
+                    lost[start["operator"]] = lost.get(start["operator"], 0) + 1
+                elif len(own) < wanted:
+                    own.append(start)
+        done = tasks.stop
+        if starts and all(len(own) >= wanted for own in starts.values()):
+            break
+    ordered = [op.name for op in domain.operators if starts.get(op.name)]
+    return {name: starts[name] for name in ordered}, lost
+
+
+def gather_starts(choice: DomainChoice, goal: str, seed: int, index: int) -> list[Any]:
+    """The starts that one demonstration gives.
+
+    Args:
+        choice: The domain, with its demonstrator for skills.
+        goal: By name; empty for the task's own.
+        seed: Of the task.
+        index: Of the task.
+
+    Returns:
+        For each option that was begun: task, operator, objects, and the state after the approach as
+        numbers; None where the approach did not lead to a start.
+    """
+    domain = open_domain(choice)
+    task = domain.task(seed, index, goal or None)
+    shown = demonstrate(domain, task)
+    found = []
+    for operator, state in _begun(domain, shown):
+        start = _approached(domain, shown, operator, state)
+        found.append(
+            {
+                "task": [goal, seed, index],
+                "operator": operator.operator.name,
+                "objects": [obj.name for obj in operator.objects],
+                "state": None if start is None else start.data.tolist(),
+            }
+        )
+    return found
+
+
+def _begun(domain: Domain, shown: Demonstration) -> Iterator[tuple[GroundOperator, State]]:
+    """Each option that was begun, and the state in which it was."""
+    grounds = {
+        (ground.operator.name, tuple(obj.name for obj in ground.objects)): ground
+        for ground in ground_operators(domain.operators, shown.space)
+    }
+    step = 0
+    for edge in shown.episode.edges:
+        yield grounds[edge.option, edge.objects], shown.episode.states[step]
+        step += edge.steps
+
+
+def _approached(
+    domain: Domain, shown: Demonstration, operator: GroundOperator, state: State
+) -> State | None:
+    """The state after the approach; None where it does not arrive, or spoils the preconditions."""
+    if domain.acquisition is None:
+        return None
+    world = domain.make_world(state)
+    try:
+        policy = domain.acquisition.approach(state, operator.objects)
+        for _ in range(APPROACH_LIMIT):
+            action = policy(world.state)
+            if action is None:
+                arrived = world.state
+                return arrived if operator.applicable(shown.space.abstract(arrived)) else None
+            world.step(action)
+    except SlapError:  # refused from there: that is no start
+        return None
+    return None
+
+
+# -- policies --------------------------------------------------------------------------------------
+
+
+def blind_policies(actions: ActionSpace) -> dict[str, Blind]:
+    """Policies that see nothing, by name; those that the action space has axes for."""
+    policies: dict[str, Blind] = {"nothing": lambda _: actions.hold}
+    if actions.gripper is not None:
+        displacements = np.zeros(len(actions.displacement_indices))
+        opened = actions.join(displacements, actions.gripper.opens)
+        closed = actions.join(displacements, actions.gripper.closes)
+        policies |= {"open": lambda _: opened, "close": lambda _: closed}
+    names = [axis.name for axis in actions.axes]
+    if "z" in names:
+        down = actions.hold
+        down[names.index("z")] = actions.low[names.index("z")]
+        policies["down"] = lambda _: down
+    policies["random"] = lambda rng: rng.uniform(actions.low, actions.high)
+    return policies
+
+
+def try_policies(choice: DomainChoice, number: int, start: dict[str, Any]) -> dict[str, int | None]:
+    """Let every policy act from a start.
+
+    Args:
+        choice: The domain, with its demonstrator for skills.
+        number: Of the start among its operator's; with it the random policy's numbers.
+        start: As :func:`gather_starts` gives it.
+
+    Returns:
+        By policy, the steps after which it first succeeded; None where it did not.
+    """
+    domain = open_domain(choice)
+    goal, seed, index = start["task"]
+    layout = domain.task(seed, index, goal or None).initial_state.layout
+    state = State(layout, np.array(start["state"]))
+    space = domain.atom_space(state)
+    (operator,) = [
+        ground
+        for ground in ground_operators(domain.operators, space)
+        if ground.operator.name == start["operator"]
+        and [obj.name for obj in ground.objects] == start["objects"]
+    ]
+
+    def succeeded(now: State) -> bool:
+        abstract = space.abstract(now)
+        return (
+            abstract & operator.add_effects == operator.add_effects
+            and not abstract & operator.delete_effects
+        )
+
+    world = domain.make_world(state)
+    outcomes: dict[str, int | None] = {}
+    for name, policy in blind_policies(domain.action_space).items():
+        rng = np.random.default_rng([RANDOM, seed, index, number])
+        world.reset(state)
+        outcomes[name] = None
+        for step in range(_horizon(domain) + 1):
+            if succeeded(world.state):
+                outcomes[name] = step
+                break
+            if step < _horizon(domain):
+                world.step(policy(rng))
+    return outcomes
+
+
+def draw(figure: Figure, found: Sequence[OperatorVacuity]) -> None:
+    """Draw each policy's share of starts, by operator, and what is allowed."""
+    axes = figure.subplots()
+    names = [policy.policy for policy in found[0].policies]
+    for number, name in enumerate(names):
+        places = [i + 0.14 * (number - (len(names) - 1) / 2) for i in range(len(found))]
+        policies = [one.policies[number] for one in found]
+        axes.plot(
+            [100 * policy.rate for policy in policies],
+            places,
+            "o",
+            color=LINES[number],
+            markersize=4,
+            label=name,
+        )
+        for place, policy in zip(places, policies, strict=True):
+            ends = [100 * policy.interval.low, 100 * policy.interval.high]
+            axes.plot(ends, [place, place], color=LINES[number], linewidth=1)
+    axes.axvline(100 * ALLOWED, color=MUTED, linestyle="--", linewidth=1)
+    axes.set_yticks(range(len(found)), [one.operator for one in found])
+    axes.set_ylim(len(found) - 0.5, -0.5)
+    axes.set_xlim(-1, max(20.0, *(105 * p.interval.high for one in found for p in one.policies)))
+    axes.set_xlabel("starts from which a blind policy succeeds [%], with 95 % interval")
+    figure.legend(loc="outside upper center", ncols=len(names))
