@@ -4,6 +4,7 @@
 
 import itertools
 import os
+import signal
 import socket
 import sys
 from contextlib import contextmanager
@@ -32,6 +33,9 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
+    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+        # As in a shell's background. Whatever tests start would inherit it and ignore Ctrl-C.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     if sys.platform == "linux":
         config.guard = leftovers.start_guard()
 

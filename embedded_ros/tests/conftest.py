@@ -32,6 +32,12 @@ _LIBC = ctypes.CDLL(None)  # opened here: between fork and exec nothing may be l
 _PR_SET_PDEATHSIG = 1  # <sys/prctl.h>
 
 
+def pytest_configure() -> None:
+    """Let Ctrl-C end what tests start, also where pytest runs in a shell's background."""
+    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 def _die_with_parent() -> None:
     """Let a process end when pytest does, by SIGKILL too."""
     if sys.platform == "linux":

@@ -49,7 +49,10 @@ class BagContents:
     @property
     def damage(self) -> str | None:
         """What cannot be read, or what is missing of the runs; None for a whole bag."""
-        return self.bag.damage or "; ".join(self.log.gaps()) or None
+        found = self.log.gaps()
+        if strays := self.recording.not_finite:
+            found.append(f"states that are not finite: {strays}, left out")
+        return self.bag.damage or "; ".join(found) or None
 
 
 def read_runs(path: Path | str) -> BagContents:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from math import isfinite
 from typing import Any
 
 from slap_ros.bags.reader import Bag
@@ -52,6 +53,7 @@ class Recording:
         self.episodes: dict[int, RecordedEpisode] = {}
         self.domain_info: DomainInfoMessage | None = None
         self.markers: dict[int, MarkersMessage] = {}  # by stamp, ns
+        self.not_finite = 0  # states
         self._add: Mapping[str, Callable[[Any], None]] = {
             DOMAIN_INFO: self._add_domain,
             TASK: self._add_task,
@@ -84,7 +86,10 @@ class Recording:
         self._episode(msg.episode).task = msg
 
     def _add_state(self, msg: StateMessage) -> None:
-        self._episode(msg.episode).states.setdefault(msg.step, msg)
+        if all(isfinite(value) for obj in msg.objects for value in obj.features):
+            self._episode(msg.episode).states.setdefault(msg.step, msg)
+        else:  # no world publishes it, and no node acts on it
+            self.not_finite += 1
 
     def _add_atoms(self, msg: AtomsMessage) -> None:
         episode = self._episode(msg.episode)
