@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from ensemble.parameters import parameter
 from ensemble.patience import IMPATIENT, PATIENT
 from slap_ros.core import Domain
-from slap_ros.domains import get_domain
+from slap_ros.learning.domain_choice import DomainChoice, open_domain
 
 
 @dataclass(frozen=True)
@@ -18,6 +18,7 @@ class CommonParameters:
 
     domain: str = parameter("", "imported at the start; empty: whichever the simulator announces")
     preset: str = parameter("", "the domain's; empty: its first")
+    skills: str = parameter("", "whose skills the domain has; empty: whichever are announced")
     patience: float = parameter(
         1.0, "factor of all deadlines, for slow domains and machines", IMPATIENT, PATIENT
     )
@@ -27,7 +28,8 @@ class CommonParameters:
 
         Raises:
             UnknownDomainError: There is no such domain.
-            InvalidParameterError: The domain has no such preset.
+            InvalidParameterError: The domain has no such preset, or no such skills.
             InvalidDomainError: The domain's own code fails.
         """
-        return get_domain(self.domain, self.preset) if self.domain else None
+        choice = DomainChoice(self.domain, self.preset, self.skills)
+        return open_domain(choice) if self.domain else None

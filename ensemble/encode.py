@@ -13,6 +13,7 @@ from diagnostic_msgs.msg import KeyValue
 from std_msgs.msg import Header
 
 from slap_ros.core import Action, ActionSpace, Domain, Skill, Task
+from slap_ros.learning.domain_choice import DomainChoice
 from slap_ros.perception import Percept
 from slap_ros.planning.options import OptionKind
 from slap_ros.planning.plan import Plan, PlanEdge
@@ -29,8 +30,17 @@ def header(stamp: Time) -> Header:
     return Header(stamp=stamp, frame_id=FRAME)
 
 
-def domain_info(domain: Domain, stamp: Time) -> msgs.DomainInfo:
-    """Which world runs: types, predicates, operators, configuration and versions."""
+def domain_info(domain: Domain, choice: DomainChoice, stamp: Time) -> msgs.DomainInfo:
+    """Which world runs.
+
+    Args:
+        domain: Types, predicates, operators and configuration are its.
+        choice: What it was opened by.
+        stamp: When it is announced.
+
+    Returns:
+        The message, with the versions of all that runs it.
+    """
     moved = domain.action_space.displacement_axes
     return msgs.DomainInfo(
         header=header(stamp),
@@ -53,7 +63,7 @@ def domain_info(domain: Domain, stamp: Time) -> msgs.DomainInfo:
         action_names=[axis.name for axis in moved],
         action_units=[axis.unit for axis in moved],
         control_period=domain.execution.control_period_s,
-        configuration=key_values(domain.configuration),
+        configuration=key_values({**domain.configuration, **choice.configuration}),
         versions=key_values(versions()),
     )
 

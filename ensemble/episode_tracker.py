@@ -18,8 +18,8 @@ from ensemble.observation import Episode
 from ensemble.refusals import Refusals
 from ensemble.steady_time import create_timer
 from slap_ros.core import Domain, Task
-from slap_ros.domains import get_domain
-from slap_ros.errors import SlapError
+from slap_ros.errors import SkillsChangedError, SlapError
+from slap_ros.learning.domain_choice import DomainChoice, open_domain
 from slap_ros.messages.decode import decode_goal, decode_state, stamp_ns
 
 RIVAL_PERIOD = 1.0  # s, between two looks at whether another simulator is still there
@@ -52,6 +52,7 @@ class EpisodeTracker(Generic[T]):
         prepare: Callable[[Episode], T],
         on_episode: Callable[[Episode, T], None],
         refusals: Refusals,
+        skills: str = "",
     ) -> None:
         """Follow both topics from now on.
 
@@ -61,13 +62,16 @@ class EpisodeTracker(Generic[T]):
                 SlapError is refused.
             on_episode: Called with each new episode, and with what was prepared for it.
             refusals: Where refused domains and tasks are counted.
+            skills: What the node was given: domains with others are refused; empty: with none.
         """
         self.current: Episode | None = None
         self.refusal: SlapError | None = None  # why the newest task, or its domain, was refused
         self._node, self._refusals = node, refusals
         self._prepare, self._on_episode = prepare, on_episode
         self._workers = ThreadPoolExecutor(1, thread_name_prefix="episode")
-        self._domains: dict[str, Domain] = {}  # by name: the newest preset
+        self._skills = skills
+        self._choices: dict[str, DomainChoice] = {}  # by name: the newest that was opened
+        self._domains: dict[str, Domain] = {}  # by name: what it stands for
         self._domain: DomainInfo | None = None  # the newest
         self._task: TaskMessage | None = None  # the newest that is not a rival's
         self._simulator: frozenset[Endpoint] = frozenset()  # which publish tasks
@@ -86,9 +90,7 @@ class EpisodeTracker(Generic[T]):
     def _on_domain(self, message: DomainInfo) -> None:
         if message != self._domain:
             self._domain = message
-            known = self._domains.get(message.name)
-            if known is None or known.preset != message.preset:
-                self._start(self._load(message.name, message.preset))
+            self._start(self._load(message))
 
     def _on_task(self, message: TaskMessage) -> None:
         if message == self._task:
@@ -105,19 +107,37 @@ class EpisodeTracker(Generic[T]):
     def _start(self, work: Coroutine[None, None, None]) -> None:
         self._node.executor.create_task(work)
 
-    async def _load(self, name: str, preset: str) -> None:
+    async def _load(self, message: DomainInfo) -> None:
         """Import a domain, and open the episode that waits for it."""
         try:
-            domain = await run_in_executor(self._workers, lambda: get_domain(name, preset))
+            choice = self._announced(message)
+            if self._choices.get(choice.name) == choice:
+                return
+            domain = await run_in_executor(self._workers, lambda: open_domain(choice))
         except SlapError as error:
             self._refuse("refused_domains", error)
             return
-        known = self._domains.get(name)
-        if known is not None and known.preset == preset:
+        if self._choices.get(choice.name) == choice:
             return  # announced twice meanwhile
-        self._domains[name] = domain
-        if self._task is not None and self._task.domain == name:
+        self._choices[choice.name], self._domains[choice.name] = choice, domain
+        if self._task is not None and self._task.domain == choice.name:
             await self._open(self._task)
+
+    def _announced(self, message: DomainInfo) -> DomainChoice:
+        """The domain to be opened.
+
+        Raises:
+            SkillsChangedError: This node was given other skills.
+            InvalidParameterError: Skills that are not known here.
+        """
+        choice = DomainChoice.announced(message)
+        if self._skills and self._skills != choice.skills:
+            raise SkillsChangedError(
+                f"{choice.name} runs with skills {choice.skills or 'of its own'}, but "
+                f"{self._node.get_name()} was given {self._skills}: start every node with the same "
+                "parameter skills"
+            )
+        return choice
 
     async def _open(self, message: TaskMessage) -> None:
         domain = self._domains[message.domain]

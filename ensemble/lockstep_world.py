@@ -25,7 +25,6 @@ from ensemble.interfaces import COMMAND, DOMAIN, RESET_TASK, STATE, TASK, VOLATI
 from ensemble.parameters import read_parameters
 from ensemble.world_parameters import WorldParameters
 from slap_ros.core import Action, Task
-from slap_ros.domains import get_domain
 from slap_ros.errors import (
     ErrorCode,
     InvalidCommandError,
@@ -33,6 +32,7 @@ from slap_ros.errors import (
     StaleCommandError,
     UnsafeCommandError,
 )
+from slap_ros.learning.domain_choice import open_domain
 from slap_ros.messages.decode import decode_command
 from slap_ros.relational import State
 
@@ -65,11 +65,11 @@ class LockstepWorld(Node, ABC, Generic[P]):
 
         Raises:
             UnknownDomainError: There is no such domain.
-            InvalidParameterError: The domain has no such preset.
+            InvalidParameterError: The domain has no such preset, or no such skills.
         """
         super().__init__(name, **kwargs)
         self._settings = read_parameters(self, parameters)
-        self._domain = get_domain(self._settings.domain, self._settings.preset)
+        self._domain = open_domain(self._settings.choice)
         self._episode = 0
         self._step = 0
         kinds = ("steps", "stale_commands", "invalid_commands", *counted)
@@ -148,7 +148,7 @@ class LockstepWorld(Node, ABC, Generic[P]):
 
     def _publish_domain(self) -> None:
         """Say what runs, also before there is a first state."""
-        self._domains.publish(encode.domain_info(self._domain, self._now()))
+        self._domains.publish(encode.domain_info(self._domain, self._settings.choice, self._now()))
 
     def _open_episode(self, task: Task, seed: int, index: int) -> None:
         """Publish a task and its initial state, as step 0 of a new episode.

@@ -45,6 +45,7 @@ class RunSettings:
     index: int
     planner: str
     record: Path | None  # the bag's folder; None: no recorder
+    skills: str = ""  # see slap_ros.learning.domain_choice
     pace: float = 0.0  # environment steps per second; 0: as fast as commands come
     shortcuts: str = ""  # a library's folder, or none; empty: the shipped one
     samples: int = DEFAULT.samples  # attempts of a shortcut in the model
@@ -70,6 +71,7 @@ def node_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int |
     common: dict[str, str | int | float] = {
         "domain": settings.domain,
         "preset": settings.preset,
+        "skills": settings.skills,
         "patience": settings.patience,
     }
     nodes: dict[str, Mapping[str, str | int | float]] = {
@@ -88,6 +90,7 @@ def _world_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int
     task: dict[str, str | int | float] = {
         "domain": settings.domain,
         "preset": settings.preset,
+        "skills": settings.skills,
         "seed": settings.seed,
         "index": settings.index,
     }

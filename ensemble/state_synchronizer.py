@@ -44,6 +44,7 @@ class StateSynchronizer:
         node: Node,
         on_observation: Callable[[Observation], None],
         prepare: Callable[[Episode], None] = lambda _: None,
+        skills: str = "",
     ) -> None:
         """Subscribe to task, state and atoms.
 
@@ -51,6 +52,7 @@ class StateSynchronizer:
             node: Who subscribes.
             on_observation: Called with each observation that is newer than the last.
             prepare: Called in a thread for each new episode, before its first observation.
+            skills: What the node was given, see :class:`EpisodeTracker`.
         """
         self.latest: Observation | None = None
         self._node = node
@@ -59,7 +61,7 @@ class StateSynchronizer:
         self._states: OrderedDict[Key, ObjectCentricState] = OrderedDict()  # without atoms
         self._atoms: OrderedDict[Key, AbstractState] = OrderedDict()  # without a state
         self._early: deque[Pair] = deque(maxlen=WAITING)  # of no episode that is known
-        self._episodes = EpisodeTracker(node, prepare, self._open, self._refusals)
+        self._episodes = EpisodeTracker(node, prepare, self._open, self._refusals, skills)
         subscribe(node, STATE, self._on_state)
         subscribe(node, ATOMS, self._on_atoms)
 

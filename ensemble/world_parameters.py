@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ensemble.parameters import MAX_SEED, parameter
+from slap_ros.learning.domain_choice import DomainChoice
 
 
 @dataclass(frozen=True)
@@ -16,4 +17,14 @@ class WorldParameters:
     domain: str = parameter("obstacle2d", "which domain")
     preset: str = parameter("", "the domain's; empty: its first, which of ours is fair")
     seed: int = parameter(0, "samples the first task", high=MAX_SEED)
+    skills: str = parameter("", "none, demonstrator; empty: those that the domain itself has")
     index: int = parameter(0, "which of the seed's tasks")
+
+    @property
+    def choice(self) -> DomainChoice:
+        """The domain that runs.
+
+        Raises:
+            InvalidParameterError: Skills that are not known.
+        """
+        return DomainChoice(self.domain, self.preset, self.skills)

@@ -27,6 +27,7 @@ ARGUMENTS = {
         "",
         "fair: random tasks; paper: the paper's start states; empty: the domain's first",
     ),
+    "skills": ("", "none, demonstrator; empty: those that the domain itself has"),
     "seed": ("0", "samples the task"),
     "index": ("0", "which of the seed's tasks"),
     "planner": ("lazy", "lazy, exhaustive or ff"),
@@ -66,7 +67,7 @@ def _discovery_range() -> list[Action]:
 
 def _worlds() -> list[Node]:
     """The simulator, or the bridge with or without a mock robot behind it."""
-    task = {"domain": _value("domain", str), "preset": _value("preset", str)}
+    task = {name: _value(name, str) for name in ("domain", "preset", "skills")}
     task |= {"seed": _value("seed", int), "index": _value("index", int)}
     arm = {"arm": _value("arm", str)}
     noise = {name: _value(name, float) for name in ("latency", "pose_noise", "dropout")}
@@ -97,7 +98,7 @@ def _solvers() -> list[Node]:
         PythonExpression(["2.0 if '", LaunchConfiguration("world"), "' == 'sim' else 8.0"]),
         value_type=float,
     )
-    common = {name: _value(name, str) for name in ("domain", "preset")}
+    common = {name: _value(name, str) for name in ("domain", "preset", "skills")}
     common |= {"patience": _value("patience", float)}
     return [
         _node("perception_node", common),

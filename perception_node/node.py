@@ -19,6 +19,8 @@ ROS Parameters:
     noise_seed (int, 0): noise is a function of it, of the episode and of its states.
     domain (string, ""), preset (string, ""): imported before the node has servers; empty: whichever
         the simulator announces, in a thread.
+    skills (string, ""): whose skills the domain has: none, demonstrator; empty: whichever the
+        simulator announces. A domain that is announced with others is refused.
     patience (double, 1.0): factor of all deadlines, for slow domains and machines.
 
 Publishers:
@@ -64,7 +66,8 @@ class PerceptionNode(Node):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("perception_node", **kwargs)
         parameters = read_parameters(self, PerceptionParameters)
-        read_parameters(self, CommonParameters).imported()
+        common = read_parameters(self, CommonParameters)
+        common.imported()
         self._quality, self._seed = parameters.quality, parameters.noise_seed
         self._perceiver: Perceiver
         self._perceived = 0
@@ -72,7 +75,9 @@ class PerceptionNode(Node):
         self._early: deque[ObjectCentricState] = deque(maxlen=qos.EPISODE.depth)
         self._atoms = self.create_publisher(ATOMS.type, ATOMS.name, ATOMS.qos)
         self._refusals = Refusals(self)
-        self._episodes = EpisodeTracker(self, self._perceiver_of, self._open, self._refusals)
+        self._episodes = EpisodeTracker(
+            self, self._perceiver_of, self._open, self._refusals, common.skills
+        )
         subscribe(self, STATE, self._on_state)
         DiagnosticsPublisher(self, lambda: {"states": self._perceived, **self._refusals.counts})
 

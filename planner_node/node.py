@@ -10,6 +10,8 @@ ROS Parameters:
     server_timeout (double, 5.0): seconds without a skill server after which a run fails.
     domain (string, ""), preset (string, ""): imported before the node has servers; empty: whichever
         the simulator announces, in a thread.
+    skills (string, ""): whose skills the domain has: none, demonstrator; empty: whichever the
+        simulator announces. A domain that is announced with others is refused.
     patience (double, 1.0): factor of all deadlines, for slow domains and machines.
 
 Publishers:
@@ -102,7 +104,7 @@ class PlannerNode(Node):
         self._counts = Counter(tried=0, solved=0)
         self._workers = ThreadPoolExecutor(1, thread_name_prefix="planning")
         self._synchronizer = StateSynchronizer(
-            self, lambda _: None, self._shortcuts.prepare_episode
+            self, lambda _: None, self._shortcuts.prepare_episode, common.skills
         )
         self._publisher = PlanPublisher(self)
         self._skills = ActionClient(self, EXECUTE_SKILL.type, EXECUTE_SKILL.name)

@@ -13,6 +13,7 @@ until ``slap/reset_task``, as no state is published then and skills give up beca
 ROS Parameters:
     domain (string, "obstacle_tower"): which domain; one with a Panda.
     preset (string, ""): one that obeys the joints' speed limit; empty: the domain's first.
+    skills (string, ""): as sim_node's.
     seed (int, 0), index (int, 0): the task whose objects there are, unless a scene says so.
     scene (string, ""): a scene file; empty: the sampled task's objects, in frames detected_NAME.
     arm (string, "panda"): panda or fr3: limits, and the prefix of joints and frames.

@@ -6,6 +6,8 @@ ROS Parameters:
     domain (string, "obstacle2d"): which domain.
     preset (string, ""): the domain's, as fair (random tasks) or paper (the paper's start states);
         empty: its first, which of our domains is fair.
+    skills (string, ""): none, demonstrator; empty: those that the domain itself has. Announced to
+        the other nodes.
     seed (int, 0): samples the first task.
     index (int, 0): which of the seed's tasks.
     pace (double, 0.0): environment steps per second, for watching; 0: as fast as commands come.

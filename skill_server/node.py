@@ -10,6 +10,8 @@ ROS Parameters:
         perceived; perception that debounces takes its time.
     domain (string, ""), preset (string, ""): imported before the node has servers; empty: whichever
         the simulator announces, in a thread.
+    skills (string, ""): whose skills the domain has: none, demonstrator; empty: whichever the
+        simulator announces. A domain that is announced with others is refused.
     patience (double, 1.0): factor of all deadlines, for slow domains and machines.
 
 Publishers:
@@ -84,7 +86,7 @@ class SkillServer(Node):
         self._busy = False  # from the acceptance of a goal to its end
         self._workers = ThreadPoolExecutor(1, thread_name_prefix="skill_start")
         self._synchronizer = StateSynchronizer(
-            self, self._on_observation, self._shortcuts.prepare_episode
+            self, self._on_observation, self._shortcuts.prepare_episode, common.skills
         )
         self._publisher = SkillPublisher(self)
         self.create_service(LIST_SKILLS.type, LIST_SKILLS.name, self._on_list)

@@ -67,6 +67,7 @@ class ErrorCode(IntEnum):
     NO_DETECTION = 77
     INVALID_MEASUREMENT = 78
     INVALID_SCENE = 79
+    OPEN_LOOP_ONLY = 80
 
     # 90-109: bags
     DAMAGED_BAG = 90
@@ -81,6 +82,7 @@ class ErrorCode(IntEnum):
     TIMEOUT = 111
     NOT_READY = 112
     ALREADY_RUNNING = 113
+    SKILLS_CHANGED = 114
 
     # 130-149: acquisition; from 140 on, proposals and language models
     INVALID_REWARD = 130
@@ -310,6 +312,12 @@ class InvalidSceneError(SlapError):
     code = ErrorCode.INVALID_SCENE
 
 
+class OpenLoopOnlyError(SlapError):
+    """A domain whose states cannot be measured on a robot, to be run on one in closed loop."""
+
+    code = ErrorCode.OPEN_LOOP_ONLY
+
+
 class DamagedBagError(SlapError):
     """A bag that ends early or cannot be read."""
 
@@ -366,6 +374,12 @@ class AlreadyRunningError(SlapError):
     """Another ensemble uses the same domain id and namespace."""
 
     code = ErrorCode.ALREADY_RUNNING
+
+
+class SkillsChangedError(SlapError):
+    """A node that was given other skills than the world announces."""
+
+    code = ErrorCode.SKILLS_CHANGED
 
 
 class InvalidRewardError(SlapError):

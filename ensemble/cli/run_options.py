@@ -16,9 +16,13 @@ from slap_ros.cli.options import MAX_INDEX, DomainName, Goal, Index, Json, Plann
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import require_writable
+from slap_ros.learning.domain_choice import DEMONSTRATOR, SHIPPED, DomainChoice
 from slap_ros.planning.execution import MAX_REPLANS
 from slap_ros.report import check_output
 from slap_ros.robot.worlds import MOCK, ROBOT, SIM, WORLDS
+
+OWN_SKILLS = "skills"
+POLICIES = {OWN_SKILLS: SHIPPED, DEMONSTRATOR: DEMONSTRATOR}  # whose skills a domain is opened with
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,13 @@ class RunOptions:
     shortcuts: Shortcuts = None
     samples: Samples = SAMPLES
     planner: Planner = "lazy"
+    policy: Annotated[
+        str,
+        typer.Option(
+            help="skills: the domain's own; demonstrator: hand-written operators and scripts, "
+            "where skills are still to be acquired."
+        ),
+    ] = OWN_SKILLS
     max_replans: Annotated[
         int, typer.Option(min=0, max=MAX_INDEX, help="Plans after the first.")
     ] = MAX_REPLANS
@@ -106,6 +117,10 @@ class RunOptions:
     def __post_init__(self) -> None:
         """Refuse what can be refused without the domain; see the class."""
         self._check_world()
+        if self.policy not in POLICIES:
+            raise InvalidParameterError(
+                f"--policy must be one of {', '.join(POLICIES)}, not {self.policy!r}"
+            )
         if not self.live and (self.watched or self.live_port is not None):
             raise InvalidParameterError("--watched and --live-port are for --live")
         if self.record is not None:
@@ -125,6 +140,11 @@ class RunOptions:
             )
         if self.mock and world != MOCK:
             raise InvalidParameterError(f"--mock is for --world mock, not for --world {world}")
+
+    @property
+    def choice(self) -> DomainChoice:
+        """The domain to run."""
+        return DomainChoice(self.domain, self.preset or "", POLICIES[self.policy])
 
     @property
     def foxglove_is_optional(self) -> bool:

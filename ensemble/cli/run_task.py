@@ -28,8 +28,8 @@ from slap_ros.cli.render import check_renderable
 from slap_ros.cli.render import render as write_animation
 from slap_ros.cli.report import write_report
 from slap_ros.core import Domain, Task, task_with_goal
-from slap_ros.domains import get_domain
 from slap_ros.evaluation.metrics import RunMetrics, known
+from slap_ros.learning.domain_choice import open_domain
 from slap_ros.messages.decode import decode_state
 from slap_ros.messages.interfaces import STATE
 from slap_ros.messages.protocols import StateMessage
@@ -49,7 +49,7 @@ def run_task(options: RunOptions) -> int:
     """
     # Everything that can be refused is refused before a node is started.
     began = monotonic()
-    domain = get_domain(options.domain, options.preset)
+    domain = open_domain(options.choice)
     imported_s = monotonic() - began
     task = task_with_goal(domain, options.seed, options.index, options.goal)
     request = replace(_request(options, domain, task), import_s=imported_s)
@@ -96,6 +96,7 @@ def _request(options: RunOptions, domain: Domain, task: Task) -> RunRequest:
         options.index,
         options.planner,
         record=None,
+        skills=options.choice.skills,
         pace=options.pace,
         patience=options.patience,
         shortcuts=options.shortcuts or "",

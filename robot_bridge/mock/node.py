@@ -6,8 +6,8 @@ It moves the domain's world when its controllers are asked to, and lets time pas
 as anything moves. For tests, and for trying the bridge out before there is a robot.
 
 ROS Parameters:
-    domain (string, "obstacle_tower"), preset (string, ""), seed (int, 0), index (int, 0): the
-        task in whose initial state the world is.
+    domain (string, "obstacle_tower"), preset (string, ""), skills (string, ""), seed (int, 0),
+        index (int, 0): the task in whose initial state the world is.
     arm (string, "panda"): prefix of joints and frames.
     trajectory_action (string, "ARM_arm_controller/follow_joint_trajectory"),
     gripper_action (string, "franka_gripper/gripper_action"): names of the actions, as the bridge's.
@@ -51,8 +51,8 @@ from robot_bridge.mock.controllers import MockControllers
 from robot_bridge.mock.noise_model import NoiseModel, NoiseSettings
 from robot_bridge.mock.plant import Plant
 from robot_bridge.mock.sensors import MockSensors
-from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
+from slap_ros.learning.domain_choice import open_domain
 
 FAULTS = ("", "reject", "abort", "ignore")
 
@@ -75,7 +75,7 @@ class MockRobot(Node):
             raise InvalidParameterError(f"parameter fault is one of {', '.join(FAULTS[1:])}")
         if min(settings.rate, settings.joint_rate, settings.pace) <= 0.0:
             raise InvalidParameterError("parameters rate, joint_rate and pace must be above 0")
-        domain = get_domain(settings.domain, settings.preset)
+        domain = open_domain(settings.choice)
         period_s = domain.execution.control_period_s / settings.pace
         noise = NoiseModel(_noise_settings(settings), np.random.default_rng(settings.noise_seed))
         self._plant = Plant(domain, domain.task(settings.seed, settings.index).initial_state)

@@ -11,9 +11,9 @@ from typing import Any
 
 from slap_ros.bags.reader import Bag
 from slap_ros.core import Domain
-from slap_ros.domains import get_domain
 from slap_ros.errors import ForeignBagError
 from slap_ros.evaluation.metrics import AtomNames, atom_names
+from slap_ros.learning.domain_choice import DomainChoice, open_domain
 from slap_ros.messages.decode import decode_state, stamp_ns
 from slap_ros.messages.interfaces import (
     ATOMS,
@@ -110,13 +110,13 @@ class Recording:
 
         Raises:
             UnknownDomainError: It is not known here.
-            InvalidParameterError: Its preset is not known here.
+            InvalidParameterError: Its preset, or its skills, are not known here.
             ForeignBagError: It has other types or features here.
         """
         info = self.domain_info
         if info is None:
             return None
-        domain = get_domain(info.name, info.preset)
+        domain = open_domain(DomainChoice.announced(info))
         recorded = {t.name: [str(name) for name in t.feature_names] for t in info.types}
         here = {t.name: [feature.name for feature in t.features] for t in domain.types}
         if recorded != here:

@@ -9,17 +9,20 @@ bags.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.learning.scripted_skill import with_scripts
+from slap_ros.messages.protocols import DomainInfoMessage
 
 SHIPPED = ""  # the skills that the domain itself has
 NO_SKILLS = "none"
 DEMONSTRATOR = "demonstrator"
 SKILLS = (SHIPPED, NO_SKILLS, DEMONSTRATOR)
+SKILLS_KEY = "skills"  # in what a world announces of its domain; not there for what ships
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,21 @@ class DomainChoice:
     def of(cls, domain: Domain, skills: str = SHIPPED) -> DomainChoice:
         """The choice of a domain's name and preset, with skills as they are said to be."""
         return cls(domain.name, domain.preset, skills)
+
+    @classmethod
+    def announced(cls, info: DomainInfoMessage) -> DomainChoice:
+        """The choice that a world announces, or announced when it was recorded.
+
+        Raises:
+            InvalidParameterError: Skills that are not known here.
+        """
+        skills = [str(pair.value) for pair in info.configuration if pair.key == SKILLS_KEY]
+        return cls(str(info.name), str(info.preset), skills[0] if skills else SHIPPED)
+
+    @property
+    def configuration(self) -> Mapping[str, str]:
+        """What a world announces of it beside name and preset."""
+        return {SKILLS_KEY: self.skills} if self.skills else {}
 
 
 def open_domain(choice: DomainChoice) -> Domain:

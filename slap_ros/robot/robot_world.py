@@ -16,11 +16,13 @@ from enum import Enum
 
 import numpy as np
 
+from slap_ros.contact.features import ROBOT as HAND_OF_FORCES
 from slap_ros.core import Action, Domain
 from slap_ros.errors import (
     InvalidMeasurementError,
     InvalidParameterError,
     InvalidStateError,
+    OpenLoopOnlyError,
     UnsafeCommandError,
 )
 from slap_ros.geometry.pose import Pose
@@ -69,6 +71,7 @@ class RobotWorld:
 
     Raises:
         InvalidParameterError: The domain has another robot, or lets its joints jump.
+        OpenLoopOnlyError: Its robot is a hand that acts by forces.
         InvalidStateError: Physics does not allow the scene.
     """
 
@@ -259,14 +262,27 @@ def require_robot(domain: Domain, initial: State) -> None:
 
     Raises:
         InvalidParameterError: Its robot is another one.
+        OpenLoopOnlyError: Its robot is a hand that acts by forces.
     """
+    _require_closed_loop(domain)
     if ROBOT not in domain.types or not isinstance(domain.make_world(initial), PandaWorld):
         raise InvalidParameterError(
             f"{domain.name} has no Panda, which the robots here are; use --world sim"
         )
 
 
+def _require_closed_loop(domain: Domain) -> None:
+    """Refuse a domain whose states a robot cannot measure."""
+    if HAND_OF_FORCES in domain.types:
+        raise OpenLoopOnlyError(
+            f"{domain.name} cannot run on a robot in closed loop: its states have the target that "
+            "the hand is pulled to and velocities of hand and fingers, which are not measured; "
+            "record a run in simulation, then `slap bag replay BAG --to robot --dry-run`"
+        )
+
+
 def _require_panda(domain: Domain, limits: Limits) -> None:
+    _require_closed_loop(domain)
     if ROBOT not in domain.types:
         raise InvalidParameterError(f"{domain.name} has no Panda, which a real robot is here")
     reach, _ = domain.action_space.split(np.array(domain.action_space.high))

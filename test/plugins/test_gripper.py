@@ -15,6 +15,7 @@ from slap_ros.core import ActionSpace, GripperAxis
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidCommandError, InvalidDomainError
 from slap_ros.learning.action_map import ActionMap
+from slap_ros.learning.domain_choice import DomainChoice
 from slap_ros.messages.decode import decode_command
 from slap_ros.messages.interfaces import COMMAND, DOMAIN_INFO
 from slap_ros.relational import Feature
@@ -62,11 +63,11 @@ def test_learned_actions_with_another_gripper_are_refused():
 @pytest.mark.parametrize("domain", DOMAINS, ids=lambda domain: domain.name)
 def test_a_command_that_was_sent_is_the_action_that_arrives(domain):
     space, rng = domain.action_space, np.random.default_rng(0)
-    stamp = encode.domain_info(FLAT, None).header.stamp
+    stamp = encode.domain_info(FLAT, DomainChoice.of(FLAT), None).header.stamp
     for action in rng.uniform(space.low, space.high, (50, len(space.axes))):
         message = encode.command(action, space, 1, 0, stamp)
         assert decode_command(message, space).tobytes() == action.tobytes()
-    names = list(encode.domain_info(domain, stamp).action_names)
+    names = list(encode.domain_info(domain, DomainChoice.of(domain), stamp).action_names)
     assert names == {"sweeping": ["x", "y"]}.get(domain.name, ["x", "y"])
     assert len(message.deltas) == len(names)
 
