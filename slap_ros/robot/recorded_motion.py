@@ -14,11 +14,15 @@ from pathlib import Path
 
 from slap_ros.bags.reader import read_bag
 from slap_ros.bags.recording import RecordedEpisode, Recording
+from slap_ros.contact.arm import MAX_JOINT_STEP
+from slap_ros.contact.features import GRIPPER
+from slap_ros.contact.features import ROBOT as HAND_OF_FORCES
 from slap_ros.core import Domain
 from slap_ros.errors import DamagedBagError, InvalidParameterError
 from slap_ros.messages.decode import decode_goal, decode_state
 from slap_ros.physics.features import JOINT_FEATURES, ROBOT
-from slap_ros.relational import State
+from slap_ros.physics.panda import MAX_STEP
+from slap_ros.relational import Object, State
 from slap_ros.robot.limits import Joints
 from slap_ros.robot.robot_world import GripperAction
 
@@ -49,6 +53,11 @@ class RecordedMotion:
         """Where the arm was at the beginning, rad."""
         return _joints(self.states[0])
 
+    @property
+    def max_step(self) -> Joints:
+        """How far the domain's world lets each joint go in a step, rad either way."""
+        return MAX_JOINT_STEP if HAND_OF_FORCES in self.domain.types else MAX_STEP
+
 
 def read_recorded_motion(path: Path) -> RecordedMotion:
     """The motion of the newest episode in a bag.
@@ -64,7 +73,7 @@ def read_recorded_motion(path: Path) -> RecordedMotion:
     if bag.damage is not None or domain is None:
         reason = bag.damage or "it does not name its domain"
         raise DamagedBagError(f"{path} is not to be executed: {reason}")
-    if ROBOT not in domain.types:
+    if not {ROBOT, HAND_OF_FORCES} & set(domain.types):
         raise InvalidParameterError(f"{domain.name} has no Panda, which a real robot is here")
     moved = [episode for _, episode in sorted(recording.episodes.items()) if episode.states]
     if not moved or moved[-1].task is None:
@@ -81,7 +90,7 @@ def read_recorded_motion(path: Path) -> RecordedMotion:
         task.seed,
         task.index,
         states,
-        tuple(_waypoints(states)),
+        tuple(_pressing(states) if HAND_OF_FORCES in domain.types else _waypoints(states)),
         space.mask(decode_goal(task.goal, space)),
     )
 
@@ -104,9 +113,26 @@ def _waypoints(states: Sequence[State]) -> Iterator[RecordedWaypoint]:
             if holding
             else GripperAction.OPEN
         )
-        (robot,) = state.layout.of_type(ROBOT)
-        gap = 2.0 * float(state.get(robot, "finger")) if holding else 0.0
+        gap = 2.0 * float(state.get(_robot(state), "finger")) if holding else 0.0
         yield RecordedWaypoint(step, _joints(state), gripper, gap)
+
+
+def _pressing(states: Sequence[State]) -> Iterator[RecordedWaypoint]:
+    """The same of a hand that acts by forces: fingers close for some steps before they hold."""
+    told = [float(state.get(_robot(state), GRIPPER.name)) for state in states]
+    for step, state in enumerate(states[1:], start=1):
+        gripper, gap = GripperAction.KEEP, 0.0
+        if told[step] != told[step - 1]:
+            gripper = GripperAction.CLOSE if told[step] > 0.0 else GripperAction.OPEN
+        if told[step] > 0.0:
+            opened = next((k for k in range(step, len(told)) if told[k] < 0.0), len(told))
+            gap = next(map(_gap, filter(_holds, states[step:opened])), 0.0)
+        yield RecordedWaypoint(step, _joints(state), gripper, gap)
+
+
+def _gap(state: State) -> float:
+    """Between the fingers, m."""
+    return sum(float(state.get(_robot(state), f"{side}_finger")) for side in ("left", "right"))
 
 
 def _holds(state: State) -> bool:
@@ -114,5 +140,10 @@ def _holds(state: State) -> bool:
 
 
 def _joints(state: State) -> Joints:
-    (robot,) = state.layout.of_type(ROBOT)
+    robot = _robot(state)
     return tuple(float(state.get(robot, feature.name)) for feature in JOINT_FEATURES)
+
+
+def _robot(state: State) -> Object:
+    (robot,) = (*state.layout.of_type(ROBOT), *state.layout.of_type(HAND_OF_FORCES))
+    return robot
