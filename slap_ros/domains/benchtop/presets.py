@@ -17,6 +17,8 @@ from slap_ros.contact.world import ACTION_SPACE, ContactWorld
 from slap_ros.core import Acquisition, Domain, Execution, Goal, Learning, Task
 from slap_ros.domains.benchtop.learner_interface import learner_interface
 from slap_ros.domains.benchtop.metrics import COMMON
+from slap_ros.domains.benchtop.visualization import VIEW, display
+from slap_ros.physics.viewpoint import Viewpoint
 from slap_ros.relational import Metric, Predicate, State, Type
 
 STEP_LIMIT = 1_000  # environment steps of a task
@@ -48,6 +50,7 @@ class BenchtopModel:
         scene_of: The bodies of a state.
         metrics: Beside those that every domain has and those that predicates rest on.
         static: Predicates that nothing changes.
+        view: Where animations are seen from.
     """
 
     types: tuple[Type, ...]
@@ -58,6 +61,7 @@ class BenchtopModel:
     scene_of: Callable[[State], ContactScene]
     metrics: tuple[Metric, ...] = ()
     static: frozenset[Predicate] = frozenset()
+    view: Viewpoint = VIEW
 
 
 def benchtop_domain(
@@ -88,6 +92,7 @@ def benchtop_domain(
         default_goal=next(iter(model.goals.values())),
         step_limit=STEP_LIMIT,
         execution=Execution(control_period_s=CONTROL_PERIOD_S),
+        display=display(model.scene_of, model.view),
         metrics=(*COMMON, *model.metrics),
         static=model.static,
         goals=model.goals,
