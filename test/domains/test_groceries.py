@@ -9,8 +9,11 @@ import pytest
 from skill_starts import CONSTANT, achieves, skill_starts
 
 from slap_ros.domains import get_domain
-from slap_ros.domains.groceries.scenery import GROCERIES, INNER, NAMES, OUTER, WALL_HEIGHT
-from slap_ros.domains.groceries.tasks import Spot
+from slap_ros.domains.benchtop.room import within_reach
+from slap_ros.domains.benchtop.state_access import pose_of, yaw_of
+from slap_ros.domains.groceries.model import NAMES
+from slap_ros.domains.groceries.scenery import GROCERIES, INNER, OUTER, WALL_HEIGHT
+from slap_ros.domains.groceries.tasks import basket_station, grasp_goal, station
 from slap_ros.errors import InvalidParameterError, UnknownObjectError
 from slap_ros.learning.demonstrator import demonstrate
 from slap_ros.learning.domain_choice import DomainChoice, open_domain
@@ -88,9 +91,14 @@ def test_the_hand_has_room_everywhere(preset):
     domain = get_domain("groceries", preset)
     for seed in range(5):
         state = domain.task(seed).initial_state
-        spots = [Spot.of(state, obj) for obj in state.objects[1:]]
-        for i, spot in enumerate(spots):
-            assert all(spot.leaves_room(other) for other in spots[:i])
+        basket, *things = state.objects[1:]
+        stations = [basket_station(pose_of(state, basket))]
+        for thing in things:
+            kind, pose = GROCERIES[thing.name], pose_of(state, thing)
+            here = station(kind, pose)
+            assert all(map(here.leaves_room, stations))
+            assert within_reach(grasp_goal(kind, pose, yaw_of(state, thing)))
+            stations.append(here)
 
 
 def test_things_differ_in_shape_and_width():

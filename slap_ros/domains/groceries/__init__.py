@@ -14,7 +14,7 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from slap_ros.core import Acquisition, Domain, presets
-from slap_ros.domains.benchtop.presets import HORIZON, BenchtopModel, benchtop_domain
+from slap_ros.domains.benchtop.presets import BenchtopModel, benchtop_domain
 from slap_ros.domains.groceries import demonstrator, model, tasks
 from slap_ros.domains.groceries.scenery import scene_of
 from slap_ros.domains.variation import varied
@@ -27,13 +27,12 @@ MODEL = BenchtopModel(
     types=model.TYPES,
     predicates=model.PREDICATES,
     holding=model.HOLDING,
-    goals=tasks.GOALS,
+    goals=model.GOALS,
     acquisition=Acquisition(
         approach=demonstrator.APPROACH,
         operators=model.OPERATORS,
-        rewards={reward.operator: reward for reward in model.REWARDS},
+        rewards=model.REWARDS,
         scripts=demonstrator.SCRIPTS,
-        horizon=HORIZON,
     ),
     scene_of=scene_of,
 )

@@ -12,10 +12,15 @@ from slap_ros.domains.benchtop import scripts
 from slap_ros.domains.benchtop.approach import make_approach
 from slap_ros.domains.benchtop.hand_motion import CLOSE, KEEP, OPEN, HandGoal, nearest_turn
 from slap_ros.domains.benchtop.scripts import GENTLE, Move, carry, follow, grasp, over, release
-from slap_ros.domains.benchtop.state_access import hand_target, position_of, value, yaw_of
+from slap_ros.domains.benchtop.state_access import (
+    hand_target,
+    position_of,
+    standing_on,
+    value,
+    yaw_of,
+)
 from slap_ros.domains.groceries.model import GRASP_HEIGHT, PICK, PLACE_IN
 from slap_ros.domains.groceries.scenery import WALL_HEIGHT
-from slap_ros.geometry.pose import Vector
 from slap_ros.relational import Object, State
 
 NEAR = 0.03  # m over where the hand is to be, from which on it is slow
@@ -40,7 +45,8 @@ def pick(state: State, objects: tuple[Object, ...]) -> Policy:
 def place(state: State, objects: tuple[Object, ...]) -> Policy:
     """Bring a thing over the basket, lower it, and let it go."""
     thing, basket = objects
-    goal = carry(thing, placed_at(state, thing, basket, LOWERED_TO))
+    x, y, z = standing_on(state, thing, basket)
+    goal = carry(thing, (x, y, z + LOWERED_TO))
     height = travel_height(state)
     return follow(
         straight_up(height),
@@ -59,25 +65,12 @@ def grasp_at(state: State, thing: Object) -> HandGoal:
     return HandGoal((x, y, height), nearest_turn(yaw_of(state, thing), math.pi))
 
 
-def placed_at(state: State, thing: Object, basket: Object, above: float = 0.0) -> Vector:
-    """Where a thing's origin is when it stands in the middle of the basket, m.
-
-    Args:
-        state: As things are.
-        thing: That is to stand there.
-        basket: It stands still.
-        above: Height over the floor that is left, m.
-    """
-    x, y, floor = position_of(state, basket)
-    return (x, y, floor + value(state, thing, "rest_height") + above)
-
-
 def acts_at(state: State, objects: tuple[Object, ...]) -> HandGoal:
     """Around what is picked, or where what is held stands in the basket."""
     thing = objects[0]
     if len(objects) == 1:
         return grasp_at(state, thing)
-    return carry(thing, placed_at(state, thing, objects[1]))(state)
+    return carry(thing, standing_on(state, thing, objects[1]))(state)
 
 
 def travel_height(state: State) -> float:

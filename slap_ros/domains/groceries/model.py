@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from slap_ros.domains.benchtop.features import PLACE, THING
+from slap_ros.domains.benchtop.goals import goal
 from slap_ros.domains.benchtop.metrics import (
     DIS_TO_OBJ,
     PARALLEL_DIS,
@@ -31,6 +32,21 @@ IN = on(GROCERY, BASKET, "In")
 IS_EMPTY = is_clear(IN, "IsEmpty")
 PREDICATES = (HAND_EMPTY, HOLDING, ON_TABLE, IN, IS_EMPTY)
 
+# The order is that of the goals task0, task1, ...
+NAMES = (
+    "bottle",
+    "can",
+    "milk",
+    "cereal",
+    "butter",
+    "jar",
+    "tuna",
+    "sausage",
+    "chocolate",
+    "ketchup",
+)
+GOALS = {f"task{number}": goal((IN, name, "basket")) for number, name in enumerate(NAMES)}
+
 _GROCERY, _BASKET = Variable("?grocery", GROCERY), Variable("?basket", BASKET)
 PICK = operator(
     "Pick",
@@ -49,7 +65,7 @@ PLACE_IN = operator(
 OPERATORS = (PICK, PLACE_IN)
 
 _ONE, _BOTH = (_GROCERY,), (_GROCERY, _BASKET)
-REWARDS = (  # the weights that the paper prints (App. C.2)
-    reward(PICK, (DIS_TO_OBJ, 0.4, _ONE), (XY_DIS, 0.2, _ONE), (Z_DIS, 0.2, _ONE)),
-    reward(PLACE_IN, (PARALLEL_DIS, 0.35, _BOTH), (PERPENDICULAR_DIS, 0.35, _BOTH)),
-)
+REWARDS = {  # the weights that the paper prints (App. C.2)
+    "Pick": reward(PICK, (DIS_TO_OBJ, 0.4, _ONE), (XY_DIS, 0.2, _ONE), (Z_DIS, 0.2, _ONE)),
+    "Place": reward(PLACE_IN, (PARALLEL_DIS, 0.35, _BOTH), (PERPENDICULAR_DIS, 0.35, _BOTH)),
+}

@@ -175,7 +175,6 @@ GROCERIES: Mapping[str, Grocery] = {
         ),
     )
 }
-NAMES = tuple(GROCERIES)
 
 # The basket's frame is the middle of its floor, on which things stand. The floor is so thick that
 # what stands on it is lifted (20 mm): it is held until it is let go, and never on the table.

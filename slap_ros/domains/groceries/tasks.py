@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Groceries: tasks, sampled; and the goals, one per thing. Lengths in m, angles in rad."""
+"""Groceries: tasks, sampled. Lengths in m, angles in rad."""
 
 from __future__ import annotations
 
@@ -11,36 +11,29 @@ from typing import ClassVar
 
 import numpy as np
 
-from slap_ros.contact.arm import arm_joints
 from slap_ros.contact.features import ROBOT, robot_features
-from slap_ros.contact.hand import PALM, hand_at, pointing_down
-from slap_ros.core import Goal, Task
+from slap_ros.contact.hand import PALM, hand_at
+from slap_ros.core import Task
 from slap_ros.domains.benchtop.features import place_features, thing_features
-from slap_ros.domains.benchtop.goals import goal
+from slap_ros.domains.benchtop.hand_motion import HandGoal
 from slap_ros.domains.benchtop.presets import STEP_LIMIT
-from slap_ros.domains.benchtop.state_access import pose_of
-from slap_ros.domains.groceries.model import BASKET, GRASP_HEIGHT, GROCERY, HALF_WIDTH, IN
-from slap_ros.domains.groceries.scenery import BASKET_BODY, FLOOR_HEIGHT, GROCERIES, NAMES, Grocery
+from slap_ros.domains.benchtop.room import HIGHEST, ROOM, Station, palm_space, within_reach
+from slap_ros.domains.benchtop.tasks import BENCH_LIMITS, Range
+from slap_ros.domains.groceries.model import BASKET, GRASP_HEIGHT, GROCERY, HALF_WIDTH, IN, NAMES
+from slap_ros.domains.groceries.scenery import BASKET_BODY, FLOOR_HEIGHT, GROCERIES, Grocery
 from slap_ros.domains.variation import TaskSettings
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.geometry.oriented_box import OrientedBox
-from slap_ros.geometry.pose import Pose, Vector, from_yaw
+from slap_ros.geometry.pose import Pose, from_yaw
 from slap_ros.relational import GroundAtom, Object, State
-
-Range = tuple[float, float]
 
 ANY = -1  # instead of a task's number
 MOST = 6  # things, by default
 TRIES = 200  # scenes drawn before there is said to be no room
 PLACES = 60  # drawn for a thing before the scene is given up
 HOME = hand_at((0.45, 0.0, 0.35))
-ROOM = 0.03  # around the hand where it grasps: it may come down that far aside
-TALL = 0.2  # half the height of the space around the hand that other things leave free
-LOWEST, HIGHEST = 0.01, 0.32  # heights between which the hand must get everywhere
-TURNS = (-0.6, 0.6)  # of the hand, that it must get there with
-
 NUMBERS: dict[str, Range] = {"things": (1, len(NAMES)), "task": (ANY, len(NAMES) - 1)}
-WITHIN_X, WITHIN_Y, TURN = (0.3, 0.8), (-0.5, 0.5), (-math.pi, math.pi)
+BASKET_LIMITS = {f"basket_{name}": BENCH_LIMITS[name] for name in ("x", "y", "yaw")}
 
 
 @dataclass(frozen=True)
@@ -51,14 +44,7 @@ class RandomGroceryTasks(TaskSettings):
     thing of the goal ``task3``. With -1 it is any.
     """
 
-    limits: ClassVar = NUMBERS | {
-        "x": WITHIN_X,
-        "y": WITHIN_Y,
-        "yaw": TURN,
-        "basket_x": WITHIN_X,
-        "basket_y": WITHIN_Y,
-        "basket_yaw": TURN,
-    }
+    limits: ClassVar = NUMBERS | BENCH_LIMITS | BASKET_LIMITS
 
     things: int = MOST
     task: int = ANY
@@ -88,26 +74,26 @@ class RandomGroceryTasks(TaskSettings):
             float(rng.uniform(*r)) for r in (self.basket_x, self.basket_y, self.basket_yaw)
         )
         basket = Pose((x, y, FLOOR_HEIGHT), from_yaw(yaw))
-        if not within_reach(basket.position):
+        if not all(within_reach(HandGoal(basket.position, turn)) for turn in self.yaw):
             return None
-        spots, poses = [Spot.of_basket(basket)], []
+        stations, poses = [basket_station(basket)], []
         for name in names:
-            pose = self._place(rng, GROCERIES[name], spots)
+            pose = self._place(rng, GROCERIES[name], stations)
             if pose is None:
                 return None
-            spots.append(Spot.of_thing(GROCERIES[name], pose))
+            stations.append(station(GROCERIES[name], pose))
             poses.append(pose)
         return make_task(basket, names, poses)
 
     def _place(
-        self, rng: np.random.Generator, thing: Grocery, spots: Sequence[Spot]
+        self, rng: np.random.Generator, thing: Grocery, stations: Sequence[Station]
     ) -> Pose | None:
         """Where a thing can stand beside others; None where no room was found."""
         for _ in range(PLACES):
             x, y, yaw = (float(rng.uniform(*r)) for r in (self.x, self.y, self.yaw))
             pose = Pose((x, y, thing.rest_height), from_yaw(yaw))
-            spot = Spot.of_thing(thing, pose)
-            if all(map(spot.leaves_room, spots)) and within_reach(pose.position):
+            has_room = all(map(station(thing, pose).leaves_room, stations))
+            if has_room and within_reach(grasp_goal(thing, pose, yaw)):
                 return pose
         return None
 
@@ -178,48 +164,21 @@ def make_task(basket: Pose, names: Sequence[str], poses: Sequence[Pose]) -> Task
     return Task(state, first_in_basket(state), STEP_LIMIT)
 
 
-@dataclass(frozen=True)
-class Spot:
-    """What a body fills, and what the hand fills around it when it grasps or puts down there."""
-
-    body: OrientedBox
-    hand: OrientedBox
-
-    @classmethod
-    def of_thing(cls, thing: Grocery, pose: Pose) -> Spot:
-        """Of a thing that stands at a pose, and is grasped across its width."""
-        x, y, _ = PALM.half_extents_m
-        return cls(thing.body.at(pose), OrientedBox(pose, (x + ROOM, y + ROOM, TALL)))
-
-    @classmethod
-    def of(cls, state: State, obj: Object) -> Spot:
-        """Of the basket or a thing, as it is in a state."""
-        pose = pose_of(state, obj)
-        return (
-            cls.of_basket(pose) if obj.type == BASKET else cls.of_thing(GROCERIES[obj.name], pose)
-        )
-
-    @classmethod
-    def of_basket(cls, pose: Pose) -> Spot:
-        """Of the basket, into which the hand reaches turned in any way."""
-        half = math.hypot(*PALM.half_extents_m[:2]) + ROOM
-        return cls(BASKET_BODY.at(pose), OrientedBox(pose, (half, half, TALL)))
-
-    def leaves_room(self, other: Spot) -> bool:
-        """Whether the hand has room at both."""
-        return not (self.hand.overlaps(other.body) or other.hand.overlaps(self.body))
+def station(thing: Grocery, pose: Pose) -> Station:
+    """Of a thing that stands at a pose; nothing else is below the palm there."""
+    return Station((thing.body.at(pose),), (palm_space(pose, bottom=0.0),))
 
 
-def within_reach(position: Vector) -> bool:
-    """Whether the arm reaches a place, high and low, and around it."""
-    x, y, _ = position
-    return all(
-        arm_joints(Pose((x + i * ROOM, y + j * ROOM, z), pointing_down(turn))) is not None
-        for i in (-1, 1)
-        for j in (-1, 1)
-        for z in (LOWEST, HIGHEST)
-        for turn in TURNS
-    )
+def basket_station(pose: Pose) -> Station:
+    """Of the basket, into which the hand reaches turned in any way."""
+    half = math.hypot(*PALM.half_extents_m[:2]) + ROOM
+    return Station((BASKET_BODY.at(pose),), (OrientedBox(pose, (half, half, HIGHEST)),))
+
+
+def grasp_goal(thing: Grocery, pose: Pose, yaw: float) -> HandGoal:
+    """The hand around a thing that stands at a pose."""
+    x, y, z = pose.position
+    return HandGoal((x, y, z + thing.grasp_height), yaw)
 
 
 def grocery_features(thing: Grocery, pose: Pose) -> Mapping[str, float]:
@@ -241,8 +200,3 @@ def first_in_basket(state: State) -> frozenset[GroundAtom]:
     if not things or not baskets:
         raise InvalidStateError("a state of groceries needs a thing and a basket")
     return frozenset({IN(things[0], baskets[0])})
-
-
-GOALS: Mapping[str, Goal] = {
-    f"task{number}": goal((IN, name, "basket")) for number, name in enumerate(NAMES)
-}
