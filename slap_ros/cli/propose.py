@@ -4,10 +4,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -21,6 +21,7 @@ from slap_ros.acquisition.proposal import Proposal
 from slap_ros.acquisition.proposers import (
     ComposedRewarder,
     ManualProposer,
+    ManualRewarder,
     Proposer,
     Rewarder,
 )
@@ -36,11 +37,14 @@ from slap_ros.files import read_text, require_writable, write_whole
 from slap_ros.language.budget import Budget, BudgetLimits
 from slap_ros.language.cassette import open_client, with_recorded
 from slap_ros.language.settings import read_settings
-from slap_ros.relational import LiftedOperator
+from slap_ros.learning.demonstrator import AtomTrace, record_traces
+from slap_ros.learning.scripted_skill import with_scripts
+from slap_ros.relational import LiftedOperator, RewardTemplate
 from slap_ros.relational.pddl import parse_domain, parse_problem
 
 PROPOSERS = ("manual", "induced", "language")
-REWARDERS = ("none", "composed", "language")
+REWARDERS = ("none", "manual", "composed", "language")
+DEMONSTRATIONS = 10  # recorded where neither a number nor bags are given
 
 
 @dataclass(frozen=True)
@@ -58,20 +62,27 @@ class ProposeOptions:
     proposer: Annotated[
         str,
         typer.Option(
-            help="Of operators: manual (the domain's own), induced (from demonstrations), or "
-            "language (from a language model)."
+            help="Of operators: manual (the domain's own, or those written by hand for it), "
+            "induced (from demonstrations), or language (from a language model)."
         ),
     ] = "manual"
     rewarder: Annotated[
         str,
-        typer.Option(help="Of rewards: none, composed (from metrics), or language."),
+        typer.Option(
+            help="Of rewards: none, manual (written by hand), composed (from metrics), or language."
+        ),
     ] = "none"
     operators: Annotated[
         Path | None,
         typer.Option(help="Check these operators instead: PDDL, a proposal's JSON, or text."),
     ] = None
     demonstrations: Annotated[
-        list[Path] | None, typer.Option(help="With induced: a bag; can be given several times.")
+        list[str] | None,
+        typer.Option(
+            metavar="N|BAG",
+            help="With induced: a bag, can be given several times; or how many the domain's "
+            f"demonstrator shall show. Default: {DEMONSTRATIONS} of the demonstrator's.",
+        ),
     ] = None
     seed: Seed = 0
     index: Index = 0
@@ -113,12 +124,34 @@ class ProposeOptions:
         ):
             if value not in known:
                 raise InvalidParameterError(f"--{kind} {value!r}: there are {', '.join(known)}")
-        if self.proposer == "induced" and not self.demonstrations:
-            raise InvalidParameterError("--proposer induced needs --demonstrations BAG")
-        if self.demonstrations and (self.proposer != "induced" or self.problem is not None):
+        if self.demonstrations and self.proposer != "induced":
+            raise InvalidParameterError("--demonstrations are for --proposer induced")
+        if self.proposer == "induced" and self.problem is not None:
             raise InvalidParameterError(
-                "--demonstrations are for --proposer induced and a domain with a world"
+                "--proposer induced needs a domain with a world, in which something can be shown"
             )
+        numbers = [text for text in self.demonstrations or () if _is_number(text)]
+        if numbers and (len(self.demonstrations or ()) > 1 or not int(numbers[0])):
+            raise InvalidParameterError(
+                "--demonstrations is one number, at least 1, or bags: not "
+                f"{', '.join(self.demonstrations or ())}"
+            )
+
+    @property
+    def bags(self) -> list[Path]:
+        """Where demonstrations are read from; none where they are recorded."""
+        return [Path(text) for text in self.demonstrations or () if not _is_number(text)]
+
+    @property
+    def recorded(self) -> int:
+        """How many demonstrations are recorded for the purpose."""
+        if self.proposer != "induced" or self.bags:
+            return 0
+        return int(self.demonstrations[0]) if self.demonstrations else DEMONSTRATIONS
+
+
+def _is_number(text: str) -> bool:
+    return text.isascii() and text.isdigit()
 
 
 def propose(options: ProposeOptions) -> None:
@@ -129,13 +162,14 @@ def propose(options: ProposeOptions) -> None:
     """
     if options.output is not None:
         require_writable(options.output)
-    problem, own = _problem(options)
+    posed = _pose(options)
+    problem = posed.problem
     log = AttemptLog(
         None if options.output is None else options.output / "attempts.jsonl", _show_entry
     )
     inquiry = _inquiry(options, log)
-    proposer = _proposer(options, problem, own, inquiry)
-    proposal = make_proposal(problem, proposer, _rewarder(options, inquiry))
+    proposer = _proposer(options, posed, inquiry)
+    proposal = make_proposal(problem, proposer, _rewarder(options, posed, inquiry))
     files = _write(options.output, proposal, problem) if options.output is not None else []
     if options.json:
         print_json({"proposal": proposal.to_data(), "attempts": log.entries, "files": files})
@@ -143,24 +177,44 @@ def propose(options: ProposeOptions) -> None:
         _show(proposal)
 
 
-def _problem(options: ProposeOptions) -> tuple[AcquisitionProblem, Sequence[LiftedOperator]]:
-    """The problem, and the operators that were written by hand for it."""
+@dataclass(frozen=True)
+class _Posed:
+    """What is to be proposed for, and what people wrote for it."""
+
+    problem: AcquisitionProblem
+    operators: Sequence[LiftedOperator]
+    rewards: Mapping[str, RewardTemplate] = field(default_factory=dict)
+
+
+def _pose(options: ProposeOptions) -> _Posed:
     if options.problem is not None:
         if options.goal is not None:
             raise InvalidParameterError("--goal is for domains with a world: edit the problem file")
         path = Path(options.domain)
         stated = parse_domain(_read(path), str(path))
         task = parse_problem(_read(options.problem), stated, str(options.problem))
-        return AcquisitionProblem.of_pddl(stated, task), stated.operators
+        return _Posed(AcquisitionProblem.of_pddl(stated, task), stated.operators)
     domain = get_domain(options.domain, options.preset)
     posed = task_with_goal(domain, options.seed, options.index, options.goal)
     problem = AcquisitionProblem.of_task(domain, posed)
-    return replace(problem, shown=tuple(_shown(options, domain))), domain.operators
+    problem = replace(problem, shown=tuple(_shown(options, domain)))
+    if (by_hand := domain.acquisition) is None:
+        return _Posed(problem, domain.operators)
+    return _Posed(problem, domain.operators or by_hand.operators, by_hand.rewards)
 
 
-def _shown(options: ProposeOptions, domain: Domain) -> list[Any]:
+def _shown(options: ProposeOptions, domain: Domain) -> list[AtomTrace]:
+    """Demonstrations: read from bags, or recorded."""
+    if options.recorded:
+        if domain.acquisition is None or not domain.acquisition.scripts:
+            raise InvalidParameterError(
+                f"--proposer induced needs --demonstrations BAG here: domain {domain.name} has no "
+                "demonstrator that could record some"
+            )
+        with console.status(f"recording {options.recorded} demonstrations"):
+            return record_traces(with_scripts(domain), options.recorded)
     found = []
-    for path in options.demonstrations or ():
+    for path in options.bags:
         bag = read_bag(path)
         found += read_demonstrations(bag, domain)
         if bag.damage is not None:
@@ -179,26 +233,24 @@ def _inquiry(options: ProposeOptions, log: AttemptLog) -> Inquiry | None:
     return Inquiry(client, with_recorded(settings, client), Budget(limits), log)
 
 
-def _proposer(
-    options: ProposeOptions,
-    problem: AcquisitionProblem,
-    own: Sequence[LiftedOperator],
-    inquiry: Inquiry | None,
-) -> Proposer:
+def _proposer(options: ProposeOptions, posed: _Posed, inquiry: Inquiry | None) -> Proposer:
     if options.operators is not None:
         path = options.operators
-        return ManualProposer(read_operators(path, problem), source=path.name)
+        return ManualProposer(read_operators(path, posed.problem), source=path.name)
     if options.proposer == "induced":
-        bags = ", ".join(path.name for path in options.demonstrations or ())
-        return InducedProposer(f"demonstrations: {len(problem.shown)}, from {bags}")
+        bags = ", ".join(path.name for path in options.bags)
+        source = bags or "the domain's demonstrator"
+        return InducedProposer(f"demonstrations: {len(posed.problem.shown)}, from {source}")
     if inquiry is not None and options.proposer == "language":
         return LanguageProposer(inquiry)
-    return ManualProposer(own)
+    return ManualProposer(posed.operators)
 
 
-def _rewarder(options: ProposeOptions, inquiry: Inquiry | None) -> Rewarder | None:
+def _rewarder(options: ProposeOptions, posed: _Posed, inquiry: Inquiry | None) -> Rewarder | None:
     if options.rewarder == "language" and inquiry is not None:
         return LanguageRewarder(inquiry)
+    if options.rewarder == "manual":
+        return ManualRewarder(posed.rewards)
     return ComposedRewarder() if options.rewarder == "composed" else None
 
 

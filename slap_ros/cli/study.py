@@ -30,6 +30,7 @@ from slap_ros.studies import (
     demonstrations,
     dynamics,
     generalisation,
+    induction,
     perception,
     planning_time,
     pruning,
@@ -277,6 +278,29 @@ def vacuity_(
         report = vacuity.study(choice, starts, seed, log, jobs, bars)
     _write(output, report, Provenance(domain, command, settings))
     log.remove()
+
+
+@app.command("induction")
+@exits
+def induction_(
+    domain: DomainName,
+    demonstrations: Annotated[
+        list[int] | None, typer.Option(help="How many; may be repeated. Default: 1, 3 and 10.")
+    ] = None,
+    tasks: Annotated[int, typer.Option(min=1, help="To plan for, of each goal.")] = 20,
+    seed: FreshSeed = FRESH_SEED,
+    preset: Preset = None,
+    output: Output = RESULTS,
+) -> None:
+    """Operators from so many demonstrations: whether A* finds plans as short for every goal."""
+    choice = _demonstrator(domain, preset, output)
+    counts = demonstrations or [1, 3, 10]
+    settings = {"preset": choice.preset, "tasks": tasks, "seed": seed}
+    command = command_line("study", "induction", domain, demonstrations=counts, **settings)
+    with _StudyBars() as bars:
+        report = induction.study(choice, counts, tasks, seed, bars)
+    settings["demonstrations"] = counts
+    _write(output, report, Provenance(domain, command, settings))
 
 
 def _demonstrator(domain: str, preset: str | None, output: Path) -> DomainChoice:

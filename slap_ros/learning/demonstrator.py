@@ -11,9 +11,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from slap_ros.core import Domain, Task
+from slap_ros.errors import UnsolvableError
 from slap_ros.planning.execution import EpisodeResult, Executor
 from slap_ros.planning.planner import SymbolicPlanner, ground_options
 from slap_ros.relational import AtomSpace, GroundAtom
+
+DEMONSTRATION_SEED = 3_000_000  # neither evaluation nor training sees these tasks
+MOST_FAILED = 20  # demonstrations in a row, of which none solves its task
 
 AtomTrace = tuple[frozenset[GroundAtom], ...]  # the atoms that hold, by step
 
@@ -60,3 +64,37 @@ def demonstrate(
         task.step_limit,
     )
     return Demonstration(space, executor.run())
+
+
+def record_traces(domain: Domain, count: int, goal: str | None = None) -> list[AtomTrace]:
+    """Demonstrations that solve their tasks, as atoms step by step.
+
+    Args:
+        domain: With scripts for skills.
+        count: How many.
+        goal: By name; None for the goals that come with tasks.
+
+    Returns:
+        As many, of different tasks, always the same.
+
+    Raises:
+        UnsolvableError: The demonstrator fails too often.
+        NoSkillsError: The domain has no operators.
+        UnknownGoalError: The domain has no goal of that name.
+    """
+    traces: list[AtomTrace] = []
+    failed = index = 0
+    while len(traces) < count:
+        shown = demonstrate(domain, domain.task(DEMONSTRATION_SEED, index, goal))
+        index += 1
+        if shown.episode.success:
+            traces.append(shown.trace)
+            failed = 0
+            continue
+        failed += 1
+        if failed == MOST_FAILED:
+            raise UnsolvableError(
+                f"the demonstrator of {domain.name} solved none of {failed} tasks in a row; the "
+                f"last one ended with: {shown.episode.error.reason}"
+            )
+    return traces

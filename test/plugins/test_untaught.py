@@ -236,3 +236,68 @@ def test_studies_need_a_demonstrator(tmp_path):
         ran = slap("study", name, "obstacle2d", "--output", str(tmp_path))
         assert ran.exit_code == ErrorCode.INVALID_PARAMETER
         assert "obstacle2d has no demonstrator" in ran.stderr
+
+
+def test_study_of_induction_compares_with_hand_written_operators(installed, tmp_path):
+    counts = ["--demonstrations", "1", "--demonstrations", "6", "--tasks", "3"]
+    few, many = study("induction", tmp_path, *counts)["found"]["inductions"]
+    assert (few["demonstrations"], many["demonstrations"]) == (1, 6)
+    assert len(few["operators"]) <= len(many["operators"])
+    assert many["too_many"] == {}  # nothing to compare with
+    for goal in many["goals"]:
+        assert len(goal["shortest"]) == 3
+        assert all(length is None or length >= 1 for length in goal["lengths"])
+    other = next(goal for goal in many["goals"] if goal["goal"] == "other")
+    assert other["as_short"] == sum(
+        a == b for a, b in zip(other["lengths"], other["shortest"], strict=True)
+    )
+
+
+def propose(*arguments):
+    return slap("propose", "untaught", *arguments)
+
+
+def test_propose_records_its_own_demonstrations(installed):
+    ran = propose("--proposer", "induced", "--demonstrations", "3", "--goal", "other", "--json")
+    assert ran.exit_code == 0, ran.output
+    proposal = json.loads(ran.stdout)["proposal"]
+    source = proposal["provenance"]["source"]
+    assert source == "demonstrations: 3, from the domain's demonstrator"
+    assert proposal["plan"]
+    assert (
+        ran.stdout
+        == propose(
+            "--proposer", "induced", "--demonstrations", "3", "--goal", "other", "--json"
+        ).stdout
+    )
+
+
+def test_propose_takes_what_people_wrote(installed):
+    proposal = json.loads(propose("--json").stdout)["proposal"]
+    assert [one["name"] for one in proposal["operators"]] == [o.name for o in TAUGHT.operators]
+    ran = propose("--rewarder", "manual")
+    assert ran.exit_code == ErrorCode.INVALID_DOMAIN
+    assert "no reward was written by hand for Pick; use the rewarder composed" in ran.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--demonstrations", "3"], "--demonstrations are for --proposer induced"),
+        (["--proposer", "induced", "--demonstrations", "0"], "is one number, at least 1, or bags"),
+        (
+            ["--proposer", "induced", "--demonstrations", "3", "--demonstrations", "4"],
+            "is one number, at least 1, or bags: not 3, 4",
+        ),
+    ],
+)
+def test_propose_refuses_demonstrations_that_cannot_be(installed, arguments, said):
+    ran = propose(*arguments)
+    assert ran.exit_code == ErrorCode.INVALID_PARAMETER
+    assert said in ran.stderr
+
+
+def test_propose_needs_a_demonstrator_to_record(installed):
+    ran = slap("propose", "obstacle2d", "--proposer", "induced")
+    assert ran.exit_code == ErrorCode.INVALID_PARAMETER
+    assert "--demonstrations BAG here: domain obstacle2d has no demonstrator" in ran.stderr

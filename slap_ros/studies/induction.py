@@ -1,0 +1,259 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How many demonstrations operators take: induced from few and from many, and planned with.
+
+Operators are induced from demonstrations of the training goal alone, and have to lead to every goal
+that the domain has a name for, in as few operators as those that people wrote.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from slap_ros.acquisition.induction import InducedOperator, induce_operators
+from slap_ros.core import Domain, Task
+from slap_ros.drawing.palette import MUTED
+from slap_ros.errors import InvalidParameterError, PlanningLimitError, UnsolvableError
+from slap_ros.learning.demonstrator import AtomTrace, record_traces
+from slap_ros.learning.domain_choice import DomainChoice, open_domain
+from slap_ros.planning.astar import find_shortest_sequence
+from slap_ros.relational import LiftedOperator, ground_operators
+from slap_ros.studies.comparison import StudyProgress
+from slap_ros.studies.figures import LINES
+from slap_ros.studies.results import MarkdownTable, StudyReport
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MEASURED = """\
+Demonstrations are recorded by the domain's demonstrator, on tasks of the training goal ({training})
+that neither this page nor training uses elsewhere. Operators are induced from the atoms that hold
+in each step, and from nothing else: no name, no objects and no end of a script is shown. With them
+A* plans for {tasks} fresh tasks of each goal. A task counts where the plan has as few operators as
+the shortest plan with the hand-written operators, which is of the paper's length; "longest" and
+"no plan" tell of the others. Preconditions are too many that more demonstrations have dropped: a
+row is compared with the last one."""
+
+
+@dataclass(frozen=True)
+class GoalPlans:
+    """What operators are worth for a goal.
+
+    Args:
+        goal: By name; empty for the goal that comes with each task.
+        lengths: Operators of a shortest plan, by task; None where there is no plan.
+        shortest: The same with hand-written operators.
+    """
+
+    goal: str
+    lengths: tuple[int | None, ...]
+    shortest: tuple[int, ...]
+
+    @property
+    def as_short(self) -> int:
+        """Tasks whose plan has as few operators."""
+        return sum(ours == best for ours, best in zip(self.lengths, self.shortest, strict=True))
+
+
+@dataclass(frozen=True)
+class Induction:
+    """Operators from so many demonstrations, and what they are worth.
+
+    Args:
+        demonstrations: How many.
+        operators: As text, with preconditions and effects.
+        too_many: Preconditions that more demonstrations have dropped, by operator.
+        goals: What they are worth, by goal.
+    """
+
+    demonstrations: int
+    operators: tuple[dict[str, Any], ...]
+    too_many: dict[str, tuple[str, ...]]
+    goals: tuple[GoalPlans, ...]
+
+    @property
+    def complete(self) -> bool:
+        """Whether every task of every goal has a plan as short as with hand-written operators."""
+        return all(goal.as_short == len(goal.lengths) for goal in self.goals)
+
+    def as_json(self) -> dict[str, Any]:
+        """Operators, plans and what is too many."""
+        return {
+            "demonstrations": self.demonstrations,
+            "complete": self.complete,
+            "operators": list(self.operators),
+            "too_many": {name: list(atoms) for name, atoms in self.too_many.items()},
+            "goals": [{**asdict(goal), "as_short": goal.as_short} for goal in self.goals],
+        }
+
+    def as_row(self) -> list[str]:
+        """Row of a table."""
+        dropped = "; ".join(f"{name}: {', '.join(a)}" for name, a in self.too_many.items())
+        return [
+            str(self.demonstrations),
+            str(len(self.operators)),
+            *(_cell(goal) for goal in self.goals),
+            dropped or "none",
+        ]
+
+
+def _cell(goal: GoalPlans) -> str:
+    """Of how many tasks the plan is as short; how long the others' are."""
+    found = [length for length in goal.lengths if length is not None]
+    parts = [f"{goal.as_short} of {len(goal.lengths)}"]
+    if missing := len(goal.lengths) - len(found):
+        parts.append(f"{missing} no plan")
+    if found and goal.as_short < len(found):
+        parts.append(f"longest {max(found)}, not {max(goal.shortest)}")
+    return "; ".join(parts)
+
+
+def study(
+    choice: DomainChoice, counts: Sequence[int], tasks: int, seed: int, progress: StudyProgress
+) -> StudyReport:
+    """Induce operators from so many demonstrations, and plan with them.
+
+    Args:
+        choice: The domain, with its demonstrator for skills.
+        counts: Of demonstrations; the first of as many as the greatest count says.
+        tasks: To plan for, of each goal.
+        seed: Of these tasks.
+        progress: Is called as goals are planned for.
+
+    Returns:
+        The report.
+
+    Raises:
+        InvalidParameterError: The domain has no demonstrator, or a count is below 1.
+        UnsolvableError: The demonstrator fails too often.
+    """
+    if not counts or min(counts) < 1:
+        raise InvalidParameterError(
+            f"counts of demonstrations are at least 1, not {', '.join(map(str, counts)) or 'none'}"
+        )
+    domain = open_domain(choice)
+    training = next(iter(domain.goals), None)
+    progress.begin(f"{choice.name}: demonstrations and plans", 1 + len(counts))
+    traces = record_traces(domain, max(counts), training)
+    progress.advance()
+    posed = {
+        goal: [domain.task(seed, index, goal or None) for index in range(tasks)]
+        for goal in domain.goals or ("",)
+    }
+    shortest = {goal: tuple(_lengths(domain.operators, domain, own)) for goal, own in posed.items()}
+    most = {one.operator.name: one for one in induce_operators(traces)}
+    found = []
+    for count in sorted(set(counts)):
+        found.append(_induced(domain, traces[:count], most, posed, shortest))
+        progress.advance()
+    return _report(choice, found, tasks, training)
+
+
+def _induced(
+    domain: Domain,
+    traces: Sequence[AtomTrace],
+    most: dict[str, InducedOperator],
+    posed: dict[str, list[Task]],
+    shortest: dict[str, tuple[int | None, ...]],
+) -> Induction:
+    """Operators from some demonstrations, and what they are worth.
+
+    Args:
+        domain: For its atoms.
+        traces: The demonstrations.
+        most: Operators from all demonstrations, by name.
+        posed: Tasks, by goal.
+        shortest: Lengths of plans with hand-written operators, by goal.
+    """
+    induced = induce_operators(traces)
+    operators = tuple(one.operator for one in induced)
+    goals = tuple(
+        GoalPlans(goal, tuple(_lengths(operators, domain, tasks)), _known(shortest[goal]))
+        for goal, tasks in posed.items()
+    )
+    too_many = {}
+    for one in induced:
+        # The same demonstrations come first, so that the same operators have the same names.
+        rest = one.operator.preconditions - most[one.operator.name].operator.preconditions
+        if rest:
+            too_many[one.operator.name] = tuple(sorted(map(str, rest)))
+    return Induction(len(traces), tuple(map(_operator_data, induced)), too_many, goals)
+
+
+def _known(lengths: Sequence[int | None]) -> tuple[int, ...]:
+    """Lengths of hand-written operators' plans, of which there is one for every task.
+
+    Raises:
+        InvalidParameterError: There is none for a task.
+    """
+    known = tuple(length for length in lengths if length is not None)
+    if len(known) < len(lengths):
+        raise InvalidParameterError(
+            "the hand-written operators have no plan for some tasks; see `slap check`"
+        )
+    return known
+
+
+def _lengths(
+    operators: Sequence[LiftedOperator], domain: Domain, tasks: Sequence[Task]
+) -> list[int | None]:
+    """Operators in a shortest plan for each task."""
+    lengths: list[int | None] = []
+    for task in tasks:
+        space = domain.atom_space(task.initial_state)
+        start = space.abstract(task.initial_state)
+        grounds = ground_operators(operators, space)
+        try:
+            lengths.append(len(find_shortest_sequence(start, space.mask(task.goal), grounds)))
+        except (UnsolvableError, PlanningLimitError):
+            lengths.append(None)
+    return lengths
+
+
+def _operator_data(induced: InducedOperator) -> dict[str, Any]:
+    operator = induced.operator
+    return {
+        "operator": str(operator),
+        "preconditions": sorted(map(str, operator.preconditions)),
+        "delete_effects": sorted(map(str, operator.delete_effects)),
+        "add_effects": sorted(map(str, operator.add_effects)),
+        "seen": induced.seen,
+    }
+
+
+def _report(
+    choice: DomainChoice, found: Sequence[Induction], tasks: int, training: str | None
+) -> StudyReport:
+    goals = [goal.goal or "(the task's own)" for goal in found[0].goals]
+    return StudyReport(
+        study="induction",
+        source="",
+        title=f"Operators from demonstrations: {choice.name}",
+        measured=MEASURED.format(training=training or "the tasks' own", tasks=tasks),
+        table=MarkdownTable(
+            ["demonstrations", "operators", *goals, "preconditions too many"],
+            [one.as_row() for one in found],
+        ),
+        found={"inductions": [one.as_json() for one in found]},
+        draw=lambda figure: draw(figure, found),
+        size=(7.6, 1.6 + 0.3 * len(goals)),
+    )
+
+
+def draw(figure: Figure, found: Sequence[Induction]) -> None:
+    """Draw the share of tasks with a plan that is short enough, by goal and demonstrations."""
+    axes = figure.subplots()
+    goals = [goal.goal or "task's own" for goal in found[0].goals]
+    for number, one in enumerate(found):
+        places = [i + 0.2 * (number - (len(found) - 1) / 2) for i in range(len(goals))]
+        shares = [100 * goal.as_short / len(goal.lengths) for goal in one.goals]
+        name = f"{one.demonstrations} demonstration{'s' * (one.demonstrations > 1)}"
+        axes.plot(shares, places, "o", color=LINES[number % len(LINES)], label=name)
+    axes.axvline(100, color=MUTED, linewidth=1)
+    axes.set_yticks(range(len(goals)), goals)
+    axes.set_ylim(len(goals) - 0.5, -0.5)
+    axes.set_xlim(-3, 103)
+    axes.set_xlabel("tasks with a plan as short as with hand-written operators [%]")
+    figure.legend(loc="outside upper center", ncols=len(found))
