@@ -32,6 +32,7 @@ OURS = {
     "cleanup_table": "slap_ros.domains.cleanup_table",
     "stack_at_target": "slap_ros.domains.stack_at_target",
     "groceries": "slap_ros.domains.groceries",
+    "stow_hammer": "slap_ros.domains.stow_hammer",
 }
 CACHED = 64  # domains that are made once
 

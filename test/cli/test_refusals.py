@@ -18,7 +18,6 @@ from ensemble.parameters import _require_within, parse_parameters
 from ensemble.robot_parameters import MockRobotParameters, PlayerParameters, RobotBridgeParameters
 from slap_ros.domains import get_domain
 from slap_ros.domains.registry import OURS
-from slap_ros.domains.variation import TaskSettings
 from slap_ros.errors import ErrorCode, InvalidParameterError
 
 NO_NUMBERS = ("nan", "inf", "-inf", "1e400", "-1e400")
@@ -35,10 +34,10 @@ def slap(*arguments):
 # -- settings of tasks ----------------------------------------------------------------------------
 
 
-def settings_of_domains():
-    for name in list(OURS):
-        get_domain(name)
-    return [kind for kind in TaskSettings.__subclasses__() if kind.__module__.startswith("slap_")]
+def settings_of(name):
+    """The settings of a domain's presets."""
+    package = import_module(f"slap_ros.domains.{name}")
+    return (package if hasattr(package, "SETTINGS") else package.tasks).SETTINGS
 
 
 def of_numbers(value):
@@ -47,35 +46,32 @@ def of_numbers(value):
     return isinstance(value, int | float)
 
 
-def test_every_number_of_every_domain_has_limits():
-    kinds = settings_of_domains()
-    assert len(kinds) == 2 * len(list(OURS))
-    for kind in kinds:
-        numbers = {f.name for f in fields(kind) if of_numbers(getattr(kind(), f.name))}
-        assert numbers == set(kind.limits), kind
+@pytest.mark.parametrize("name", list(OURS))
+def test_every_number_of_every_domain_has_limits(name):
+    assert set(settings_of(name)) == {"fair", "paper"}
+    for settings in settings_of(name).values():
+        numbers = {f.name for f in fields(settings) if of_numbers(getattr(settings, f.name))}
+        assert numbers == set(settings.limits), settings
 
 
 @pytest.mark.parametrize("value", NO_SETTINGS, ids=lambda text: text[:12])
 @pytest.mark.parametrize("name", list(OURS))
 def test_a_setting_is_finite_and_within_its_limits(name, value):
-    kinds = [kind for kind in settings_of_domains() if f".{name}." in kind.__module__]
-    for preset, kind in zip(("fair", "paper"), sorted(kinds, key=preset_of), strict=True):
-        for setting in kind.limits:
+    for preset, settings in settings_of(name).items():
+        for setting in settings.limits:
             with pytest.raises(InvalidParameterError, match=setting) as caught:
                 get_domain(name, f"{preset}:{setting}={value}")
             assert len(str(caught.value)) < 300
 
 
-def preset_of(kind):
-    return "fair" if kind.__name__.startswith("Random") else "paper"
-
-
 @pytest.mark.parametrize("name", list(OURS))
 def test_what_is_within_the_limits_is_a_task_or_an_error(name, monkeypatch):
     # Where there is no room, thousands of scenes are drawn; here a few will do.
-    monkeypatch.setattr(import_module(f"slap_ros.domains.{name}.tasks"), "TRIES", 50)
-    (kind,) = (k for k in settings_of_domains() if f".{name}." in k.__module__ and "R" in str(k))
-    for setting, limits in kind.limits.items():
+    for module in (f"{name}.tasks", "benchtop.tasks"):
+        tasks = import_module(f"slap_ros.domains.{module}")
+        if hasattr(tasks, "TRIES"):
+            monkeypatch.setattr(tasks, "TRIES", 50)
+    for setting, limits in settings_of(name)["fair"].limits.items():
         for number in limits:
             try:
                 assert get_domain(name, f"fair:{setting}={number}").task(0).goal

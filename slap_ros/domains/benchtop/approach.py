@@ -25,6 +25,7 @@ from slap_ros.relational import Object, State
 DISTANCE = 0.04  # m before where the skill acts (LG-SAIL §5.1)
 # Nearer than 10 mm, opening the fingers would already stack what they hold.
 ASIDE = (0.01, 0.025)  # m, least and most
+STRAIGHT = (0.0, 0.0)  # rad, turned neither way
 UP: Vector = (0.0, 0.0, 1.0)
 
 # Where an operator's skill acts: where the hand is to be when it touches what the last object
@@ -44,6 +45,7 @@ def make_approach(
     acts_at: ActsAt,
     outwards: Outwards = from_above,
     height: Callable[[State], float] = travel_height,
+    turned: tuple[float, float] = STRAIGHT,
 ) -> Approach:
     """The approach of a domain.
 
@@ -51,11 +53,13 @@ def make_approach(
         acts_at: Where a skill acts.
         outwards: From there to where it begins.
         height: Of the grasp point while it travels, m.
+        turned: By how much what is held is turned from how it is to be, least and most, rad.
     """
 
     def approach(state: State, objects: tuple[Object, ...]) -> Policy:
-        goal = begin_at(state, objects, acts_at(state, objects), outwards(state, objects))
         empty = held_thing(state) is None
+        acts, out = acts_at(state, objects), outwards(state, objects)
+        goal = begin_at(state, objects, acts, out, STRAIGHT if empty else turned)
         gripper = OPEN if empty else KEEP
         way = (*over(state, goal, gripper, height(state)), Move(goal, gripper))
         return follow(release(), *way) if empty else follow(*way)
@@ -64,15 +68,20 @@ def make_approach(
 
 
 def begin_at(
-    state: State, objects: tuple[Object, ...], goal: HandGoal, outwards: Vector
+    state: State,
+    objects: tuple[Object, ...],
+    goal: HandGoal,
+    outwards: Vector,
+    turned: tuple[float, float] = STRAIGHT,
 ) -> HandGoal:
-    """Where a skill begins: before where it acts, and somewhat aside.
+    """Where a skill begins: before where it acts, somewhat aside, and turned if need be.
 
     Args:
         state: In which the approach begins; how far aside, and to which side, is a function of it.
         objects: The operator's.
         goal: Where the skill acts.
         outwards: Of length 1, from there to where it begins.
+        turned: By how much, least and most, to either side, rad.
 
     Returns:
         A goal for the hand.
@@ -82,7 +91,8 @@ def begin_at(
     right, up = _across(outwards)
     aside = far * (math.cos(angle) * np.array(right) + math.sin(angle) * np.array(up))
     x, y, z = (np.array(goal.position) + DISTANCE * np.array(outwards) + aside).tolist()
-    return HandGoal((x, y, z), goal.yaw)
+    turn = rng.choice((-1.0, 1.0)) * rng.uniform(*turned)
+    return HandGoal((x, y, z), goal.yaw + turn)
 
 
 def _seed(state: State, objects: tuple[Object, ...]) -> int:
