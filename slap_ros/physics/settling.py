@@ -36,7 +36,7 @@ def resting_poses(
     below = list(fixed)
     poses = {}
     for i in sorted(measured, key=lambda i: measured[i].position[2]):
-        pose = _levelled(measured[i])
+        pose = levelled(measured[i])
         if pose is not None:
             pose = _put_down(pose, bodies[i], below)
         poses[i] = measured[i] if pose is None else pose
@@ -44,7 +44,7 @@ def resting_poses(
     return poses
 
 
-def _levelled(pose: Pose) -> Pose | None:
+def levelled(pose: Pose) -> Pose | None:
     """With the axis that points up or down best exactly so; None where none does."""
     ups = [rotate(pose.quaternion, axis) for axis in AXES]
     x, y, z = max(ups, key=lambda up: abs(up[2]))

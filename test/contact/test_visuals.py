@@ -9,6 +9,7 @@ import pytest
 
 from benchmarks.workbench import BENCH, CUBE_AT, HAND, LEFT_DRAWER, Setting, start
 from slap_ros.contact.hand import hand_at
+from slap_ros.contact.links import link_poses, links
 from slap_ros.contact.visuals import ContactVisuals
 from slap_ros.physics.panda import grasp_pose
 from slap_ros.physics.rendering import Camera
@@ -21,10 +22,10 @@ DIFFERENT = 30  # of 255
 
 def drawn_at(name: str, setting: Setting) -> list[tuple[float, ...]]:
     """Where the parts of a link are drawn."""
-    links = zip(VISUALS.links, VISUALS.link_poses(start(setting)), strict=True)
+    placed = zip(links(BENCH), link_poses(BENCH, start(setting)), strict=True)
     (found,) = (
         [pose.compose(part.pose).position for part in link.parts]
-        for link, pose in links
+        for link, pose in placed
         if link.name == name
     )
     return found

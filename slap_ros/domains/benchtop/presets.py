@@ -13,6 +13,7 @@ import numpy as np
 from slap_ros.contact.arm import CONTROL_PERIOD_S
 from slap_ros.contact.features import ROBOT
 from slap_ros.contact.scene import ContactScene
+from slap_ros.contact.settling import settled
 from slap_ros.contact.world import ACTION_SPACE, ContactWorld
 from slap_ros.core import Acquisition, Domain, Execution, Goal, Learning, Task
 from slap_ros.domains.benchtop.learner_interface import learner_interface
@@ -91,7 +92,10 @@ def benchtop_domain(
         make_world=lambda state: ContactWorld(model.scene_of(state), state),
         default_goal=next(iter(model.goals.values())),
         step_limit=STEP_LIMIT,
-        execution=Execution(control_period_s=CONTROL_PERIOD_S),
+        execution=Execution(
+            control_period_s=CONTROL_PERIOD_S,
+            settle=lambda state: settled(model.scene_of(state), state),
+        ),
         display=display(model.scene_of, model.view),
         metrics=(*COMMON, *model.metrics),
         static=model.static,

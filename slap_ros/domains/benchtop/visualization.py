@@ -10,8 +10,9 @@ from functools import lru_cache
 
 from slap_ros.contact.arm import CONTROL_PERIOD_S
 from slap_ros.contact.features import ROBOT
+from slap_ros.contact.links import Link, link_poses, links
 from slap_ros.contact.scene import ContactScene, CylinderPart, Part
-from slap_ros.contact.visuals import ContactVisuals, Link
+from slap_ros.contact.visuals import ContactVisuals
 from slap_ros.core import Display, VisibleBody
 from slap_ros.domains.visualization import animation, arm_bodies
 from slap_ros.geometry.pose import Pose, Vector
@@ -64,8 +65,7 @@ def visible_arm(state: State) -> list[VisibleBody]:
 
 def _links(scene: ContactScene, state: State) -> list[tuple[Link, Pose]]:
     """All but the floor, which nobody wants to see from below."""
-    visuals = ContactVisuals(scene)
-    placed = zip(visuals.links, visuals.link_poses(state), strict=True)
+    placed = zip(links(scene), link_poses(scene, state), strict=True)
     floor = scene.fixed[-1].name
     return [(link, pose) for link, pose in placed if link.name != floor]
 
