@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from slap_ros.acquisition.episodes import Episodes
 from slap_ros.acquisition.groundings import Grounding, Groundings, Indices
 from slap_ros.acquisition.observations import SIZE, SkillObserver
 from slap_ros.acquisition.reward import SkillReward
@@ -45,24 +46,6 @@ class Initiation:
         return Grounding(self.state.layout, self.objects)
 
 
-@dataclass(frozen=True)
-class Episodes:
-    """What happened in e whole episodes of a skill.
-
-    Args:
-        states: Shape (e, horizon + 1, width), rows as :class:`Groundings` has them.
-        actions: The policy's, from -1 to 1, shape (e, horizon, actions).
-        numbers: Of the grounding of each, shape (e,).
-    """
-
-    states: Array
-    actions: NDArray[np.float32]
-    numbers: Indices
-
-    def __len__(self) -> int:
-        return len(self.numbers)
-
-
 class SkillMdp:
     """What is observed and paid for in states of an operator's skill."""
 
@@ -80,6 +63,10 @@ class SkillMdp:
         self.domain, self.reward, self.groundings = domain, reward, groundings
         self._observe = SkillObserver(domain)
         self.action_map = ActionMap(domain, gripper=True)
+
+    def over(self, groundings: Groundings) -> SkillMdp:
+        """The same for states of other groundings."""
+        return SkillMdp(self.domain, self.reward, groundings)
 
     def observe(self, rows: Array, numbers: Indices) -> NDArray[np.float32]:
         """What is observed in states.
@@ -181,6 +168,7 @@ class SkillVecEnv:
             np.concatenate([episodes.states for episodes in taken]),
             np.concatenate([episodes.actions for episodes in taken]),
             np.concatenate([episodes.numbers for episodes in taken]),
+            self.mdp.groundings,
         )
 
     def _end_round(self) -> None:
@@ -189,6 +177,7 @@ class SkillVecEnv:
                 np.stack(self._trace, axis=1),
                 np.stack(self._actions, axis=1),
                 self._numbers.copy(),
+                self.mdp.groundings,
             )
         )
         self.succeeded = self._success

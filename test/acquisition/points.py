@@ -10,6 +10,7 @@ import hashlib
 
 import numpy as np
 
+from slap_ros.acquisition.skill_env import Initiation
 from slap_ros.core import (
     Acquisition,
     ActionSpace,
@@ -130,8 +131,8 @@ PUT = LiftedOperator(
     frozenset({LiftedAtom(HOLDING, (T,))}),
 )
 REWARDS = {
-    "Pick": RewardTemplate("Pick", (RewardTerm(DIS_TO_OBJ, (T,), 0.8),)),
-    "Put": RewardTemplate("Put", (RewardTerm(PARALLEL_DIS, (T, P), 0.8),)),
+    "Pick": RewardTemplate("Pick", (RewardTerm(DIS_TO_OBJ, (T,), 0.5),)),
+    "Put": RewardTemplate("Put", (RewardTerm(PARALLEL_DIS, (T, P), 0.5),)),
 }
 
 
@@ -225,6 +226,27 @@ def _distance(state, hand, column):
 
 def _separation(state, obj, column):
     return np.linalg.norm(state.gather(column, XY) - state[obj][..., None, :2], axis=-1)
+
+
+def begin(operator, tasks, seed=5):
+    """Where a skill begins in some tasks, the approach done, with groundings in turn."""
+    found = []
+    for index in tasks:
+        state = POINTS.task(seed, index).initial_state
+        names = state.layout.by_name
+        thing, place = names[f"thing{index % 2}"], names[f"place{index // 2 % 2}"]
+        objects = (thing,) if operator is PICK else (thing, place)
+        if operator is PUT:
+            x, y, _ = state[thing]
+            hand = names["hand"]
+            state = state.replace(
+                {(hand, "x"): x, (hand, "y"): y, (hand, "closed"): 1.0, (thing, "held"): 1.0}
+            )
+        world, policy = Point(state), approach(state, objects)
+        while (action := policy(world.state)) is not None:
+            world.step(action)
+        found.append(Initiation(world.state, objects))
+    return found
 
 
 def sample_task(rng, things=2):

@@ -1,0 +1,171 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""SAC: the same as stable-baselines3's, resumed to the same weights, and it learns."""
+
+from dataclasses import replace
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import torch
+from points import HORIZON, PICK, POINTS, REWARDS, begin
+from stable_baselines3 import SAC
+
+from slap_ros.acquisition.episodes import load_episodes, save_episodes
+from slap_ros.acquisition.groundings import Groundings
+from slap_ros.acquisition.reward import SkillReward
+from slap_ros.acquisition.sac import SkillLearner
+from slap_ros.acquisition.sac_settings import SAC_PRESETS, SMALL, sac_preset
+from slap_ros.acquisition.sac_update import LeanSac
+from slap_ros.acquisition.skill_env import SkillMdp, SkillVecEnv
+from slap_ros.errors import InvalidParameterError
+from slap_ros.relational import RewardTemplate
+
+QUICK = replace(SMALL, random_steps=192)
+STARTS = begin(PICK, range(40))
+FRESH = begin(PICK, range(40, 80))
+MDP = SkillMdp(
+    POINTS,
+    SkillReward(PICK, REWARDS["Pick"]),
+    Groundings(list(dict.fromkeys(one.grounding for one in STARTS))),
+)
+
+
+def learner(first_round=0, seed=1):
+    return SkillLearner(SkillVecEnv(MDP, STARTS, 8, HORIZON, (seed,), first_round), QUICK, seed)
+
+
+def weights(learner):
+    return {k: v.clone() for k, v in learner._sac.policy.state_dict().items()}
+
+
+def success(policy):
+    env = SkillVecEnv(MDP, FRESH, len(FRESH), HORIZON, (9,))
+    for _ in range(HORIZON):
+        env.step(policy.mean(env.observations))
+    return env.succeeded.mean()
+
+
+@pytest.mark.parametrize("task", ["Pendulum-v1", "MountainCarContinuous-v0"])
+def test_an_update_is_stable_baselines3s_up_to_rounding(task):
+    kwargs = {
+        "learning_starts": 100,
+        "buffer_size": 1000,
+        "batch_size": 64,
+        "policy_kwargs": {"net_arch": [16, 16]},
+        "device": "cpu",
+    }
+    for seed in range(5):
+        ours, theirs = (
+            kind("MlpPolicy", gym.make(task), seed=seed, **kwargs).learn(140)
+            for kind in (LeanSac, SAC)
+        )
+        assert ours._n_updates == theirs._n_updates == 40
+        for (name, one), other in zip(
+            ours.policy.state_dict().items(), theirs.policy.state_dict().values(), strict=True
+        ):
+            torch.testing.assert_close(one, other, rtol=1e-3, atol=1e-4, msg=name)
+        torch.testing.assert_close(ours.log_ent_coef, theirs.log_ent_coef, rtol=1e-4, atol=1e-5)
+
+
+def test_what_is_resumed_ends_with_the_same_weights(tmp_path):
+    whole = learner()
+    for segment in range(2):
+        save_episodes(tmp_path / str(segment), whole.learn(2))
+    whole.save(tmp_path / "checkpoint.pt")
+    whole.learn(2)
+    torch.rand(7)  # whatever else draws from torch's generator meanwhile
+    resumed = learner(first_round=4)
+    episodes = [load_episodes(tmp_path / str(i), POINTS.types_by_name) for i in range(2)]
+    resumed.resume(tmp_path / "checkpoint.pt", episodes)
+    resumed.learn(2)
+    assert resumed.steps == whole.steps == 6 * HORIZON * 8
+    for one, other in zip(weights(whole).values(), weights(resumed).values(), strict=True):
+        assert torch.equal(one, other)
+    other = learner(seed=2)
+    other.learn(6)
+    assert not torch.equal(weights(other)["actor.mu.weight"], weights(whole)["actor.mu.weight"])
+
+
+def test_a_damaged_checkpoint_is_refused(tmp_path):
+    path = tmp_path / "checkpoint.pt"
+    path.write_bytes(b"PK\x03\x04 no checkpoint")
+    with pytest.raises(InvalidParameterError, match="damaged"):
+        learner().resume(path, [])
+    (tmp_path / "0").write_bytes(b"no episodes")
+    with pytest.raises(InvalidParameterError, match="damaged"):
+        load_episodes(tmp_path / "0", POINTS.types_by_name)
+
+
+def test_rewards_are_computed_again_when_the_template_changes():
+    first = learner()
+    episodes = first.learn(2)
+    before = first.buffer.rewards[: first.buffer.size(), 0].copy()
+    halved = RewardTemplate(
+        "Pick", tuple(replace(term, weight=term.weight / 2) for term in REWARDS["Pick"].terms)
+    )
+    mdp = SkillMdp(POINTS, SkillReward(PICK, halved), MDP.groundings)
+    second = SkillLearner(SkillVecEnv(mdp, STARTS, 8, HORIZON, (1,)), QUICK, 1)
+    second.buffer.add_episodes(episodes)
+    after = second.buffer.rewards[: second.buffer.size(), 0]
+    succeeded = before == 1.0
+    assert np.allclose(after[~succeeded], before[~succeeded] / 2)
+    assert (after[succeeded] == 1.0).all()
+    assert np.array_equal(
+        second.buffer.observations[: second.buffer.size()],
+        first.buffer.observations[: first.buffer.size()],
+    )
+
+
+def test_a_full_buffer_forgets_the_oldest():
+    small = replace(QUICK, capacity=5 * HORIZON * 8)
+    env = SkillVecEnv(MDP, STARTS, 8, HORIZON, (1,))
+    one = SkillLearner(env, small, 1)
+    for _ in range(4):
+        episodes = one.learn(2)
+    assert one.buffer.size() <= small.capacity
+    count = episodes.transitions
+    newest = one.buffer.actions[one.buffer.size() - count : one.buffer.size(), 0]
+    assert np.array_equal(newest, episodes.actions.reshape(count, -1))
+
+
+def test_nothing_is_terminal_for_the_critic():
+    one = learner()
+    one.learn(1)
+    assert not one.buffer.sample(64).dones.any()
+
+
+def test_a_skill_can_begin_with_another_ones_weights():
+    one, other = learner(), learner(seed=2)
+    policy = one.policy()
+    assert not np.array_equal(other.policy().mean(FRESH_SEEN), policy.mean(FRESH_SEEN))
+    other.begin_with(policy)
+    assert np.array_equal(other.policy().mean(FRESH_SEEN), policy.mean(FRESH_SEEN))
+    large = SkillLearner(SkillVecEnv(MDP, STARTS, 8, HORIZON, (1,)), SAC_PRESETS["large"], 1)
+    with pytest.raises(InvalidParameterError, match="same hidden layers"):
+        large.begin_with(policy)
+
+
+FRESH_SEEN = SkillVecEnv(MDP, FRESH, 8, HORIZON, (9,)).observations
+
+
+def test_torch_and_numpy_say_the_same():
+    one = learner()
+    one.learn(2)
+    ours = one.policy().mean(FRESH_SEEN)
+    theirs, _ = one._sac.predict(FRESH_SEEN, deterministic=True)
+    assert np.allclose(ours, theirs, atol=1e-5)
+
+
+def test_pick_is_learned():
+    one = learner()
+    assert success(one.policy()) < 0.2
+    one.learn(26)
+    assert success(one.policy()) >= 0.9
+
+
+def test_unknown_settings_are_refused():
+    with pytest.raises(InvalidParameterError, match="there are small, large, maple"):
+        sac_preset("huge")
+    with pytest.raises(InvalidParameterError, match="give a multiple"):
+        replace(SMALL, environments=7)
