@@ -13,15 +13,15 @@ from rich.table import Table
 
 from slap_ros.cli.command_line import command_line
 from slap_ros.cli.console import console, print_json, progress
-from slap_ros.cli.options import DomainName, Jobs, Json, Planner, Preset
+from slap_ros.cli.options import DomainName, Goal, Jobs, Json, Planner, Preset, Skills
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose, sampling
-from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode
 from slap_ros.evaluation.approaches import Approach, approaches, shooting
 from slap_ros.evaluation.evaluation_file import require_replaceable, write_evaluation
 from slap_ros.evaluation.experiment import Experiment, Trial, run_all
 from slap_ros.evaluation.summary import Spread, Summary
 from slap_ros.files import require_writable
+from slap_ros.learning.domain_choice import SHIPPED, DomainChoice, open_domain
 from slap_ros.planning.planner import make_planner
 from slap_ros.shortcuts.shipped import shipped_library
 from slap_ros.studies.results import describe_library
@@ -40,6 +40,8 @@ def evaluate(
         ),
     ] = 0,
     preset: Preset = None,
+    goal: Goal = None,
+    skills: Skills = SHIPPED,
     shortcuts: Shortcuts = None,
     samples: Samples = SAMPLES,
     with_shooting: Annotated[
@@ -62,7 +64,7 @@ def evaluate(
     With a shortcut library: pure planning, SLAP as the paper evaluates it (one sample) and SLAP
     with --samples, on the same tasks. Spreads are mean ± sample standard deviation over all tasks.
     """
-    chosen = get_domain(domain, preset)
+    chosen = open_domain(DomainChoice(domain, preset or "", skills))
     settings = {
         "preset": chosen.preset,
         "tasks": tasks,
@@ -71,13 +73,14 @@ def evaluate(
         "samples": samples,
         "planner": planner,
     }
+    settings |= {name: given for name, given in (("goal", goal), ("skills", skills)) if given}
     command = command_line("evaluate", domain, shortcuts=shortcuts, **settings)
     if output is not None:
         require_writable(output)
         require_replaceable(output, command)
     library = choose(shortcuts, chosen, planner)
-    make_planner(planner, chosen, chosen.task(first_seed).initial_state)
-    experiment = Experiment(chosen, tasks, seeds, first_seed, planner)
+    experiment = Experiment(chosen, tasks, seeds, first_seed, planner, goal=goal, skills=skills)
+    make_planner(planner, chosen, experiment.task(first_seed, 0).initial_state)
     compared = list(approaches(library, sampling(samples)))
     if with_shooting and library is not None:
         compared.insert(1, shooting(library, chosen, sampling(samples)))

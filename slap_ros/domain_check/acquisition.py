@@ -29,16 +29,7 @@ def parts(domain: Domain, acquisition: Acquisition) -> Iterator[Check]:
         domain: To be checked.
         acquisition: The domain's.
     """
-    fluent = [p for p in domain.predicates if p not in domain.static_predicates]
-    without = sorted(p.name for p in fluent if not p.conditions)
-    yield Check(
-        "metrics",
-        "warning" if without else "ok",
-        f"no metric behind {', '.join(without)}"
-        if without
-        else f"behind each of {len(fluent)} predicates that change",
-        "rewards are composed of the metrics that predicates rest on: Predicate.of" * bool(without),
-    )
+    yield _metrics(domain, acquisition)
     names = {operator.name for operator in acquisition.operators}
     for kind, found in (("rewards", acquisition.rewards), ("scripts", acquisition.scripts)):
         missing, unknown = sorted(names - set(found)), sorted(set(found) - names)
@@ -55,6 +46,27 @@ def parts(domain: Domain, acquisition: Acquisition) -> Iterator[Check]:
             )
         else:
             yield Check(kind, "ok", f"one for each of {len(names)} hand-written operators")
+
+
+def _metrics(domain: Domain, acquisition: Acquisition) -> Check:
+    """Whether a reward can be composed for each operator that people wrote."""
+    without = [
+        operator.name
+        for operator in acquisition.operators
+        if not any(c.rewarded for atom in operator.add_effects for c in atom.predicate.conditions)
+    ]
+    if without:
+        return Check(
+            "metrics",
+            "warning",
+            f"none leads to what {', '.join(without)} add: no reward can be composed for them",
+            "give conditions on metrics to the predicates of their effects: Predicate.of",
+        )
+    found = f"one at least leads to what each of {len(acquisition.operators)} operators adds"
+    fluent = (p for p in domain.predicates if p not in domain.static_predicates)
+    if alone := sorted(p.name for p in fluent if not p.conditions):
+        found += f"; without any: {', '.join(alone)}"
+    return Check("metrics", "ok", found)
 
 
 def goals(domain: Domain, acquisition: Acquisition, seed: int) -> Check:

@@ -7,10 +7,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from slap_ros.core import Domain, Task
-from slap_ros.domains import get_domain
+from slap_ros.core import Domain, Task, task_with_goal
 from slap_ros.errors import ErrorCode
 from slap_ros.evaluation.approaches import PURE_PLANNING, Approach
+from slap_ros.learning.domain_choice import SHIPPED, DomainChoice, open_domain
 from slap_ros.learning.workers import local_workers
 from slap_ros.planning.execution import EpisodeResult, ExecutedEdge, Executor
 from slap_ros.relational import GroundAtom
@@ -20,7 +20,16 @@ from slap_ros.relational import GroundAtom
 class Experiment:
     """Which tasks: ``tasks`` of each of ``seeds`` seeds, the first of which is ``first_seed``.
 
-    Of those, the ones in ``left_out`` are not solved, each a seed and an index.
+    Args:
+        domain: Whose tasks, with the skills that are meant.
+        tasks: Of each seed.
+        seeds: How many.
+        first_seed: The first of them.
+        planner: By name.
+        left_out: Seeds and indices of tasks that are not solved.
+        goal: By name or as atoms, as :func:`~slap_ros.core.task_with_goal` takes it; None for the
+            goal that comes with each task.
+        skills: Whose they are, as :class:`~slap_ros.learning.domain_choice.DomainChoice` has it.
     """
 
     domain: Domain
@@ -29,6 +38,8 @@ class Experiment:
     first_seed: int = 0
     planner: str = "lazy"
     left_out: frozenset[tuple[int, int]] = frozenset()
+    goal: str | None = None
+    skills: str = SHIPPED
 
     def __iter__(self) -> Iterator[tuple[int, int]]:
         """Seed and index of each task."""
@@ -40,12 +51,16 @@ class Experiment:
     def __len__(self) -> int:
         return self.tasks * self.seeds - len(self.left_out)
 
+    def task(self, seed: int, index: int) -> Task:
+        """One of the tasks."""
+        return task_with_goal(self.domain, seed, index, self.goal)
+
     def without_repetitions(self) -> Experiment:
         """The same without tasks that are equal to an earlier one, in state and goal."""
         known: set[tuple[bytes, frozenset[GroundAtom]]] = set()
         left_out = set(self.left_out)
         for seed, index in self:
-            task = self.domain.task(seed, index)
+            task = self.task(seed, index)
             key = (task.initial_state.key, task.goal)
             if key in known:
                 left_out.add((seed, index))
@@ -63,7 +78,7 @@ class Experiment:
         Returns:
             What happened.
         """
-        return solve(self.domain, self.domain.task(seed, index), approach, self.planner)
+        return solve(self.domain, self.task(seed, index), approach, self.planner)
 
 
 def solve(domain: Domain, task: Task, approach: Approach, planner: str = "lazy") -> EpisodeResult:
@@ -165,9 +180,9 @@ def run_all(experiment: Experiment, approach: Approach, jobs: int) -> Iterator[T
     Yields:
         The figures of each task, as it ends.
     """
-    domain = experiment.domain
+    choice = DomainChoice.of(experiment.domain, experiment.skills)
     work = [
-        (domain.name, domain.preset, experiment.planner, approach, seed, index)
+        (choice, experiment.goal, experiment.planner, approach, seed, index)
         for seed, index in experiment
     ]
     with local_workers(jobs) as workers:
@@ -176,8 +191,8 @@ def run_all(experiment: Experiment, approach: Approach, jobs: int) -> Iterator[T
 
 
 def _try(
-    domain: str, preset: str, planner: str, approach: Approach, seed: int, index: int
+    choice: DomainChoice, goal: str | None, planner: str, approach: Approach, seed: int, index: int
 ) -> Trial:
     """One task; its domain is made where this runs."""
-    experiment = Experiment(get_domain(domain, preset), 1, 1, planner=planner)
+    experiment = Experiment(open_domain(choice), 1, 1, planner=planner, goal=goal)
     return Trial.of(seed, index, experiment.run(seed, index, approach))

@@ -301,3 +301,14 @@ def test_propose_needs_a_demonstrator_to_record(installed):
     ran = slap("propose", "obstacle2d", "--proposer", "induced")
     assert ran.exit_code == ErrorCode.INVALID_PARAMETER
     assert "--demonstrations BAG here: domain obstacle2d has no demonstrator" in ran.stderr
+
+
+def test_evaluate_the_demonstrator_for_a_goal(installed):
+    arguments = ["--skills", "demonstrator", "--goal", "other", "--tasks", "2", "--seeds", "1"]
+    ran = slap("evaluate", "untaught", *arguments, "--planner", "astar", "--json")
+    assert ran.exit_code == 0, ran.output
+    figures = json.loads(ran.stdout)
+    assert figures["success_rate"] == 1.0
+    shown = [demonstrate(with_scripts(DOMAIN), DOMAIN.task(0, i, "other")) for i in range(2)]
+    steps = [one.episode.plan_length for one in shown]
+    assert figures["plan_length"]["mean"] == pytest.approx(sum(steps) / 2)
