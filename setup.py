@@ -19,6 +19,7 @@ PACKAGES = [
     "perception_node",
     "planner_node",
     "skill_server",
+    "acquisition_node",
     "recorder_node",
     "robot_bridge",
 ]

@@ -16,9 +16,10 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
-from slap_msgs.action import ExecuteSkill, SolveTask
+from slap_msgs.action import ExecuteSkill, ProposeOperators, SolveTask
 from slap_msgs.msg import (
     AbstractState,
+    AcquisitionEvent,
     DomainInfo,
     ObjectCentricState,
     Plan,
@@ -90,6 +91,7 @@ COMMAND = _topic("slap/command", RobotCommand)
 PLAN = _topic("slap/plan", Plan)
 PLAN_EVENTS = _topic("slap/plan_events", PlanEvent)
 SKILL_EVENTS = _topic("slap/skill_events", SkillEvent)
+ACQUISITION_EVENTS = _topic("slap/acquisition_events", AcquisitionEvent)
 DIAGNOSTICS = _topic("diagnostics", DiagnosticArray)
 MARKERS = _topic("slap/markers", MarkerArray)
 TF = _topic("tf", TFMessage)
@@ -104,6 +106,7 @@ RECORDED = (
     PLAN,
     PLAN_EVENTS,
     SKILL_EVENTS,
+    ACQUISITION_EVENTS,
     MARKERS,
     TF,
     JOINT_STATES,
@@ -124,3 +127,4 @@ LIST_SKILLS = Call("slap/list_skills", ListSkills)
 CLOSE_BAG = Call("slap/close_bag", Trigger)
 SOLVE_TASK = Call("slap/solve_task", SolveTask)
 EXECUTE_SKILL = Call("slap/execute_skill", ExecuteSkill)
+PROPOSE_OPERATORS = Call("slap/propose_operators", ProposeOperators)

@@ -22,6 +22,7 @@ NODE_CLASSES: Mapping[str, str] = {  # by the name of the module that is run as 
     "perception_node": "perception_node.node:PerceptionNode",
     "skill_server": "skill_server.node:SkillServer",
     "planner_node": "planner_node.node:PlannerNode",
+    "acquisition_node": "acquisition_node.node:AcquisitionNode",
     "recorder_node": "recorder_node.node:RecorderNode",
 }
 

@@ -41,6 +41,8 @@ ARGUMENTS = {
     "dropout": ("0.0", "share of detections that the mock robot loses"),
     "pace": ("0.0", "environment steps per second, for watching; 0: at full speed"),
     "patience": ("1.0", "factor of all deadlines, for slow domains and machines"),
+    "acquisition": ("false", "run acquisition_node as well, which proposes operators"),
+    "language_settings": ("", "of acquisition_node: JSON file with model and server"),
     "record": ("", "folder of the bag to record; empty: none"),
     "rviz": ("false", "open RViz as well"),
     "namespace": ("", "of every node: /robot1 gives /robot1/slap/state"),
@@ -104,6 +106,11 @@ def _solvers() -> list[Node]:
         _node("perception_node", common),
         _node("skill_server", common | shortcuts | {"state_timeout": state_timeout}),
         _node("planner_node", common | shortcuts | {"planner": _value("planner", str)}),
+        _node(
+            "acquisition_node",
+            common | {"language_settings": _value("language_settings", str)},
+            condition=IfCondition(LaunchConfiguration("acquisition")),
+        ),
     ]
 
 

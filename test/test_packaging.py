@@ -52,6 +52,7 @@ NODES = (
     "perception_node",
     "planner_node",
     "skill_server",
+    "acquisition_node",
     "recorder_node",
     "robot_bridge",
 )

@@ -15,6 +15,7 @@ ABOVE_THE_CORE = (
     "perception_node",
     "planner_node",
     "skill_server",
+    "acquisition_node",
     "recorder_node",
     "robot_bridge",
     "ensemble",

@@ -16,6 +16,7 @@ from slap_ros.evaluation.metrics import AtomNames, atom_names
 from slap_ros.learning.domain_choice import DomainChoice, open_domain
 from slap_ros.messages.decode import decode_state, stamp_ns
 from slap_ros.messages.interfaces import (
+    ACQUISITION_EVENT,
     ATOMS,
     BODIES,
     COMMAND,
@@ -25,6 +26,7 @@ from slap_ros.messages.interfaces import (
     TASK,
 )
 from slap_ros.messages.protocols import (
+    AcquisitionEventMessage,
     AtomsMessage,
     CommandMessage,
     DomainInfoMessage,
@@ -53,6 +55,7 @@ class Recording:
         self.episodes: dict[int, RecordedEpisode] = {}
         self.domain_info: DomainInfoMessage | None = None
         self.markers: dict[int, MarkersMessage] = {}  # by stamp, ns
+        self.acquisition: list[AcquisitionEventMessage] = []  # in order of arrival
         self.not_finite = 0  # states
         self._add: Mapping[str, Callable[[Any], None]] = {
             DOMAIN_INFO: self._add_domain,
@@ -61,6 +64,7 @@ class Recording:
             ATOMS: self._add_atoms,
             COMMAND: self._add_command,
             MARKERS: self._add_markers,
+            ACQUISITION_EVENT: self.acquisition.append,
         }
 
     @classmethod

@@ -26,3 +26,14 @@ class SkillEventKind(IntEnum):
     REACHED = 1
     FAILED = 2
     CANCELED = 3
+
+
+class AcquisitionEventKind(IntEnum):
+    """What happens to a proposal: ``slap_msgs/AcquisitionEvent.kind``."""
+
+    STARTED = 0
+    ANSWERED = 1
+    VERIFIED = 2
+    FINISHED = 3
+    FAILED = 4
+    CANCELED = 5

@@ -161,6 +161,21 @@ class SkillEventMessage(Protocol):
     objects: Sequence[str]
 
 
+class AcquisitionEventMessage(Protocol):
+    """Fields of ``slap_msgs/AcquisitionEvent``."""
+
+    header: Header
+    episode: int
+    kind: int
+    subject: str
+    complaints: Sequence[str]
+    plan: Sequence[str]
+    answer: str
+    tokens: int
+    seconds: float
+    error_msg: str
+
+
 class PointMessage(Protocol):
     """``geometry_msgs/Point`` or ``geometry_msgs/Vector3``."""
 

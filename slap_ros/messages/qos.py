@@ -39,6 +39,7 @@ OFFERED = {
     "slap/plan": LATCHED,
     "slap/plan_events": EPISODE,
     "slap/skill_events": EPISODE,
+    "slap/acquisition_events": EPISODE,
     "slap/markers": EPISODE,
     "joint_states": EPISODE,
     "diagnostics": VOLATILE,

@@ -17,6 +17,7 @@ from slap_ros.evaluation.metrics import RunMetrics, RunTrace, describe
 from slap_ros.messages.protocols import KeyValueMessage
 from slap_ros.report.atom_timeline import AtomTimeline, atom_timeline
 from slap_ros.report.chain import PlanChain, chains
+from slap_ros.report.proposals import RecordedProposal, recorded_proposals
 from slap_ros.report.scene import RecordedScene, scene
 from slap_ros.report.timeline import Incident, OptionSpan, incidents, spans
 from slap_ros.report.traces import Series, robot_series
@@ -69,6 +70,7 @@ class BagReport:
     name: str
     runs: tuple[RunReport, ...]
     evaluation: BagEvaluation
+    proposals: tuple[RecordedProposal, ...]
     unchecked: str  # why no atoms were compared with recomputed ones; empty where they were
 
 
@@ -94,7 +96,8 @@ def read_report(path: Path | str) -> BagReport:
         unchecked = "the recording does not name its domain"
     name = Path(path).resolve().name
     runs = tuple(_report(name, reading, trace, domain) for trace in reading.log.traces())
-    return BagReport(name, runs, evaluate(reading, domain), unchecked)
+    proposals = recorded_proposals(reading.recording.acquisition)
+    return BagReport(name, runs, evaluate(reading, domain), proposals, unchecked)
 
 
 def _report(name: str, reading: BagContents, trace: RunTrace, domain: Domain | None) -> RunReport:

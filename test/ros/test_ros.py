@@ -25,6 +25,7 @@ EXECUTABLES = (
     "perception_node",
     "planner_node",
     "skill_server",
+    "acquisition_node",
     "recorder_node",
     "robot_bridge",
     "mock_robot",
