@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whatever a service or an action is asked, it answers."""
+"""Whatever a service or an action is asked, it answers; what a domain raises is named."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from traceback import format_exc
 
 from rclpy.node import Node
 
-from slap_ros.errors import InternalError, SlapError
+from slap_ros.errors import InternalError, InvalidDomainError, SlapError, error_from
 
 
 def error_to_answer(node: Node, error: Exception) -> SlapError:
@@ -27,4 +27,24 @@ def error_to_answer(node: Node, error: Exception) -> SlapError:
     node.get_logger().error(format_exc())
     return InternalError(
         f"{type(error).__name__}: {error} (where it was raised is in the log of {node.get_name()})"
+    )
+
+
+def domain_error(node: Node, domain: str, error: Exception) -> SlapError:
+    """The error that stands for what a domain's code raised. To be called where it was caught.
+
+    Args:
+        node: Whose log gets the traceback of what is no error of slap_ros.
+        domain: The domain's name.
+        error: What was raised.
+
+    Returns:
+        An error that names the domain, with the code of an error of slap_ros, if it is one.
+    """
+    if isinstance(error, SlapError):
+        return error_from(error.code, f"domain {domain}: {error}")
+    node.get_logger().error(format_exc())
+    return InvalidDomainError(
+        f"domain {domain} raised {type(error).__name__}: {error} (the log of {node.get_name()} "
+        "says where)"
     )

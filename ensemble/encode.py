@@ -13,7 +13,9 @@ from diagnostic_msgs.msg import KeyValue
 from std_msgs.msg import Header
 
 from slap_ros.core import Action, ActionSpace, Domain, Skill, Task
+from slap_ros.errors import SlapError
 from slap_ros.learning.domain_choice import DomainChoice
+from slap_ros.messages.decode import NANOSECONDS
 from slap_ros.perception import Percept
 from slap_ros.planning.options import OptionKind
 from slap_ros.planning.plan import Plan, PlanEdge
@@ -184,6 +186,28 @@ def command(
     deltas, gripper = actions.split(action)
     return msgs.RobotCommand(
         header=header(stamp), episode=episode, step=step, deltas=deltas.tolist(), gripper=gripper
+    )
+
+
+def fault(error: SlapError, episode: int, opened_ns: int, step: int) -> msgs.EpisodeFault:
+    """Why an episode cannot go on.
+
+    Args:
+        error: What has failed.
+        episode: Number of the episode.
+        opened_ns: Stamp of its task, ns since the epoch.
+        step: The last that was taken.
+
+    Returns:
+        The message.
+    """
+    seconds, nanoseconds = divmod(opened_ns, NANOSECONDS)
+    return msgs.EpisodeFault(
+        header=header(Time(sec=seconds, nanosec=nanoseconds)),
+        episode=episode,
+        step=step,
+        error_code=int(error.code),
+        error_msg=str(error),
     )
 
 

@@ -12,6 +12,7 @@ from rclpy.node import Node
 from slap_msgs.msg import DomainInfo
 from slap_msgs.msg import Task as TaskMessage
 
+from ensemble.answering import domain_error, error_to_answer
 from ensemble.futures import run_in_executor
 from ensemble.interfaces import DOMAIN, TASK, Topic
 from ensemble.observation import Episode
@@ -114,8 +115,8 @@ class EpisodeTracker(Generic[T]):
             if self._choices.get(choice.name) == choice:
                 return
             domain = await run_in_executor(self._workers, lambda: open_domain(choice))
-        except SlapError as error:
-            self._refuse("refused_domains", error)
+        except Exception as raised:  # of a domain's code
+            self._refuse("refused_domains", error_to_answer(self._node, raised))
             return
         if self._choices.get(choice.name) == choice:
             return  # announced twice meanwhile
@@ -145,8 +146,8 @@ class EpisodeTracker(Generic[T]):
             episode, prepared = await run_in_executor(
                 self._workers, lambda: self._made(message, domain)
             )
-        except SlapError as error:
-            self._refuse("refused_tasks", error)
+        except Exception as raised:  # of a domain's code
+            self._refuse("refused_tasks", domain_error(self._node, domain.name, raised))
             return
         if message is self._task:  # not overtaken meanwhile
             self.current, self.refusal = episode, None

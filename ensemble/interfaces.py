@@ -21,6 +21,7 @@ from slap_msgs.msg import (
     AbstractState,
     AcquisitionEvent,
     DomainInfo,
+    EpisodeFault,
     ObjectCentricState,
     Plan,
     PlanEvent,
@@ -88,6 +89,7 @@ TASK = _topic("slap/task", Task)
 STATE = _topic("slap/state", ObjectCentricState)
 ATOMS = _topic("slap/atoms", AbstractState)
 COMMAND = _topic("slap/command", RobotCommand)
+FAULT = _topic("slap/fault", EpisodeFault)
 PLAN = _topic("slap/plan", Plan)
 PLAN_EVENTS = _topic("slap/plan_events", PlanEvent)
 SKILL_EVENTS = _topic("slap/skill_events", SkillEvent)
@@ -103,6 +105,7 @@ RECORDED = (
     STATE,
     ATOMS,
     COMMAND,
+    FAULT,
     PLAN,
     PLAN_EVENTS,
     SKILL_EVENTS,

@@ -19,9 +19,9 @@ from slap_msgs.msg import RobotCommand
 from slap_msgs.srv import ResetTask
 
 from ensemble import encode
-from ensemble.answering import error_to_answer
+from ensemble.answering import domain_error, error_to_answer
 from ensemble.diagnostics import DiagnosticsPublisher
-from ensemble.interfaces import COMMAND, DOMAIN, RESET_TASK, STATE, TASK, VOLATILE
+from ensemble.interfaces import COMMAND, DOMAIN, FAULT, RESET_TASK, STATE, TASK, VOLATILE
 from ensemble.parameters import read_parameters
 from ensemble.world_parameters import WorldParameters
 from slap_ros.core import Action, Task
@@ -33,9 +33,10 @@ from slap_ros.errors import (
     UnsafeCommandError,
 )
 from slap_ros.learning.domain_choice import open_domain
-from slap_ros.messages.decode import decode_command
+from slap_ros.messages.decode import decode_command, stamp_ns
 from slap_ros.relational import State
 
+QUIET = 10.0  # s between two log lines about states that cannot be shown
 UNSAMPLED = -1  # seed of a task that was given or measured, not sampled
 REFUSALS = {  # what is counted, by the error that refuses a command
     StaleCommandError: "stale_commands",
@@ -60,7 +61,7 @@ class LockstepWorld(Node, ABC, Generic[P]):
         Args:
             name: The node's.
             parameters: The dataclass of its parameters.
-            counted: What its diagnostics count besides steps, stale and invalid commands.
+            counted: What its diagnostics count besides steps, refused commands and faults.
             kwargs: The node's.
 
         Raises:
@@ -72,11 +73,14 @@ class LockstepWorld(Node, ABC, Generic[P]):
         self._domain = open_domain(self._settings.choice)
         self._episode = 0
         self._step = 0
-        kinds = ("steps", "stale_commands", "invalid_commands", *counted)
+        self._opened_ns = 0  # the stamp of the episode's task
+        self._fault = ErrorCode.NONE  # what ended the episode
+        kinds = ("steps", "stale_commands", "invalid_commands", "faults", *counted)
         self._counts: Counter[str] = Counter(dict.fromkeys(kinds, 0))
         self._domains = self.create_publisher(DOMAIN.type, DOMAIN.name, DOMAIN.qos)
         self._tasks = self.create_publisher(TASK.type, TASK.name, TASK.qos)
         self._states = self.create_publisher(STATE.type, STATE.name, STATE.qos)
+        self._faults = self.create_publisher(FAULT.type, FAULT.name, FAULT.qos)
         # Volatile: commands from before this node started answer another world's states.
         self.create_subscription(COMMAND.type, COMMAND.name, self._on_command, VOLATILE)
         self.create_service(RESET_TASK.type, RESET_TASK.name, self._on_reset)
@@ -110,7 +114,7 @@ class LockstepWorld(Node, ABC, Generic[P]):
         """Publish a state for people to look at."""
 
     def _diagnostics(self) -> dict[str, object]:
-        return {**self._counts, "episode": self._episode}
+        return {**self._counts, "episode": self._episode, "fault": self._fault.name}
 
     # -- commands and steps ---------------------------------------------------------------------
 
@@ -120,6 +124,8 @@ class LockstepWorld(Node, ABC, Generic[P]):
             self._apply(decode_command(message, self._domain.action_space))
         except tuple(REFUSALS) as error:
             self._refuse(error)
+        except Exception as raised:  # of a domain's code
+            self._fail(domain_error(self, self._domain.name, raised))
 
     def _require_current(self, message: RobotCommand) -> None:
         """Refuse a command that does not answer the current state, or not as the first one."""
@@ -136,13 +142,27 @@ class LockstepWorld(Node, ABC, Generic[P]):
         self._counts[kind] += 1
         self.get_logger().warning(f"{error} ({self._counts[kind]} {kind.replace('_', ' ')})")
 
+    def _fail(self, error: SlapError) -> None:
+        """End the episode: no step is taken, and no state published, until the next reset."""
+        self._fault = error.code
+        self._counts["faults"] += 1
+        self._faults.publish(encode.fault(error, self._episode, self._opened_ns, self._step))
+        self.get_logger().error(f"{error.code.name}: {error}; nothing moves until reset_task")
+
     def _publish_step(self, state: State) -> None:
         """Publish the state after a step; from now on a command that answers it is accepted."""
         self._step += 1
         self._counts["steps"] += 1
         now = self._now()
         self._states.publish(encode.state(state, self._episode, self._step, now))
-        self._show(state, now)  # after the state: the other nodes are at work meanwhile
+        self._try_to_show(state, now)  # after the state: the other nodes are at work meanwhile
+
+    def _try_to_show(self, state: State, stamp: Time) -> None:
+        try:
+            self._show(state, stamp)
+        except Exception as raised:  # of a domain's code: nobody but people misses the picture
+            error = domain_error(self, self._domain.name, raised)
+            self.get_logger().error(f"not shown: {error}", throttle_duration_sec=QUIET)
 
     # -- episodes -------------------------------------------------------------------------------
 
@@ -160,12 +180,14 @@ class LockstepWorld(Node, ABC, Generic[P]):
         """
         self._episode += 1
         self._step = 0
+        self._fault = ErrorCode.NONE
         now = self._now()
         self._publish_domain()  # for whoever was told something else meanwhile
         message = encode.task(task, self._domain, self._episode, seed, index, now)
+        self._opened_ns = stamp_ns(message.header)
         self._tasks.publish(message)
         self._states.publish(message.initial_state)
-        self._show(task.initial_state, now)
+        self._try_to_show(task.initial_state, now)
         origin = "not sampled" if seed == UNSAMPLED else f"seed {seed}"
         self.get_logger().info(f"episode {self._episode}: {self._domain.name}, {origin}")
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from slap_ros.core import Domain, Task
 from slap_ros.errors import EpisodeChangedError
 from slap_ros.messages.decode import stamp_ns
-from slap_ros.messages.protocols import StateMessage
+from slap_ros.messages.protocols import EpisodeFaultMessage, StateMessage
 from slap_ros.relational import AtomSpace, State
 
 
@@ -43,6 +43,10 @@ class Episode:
             and (message.step > 0 or stamp_ns(message.header) == self.opened_ns)
             and [obj.name for obj in message.objects] == [o.name for o in self.space.layout.objects]
         )
+
+    def is_ended_by(self, fault: EpisodeFaultMessage) -> bool:
+        """Whether a fault is this episode's."""
+        return fault.episode == self.number and stamp_ns(fault.header) == self.opened_ns
 
 
 @dataclass(frozen=True)

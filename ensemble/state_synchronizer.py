@@ -10,15 +10,15 @@ from time import monotonic
 from typing import NamedTuple
 
 from rclpy.node import Node
-from slap_msgs.msg import AbstractState, ObjectCentricState
+from slap_msgs.msg import AbstractState, EpisodeFault, ObjectCentricState
 
 from ensemble.episode_tracker import EpisodeTracker, subscribe
 from ensemble.futures import wait_until
-from ensemble.interfaces import ATOMS, STATE
+from ensemble.interfaces import ATOMS, FAULT, STATE
 from ensemble.observation import Episode, Observation
 from ensemble.refusals import Refusals
 from slap_ros.errors import SlapError
-from slap_ros.messages.decode import decode_atoms, decode_seen, decode_state, stamp_ns
+from slap_ros.messages.decode import decode_atoms, decode_fault, decode_seen, decode_state, stamp_ns
 from slap_ros.perception.percept import known_part
 
 WAITING = 100  # messages kept until their counterpart, or their episode, is known
@@ -61,9 +61,11 @@ class StateSynchronizer:
         self._states: OrderedDict[Key, ObjectCentricState] = OrderedDict()  # without atoms
         self._atoms: OrderedDict[Key, AbstractState] = OrderedDict()  # without a state
         self._early: deque[Pair] = deque(maxlen=WAITING)  # of no episode that is known
+        self._fault: EpisodeFault | None = None  # the newest
         self._episodes = EpisodeTracker(node, prepare, self._open, self._refusals, skills)
         subscribe(node, STATE, self._on_state)
         subscribe(node, ATOMS, self._on_atoms)
+        subscribe(node, FAULT, self._on_fault)
 
     @property
     def episode(self) -> Episode | None:
@@ -74,6 +76,14 @@ class StateSynchronizer:
     def counts(self) -> Mapping[str, int]:
         """What was refused, for diagnostics."""
         return self._refusals.counts
+
+    @property
+    def failure(self) -> SlapError | None:
+        """Why the current episode cannot go on; None if it can."""
+        episode, fault = self.episode, self._fault
+        if episode is None or fault is None or not episode.is_ended_by(fault):
+            return None
+        return decode_fault(fault)
 
     def destroy(self) -> None:
         """Stop the thread in which episodes are prepared."""
@@ -95,15 +105,21 @@ class StateSynchronizer:
             An observation of this episode, or of a later one.
 
         Raises:
-            SlapError: ``missing``, or why the task was refused.
+            SlapError: ``missing``, or why the task was refused, or its states cannot be perceived.
         """
         deadline = monotonic() + timeout_s
 
         def seen() -> bool:
             return self.latest is not None and self.latest.episode.number >= episode
 
-        await wait_until(self._node, lambda: seen() or monotonic() > deadline)
-        if self.latest is None and self._episodes.refusal is not None:
+        def unseen_failure() -> SlapError | None:
+            latest = self.latest
+            return None if latest and latest.episode is self.episode else self.failure
+
+        await wait_until(self._node, lambda: seen() or unseen_failure() or monotonic() > deadline)
+        if failure := unseen_failure():
+            raise failure
+        if not seen() and self._episodes.refusal is not None:
             raise self._episodes.refusal
         if self.latest is None or not seen():
             raise missing(
@@ -131,6 +147,9 @@ class StateSynchronizer:
             _keep(self._atoms, message)
         else:
             self._take(Pair(state, message))
+
+    def _on_fault(self, message: EpisodeFault) -> None:
+        self._fault = message
 
     def _take(self, pair: Pair) -> None:
         episode, known = self._episodes.current, self.latest

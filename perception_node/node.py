@@ -26,6 +26,7 @@ ROS Parameters:
 Publishers:
     slap/atoms (slap_msgs/AbstractState): the ground atoms of each state, and what else is perceived
         otherwise than it is.
+    slap/fault (slap_msgs/EpisodeFault): why nothing is perceived any more: a predicate raised.
     diagnostics (diagnostic_msgs/DiagnosticArray): states perceived, messages refused; 1 Hz.
 
 Subscribers:
@@ -43,11 +44,12 @@ from rclpy.node import Node
 from slap_msgs.msg import ObjectCentricState
 
 from ensemble import encode
+from ensemble.answering import domain_error
 from ensemble.common_parameters import CommonParameters
 from ensemble.diagnostics import DiagnosticsPublisher
 from ensemble.entry_point import run_node
 from ensemble.episode_tracker import EpisodeTracker, subscribe
-from ensemble.interfaces import ATOMS, STATE
+from ensemble.interfaces import ATOMS, FAULT, STATE
 from ensemble.observation import Episode
 from ensemble.parameters import read_parameters
 from ensemble.perception_parameters import PerceptionParameters
@@ -58,6 +60,7 @@ from slap_ros.messages.decode import decode_state
 from slap_ros.perception import ExactPerceiver, NoisyPerceiver, Perceiver
 
 BEFORE_FIRST = -1  # step before an episode's first
+AFTER_LAST = 2**32  # above all that a message can have
 
 
 class PerceptionNode(Node):
@@ -74,6 +77,7 @@ class PerceptionNode(Node):
         self._step = BEFORE_FIRST  # of the newest state perceived in this episode
         self._early: deque[ObjectCentricState] = deque(maxlen=qos.EPISODE.depth)
         self._atoms = self.create_publisher(ATOMS.type, ATOMS.name, ATOMS.qos)
+        self._faults = self.create_publisher(FAULT.type, FAULT.name, FAULT.qos)
         self._refusals = Refusals(self)
         self._episodes = EpisodeTracker(
             self, self._perceiver_of, self._open, self._refusals, common.skills
@@ -118,9 +122,19 @@ class PerceptionNode(Node):
         except SlapError as error:
             self._refusals.add("refused_states", f"step {message.step} not perceived: {error}")
             return
+        except Exception as raised:  # of a domain's predicate
+            self._fail(domain_error(self, episode.domain.name, raised), episode, message)
+            return
         self._step = message.step
         self._atoms.publish(encode.percept(percept, message, episode.space, state))
         self._perceived += 1
+
+    def _fail(self, error: SlapError, episode: Episode, message: ObjectCentricState) -> None:
+        """End the episode: what comes of it later is not perceived."""
+        self._step = AFTER_LAST
+        fault = encode.fault(error, episode.number, episode.opened_ns, message.step)
+        self._faults.publish(fault)
+        self.get_logger().error(f"step {message.step} not perceived: {error}")
 
 
 def main() -> int:

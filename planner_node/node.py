@@ -21,7 +21,7 @@ Publishers:
         1 Hz.
 
 Subscribers:
-    slap/domain, slap/task, slap/state, slap/atoms: see ``ensemble.observation``.
+    slap/domain, slap/task, slap/state, slap/atoms, slap/fault: see ``ensemble.observation``.
 
 Action servers:
     slap/solve_task (slap_msgs/SolveTask): solve an episode's task.

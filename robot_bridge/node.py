@@ -8,7 +8,7 @@ moved before it. The next state is measured once the arm stands and what it move
 
 It holds, which means that nothing is sent and that controllers stay where they are: between
 commands; where a command is refused; and from the first failure of a controller or of the sensors
-until ``slap/reset_task``, as no state is published then and skills give up because none arrives.
+until ``slap/reset_task``: no state is published then, and ``slap/fault`` ends the skill under way.
 
 ROS Parameters:
     domain (string, "obstacle_tower"): which domain; one with a Panda.
@@ -38,7 +38,8 @@ ROS Parameters:
 
 Publishers:
     slap/domain (slap_msgs/DomainInfo), slap/task (slap_msgs/Task), slap/state
-        (slap_msgs/ObjectCentricState), slap/markers (visualization_msgs/MarkerArray): as sim_node.
+        (slap_msgs/ObjectCentricState), slap/fault (slap_msgs/EpisodeFault), slap/markers
+        (visualization_msgs/MarkerArray): as sim_node.
     diagnostics (diagnostic_msgs/DiagnosticArray): phase, fault, counts; 1 Hz.
 
 Subscribers:
@@ -75,7 +76,6 @@ from robot_bridge.step_measurement import StepMeasurement
 from slap_ros.core import Action, Task
 from slap_ros.errors import (
     BusyError,
-    ErrorCode,
     InvalidStateError,
     NoJointStateError,
     SlapError,
@@ -101,14 +101,12 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
     """The robot bridge."""
 
     def __init__(self, **kwargs: Any) -> None:
-        counted = ("unsafe_commands", "faults")
-        super().__init__("robot_bridge", RobotBridgeParameters, counted, **kwargs)
+        super().__init__("robot_bridge", RobotBridgeParameters, ("unsafe_commands",), **kwargs)
         self._robot = Robot(self, self._domain, self._sampled_state, self._settings)
         self._phase = Phase.STARTING
         self._since_s = (
             self._robot.clock.now_s()
         )  # when the phase, or the measurement of a state, began
-        self._fault = ErrorCode.NONE
         self._goal: Collection[GroundAtom] = ()
         self._measurement: StepMeasurement  # of the step under way
         self._markers = self.create_publisher(MARKERS.type, MARKERS.name, MARKERS.qos)
@@ -130,7 +128,6 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
             **super()._diagnostics(),
             **self._robot.sensors.counts,
             "phase": self._phase.name,
-            "fault": self._fault.name,
             "holding": holding,
         }
 
@@ -145,9 +142,7 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
         """Hold until reset."""
         self._robot.controllers.hold()
         self._enter(Phase.FAULT)
-        self._fault = error.code
-        self._counts["faults"] += 1
-        self.get_logger().error(f"{error.code.name}: {error}; the robot holds until reset_task")
+        super()._fail(error)
 
     # -- commands and steps ---------------------------------------------------------------------
 
@@ -223,7 +218,6 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
 
     def _begin(self, state: State) -> None:
         goal = frozenset(self._goal) or self._domain.default_goal(state)
-        self._fault = ErrorCode.NONE
         self._enter(Phase.READY)
         self._open_episode(Task(state, goal, self._domain.step_limit), UNSAMPLED, 0)
 

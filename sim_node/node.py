@@ -17,6 +17,7 @@ Publishers:
     slap/domain (slap_msgs/DomainInfo): what world runs; latched.
     slap/task (slap_msgs/Task): the episode's task; latched.
     slap/state (slap_msgs/ObjectCentricState): the state after each step.
+    slap/fault (slap_msgs/EpisodeFault): why no state comes any more: the domain raised.
     slap/markers (visualization_msgs/MarkerArray), tf (tf2_msgs/TFMessage), joint_states
         (sensor_msgs/JointState): the same for RViz and Foxglove.
     diagnostics (diagnostic_msgs/DiagnosticArray): steps taken and commands refused; 1 Hz.
@@ -46,7 +47,7 @@ from ensemble.steady_time import create_timer
 from ensemble.visualization import Visualizer
 from ensemble.world_parameters import WorldParameters
 from slap_ros.core import Action, Task, World
-from slap_ros.errors import InvalidParameterError, InvalidStateError
+from slap_ros.errors import ErrorCode, InvalidParameterError, InvalidStateError
 from slap_ros.messages.decode import decode_goal, decode_state
 from slap_ros.relational import State
 
@@ -103,6 +104,8 @@ class SimNode(LockstepWorld[SimParameters]):
             self._timer = None
 
     def _occupation(self) -> str:
+        if self._fault is not ErrorCode.NONE:
+            return f"which ended with {self._fault.name}"
         return "" if self._timer is None else "which has its command"
 
     def _show(self, state: State, stamp: Time) -> None:

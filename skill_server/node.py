@@ -20,7 +20,8 @@ Publishers:
     diagnostics (diagnostic_msgs/DiagnosticArray): skills run, messages refused; 1 Hz.
 
 Subscribers:
-    slap/domain, slap/task, slap/state, slap/atoms: see ``ensemble.observation``.
+    slap/domain, slap/task, slap/state, slap/atoms, slap/fault: see
+        ``ensemble.observation``. A fault ends the skill under way, or the next, with its code.
 
 Services:
     slap/list_skills (slap_msgs/ListSkills): the current domain's options and learned shortcuts.
@@ -138,6 +139,7 @@ class SkillServer(Node):
             goal.abort()
             return result(OptionResult(error.code, str(error)), 0)
         else:
+            self._end_if_failed()  # meanwhile, or before
             return await self._execution.run(self._synchronizer.latest)
         finally:
             self._execution = None
@@ -161,7 +163,14 @@ class SkillServer(Node):
         if self._execution is not None:
             self._execution.advance(observation)
 
+    def _end_if_failed(self) -> None:
+        """End the skill under way if its episode cannot go on."""
+        failure = self._synchronizer.failure
+        if self._execution is not None and failure is not None:
+            self._execution.end_with(failure)
+
     def _check(self) -> None:
+        self._end_if_failed()
         if self._execution is not None:
             self._execution.check(self._state_timeout_s)
 

@@ -19,7 +19,7 @@ from ensemble.node_liveness import NodeLiveness
 from ensemble.observation import Observation
 from skill_server.skill_publisher import SkillPublisher
 from slap_ros.core import Action
-from slap_ros.errors import ErrorCode
+from slap_ros.errors import ErrorCode, SlapError
 from slap_ros.planning.options import Option, OptionExecution, OptionResult
 
 
@@ -101,6 +101,11 @@ class SkillExecution:
         except Exception as raised:  # of a skill's policy
             error = error_to_answer(self.node, raised)
             return OptionResult(error.code, f"{self.option}: {error}")
+
+    def end_with(self, error: SlapError) -> None:
+        """End, as the episode has."""
+        if not self._ended.done():
+            self._stop(error.code, str(error))
 
     def check(self, state_timeout_s: float) -> None:
         """End if no state has come for ``state_timeout_s``, or the planner is gone."""

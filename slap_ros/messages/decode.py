@@ -9,9 +9,10 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from slap_ros.core import Action, ActionSpace
-from slap_ros.errors import InvalidStateError
+from slap_ros.errors import ErrorCode, InvalidStateError, SlapError, error_from
 from slap_ros.messages.protocols import (
     CommandMessage,
+    EpisodeFaultMessage,
     GroundAtomMessage,
     Header,
     ObjectStateMessage,
@@ -57,6 +58,12 @@ def _decode_object(msg: ObjectStateMessage, types: Mapping[str, Type]) -> Object
             f"got {len(msg.features)}"
         )
     return obj
+
+
+def decode_fault(msg: EpisodeFaultMessage) -> SlapError:
+    """The error that ended an episode; UNKNOWN for a code of another version, or none."""
+    known = msg.error_code in set(ErrorCode) - {ErrorCode.NONE}
+    return error_from(msg.error_code if known else ErrorCode.UNKNOWN, str(msg.error_msg))
 
 
 def decode_seen(msgs: Iterable[ObjectStateMessage], state: State) -> State:

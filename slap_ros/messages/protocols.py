@@ -61,6 +61,16 @@ class AtomsMessage(Protocol):
     missing: Sequence[str]
 
 
+class EpisodeFaultMessage(Protocol):
+    """Fields of ``slap_msgs/EpisodeFault``."""
+
+    header: Header
+    episode: int
+    step: int
+    error_code: int
+    error_msg: str
+
+
 class CommandMessage(Protocol):
     """Fields of ``slap_msgs/RobotCommand``."""
 

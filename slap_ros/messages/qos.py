@@ -36,6 +36,7 @@ OFFERED = {
     "slap/state": EPISODE,
     "slap/atoms": EPISODE,
     "slap/command": EPISODE,
+    "slap/fault": LATCHED,
     "slap/plan": LATCHED,
     "slap/plan_events": EPISODE,
     "slap/skill_events": EPISODE,

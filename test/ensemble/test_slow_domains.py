@@ -2,9 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A domain that takes seconds to import and to step: waited for, and never in a callback."""
 
-import importlib
 import json
-import os
 import subprocess
 import sys
 
@@ -17,7 +15,6 @@ from slap_msgs.msg import DomainInfo
 from ensemble.interfaces import ATOMS, DOMAIN
 from ensemble.spinner import Spinner
 from perception_node.node import PerceptionNode
-from slap_ros.domains import forget_domains
 
 LIMIT = 60.0  # s, far more than anything here takes
 SLOW = '''
@@ -54,21 +51,8 @@ def make():
 
 
 @pytest.fixture
-def slow_domain(tmp_path, monkeypatch):
-    """A distribution of somebody's, installed in a folder."""
-    (tmp_path / "slow_domain.py").write_text(SLOW)
-    info = tmp_path / "slow_domain-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: slow_domain\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text("[slap_ros.domains]\nslow = slow_domain:make\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
-    monkeypatch.setenv("PYTHONPATH", path)
-    importlib.invalidate_caches()
-    forget_domains()
-    yield "slow"
-    forget_domains()
-    sys.modules.pop("slow_domain", None)
+def slow_domain(install_domain):
+    return install_domain("slow", SLOW)
 
 
 def test_a_slow_domain_is_waited_for(network, slow_domain):

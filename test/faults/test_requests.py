@@ -184,6 +184,21 @@ def test_a_bag_can_be_closed_again_and_again(ensemble):
         assert ensemble.call(CLOSE_BAG, CLOSE_BAG.type.Request()).message
 
 
+def test_whatever_a_robot_is_asked_to_begin_with_it_answers(network):
+    pytest.importorskip("pybullet")
+    settings = RunSettings(
+        "obstacle_tower", "fair", 1, 0, "lazy", None, world="mock", mock={"pace": 50.0}
+    )
+    nodes = node_parameters(settings)
+    with bench({name: nodes[name] for name in ("robot_bridge.mock", "robot_bridge")}) as found:
+        found.until(lambda: found.task)
+        sampled = ResetTask.Request(seed=1, index=1, goal=found.task.goal)
+        given = ResetTask.Request(initial_state=found.task.initial_state)
+        for request in (*variants(sampled), *variants(given)):
+            answered(found.call(RESET_TASK, request))
+        found.until(lambda: not found.call(RESET_TASK, ResetTask.Request()).error_code)
+
+
 def test_whatever_the_controllers_are_asked_they_answer(network):
     pytest.importorskip("pybullet")
     settings = RunSettings(

@@ -12,10 +12,10 @@ from diagnostic_msgs.msg import DiagnosticArray
 from faulty_links import Laboratory
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
-from slap_msgs.msg import DomainInfo
+from slap_msgs.msg import DomainInfo, EpisodeFault
 
 from ensemble.client import RunClient
-from ensemble.interfaces import ATOMS, DIAGNOSTICS, DOMAIN, STATE, TASK
+from ensemble.interfaces import ATOMS, DIAGNOSTICS, DOMAIN, FAULT, STATE, TASK
 from ensemble.nodes import RunSettings, node_class, node_parameters
 from ensemble.spinner import Spinner
 from sim_node.node import SimNode
@@ -23,6 +23,7 @@ from slap_ros.bags import evaluate_bag
 
 LIMIT = 60.0  # s, far more than anything here takes
 LISTENERS = ("/perception_node", "/planner_node", "/skill_server")
+HEARD_BY = {DOMAIN.name: 6, TASK.name: 6, STATE.name: 6, ATOMS.name: 5, FAULT.name: 4}  # nodes
 LATEST = 2**31 - 1  # s since the epoch, in 2038: the last that a stamp can have
 
 
@@ -31,8 +32,8 @@ class StrayLaboratory(Laboratory):
 
     def __init__(self, client, spinner):
         super().__init__(client, spinner, relay=None)
-        self.newest, self.health = {}, {}
-        for topic in (DOMAIN, TASK, STATE, ATOMS):
+        self.newest, self.health = dict.fromkeys((FAULT.name,)), {}
+        for topic in (DOMAIN, TASK, STATE, ATOMS, FAULT):
             client.create_subscription(
                 topic.type, topic.name, partial(self._on_message, topic.name), topic.qos
             )
@@ -67,8 +68,8 @@ class StrayLaboratory(Laboratory):
         """What all the others heard, and refused if it is of a kind that is."""
         before = self.refused(kind)
         stray = self.client.create_publisher(topic.type, topic.name, topic.qos)
-        # Heard by this client, twice, by the recorder, and by whoever acts on it.
-        reached = 3 + (2 if topic is ATOMS else 3)
+        # Heard by this client, the recorder, and whoever acts on it.
+        reached = HEARD_BY[topic.name]
         assert self.spinner.spin_until(lambda: stray.get_subscription_count() >= reached, LIMIT)
         stray.publish(message)
         assert self.spinner.spin_until(lambda: self.newest[topic.name] == message, LIMIT)
@@ -94,7 +95,7 @@ def laboratory(bag):
         for node in nodes:
             executor.add_node(node)
         assert bench.spinner.spin_until(
-            lambda: client.ready(True) and len(bench.newest) == 4, LIMIT
+            lambda: client.ready(True) and len(bench.newest) == 5, LIMIT
         )
         bench.nodes = nodes
         yield bench
@@ -131,6 +132,12 @@ def unknown_atom(atoms):
     return atoms
 
 
+def of_another_world(_):
+    """A simulator that has ended had as many episodes."""
+    number = 2 + list(STRAYS).index("fault of another world")
+    return EpisodeFault(episode=number, error_code=75)
+
+
 def not_finite(state):
     state = changed(state, step=state.step + 1)
     state.objects[0].features[0] = float("inf")  # equal to itself
@@ -154,6 +161,8 @@ STRAYS = {
     "state that is none": (STATE, not_finite, None),
     "atoms of 2038": (ATOMS, lambda m: stamped(m, LATEST), None),
     "atoms that are none": (ATOMS, unknown_atom, None),
+    "fault of another episode": (FAULT, lambda _: EpisodeFault(episode=99, error_code=75), None),
+    "fault of another world": (FAULT, of_another_world, None),
 }
 
 

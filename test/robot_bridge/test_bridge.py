@@ -17,7 +17,7 @@ from tf2_msgs.msg import TFMessage
 
 from ensemble.cli.run_options import RunOptions
 from ensemble.client import RunClient
-from ensemble.interfaces import COMMAND, JOINT_STATES, RESET_TASK, SENSOR_DATA, TF
+from ensemble.interfaces import COMMAND, FAULT, JOINT_STATES, RESET_TASK, SENSOR_DATA, TF
 from ensemble.launcher import InProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.robot_parameters import parse_mock_robot
@@ -85,6 +85,8 @@ class Lab:
         """Wait until the bridge holds for this reason; it then stands."""
         self.until(lambda: self.health.get("fault") == code.name)
         assert self.health["holding"] == "True"
+        (said,) = [m for kind, m in self.heard if kind == FAULT.type_name]
+        assert (said.error_code, said.episode) == (code, self.states[-1].episode)
         states, joints = len(self.states), self.joints[-1][:7]
         self.command(deltas=[0.02, *STILL[1:]])
         self.wait(0.5)
@@ -105,7 +107,7 @@ def lab(mock=None, bridge=None, started=True):
     only = {name: nodes[name] for name in ("robot_bridge.mock", "robot_bridge")}
     heard = []
     with (
-        temporary_node(lambda: RunClient(lambda *message: heard.append(message))) as (
+        temporary_node(lambda: RunClient(lambda *message: heard.append(message), (FAULT,))) as (
             client,
             spinner,
         ),
