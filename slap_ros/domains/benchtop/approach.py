@@ -23,8 +23,8 @@ from slap_ros.geometry.pose import Vector
 from slap_ros.relational import Object, State
 
 DISTANCE = 0.04  # m before where the skill acts (LG-SAIL §5.1)
-# Nearer than 10 mm, opening the fingers would already stack what they hold.
-ASIDE = (0.01, 0.025)  # m, least and most
+# What is stacked is within 10 mm, so opening the fingers where a skill begins stacks nothing.
+ASIDE = (0.015, 0.025)  # m, least and most
 STRAIGHT = (0.0, 0.0)  # rad, turned neither way
 UP: Vector = (0.0, 0.0, 1.0)
 
