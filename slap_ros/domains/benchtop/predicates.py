@@ -120,7 +120,7 @@ def is_clear(occupied: Predicate, name: str = "IsClear") -> Predicate:
         per_thing = margins.reshape(*margins.shape[:-1], -1, len(places.objects))
         return strictly(-per_thing.max(axis=-2))
 
-    return _described(name, (place,), margin, f"there is no {thing} with {occupied}")
+    return _described(name, (place,), margin, f"no {thing} is {occupied} it")
 
 
 @lru_cache(maxsize=256)
