@@ -275,9 +275,9 @@ def _require_closed_loop(domain: Domain) -> None:
     """Refuse a domain whose states a robot cannot measure."""
     if HAND_OF_FORCES in domain.types:
         raise OpenLoopOnlyError(
-            f"{domain.name} cannot run on a robot in closed loop: its states have the target that "
-            "the hand is pulled to and velocities of hand and fingers, which are not measured; "
-            "record a run in simulation, then `slap bag replay BAG --to robot --dry-run`"
+            f"{domain.name} cannot run on a robot: its states have the target that the hand is "
+            "pulled to and the velocities of hand and fingers, which nothing measures; record a "
+            "run in simulation, then `slap bag replay BAG --to robot --dry-run` checks its motion"
         )
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from functools import lru_cache
+from itertools import pairwise
 
 from slap_ros.contact.arm import CONTROL_PERIOD_S
 from slap_ros.contact.features import ROBOT
@@ -22,7 +23,7 @@ from slap_ros.relational import State
 
 SceneOf = Callable[[State], ContactScene]
 VIEW = Viewpoint(eye=(1.3, -0.95, 0.75), target=(0.47, 0.0, 0.14))
-SIDES = 16  # of the prism that a cylinder is shown as
+SIDES = 12  # of the prism that a cylinder is shown as
 
 
 def display(scene_of: SceneOf, view: Viewpoint = VIEW) -> Display:
@@ -94,6 +95,8 @@ def prism(radius_m: float, length_m: float) -> tuple[Vector, ...]:
     for (a, b), (c, d) in zip(rim, (*rim[1:], rim[0]), strict=True):
         corners += [(a, b, -half), (c, d, -half), (c, d, half)]
         corners += [(a, b, -half), (c, d, half), (a, b, half)]
-        corners += [(0.0, 0.0, half), (a, b, half), (c, d, half)]
-        corners += [(0.0, 0.0, -half), (c, d, -half), (a, b, -half)]
+    x, y = rim[0]
+    for (a, b), (c, d) in pairwise(rim[1:]):
+        corners += [(x, y, half), (a, b, half), (c, d, half)]
+        corners += [(x, y, -half), (c, d, -half), (a, b, -half)]
     return tuple(corners)
