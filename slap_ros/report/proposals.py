@@ -20,7 +20,7 @@ IN_PLAN = "all operators together"
 
 
 @dataclass(frozen=True)
-class Exchange:
+class RecordedExchange:
     """An answer of a model, or a verdict of the planner.
 
     Args:
@@ -52,7 +52,7 @@ class RecordedProposal:
     outcome: str
     reason: str
     plan: tuple[str, ...]
-    exchanges: tuple[Exchange, ...]
+    exchanges: tuple[RecordedExchange, ...]
 
 
 def recorded_proposals(
@@ -60,7 +60,7 @@ def recorded_proposals(
 ) -> tuple[RecordedProposal, ...]:
     """The proposals that a bag's events tell of, in order."""
     found: list[RecordedProposal] = []
-    open_: list[Exchange] | None = None
+    open_: list[RecordedExchange] | None = None
     for event in events:
         kind = KINDS.get(event.kind)
         if kind is None:
@@ -80,9 +80,9 @@ def recorded_proposals(
     return tuple(found)
 
 
-def _exchange(kind: AcquisitionEventKind, event: AcquisitionEventMessage) -> Exchange:
+def _exchange(kind: AcquisitionEventKind, event: AcquisitionEventMessage) -> RecordedExchange:
     verdict = kind == AcquisitionEventKind.VERIFIED
-    return Exchange(
+    return RecordedExchange(
         IN_PLAN if verdict else event.subject,
         event.answer,
         tuple(event.complaints),

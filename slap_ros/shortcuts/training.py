@@ -89,15 +89,34 @@ class CandidateGroup:
     Args:
         signature: Of the candidate with the largest expected saving.
         operator_path: Names of the operators by which their sources were reached.
-        tasks: In how many explored tasks there was one.
-        relative_saving: Share of a plan's length that it is expected to save, mean over all
-            explored tasks.
+        savings: Share of the plan's length that it is expected to save in each explored task; 0
+            where there was none.
     """
 
     signature: Signature
     operator_path: OperatorPath
-    tasks: int
-    relative_saving: float
+    savings: tuple[float, ...]
+
+    @property
+    def tasks(self) -> int:
+        """In how many explored tasks there was one."""
+        return sum(saving > 0.0 for saving in self.savings)
+
+    @property
+    def relative_saving(self) -> float:
+        """Share of a plan's length that it is expected to save, mean over all explored tasks."""
+        return fmean(self.savings)
+
+    def saving_beside(self, others: Sequence[CandidateGroup]) -> float:
+        """What it is expected to save more than the best of others in each task, mean over tasks.
+
+        Args:
+            others: Those that are learned already.
+        """
+        return fmean(
+            max(0.0, own - max(best, default=0.0))
+            for own, *best in zip(self.savings, *(other.savings for other in others), strict=True)
+        )
 
 
 ProblemKey = tuple[frozenset[Pattern], frozenset[str]]  # equal for equal learning problems
@@ -109,20 +128,24 @@ def _problem_key(signature: Signature) -> ProblemKey:
 
 def rank(explored: Sequence[ExplorationResult]) -> list[CandidateGroup]:
     """Group candidates that are the same up to objects; the largest relative saving first."""
-    groups: dict[tuple[ProblemKey, OperatorPath], list[ShortcutCandidate]] = {}
-    for result in explored:
+    groups: dict[tuple[ProblemKey, OperatorPath], dict[int, ShortcutCandidate]] = {}
+    for task, result in enumerate(explored):
         for key, candidate in _best_by_key(result).items():
-            groups.setdefault(key, []).append(candidate)
+            groups.setdefault(key, {})[task] = candidate
     ranked = [
         CandidateGroup(
-            max(group, key=lambda c: (c.expected_saving, c.signature.name)).signature,
+            max(group.values(), key=lambda c: (c.expected_saving, c.signature.name)).signature,
             operator_path,
-            len(group),
-            sum(c.expected_saving / c.plan_steps for c in group) / len(explored),
+            tuple(_saving(group.get(task)) for task in range(len(explored))),
         )
         for (_, operator_path), group in groups.items()
     ]
     return sorted(ranked, key=lambda g: (-g.relative_saving, g.signature.name, g.operator_path))
+
+
+def _saving(candidate: ShortcutCandidate | None) -> float:
+    """Share of the plan's length."""
+    return candidate.expected_saving / candidate.plan_steps if candidate is not None else 0.0
 
 
 def _best_by_key(
@@ -174,17 +197,32 @@ class Training:
         ranked = rank(explored)
         self.callback.on_ranked(ranked)
         operator_steps = mean_steps(explored)
-        tried: set[ProblemKey] = set()
-        for group in ranked:
-            key, expected = _problem_key(group.signature), baseline * (1.0 - group.relative_saving)
-            if key in tried or not self._shorter(expected, length):
-                continue
-            if len(tried) == self.settings.shortcuts:
+        kept: list[CandidateGroup] = []
+        for _ in range(self.settings.shortcuts):
+            group = self._most_promising(ranked, kept)
+            if group is None:
                 break
-            tried.add(key)
-            length = self._try(group, operator_steps, length)
+            key = _problem_key(group.signature)
+            ranked = [other for other in ranked if _problem_key(other.signature) != key]
+            before, length = length, self._try(group, operator_steps, length)
+            if length < before:
+                kept.append(group)
         record = self._record(explored, baseline, length)
         return Library(self.distribution.domain, tuple(self._shortcuts), record)
+
+    def _most_promising(
+        self, groups: Sequence[CandidateGroup], kept: Sequence[CandidateGroup]
+    ) -> CandidateGroup | None:
+        """Who saves most beside what is learned already; None where nobody saves enough.
+
+        Shortcuts are worth having together where they serve different tasks. The first of those
+        that save the same is taken.
+        """
+        saving = [group.saving_beside(kept) for group in groups]
+        most = max(saving, default=0.0)
+        if most < self.settings.least_saving:
+            return None
+        return groups[saving.index(most)]
 
     def _shorter(self, steps: float, than: float) -> bool:
         """Whether a plan length is less by what a shortcut must save at least."""

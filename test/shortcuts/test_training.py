@@ -18,7 +18,7 @@ from slap_ros.shortcuts.explore import ExplorationResult, ShortcutCandidate
 from slap_ros.shortcuts.library import load_library, save_library
 from slap_ros.shortcuts.settings import ExplorationSettings, training_settings
 from slap_ros.shortcuts.signature import Signature
-from slap_ros.shortcuts.training import Training, rank
+from slap_ros.shortcuts.training import CandidateGroup, Training, rank
 
 TASKS = TaskDistribution("obstacle2d", "fair", 5)
 OURS = training_settings("ours", get_domain("obstacle2d"))
@@ -174,3 +174,19 @@ def test_candidates_are_ranked_by_what_they_save_over_all_tasks():
     assert first.relative_saving == pytest.approx(0.3)
     assert second.relative_saving == pytest.approx(0.25)
     assert (first.tasks, second.tasks) == (2, 1)
+
+
+def test_what_serves_other_tasks_is_worth_learning_beside_what_saves_more():
+    def group(name, *savings):
+        return CandidateGroup(candidate(name, 0.0).signature, (), savings)
+
+    most, same_tasks, other_tasks = (
+        group("most", 0.5, 0.4, 0.0, 0.0),
+        group("same", 0.4, 0.4, 0.0, 0.0),
+        group("other", 0.0, 0.0, 0.1, 0.1),
+    )
+    assert most.saving_beside([]) == most.relative_saving == pytest.approx(0.225)
+    assert most.tasks == 2
+    assert same_tasks.saving_beside([most]) == 0.0
+    assert other_tasks.saving_beside([most]) == pytest.approx(0.05)
+    assert most.saving_beside([same_tasks, other_tasks]) == pytest.approx(0.025)
