@@ -33,6 +33,7 @@ OURS = {
     "stack_at_target": "slap_ros.domains.stack_at_target",
     "groceries": "slap_ros.domains.groceries",
     "stow_hammer": "slap_ros.domains.stow_hammer",
+    "make_coffee": "slap_ros.domains.make_coffee",
     "peg_in_hole": "slap_ros.domains.peg_in_hole",
 }
 CACHED = 64  # domains that are made once

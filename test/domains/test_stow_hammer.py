@@ -8,41 +8,38 @@ import math
 
 import numpy as np
 import pytest
-from skill_starts import CONSTANT, achieves
+from drawer_states import (
+    assert_margins_agree,
+    assert_metrics_agree,
+    atoms,
+    carry_out,
+    changed,
+    constant_motions,
+    put,
+)
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.benchtop import drawers
 from slap_ros.domains.benchtop.cabinet import TRAVEL
-from slap_ros.domains.benchtop.metrics import NORM_ANGLE, PERPENDICULAR_DIS
 from slap_ros.domains.benchtop.state_access import pose_of
 from slap_ros.domains.stow_hammer.scenery import HALF_LENGTH, RADIUS, SHAPE
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.geometry.pose import Pose, from_yaw
 from slap_ros.learning.demonstrator import demonstrate
 from slap_ros.learning.domain_choice import DomainChoice, open_domain
-from slap_ros.physics.features import POSE_FEATURES
-from slap_ros.relational import Column, State
+from slap_ros.relational import State
 
 DOMAIN = get_domain("stow_hammer")
 SCRIPTED = open_domain(DomainChoice("stow_hammer", skills="demonstrator"))
-POSE = tuple(feature.name for feature in POSE_FEATURES)
 STOW = ("Open", "Pick", "Place", "Close")
 
 
-def atoms(state):
-    space = DOMAIN.atom_space(state)
-    return {str(atom) for atom in space.decode(space.abstract(state))}
-
-
-def put(state, name, pose):
-    """The state with a body elsewhere."""
-    obj = state.layout.object(name)
-    values = (*pose.position, *pose.quaternion)
-    return state.replace({(obj, axis): v for axis, v in zip(POSE, values, strict=True)})
+def found_in(state):
+    return atoms(DOMAIN, state)
 
 
 def opened(state, name, opening):
-    return state.replace({(state.layout.object(name), "opening"): opening})
+    return changed(state, name, opening=opening)
 
 
 def stowed(state, hammer, cabinet, aside=0.0, up=0.0, turn=0.0):
@@ -71,9 +68,8 @@ def scattered(initial, count):
                 state = stowed(state, name, cabinet, off[0], 0.5 * off[1], turn)
             else:
                 z = RADIUS + float(rng.choice([0.0, 0.01, 0.02, rng.uniform(-0.02, 0.05)]))
-                state = state.replace({(state.layout.object(name), "z"): z})
-            held = float(rng.random() < 0.3)
-            state = state.replace({(state.layout.object(name), "held"): held})
+                state = changed(state, name, z=z)
+            state = changed(state, name, held=float(rng.random() < 0.3))
         rows.append(state.data)
     return State(initial.layout, np.stack(rows))
 
@@ -115,8 +111,8 @@ def test_the_demonstrator_does_what_the_paper_plans(goal, hammers, plan):
 def test_two_drawers_are_never_open_at_once():
     """HasFreeSpace sees to it, also of a drawer that is neither open nor closed."""
     state = DOMAIN.task(0).initial_state
-    assert "HasFreeSpace()" in atoms(state)
-    ajar = atoms(opened(state, "cabinet1", 0.05))
+    assert "HasFreeSpace()" in found_in(state)
+    ajar = found_in(opened(state, "cabinet1", 0.05))
     assert not ajar & {"HasFreeSpace()", "IsCabinetOpen(cabinet1)", "IsCabinetClose(cabinet1)"}
     space = SCRIPTED.atom_space(state)
     both = space.mask(space.atom("IsCabinetOpen", (f"cabinet{i}",)) for i in range(2))
@@ -139,10 +135,10 @@ def test_two_drawers_are_never_open_at_once():
 @pytest.mark.parametrize("opening", [0.0, 0.1, TRAVEL])
 def test_a_hammer_is_in_a_drawer_wherever_that_is(opening):
     state = stowed(opened(DOMAIN.task(2).initial_state, "cabinet1", opening), "hammer0", "cabinet1")
-    assert "InCabinet(hammer0, cabinet1)" in atoms(state)
-    assert not {"OnTable(hammer0)", "InCabinet(hammer0, cabinet0)"} & atoms(state)
+    assert "InCabinet(hammer0, cabinet1)" in found_in(state)
+    assert not {"OnTable(hammer0)", "InCabinet(hammer0, cabinet0)"} & found_in(state)
     left = opened(state, "cabinet1", abs(opening - 0.02))
-    assert "InCabinet(hammer0, cabinet1)" not in atoms(left)
+    assert "InCabinet(hammer0, cabinet1)" not in found_in(left)
 
 
 @pytest.mark.parametrize(
@@ -159,61 +155,40 @@ def test_a_hammer_is_in_a_drawer_wherever_that_is(opening):
 )
 def test_how_a_hammer_must_lie(off, holds):
     state = opened(DOMAIN.task(3).initial_state, "cabinet0", TRAVEL)
-    found = atoms(stowed(state, "hammer1", "cabinet0", **off))
+    found = found_in(stowed(state, "hammer1", "cabinet0", **off))
     assert ("InCabinet(hammer1, cabinet0)" in found) == holds
 
 
 def test_truth_and_margin_agree():
     batch = scattered(DOMAIN.task(4).initial_state, 2_000)
-    space = DOMAIN.atom_space(DOMAIN.task(4).initial_state)
+    assert_margins_agree(DOMAIN, batch)
+    space = DOMAIN.atom_space(State(batch.layout, batch.data[0]))
     truth = space.truth(batch)
-    assert all(0.01 < share < 0.99 for share in truth.mean(axis=0))
-    for i, atom in enumerate(space.atoms):
-        margins = atom.predicate.margin(batch, *(Column((obj,)) for obj in atom.objects))
-        assert ((margins[..., 0] >= 0.0) == truth[:, i]).all(), atom
     held = [i for i, atom in enumerate(space.atoms) if atom.predicate.name == "Holding"]
     lying = [i for i, atom in enumerate(space.atoms) if atom.predicate.name == "OnTable"]
     assert not (truth[:, held] & truth[:, lying]).any()
 
 
 def test_metrics_are_defined_alike_for_one_and_for_many():
-    batch = scattered(DOMAIN.task(5).initial_state, 20)
-    objects = {kind: batch.layout.of_type(kind) for kind in DOMAIN.types}
-    for metric in (*drawers.METRICS, PERPENDICULAR_DIS, NORM_ANGLE):
-        chosen = [objects[kind][-1] for kind in metric.types]
-        many = metric.value(batch, *(Column((obj,)) for obj in chosen))[..., 0]
-        one = [metric.scalar(State(batch.layout, row), *chosen) for row in batch.data]
-        assert many == pytest.approx(one, abs=1e-9)
+    assert_metrics_agree(DOMAIN, scattered(DOMAIN.task(5).initial_state, 20))
 
 
 # -- skills ---------------------------------------------------------------------------------------
 
 
+PLAN = (
+    ("Open", ("cabinet0",)),
+    ("Pick", ("hammer0",)),
+    ("Place", ("hammer0", "cabinet0")),
+    ("Close", ("cabinet0",)),
+)
+
+
 def test_a_hammer_that_is_let_fall_is_not_stowed():
-    """Nor does any other constant motion do what an operator says, from where its skill begins."""
-    done = {}
-    for seed in (6, 7):
-        state = SCRIPTED.task(seed).initial_state
-        objects = {"Open": ("cabinet0",), "Pick": ("hammer0",), "Close": ("cabinet0",)}
-        with SCRIPTED.make_world(state) as world:
-            for operator in (DOMAIN.acquisition.operators[i] for i in (0, 1, 2, 3)):
-                names = objects.get(operator.name, ("hammer0", "cabinet0"))
-                chosen = tuple(map(state.layout.object, names))
-                before = world.state
-                start = carry_out(world, DOMAIN.acquisition.approach(before, chosen))
-                for name, action in CONSTANT.items():
-                    found = achieves(DOMAIN, operator, chosen, start, action)
-                    done[operator.name, name] = done.get((operator.name, name), 0) + found
-                world.reset(before)
-                carry_out(world, DOMAIN.acquisition.scripts[operator.name](before, chosen))
+    """Nor does any other constant motion do what an operator says."""
+    done = constant_motions(DOMAIN, DOMAIN.task(6).initial_state, PLAN)
     assert len(done) == 16
     assert not any(done.values()), done
-
-
-def carry_out(world, policy):
-    while (action := policy(world.state)) is not None:
-        world.step(action)
-    return world.state
 
 
 def test_a_drawer_that_is_pushed_fast_keeps_its_hammer_within_reach_of_the_goal():
@@ -227,7 +202,7 @@ def test_a_drawer_that_is_pushed_fast_keeps_its_hammer_within_reach_of_the_goal(
             world.step(np.array([0.0, 0.0, -0.01, 0.0, -1.0]))
         for _ in range(15):
             world.step(np.array([0.02, 0.0, 0.0, 0.0, -1.0]))
-        assert {"IsCabinetClose(cabinet0)", "InCabinet(hammer0, cabinet0)"} <= atoms(world.state)
+        assert {"IsCabinetClose(cabinet0)", "InCabinet(hammer0, cabinet0)"} <= found_in(world.state)
 
 
 def test_a_hammer_fits_in_a_drawer_with_some_room():

@@ -18,10 +18,10 @@ from slap_ros.domains.benchtop.operators import atom, operator, reward
 from slap_ros.domains.benchtop.predicates import DRAWER_OPEN, is_closed, is_open
 from slap_ros.domains.benchtop.scripts import Move, follow, hold_still, over, release
 from slap_ros.domains.benchtop.state_access import (
-    POSITION,
-    QUATERNION,
+    distances,
     hand_position,
     hand_positions,
+    in_base,
     pose_of,
     position_of,
     positions,
@@ -72,10 +72,7 @@ def _in_drawers(state: State, cabinets: Column, point: Vector) -> Array:
     x, y, z = point
     opening = state.stack(cabinets, "opening")
     local = np.stack([np.full_like(opening, x), opening + y, np.full_like(opening, z)], axis=-1)
-    turns = state.gather(cabinets, QUATERNION)
-    around = 2.0 * np.cross(turns[..., :3], local)
-    turned = local + turns[..., 3:] * around + np.cross(turns[..., :3], around)
-    return state.gather(cabinets, POSITION) + turned
+    return in_base(state, cabinets, local)
 
 
 # -- metrics, all ours ----------------------------------------------------------------------------
@@ -87,21 +84,26 @@ def dis_to_handle(state: State, cabinet: Object) -> float:
 
 
 def _dis_to_handle(state: State, cabinets: Column) -> Array:
-    return _length(_in_drawers(state, cabinets, HANDLE) - hand_positions(state))
+    return distances(_in_drawers(state, cabinets, HANDLE), hand_positions(state))
 
 
 def drawer_dis(state: State, thing: Object, cabinet: Object) -> float:
-    """Seen from above, from the thing to the middle of the drawer, however far that is open."""
+    """Seen from above, from the thing to the middle of the drawer, however far that is open.
+
+    Args:
+        state: A single one.
+        thing: What is put into a drawer.
+        cabinet: The drawer's.
+
+    Returns:
+        m, at least 0.
+    """
     return math.dist(position_of(state, thing)[:2], middle_of(state, cabinet)[:2])
 
 
 def _drawer_dis(state: State, things: Column, cabinets: Column) -> Array:
-    return _length((positions(state, things) - _in_drawers(state, cabinets, MIDDLE))[..., :2])
-
-
-def _length(vectors: Array) -> Array:
-    lengths: Array = np.linalg.norm(vectors, axis=-1)
-    return lengths
+    middles = _in_drawers(state, cabinets, MIDDLE)
+    return distances(positions(state, things)[..., :2], middles[..., :2])
 
 
 DIS_TO_HANDLE = Metric(

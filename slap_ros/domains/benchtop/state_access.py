@@ -148,3 +148,27 @@ def axes(state: State, column: Column) -> Array:
     return np.stack(
         [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)], axis=-1
     )
+
+
+def in_base(state: State, column: Column, points: Array) -> Array:
+    """Where points of objects are in the base's frame, m.
+
+    Args:
+        state: A state or a batch of states.
+        column: The objects.
+        points: In the objects' own frames, m, shape (..., objects, 3).
+
+    Returns:
+        Of the same shape.
+    """
+    turns = state.gather(column, QUATERNION)
+    axis, cosine = turns[..., :3], turns[..., 3:]
+    around = 2.0 * np.cross(axis, points)
+    turned: Array = points + cosine * around + np.cross(axis, around)
+    return positions(state, column) + turned
+
+
+def distances(points: Array, others: Array) -> Array:
+    """How far points are from others, m; coordinates last."""
+    apart: Array = np.linalg.norm(points - others, axis=-1)
+    return apart

@@ -1,0 +1,225 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A pod goes from its drawer into the holder, by the paper's plan; and nothing less does."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from drawer_states import (
+    assert_margins_agree,
+    assert_metrics_agree,
+    atoms,
+    carry_out,
+    changed,
+    constant_motions,
+    put,
+)
+
+from slap_ros.domains import get_domain
+from slap_ros.domains.benchtop import drawers
+from slap_ros.domains.benchtop.cabinet import TRAVEL
+from slap_ros.domains.benchtop.state_access import pose_of
+from slap_ros.domains.make_coffee.scenery import (
+    BOTTOM,
+    HOLDER_RADIUS,
+    LID_HIGH,
+    POD_HALF,
+    POD_RADIUS,
+    SHAPE,
+)
+from slap_ros.errors import InvalidParameterError, InvalidStateError
+from slap_ros.geometry.pose import Pose
+from slap_ros.learning.demonstrator import demonstrate
+from slap_ros.learning.domain_choice import DomainChoice, open_domain
+from slap_ros.relational import State
+
+DOMAIN = get_domain("make_coffee")
+SCRIPTED = open_domain(DomainChoice("make_coffee", skills="demonstrator"))
+PLAN = (
+    ("Open", ("cabinet",)),
+    ("Pick", ("cabinet", "pod")),
+    ("Insert", ("pod", "holder")),
+    ("CloseLid", ("holder",)),
+    ("Close", ("cabinet",)),
+)
+
+
+def inserted(state, aside=0.0, up=0.0):
+    """The state with the pod in the holder, or somewhat off."""
+    frame = pose_of(state, state.layout.object("holder"))
+    return put(state, "pod", frame.compose(Pose((aside, 0.0, BOTTOM + POD_HALF + up))))
+
+
+def in_drawer(state, aside=0.0, up=0.0):
+    """The state with the pod in the drawer."""
+    cabinet = state.layout.object("cabinet")
+    x, y, z = drawers.middle_of(state, cabinet)
+    return put(state, "pod", Pose((x + aside, y, z + POD_HALF + up)))
+
+
+def scattered(initial, count):
+    """A batch in which the pod is about the drawer and about the holder; both more or less open."""
+    rng, rows = np.random.default_rng(4), []
+    for _ in range(count):
+        opening = float(rng.choice([0.0, 0.01, 0.1, rng.uniform(0.0, TRAVEL)]))
+        lid = float(rng.choice([0.0, rng.uniform(0.2, 0.3), rng.uniform(0.0, LID_HIGH)]))
+        state = changed(changed(initial, "cabinet", opening=opening), "holder", opening=lid)
+        where = inserted if rng.random() < 0.5 else in_drawer
+        aside = float(rng.normal(0.0, 0.006 if where is inserted else 0.04))
+        state = where(state, aside, float(rng.choice([0.0, rng.normal(0.0, 0.02)])))
+        rows.append(changed(state, "pod", held=float(rng.random() < 0.3)).data)
+    return State(initial.layout, np.stack(rows))
+
+
+# -- tasks and plans ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("preset", ["fair", "paper"])
+def test_tasks_differ_and_can_be(preset):
+    domain = get_domain("make_coffee", preset)
+    states = [domain.task(seed).initial_state for seed in range(100)]
+    assert len({state.key for state in states}) == 100
+    with domain.make_world(states[0]) as world:
+        for state in states:  # the world refuses what cannot be
+            world.reset(state)
+            rested = world.step(np.zeros(5))
+            for name in ("pod", "cabinet", "holder"):
+                obj = state.layout.object(name)
+                assert rested[obj].tobytes() == state[obj].tobytes()
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_demonstrator_does_what_the_paper_plans(seed):
+    shown = demonstrate(SCRIPTED, SCRIPTED.task(seed))
+    assert shown.episode.success
+    assert tuple((edge.option, edge.objects) for edge in shown.episode.edges) == PLAN
+    found = atoms(DOMAIN, shown.episode.states[-1])
+    assert {"In(pod, holder)", "IsLidClose(holder)", "IsCabinetClose(cabinet)"} <= found
+
+
+def test_the_lid_is_not_closed_before_the_pod_is_in():
+    """Nothing opens it again, so no plan is left."""
+    state = changed(SCRIPTED.task(3).initial_state, "holder", opening=0.0)
+    shown = demonstrate(SCRIPTED, replace(SCRIPTED.task(3), initial_state=state))
+    assert not shown.episode.success
+    assert not shown.episode.edges
+
+
+# -- predicates -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("off", "holds"),
+    [
+        ({}, True),
+        ({"aside": 0.0055}, True),
+        ({"aside": 0.0065}, False),
+        ({"up": 0.0045}, True),
+        ({"up": 0.0055}, False),
+    ],
+)
+def test_how_a_pod_must_stand_in_the_holder(off, holds):
+    found = atoms(DOMAIN, inserted(DOMAIN.task(3).initial_state, **off))
+    assert ("In(pod, holder)" in found) == holds
+    assert ("IsEmpty(holder)" in found) != holds
+
+
+def test_a_pod_is_in_its_drawer_until_it_is_lifted_out():
+    state = changed(DOMAIN.task(4).initial_state, "cabinet", opening=TRAVEL)
+    resting, grasped, lifted = (
+        atoms(DOMAIN, changed(in_drawer(state, up=up), "pod", held=held))
+        for up, held in ((0.0, 0.0), (0.015, 1.0), (0.025, 1.0))
+    )
+    assert {"InCabinet(pod, cabinet)", "HandEmpty()"} <= resting
+    assert {"InCabinet(pod, cabinet)", "Holding(pod)"} <= grasped
+    assert "InCabinet(pod, cabinet)" not in lifted
+    assert "HandEmpty()" not in grasped
+
+
+@pytest.mark.parametrize(
+    ("degrees", "names"), [(14, {"IsLidClose"}), (16, set()), (59, set()), (61, {"IsLidOpen"})]
+)
+def test_a_lid_is_open_closed_or_neither(degrees, names):
+    state = changed(DOMAIN.task(5).initial_state, "holder", opening=math.radians(degrees))
+    assert {name[:-8] for name in atoms(DOMAIN, state) if "Lid" in name} == names
+
+
+def test_truth_and_margin_agree():
+    assert_margins_agree(DOMAIN, scattered(DOMAIN.task(6).initial_state, 2_000))
+
+
+def test_metrics_are_defined_alike_for_one_and_for_many():
+    assert_metrics_agree(DOMAIN, scattered(DOMAIN.task(7).initial_state, 20))
+
+
+# -- skills ---------------------------------------------------------------------------------------
+
+
+def test_constant_motions_do_not_make_coffee():
+    """A pod that is let fall hardly ever falls into the holder."""
+    done = constant_motions(DOMAIN, DOMAIN.task(8).initial_state, PLAN)
+    assert len(done) == 20
+    assert not any(done.values()), done
+
+
+def test_a_lid_stays_where_it_is_left():
+    state = DOMAIN.task(11).initial_state
+    with DOMAIN.make_world(state) as world:
+        for opening in (0.3, 0.8, 1.5, 2.0):
+            world.reset(changed(state, "holder", opening=opening))
+            for _ in range(20):
+                world.step(np.zeros(5))
+            left = float(world.state.get(state.layout.object("holder"), "opening"))
+            assert left == pytest.approx(opening, abs=0.01)
+
+
+def test_a_pod_fits_with_some_room():
+    assert pytest.approx(0.004) == HOLDER_RADIUS - POD_RADIUS
+    assert SHAPE.headroom > 2.0 * POD_HALF
+
+
+def test_an_approach_ends_behind_the_lid():
+    state = DOMAIN.task(12).initial_state
+    holder = state.layout.object("holder")
+    with DOMAIN.make_world(state) as world:
+        after = carry_out(world, DOMAIN.acquisition.approach(state, (holder,)))
+        behind, _, over = (
+            pose_of(after, holder)
+            .inverse()
+            .apply(pose_of(after, after.layout.of_type(DOMAIN.types[0])[0]).position)
+        )
+        assert after[holder].tobytes() == state[holder].tobytes()  # it was not touched
+        assert behind > 0.12
+        assert 0.1 < over < 0.2
+
+
+# -- what cannot be -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("preset", "message"),
+    [
+        ("fair:lid=nan", "'lid' is"),
+        ("fair:lid=0.2", "'lid' is .* it must be from 1.6 to 2"),
+        ("paper:pod_aside=1", "'pod_aside' is .* it must be from -0.03 to 0.03"),
+        ("paper:pods=2", "unknown setting 'pods'"),
+    ],
+)
+def test_settings_that_cannot_be(preset, message):
+    with pytest.raises(InvalidParameterError, match=message):
+        get_domain("make_coffee", preset)
+
+
+def test_states_that_cannot_be_leave_the_world_usable():
+    state = DOMAIN.task(13).initial_state
+    with DOMAIN.make_world(state) as world:
+        with pytest.raises(InvalidStateError, match="opening of holder is 3"):
+            world.reset(changed(state, "holder", opening=3.0))
+        with pytest.raises(InvalidStateError, match="inside one another"):
+            world.reset(changed(state, "pod", z=-0.02))
+        world.reset(state)
+        assert world.state == state
