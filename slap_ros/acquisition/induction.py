@@ -7,10 +7,15 @@ does not. A demonstration is cut where atoms change and stay so; cuts whose chan
 objects are one operator; its parameters are the objects of the changes, and its preconditions what
 held of them (and of no object) before *every* such cut. So it asks for too much rather than for too
 little, and further demonstrations can only drop preconditions.
+
+Where atoms are only lost, as those of a closed drawer that is being opened, nothing is cut: with
+preconditions and goals that are atoms, an operator that adds nothing is in no shortest plan. It is
+a passage to the next change, however long it takes.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise, permutations
@@ -31,6 +36,7 @@ from slap_ros.relational import (
 from slap_ros.relational.metrics import variable_names
 
 HOLD_STEPS = 3  # environment steps that atoms must stay as they are for a change to count
+HOLD_S = 0.3  # for which they must as well: steps of some domains are short
 MAX_OBJECTS = 6  # of one change; more are compared in too many orders
 
 Trace = Sequence[frozenset[GroundAtom]]  # the atoms that hold, step by step
@@ -88,6 +94,11 @@ class InducedProposer:
         )
 
 
+def hold_steps_of(control_period_s: float) -> int:
+    """Environment steps that atoms must stay as they are, in a domain of that control period."""
+    return max(HOLD_STEPS, math.ceil(HOLD_S / control_period_s))
+
+
 def induce_operators(
     demonstrations: Sequence[Trace], hold_steps: int = HOLD_STEPS
 ) -> list[InducedOperator]:
@@ -105,7 +116,7 @@ def induce_operators(
     """
     clusters: list[_Cluster] = []
     for trace in demonstrations:
-        for before, after in pairwise(stable_states(trace, hold_steps)):
+        for before, after in pairwise(_without_passages(stable_states(trace, hold_steps))):
             change = _Change.of(before, after)
             if len(change.objects) > MAX_OBJECTS:
                 continue  # everything at once is no skill
@@ -139,6 +150,15 @@ def stable_states(trace: Trace, hold_steps: int = HOLD_STEPS) -> list[frozenset[
         if (steps >= hold_steps or i in (0, len(runs) - 1)) and lasting[-1:] != [atoms]:
             lasting.append(atoms)
     return lasting
+
+
+def _without_passages(states: Sequence[frozenset[GroundAtom]]) -> list[frozenset[GroundAtom]]:
+    """The states but those in which atoms are only lost, the last state excepted."""
+    kept = list(states[:1])
+    for i, atoms in enumerate(states[1:], start=1):
+        if not atoms <= kept[-1] or (i == len(states) - 1 and atoms != kept[-1]):
+            kept.append(atoms)
+    return kept
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from slap_ros.acquisition.attempt_log import AttemptLog, Entry
-from slap_ros.acquisition.induction import InducedProposer
+from slap_ros.acquisition.induction import HOLD_STEPS, InducedProposer, hold_steps_of
 from slap_ros.acquisition.inquiry import Inquiry
 from slap_ros.acquisition.language_proposer import LanguageProposer, LanguageRewarder
 from slap_ros.acquisition.operator_file import read_operators
@@ -184,6 +184,7 @@ class _Posed:
     problem: AcquisitionProblem
     operators: Sequence[LiftedOperator]
     rewards: Mapping[str, RewardTemplate] = field(default_factory=dict)
+    hold_steps: int = HOLD_STEPS  # that atoms must stay for a change to count
 
 
 def _pose(options: ProposeOptions) -> _Posed:
@@ -198,9 +199,11 @@ def _pose(options: ProposeOptions) -> _Posed:
     posed = task_with_goal(domain, options.seed, options.index, options.goal)
     problem = AcquisitionProblem.of_task(domain, posed)
     problem = replace(problem, shown=tuple(_shown(options, domain)))
+    hold_steps = hold_steps_of(domain.execution.control_period_s)
     if (by_hand := domain.acquisition) is None:
-        return _Posed(problem, domain.operators)
-    return _Posed(problem, domain.operators or by_hand.operators, by_hand.rewards)
+        return _Posed(problem, domain.operators, hold_steps=hold_steps)
+    operators = domain.operators or by_hand.operators
+    return _Posed(problem, operators, by_hand.rewards, hold_steps)
 
 
 def _shown(options: ProposeOptions, domain: Domain) -> list[AtomTrace]:
@@ -240,7 +243,8 @@ def _proposer(options: ProposeOptions, posed: _Posed, inquiry: Inquiry | None) -
     if options.proposer == "induced":
         bags = ", ".join(path.name for path in options.bags)
         source = bags or "the domain's demonstrator"
-        return InducedProposer(f"demonstrations: {len(posed.problem.shown)}, from {source}")
+        shown = f"demonstrations: {len(posed.problem.shown)}, from {source}"
+        return InducedProposer(shown, posed.hold_steps)
     if inquiry is not None and options.proposer == "language":
         return LanguageProposer(inquiry)
     return ManualProposer(posed.operators)

@@ -10,16 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from itertools import permutations
 from typing import TYPE_CHECKING, Any
 
-from slap_ros.acquisition.induction import InducedOperator, induce_operators
+from slap_ros.acquisition.induction import InducedOperator, hold_steps_of, induce_operators
 from slap_ros.core import Domain, Task
 from slap_ros.drawing.palette import MUTED
 from slap_ros.errors import InvalidParameterError, PlanningLimitError, UnsolvableError
 from slap_ros.learning.demonstrator import AtomTrace, record_traces
 from slap_ros.learning.domain_choice import DomainChoice, open_domain
 from slap_ros.planning.astar import find_shortest_sequence
-from slap_ros.relational import LiftedOperator, ground_operators
+from slap_ros.relational import LiftedAtom, LiftedOperator, Variable, ground_operators
 from slap_ros.studies.comparison import StudyProgress
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.results import MarkdownTable, StudyReport
@@ -30,11 +31,13 @@ if TYPE_CHECKING:
 MEASURED = """\
 Demonstrations are recorded by the domain's demonstrator, on tasks of the training goal ({training})
 that neither this page nor training uses elsewhere. Operators are induced from the atoms that hold
-in each step, and from nothing else: no name, no objects and no end of a script is shown. With them
+in each step, and from nothing else: no name, no objects and no end of a script is shown. A change
+counts where atoms stay for {hold_steps} environment steps, and where some are added. With the
+operators
 A* plans for {tasks} fresh tasks of each goal. A task counts where the plan has as few operators as
 the shortest plan with the hand-written operators, which is of the paper's length; "longest" and
-"no plan" tell of the others. Preconditions are too many that more demonstrations have dropped: a
-row is compared with the last one."""
+"no plan" tell of the others. Preconditions are too many that the hand-written operator with the
+same effects does not have."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,7 @@ class Induction:
     Args:
         demonstrations: How many.
         operators: As text, with preconditions and effects.
-        too_many: Preconditions that more demonstrations have dropped, by operator.
+        too_many: Preconditions that hand-written operators with the same effects lack, by operator.
         goals: What they are worth, by goal.
     """
 
@@ -143,10 +146,9 @@ def study(
         for goal in domain.goals or ("",)
     }
     shortest = {goal: tuple(_lengths(domain.operators, domain, own)) for goal, own in posed.items()}
-    most = {one.operator.name: one for one in induce_operators(traces)}
     found = []
     for count in sorted(set(counts)):
-        found.append(_induced(domain, traces[:count], most, posed, shortest))
+        found.append(_induced(domain, traces[:count], posed, shortest))
         progress.advance()
     return _report(choice, found, tasks, training)
 
@@ -154,7 +156,6 @@ def study(
 def _induced(
     domain: Domain,
     traces: Sequence[AtomTrace],
-    most: dict[str, InducedOperator],
     posed: dict[str, list[Task]],
     shortest: dict[str, tuple[int | None, ...]],
 ) -> Induction:
@@ -163,23 +164,43 @@ def _induced(
     Args:
         domain: For its atoms.
         traces: The demonstrations.
-        most: Operators from all demonstrations, by name.
         posed: Tasks, by goal.
         shortest: Lengths of plans with hand-written operators, by goal.
     """
-    induced = induce_operators(traces)
+    induced = induce_operators(traces, hold_steps_of(domain.execution.control_period_s))
     operators = tuple(one.operator for one in induced)
     goals = tuple(
         GoalPlans(goal, tuple(_lengths(operators, domain, tasks)), _known(shortest[goal]))
         for goal, tasks in posed.items()
     )
-    too_many = {}
-    for one in induced:
-        # The same demonstrations come first, so that the same operators have the same names.
-        rest = one.operator.preconditions - most[one.operator.name].operator.preconditions
-        if rest:
-            too_many[one.operator.name] = tuple(sorted(map(str, rest)))
+    too_many = {
+        operator.name: tuple(sorted(map(str, rest)))
+        for operator in operators
+        if (rest := _too_many(operator, domain.operators))
+    }
     return Induction(len(traces), tuple(map(_operator_data, induced)), too_many, goals)
+
+
+def _too_many(operator: LiftedOperator, by_hand: Sequence[LiftedOperator]) -> frozenset[LiftedAtom]:
+    """Preconditions that a hand-written operator with the same effects does not have."""
+    for other in by_hand:
+        for order in permutations(operator.parameters, len(other.parameters)):
+            names = dict(zip(other.parameters, order, strict=True))
+
+            def renamed(
+                atoms: frozenset[LiftedAtom], names: dict[Variable, Variable] = names
+            ) -> frozenset[LiftedAtom]:
+                return frozenset(
+                    LiftedAtom(atom.predicate, tuple(names[v] for v in atom.variables))
+                    for atom in atoms
+                )
+
+            if (renamed(other.add_effects), renamed(other.delete_effects)) == (
+                operator.add_effects,
+                operator.delete_effects,
+            ):
+                return operator.preconditions - renamed(other.preconditions)
+    return frozenset()
 
 
 def _known(lengths: Sequence[int | None]) -> tuple[int, ...]:
@@ -226,12 +247,15 @@ def _operator_data(induced: InducedOperator) -> dict[str, Any]:
 def _report(
     choice: DomainChoice, found: Sequence[Induction], tasks: int, training: str | None
 ) -> StudyReport:
+    hold_steps = hold_steps_of(open_domain(choice).execution.control_period_s)
     goals = [goal.goal or "(the task's own)" for goal in found[0].goals]
     return StudyReport(
         study="induction",
         source="",
         title=f"Operators from demonstrations: {choice.name}",
-        measured=MEASURED.format(training=training or "the tasks' own", tasks=tasks),
+        measured=MEASURED.format(
+            training=training or "the tasks' own", tasks=tasks, hold_steps=hold_steps
+        ),
         table=MarkdownTable(
             ["demonstrations", "operators", *goals, "preconditions too many"],
             [one.as_row() for one in found],

@@ -11,7 +11,12 @@ from random import Random
 import pytest
 from paper_problems import ALL, Printed, peg_in_hole, stow_hammer
 
-from slap_ros.acquisition.induction import InducedProposer, induce_operators, stable_states
+from slap_ros.acquisition.induction import (
+    InducedProposer,
+    hold_steps_of,
+    induce_operators,
+    stable_states,
+)
 from slap_ros.acquisition.problem import AcquisitionProblem
 from slap_ros.acquisition.verification import verify
 from slap_ros.core import Task
@@ -112,6 +117,27 @@ def short_show() -> tuple[tuple[frozenset[GroundAtom], ...], ...]:
     plan = verify(PEGS.operators, problem).plan
     assert plan is not None
     return (tuple(acted(problem, plan[:3], Random(0))),)
+
+
+def test_what_is_only_lost_for_a_while_is_a_passage_however_long() -> None:
+    """A drawer on its way is neither closed nor open, for many steps."""
+    stow = stow_hammer()
+    plan = verify(stow.operators, stow.problem).plan
+    assert plan is not None
+    state = stow.problem.start_mask
+    trace = [atoms(stow.problem, state)] * 9
+    for step in plan:
+        trace += [atoms(stow.problem, state & ~step.delete_effects)] * 9
+        state = step.apply(state)
+        trace += [atoms(stow.problem, state)] * 9
+    assert meaning([one.operator for one in induce_operators([trace])]) == meaning(stow.operators)
+    (begun,) = induce_operators([[stow.problem.init] * 9 + [trace[9]] * 9])  # it ends on its way
+    assert begun.operator.name.startswith("End")
+
+
+@pytest.mark.parametrize(("period_s", "steps"), [(0.05, 6), (0.1, 3), (0.125, 3), (1.0, 3)])
+def test_atoms_have_to_last_in_time_and_in_steps(period_s: float, steps: int) -> None:
+    assert hold_steps_of(period_s) == steps
 
 
 def test_flicker_is_no_change() -> None:
