@@ -17,6 +17,7 @@ from slap_ros.domains.peg_in_hole import demonstrator, model
 from slap_ros.domains.peg_in_hole.scenery import scene
 from slap_ros.domains.peg_in_hole.tasks import GOALS, MM, PegTasks
 from slap_ros.domains.variation import varied
+from slap_ros.physics.viewpoint import Viewpoint
 
 SETTINGS = {
     "fair": PegTasks(),
@@ -29,6 +30,7 @@ SETTINGS = {
         height=(0.14, 0.14),
     ),
 }
+VIEW = Viewpoint(eye=(1.2, -0.6, 0.5), target=(0.52, 0.0, 0.12))  # onto the plates' far sides
 ACQUISITION = Acquisition(
     approach=demonstrator.APPROACH,
     operators=model.OPERATORS,
@@ -52,5 +54,6 @@ def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Doma
         scene_of=lambda _: bodies,
         metrics=model.METRICS,
         static=model.STATIC,
+        view=VIEW,
     )
     return benchtop_domain("peg_in_hole", preset, of_clearance, settings)

@@ -73,11 +73,11 @@ REWARDS = {
     PICK.name: reward(
         PICK, (DIS_TO_OBJ, 0.4, (_PEG,)), (XY_DIS, 0.2, (_PEG,)), (Z_DIS, 0.2, (_PEG,))
     ),
-    # The paper's parallel_dis and perpendicular_dis of a hole are along its axis and across.
+    # The paper's names are parallel_dis, perpendicular_dis and orientation_diff.
     INSERT.name: reward(
         INSERT,
-        (AXIAL_DIS, 0.2, (_PEG, _HOLE)),
         (RADIAL_DIS, 0.2, (_PEG, _HOLE)),
+        (AXIAL_DIS, 0.2, (_PEG, _HOLE)),
         (NORM_ANGLE, 0.35, (_PEG, _HOLE)),
     ),
 }
