@@ -35,6 +35,7 @@ OURS = {
     "stow_hammer": "slap_ros.domains.stow_hammer",
     "make_coffee": "slap_ros.domains.make_coffee",
     "peg_in_hole": "slap_ros.domains.peg_in_hole",
+    "bowls": "slap_ros.domains.bowls",
 }
 CACHED = 64  # domains that are made once
 
