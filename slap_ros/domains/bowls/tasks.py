@@ -55,13 +55,13 @@ MIDDLE = (0.56, 0.0)  # of the table, as far as the arm reaches
 FROM_PLATE = (0.28, 0.34)  # to the ramekin, so that there is room between them
 BESIDE = (0.02, 0.04)  # between a bowl and what it is next to
 ASIDE = 0.01  # of a bowl, at most, along x and y
-PLATE_PLACE = (0.52, 0.0)  # in the preset paper, as are the next
+PLATE_PLACE = (0.61, -0.15)  # in the preset paper, as are the next
 PLACES: Mapping[str, tuple[float, float]] = {
-    "ramekin": (0.52, 0.3),
-    "cookies": (0.52, -0.2),
-    "tray": (0.7, 0.2),
-    "stove": (0.5, -0.4),
-    "cabinet": (0.7, -0.3),
+    "ramekin": (0.4, -0.39),
+    "cookies": (0.66, 0.26),
+    "tray": (0.42, 0.2),
+    "stove": (0.48, 0.38),
+    "cabinet": (0.42, -0.03),
 }
 
 NUMBERS: dict[str, Range] = {"bowls": (1, 3), "task": (ANY, len(SPOTS) - 1)}
