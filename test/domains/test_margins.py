@@ -5,6 +5,7 @@
 import numpy as np
 import pytest
 from random_states import one_by_one, random_states
+from scattered_states import BENCHTOP, scattered
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.obstacle2d.model import RESTING_TOLERANCE
@@ -66,6 +67,27 @@ def test_a_margin_is_positive_exactly_where_its_atom_holds(name):
             columns = [Column((obj,)) for obj in atom.objects]
             positive = atom.predicate.margin(batch, *columns)[..., 0] >= 0.0
             assert (positive == truth[:, i]).all()
+
+
+@pytest.mark.parametrize("name", BENCHTOP)
+def test_a_margin_at_a_bench_is_positive_exactly_where_its_atom_holds(name):
+    """Every fluent predicate has one, and is seen to hold and not to hold."""
+    domain, batch = get_domain(name), scattered(name)
+    space = domain.atom_space(domain.task(0).initial_state)
+    truth = space.truth(batch)
+    held, missed = set(), set()
+    for i, atom in enumerate(space.atoms):
+        if atom.predicate in domain.static_predicates:
+            continue
+        assert atom.predicate.margin is not None
+        columns = [Column((obj,)) for obj in atom.objects]
+        margins = atom.predicate.margin(batch, *columns)[..., 0]
+        assert np.isfinite(margins).all()
+        assert ((margins >= 0.0) == truth[:, i]).all()
+        held |= {atom.predicate.name} if truth[:, i].any() else set()
+        missed |= {atom.predicate.name} if not truth[:, i].all() else set()
+    fluent = {p.name for p in domain.predicates} - {p.name for p in domain.static_predicates}
+    assert held == missed == fluent
 
 
 def sliding(yaw, gap):

@@ -23,6 +23,7 @@ from slap_ros.relational.state import Array
 LIFTED = 0.02  # m over the table, from which on a thing that is grasped is held
 LYING = 0.01  # m over the table, up to which a thing lies on it
 STACKED = 0.01  # m between the middles of two things, up to which one is on the other
+BESIDE = 0.03  # m between the middles of two things, from which on one can be beside the other
 TOUCHING = 0.005  # m between an underside and what it stands on
 DRAWER_OPEN = 0.1  # m, at least
 DRAWER_CLOSED = 0.01  # m, at most
@@ -105,11 +106,21 @@ def hand_empty(held: Predicate) -> Predicate:
     return _described("HandEmpty", (), margin, "nothing is held")
 
 
+def over(thing: Type, place: Type) -> Predicate:
+    """The relation of a thing that is on a place or just above it, in the hand or not.
+
+    So what is taken away from a place leaves it clear only when it is lifted.
+    """
+    conditions = [at_most(PARALLEL_DIS, BESIDE), within(PERPENDICULAR_DIS, -TOUCHING, LIFTED)]
+    return Predicate.of("Over", (thing, place), conditions)
+
+
 def is_clear(occupied: Predicate, name: str = "IsClear") -> Predicate:
     """The predicate that nothing is on a place, or in it.
 
     Args:
-        occupied: On or In, of a thing and a place. Of a thing and itself it must be false.
+        occupied: What makes it not so, of a thing and a place: In, or :func:`over`. Of a thing
+            and itself it must be false.
         name: The predicate's.
     """
     thing, place = occupied.types
@@ -120,7 +131,7 @@ def is_clear(occupied: Predicate, name: str = "IsClear") -> Predicate:
         per_thing = margins.reshape(*margins.shape[:-1], -1, len(places.objects))
         return strictly(-per_thing.max(axis=-2))
 
-    return _described(name, (place,), margin, f"no {thing} is {occupied} it")
+    return _described(name, (place,), margin, f"there is no {thing} with {occupied.text}")
 
 
 @lru_cache(maxsize=256)

@@ -28,7 +28,7 @@ HOLDING = predicates.holding(CUBE)
 HAND_EMPTY = predicates.hand_empty(HOLDING)
 ON_TABLE = predicates.on_table(CUBE)
 ON = predicates.on(CUBE, PLACE)  # of a target, the paper's OnTarget
-IS_CLEAR = predicates.is_clear(ON)
+IS_CLEAR = predicates.is_clear(predicates.over(CUBE, PLACE))
 PREDICATES = (HAND_EMPTY, HOLDING, ON_TABLE, ON, IS_CLEAR)
 
 GOALS = {

@@ -1,0 +1,81 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Metrics and predicates of domains at a bench, in states in which everything is anywhere."""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import pytest
+from scattered_states import BENCHTOP, STATES, metrics_of, scattered
+
+from slap_ros.domains import get_domain
+from slap_ros.relational import Column, State
+
+ONE_BY_ONE = 60  # states, in which every metric and predicate is spelled out
+EXACT = 1e-9
+BARELY = 1e-6  # rad: the angle between axes that are nearly parallel is not known better
+
+
+def objects_of(layout, types):
+    """Every choice of different objects for types."""
+    return [
+        chosen
+        for chosen in permutations(layout.objects, len(types))
+        if all(obj.type.is_a(kind) for obj, kind in zip(chosen, types, strict=True))
+    ]
+
+
+@pytest.mark.parametrize("name", BENCHTOP)
+def test_conditions_hold_as_the_readable_definitions_of_metrics_say(name):
+    domain, batch = get_domain(name), scattered(name)
+    space = domain.atom_space(domain.task(0).initial_state)
+    truth = space.truth(batch)
+    for row in range(ONE_BY_ONE):
+        state = State(batch.layout, batch.data[row])
+        for i, atom in enumerate(space.atoms):
+            conditions = atom.predicate.conditions
+            values = [
+                c.metric.scalar(state, *(atom.objects[k] for k in c.arguments)) for c in conditions
+            ]
+            holds = all(
+                c.lower <= value <= c.upper for c, value in zip(conditions, values, strict=True)
+            )
+            assert not conditions or holds == truth[row, i], (str(atom), values)
+
+
+@pytest.mark.parametrize("name", BENCHTOP)
+def test_both_definitions_of_a_metric_agree(name):
+    domain, batch = get_domain(name), scattered(name)
+    for metric in metrics_of(domain):
+        chosen = objects_of(batch.layout, metric.types)
+        columns = [Column(objects) for objects in zip(*chosen, strict=True)]
+        values = metric.value(batch, *columns)
+        normalised = metric.normalised(batch, *columns)
+        assert values.shape == (STATES, len(chosen))
+        assert ((normalised >= 0.0) & (normalised <= 1.0)).all()
+        for row in range(ONE_BY_ONE):
+            state = State(batch.layout, batch.data[row])
+            spelled_out = [metric.scalar(state, *objects) for objects in chosen]
+            tolerance = BARELY if metric.unit == "rad" else EXACT
+            assert values[row] == pytest.approx(spelled_out, abs=tolerance), metric.name
+
+
+@pytest.mark.parametrize("name", BENCHTOP)
+def test_what_prompts_quote_is_there(name):
+    for metric in metrics_of(get_domain(name)):
+        assert metric.definition.startswith(f"def {metric.scalar.__name__}(state: State")
+        assert metric.description.endswith(".")
+
+
+@pytest.mark.parametrize("name", BENCHTOP)
+def test_nothing_is_held_and_on_the_table(name):
+    domain, batch = get_domain(name), scattered(name)
+    space = domain.atom_space(domain.task(0).initial_state)
+    truth = space.truth(batch)
+    of = {str(atom): i for i, atom in enumerate(space.atoms)}
+    pairs = [(of[f"Holding{a}"], i) for n, i in of.items() if (a := n.removeprefix("OnTable")) != n]
+    assert pairs
+    assert not any((truth[:, held] & truth[:, lying]).any() for held, lying in pairs)
+    held = [i for n, i in of.items() if n.startswith("Holding")]
+    assert (truth[:, of["HandEmpty()"]] != truth[:, held].any(axis=1)).all()
