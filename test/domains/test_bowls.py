@@ -131,7 +131,7 @@ def test_surfaces_count_as_the_table_and_the_plate_does_not():
 
     def above(name, height):
         x, y, z = position_of(state, state.layout.object(name))
-        return x + 0.007, y, z + REST_HEIGHT + height
+        return x + 0.006, y, z + REST_HEIGHT + height
 
     for name in FURNITURE:
         assert atoms(above(name, 0.0)) == {f"OnTable({bowl})", "HandEmpty()", "IsClear(plate)"}
