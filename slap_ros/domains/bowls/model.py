@@ -130,7 +130,7 @@ ON_TABLE = Predicate.of(
 # Nearer to the middle than cubes have to be: with 10 mm, random motions put a bowl on the plate in
 # more than a tenth of all trials.
 ON = predicates.on(BOWL, PLATE, radius=0.007)
-IS_CLEAR = predicates.is_clear(ON)
+IS_CLEAR = predicates.is_clear(predicates.over(BOWL, PLATE))
 PREDICATES = (HAND_EMPTY, HOLDING, ON_TABLE, ON, IS_CLEAR)
 
 # Where a bowl can be at first, by the number in its name and that of the goal.

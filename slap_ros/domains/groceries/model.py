@@ -14,7 +14,7 @@ from slap_ros.domains.benchtop.metrics import (
     Z_DIS,
 )
 from slap_ros.domains.benchtop.operators import atom, operator, reward
-from slap_ros.domains.benchtop.predicates import hand_empty, holding, is_clear, on, on_table
+from slap_ros.domains.benchtop.predicates import hand_empty, holding, is_clear, on, on_table, over
 from slap_ros.relational import Feature, Type, Variable
 
 HALF_WIDTH = Feature("half_width", "m")  # half of what is between the fingers
@@ -29,7 +29,7 @@ HAND_EMPTY = hand_empty(HOLDING)
 ON_TABLE = on_table(GROCERY)
 # In the middle of the basket, where it was put: what is dropped into it lies anywhere.
 IN = on(GROCERY, BASKET, "In")
-IS_EMPTY = is_clear(IN, "IsEmpty")
+IS_EMPTY = is_clear(over(GROCERY, BASKET), "IsEmpty")
 PREDICATES = (HAND_EMPTY, HOLDING, ON_TABLE, IN, IS_EMPTY)
 
 # The order is that of the goals task0, task1, ...
