@@ -68,7 +68,16 @@ def at_pod(state: State, pod: Object) -> HandGoal:
 
 
 def at_lid(state: State, holder: Object, away: float = 0.0) -> HandGoal:
-    """Where fingers touch the back of an open lid, or so far behind."""
+    """Where fingers touch the back of an open lid, or a place behind it.
+
+    Args:
+        state: As things are.
+        holder: Whose lid.
+        away: So far behind, along the holder's x.
+
+    Returns:
+        A goal for the hand.
+    """
     lid = lid_pose(pose_of(state, holder), value(state, holder, "opening"))
     x, y, z = lid.apply(BACK)
     ahead, aside, _ = axis_of(state, holder)

@@ -49,14 +49,14 @@ RED: Colour = (0.75, 0.2, 0.2, 1.0)
 
 
 def pod(name: str) -> Compound:
-    """A pod."""
+    """A pod: a cylinder that stands upright."""
     return cylinder(
         name, POD_RADIUS, 2.0 * POD_HALF, mass_kg=POD_MASS, friction=POD_FRICTION, colour=BROWN
     )
 
 
 def holder(name: str) -> JointedBody:
-    """A holder under a lid."""
+    """A holder for one pod, under a lid that turns."""
     half = 0.5 * LID_LENGTH
     joint = Joint(
         JointKind.TURN,
