@@ -38,6 +38,8 @@ from slap_ros.contact.hand import hand_at, wrapped
 from slap_ros.contact.scene import TABLE, BoxPart, Compound, ContactScene, CylinderPart
 from slap_ros.contact.world import ACTION_SPACE, MAX_SHIFT, MAX_TURN, ContactWorld
 from slap_ros.domains.groceries.scenery import GROCERIES
+from slap_ros.domains.make_coffee.scenery import POD_HALF, pod
+from slap_ros.domains.stow_hammer.scenery import RADIUS, hammer
 from slap_ros.geometry.pose import (
     NO_ROTATION,
     ORIGIN,
@@ -49,6 +51,7 @@ from slap_ros.geometry.pose import (
     rotate,
 )
 from slap_ros.physics.features import body_features
+from slap_ros.physics.scene import GREY
 from slap_ros.relational import State
 
 SHAKEN = 100  # steps
@@ -94,10 +97,14 @@ GRASPABLE = {
     "hammer": Graspable(HAMMER, 0.012, grip=(-0.03, 0.0, 0.0)),
 }
 OF_DOMAINS = {
-    name: Graspable(thing.body, thing.rest_height, grip=(0.0, 0.0, thing.grasp_height))
-    for name, thing in GROCERIES.items()
+    "stow_hammer": {"balanced hammer": Graspable(hammer("balanced hammer", GREY), RADIUS)},
+    "make_coffee": {"pod": Graspable(pod("pod"), POD_HALF)},
+    "groceries": {
+        name: Graspable(thing.body, thing.rest_height, grip=(0.0, 0.0, thing.grasp_height))
+        for name, thing in GROCERIES.items()
+    },
 }
-EVERYTHING = GRASPABLE | OF_DOMAINS
+EVERYTHING = GRASPABLE | {n: thing for things in OF_DOMAINS.values() for n, thing in things.items()}
 
 
 def grasped_world(name: str, seed: int) -> ContactWorld:
@@ -306,7 +313,11 @@ def main() -> None:
         "drawer": lambda: drawers(count),
         "lid": lambda: lids(count),
         **{f"insert {c} mm": lambda c=c: insertions(c, count) for c in CLEARANCES_MM},
-        **{f"groceries: grasp {n}": lambda n=n: grasps(n, count) for n in OF_DOMAINS},
+        **{
+            f"{domain}: grasp {n}": lambda n=n: grasps(n, count)
+            for domain, things in OF_DOMAINS.items()
+            for n in things
+        },
     }
     rows = {name: measure for name, measure in table.items() if arguments.only in name}
     show({name: measure() for name, measure in rows.items()}, arguments.json)

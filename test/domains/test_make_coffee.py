@@ -205,7 +205,7 @@ def test_an_approach_ends_behind_the_lid():
     [
         ("fair:lid=nan", "'lid' is"),
         ("fair:lid=0.2", "'lid' is .* it must be from 1.6 to 2"),
-        ("paper:pod_aside=1", "'pod_aside' is .* it must be from -0.03 to 0.03"),
+        ("paper:pod_aside=1", "'pod_aside' is .* it must be from -0.025 to 0.025"),
         ("paper:pods=2", "unknown setting 'pods'"),
     ],
 )

@@ -33,6 +33,7 @@ HANDLE_HEIGHT = FLOOR + 0.5 * RIM - BOARD
 # What lies in a drawer must go with it. With 0.6 kg and friction 1, a hammer slid by 22 mm while
 # its drawer was pushed shut.
 DRAWER_MASS = 1.5  # kg
+STAYS = 10.0  # N, of dry friction: a drawer that is just open stays so when it is brushed against
 FRICTION = 2.0  # 1
 
 # In the cabinet's frame, while the drawer is closed.
@@ -61,7 +62,7 @@ class CabinetShape:
             name: Of its object.
             colour: Of its drawer.
         """
-        joint = Joint(JointKind.SLIDE, (0.0, 1.0, 0.0), TRAVEL, damping=5.0, dry_friction=2.0)
+        joint = Joint(JointKind.SLIDE, (0.0, 1.0, 0.0), TRAVEL, damping=5.0, dry_friction=STAYS)
         return JointedBody(
             name,
             self._frame(),

@@ -50,7 +50,7 @@ from slap_ros.relational.state import Array
 
 TYPES = (PLACE, THING, DRAWER, LID, POD, CABINET, HOLDER)
 INSERTED = 0.006  # between the axes of pod and holder, whose walls leave 4 mm to each side
-INSIDE = 0.05  # from the middle of the drawer, whose walls leave a pod less
+INSIDE = 0.07  # from the middle of the drawer, whose walls leave a pod less
 LIFTED_OUT = 0.02  # over the drawer's floor
 LID_OPEN, LID_CLOSED = math.radians(60.0), math.radians(15.0)
 

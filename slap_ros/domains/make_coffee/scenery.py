@@ -41,8 +41,9 @@ LID_HIGH = 2.1  # rad
 LID_MASS, HOLDER_FRICTION = 0.05, 0.5  # kg, 1
 STAYS = 0.05  # N m, of the hinge's dry friction: the lid stays where it is left
 
-# A pod stands upright in the front part of the drawer, and the roof is high enough for it.
-SHAPE = CabinetShape(half_width=0.06, headroom=2.0 * POD_HALF + 0.004, compartment=0.115)
+# A pod stands upright in the front part of the drawer, under a roof that is high enough for it.
+# Open fingers reach 54 mm to either side of it, and must come down between the walls.
+SHAPE = CabinetShape(half_width=0.085, headroom=2.0 * POD_HALF + 0.004, compartment=0.115)
 BROWN: Colour = (0.45, 0.3, 0.2, 1.0)
 WHITE: Colour = (0.92, 0.92, 0.9, 1.0)
 RED: Colour = (0.75, 0.2, 0.2, 1.0)

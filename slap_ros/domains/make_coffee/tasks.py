@@ -48,7 +48,7 @@ class CoffeeTasks(TaskSettings):
         "front_x": (0.45, 0.55),
         "front_y": (0.3, 0.4),
         "front_turn": (-0.3, 0.3),
-        "pod_aside": (-0.03, 0.03),
+        "pod_aside": (-0.025, 0.025),
         "pod_deep": (-0.02, 0.02),
         "holder_x": (0.47, 0.55),
         "holder_y": (-0.25, -0.1),
