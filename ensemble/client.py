@@ -18,6 +18,7 @@ from ensemble.interfaces import (
     CLOSE_BAG,
     DOMAIN,
     EXECUTE_SKILL,
+    JOINT_STATES,
     PLAN,
     PLAN_EVENTS,
     SKILL_EVENTS,
@@ -26,6 +27,7 @@ from ensemble.interfaces import (
     TASK,
     Topic,
 )
+from ensemble.offered_qos import subscribe_as_offered
 from slap_ros.evaluation.metrics import RunLog
 from slap_ros.relational import GroundAtom
 
@@ -75,7 +77,10 @@ class RunClient(Node):
             self.log.add(topic.type_name, message)
             self._on_message(topic.type_name, message)
 
-        self.create_subscription(topic.type, topic.name, callback, topic.qos)
+        if topic is JOINT_STATES:
+            subscribe_as_offered(self, topic, callback)
+        else:
+            self.create_subscription(topic.type, topic.name, callback, topic.qos)
 
     def other_nodes(self) -> list[str]:
         """Names of the other nodes in this namespace."""

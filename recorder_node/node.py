@@ -9,7 +9,7 @@ ROS Parameters:
     bag (string, no default): the folder to write; must not exist.
 
 Subscribers:
-    every topic of ``ensemble.interfaces.RECORDED``, as raw bytes.
+    every topic of ``ensemble.interfaces.RECORDED``, as raw bytes; joint_states as they are offered.
 
 Publishers:
     diagnostics (diagnostic_msgs/DiagnosticArray): messages written; 1 Hz.
@@ -35,13 +35,28 @@ from std_srvs.srv import Trigger
 from ensemble.diagnostics import DiagnosticsPublisher
 from ensemble.entry_point import run_node
 from ensemble.futures import wait_until
-from ensemble.interfaces import CLOSE_BAG, DIAGNOSTICS, DOMAIN, RECORDED, TASK, Topic
+from ensemble.interfaces import (
+    CLOSE_BAG,
+    DIAGNOSTICS,
+    DOMAIN,
+    JOINT_STATES,
+    RECORDED,
+    TASK,
+    TF,
+    Topic,
+)
+from ensemble.offered_qos import subscribe_as_offered
 from ensemble.parameters import parameter, read_parameters
 from slap_ros.bags.writer import BagWriter, require_new
 from slap_ros.errors import InvalidParameterError
 from slap_ros.versions import versions
 
 QUIET = 0.2  # s without a message, after which nothing more is expected
+ENDLESS = (
+    DIAGNOSTICS,
+    JOINT_STATES,
+    TF,
+)  # a robot's driver never stops; a simulator's go with states
 
 
 @dataclass(frozen=True)
@@ -93,14 +108,16 @@ class RecorderNode(Node):
         super().destroy_node()
 
     def _subscribe(self, topic: Topic) -> None:
-        name = self.resolve_topic_name(topic.name)
-        callback = partial(self._on_message, topic, name)
-        self.create_subscription(topic.type, topic.name, callback, topic.qos, raw=True)
+        callback = partial(self._on_message, topic, self.resolve_topic_name(topic.name))
+        if topic is JOINT_STATES:
+            subscribe_as_offered(self, topic, callback, raw=True)
+        else:
+            self.create_subscription(topic.type, topic.name, callback, topic.qos, raw=True)
 
     def _on_message(self, topic: Topic, name: str, raw: bytes) -> None:
         if self._closed:
             return
-        if topic is not DIAGNOSTICS:  # these never stop
+        if topic not in ENDLESS:
             self._newest_s = monotonic()
         record = Record(name, topic.type_name, self._now_ns(), bytes(raw))
         if self._writer is not None:

@@ -14,7 +14,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
-from ensemble.interfaces import JOINT_STATES, TF
+from ensemble.interfaces import JOINT_STATES, SENSOR_DATA, TF
 from ensemble.robot_parameters import MockRobotParameters, arm_joints, base_frame, finger_joints
 from ensemble.steady_time import create_timer
 from robot_bridge.mock.noise_model import NoiseModel
@@ -45,7 +45,7 @@ class MockSensors:
         self._pending: list[tuple[float, int, TransformStamped]] = []  # by the time they are due
         self._numbers = count()
         self._frames = node.create_publisher(TF.type, TF.name, TF.qos)
-        self._joints = node.create_publisher(JOINT_STATES.type, JOINT_STATES.name, JOINT_STATES.qos)
+        self._joints = node.create_publisher(JOINT_STATES.type, JOINT_STATES.name, SENSOR_DATA)
         create_timer(node, 1.0 / settings.joint_rate, self._publish_joints)
         create_timer(node, 1.0 / settings.rate, self._detect)
         create_timer(node, DELIVERY_PERIOD, self._deliver)

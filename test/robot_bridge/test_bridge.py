@@ -23,7 +23,7 @@ from ensemble.nodes import RunSettings, node_parameters
 from ensemble.robot_parameters import parse_mock_robot
 from ensemble.run import RunRequest, run
 from ensemble.spinner import temporary_node
-from slap_ros.bags import evaluate_bag
+from slap_ros.bags import evaluate_bag, read_bag
 from slap_ros.errors import ErrorCode, InvalidParameterError
 from slap_ros.messages.interfaces import STATE
 
@@ -125,7 +125,10 @@ def test_the_ensemble_solves_a_task_on_a_mock_robot(network, tmp_path):
     chosen = settings(bridge=PATIENT, record=bag)
     metrics = run(RunRequest(chosen, timeout_s=600, in_process=True), lambda *_: None)
     assert metrics.success, metrics.error_msg
+    assert metrics.error_code == ErrorCode.NONE  # the bag is closed, though joint states never stop
     assert metrics.plan_length > 60
+    joints = [item for item in read_bag(bag) if item.topic == "/joint_states"]
+    assert len(joints) > metrics.plan_length
     found = evaluate_bag(bag)
     assert found.runs[0].plan_length == metrics.plan_length
     assert found.states == metrics.plan_length + 1
