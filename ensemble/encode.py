@@ -27,6 +27,12 @@ from slap_ros.versions import versions
 FRAME = "world"
 
 
+def time(ns: int) -> Time:
+    """Nanoseconds since the epoch as a stamp."""
+    seconds, rest = divmod(ns, NANOSECONDS)
+    return Time(sec=seconds, nanosec=rest)
+
+
 def header(stamp: Time) -> Header:
     """A header in the world frame."""
     return Header(stamp=stamp, frame_id=FRAME)
@@ -201,9 +207,8 @@ def fault(error: SlapError, episode: int, opened_ns: int, step: int) -> msgs.Epi
     Returns:
         The message.
     """
-    seconds, nanoseconds = divmod(opened_ns, NANOSECONDS)
     return msgs.EpisodeFault(
-        header=header(Time(sec=seconds, nanosec=nanoseconds)),
+        header=header(time(opened_ns)),
         episode=episode,
         step=step,
         error_code=int(error.code),

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from time import monotonic_ns
 from typing import Any
 
 from rclpy.node import Node
@@ -23,6 +24,7 @@ class PlanPublisher:
     def __init__(self, node: Node) -> None:
         """Publish as ``node``."""
         self._node = node
+        self._planning: tuple[int, int] | None = None  # its start: stamp and monotonic time, ns
         self._plans = node.create_publisher(PLAN.type, PLAN.name, PLAN.qos)
         self._events = node.create_publisher(PLAN_EVENTS.type, PLAN_EVENTS.name, PLAN_EVENTS.qos)
 
@@ -59,11 +61,26 @@ class PlanPublisher:
         Returns:
             The event's stamp, ns since the epoch.
         """
-        header = encode.header(self._now())
+        header = encode.header(self._stamp(kind))
         self._events.publish(
             PlanEvent(header=header, episode=at.episode.number, step=at.step, kind=kind, **details)
         )
         return stamp_ns(header)
+
+    def _stamp(self, kind: int) -> Any:
+        """The stamp of an event: planning ends as long after its start as it took.
+
+        So the difference of both is that time, also where the clock was set meanwhile.
+        """
+        now, started = self._node.get_clock().now(), self._planning
+        if kind == PlanEvent.PLANNING_STARTED:
+            self._planning = now.nanoseconds, monotonic_ns()
+        elif kind in (PlanEvent.PLANNED, PlanEvent.FAILED):
+            self._planning = None
+            if started is not None:
+                started_ns, began_ns = started
+                return encode.time(started_ns + monotonic_ns() - began_ns)
+        return now.to_msg()
 
     def _now(self) -> Any:
         return self._node.get_clock().now().to_msg()

@@ -10,6 +10,7 @@ A metric that the messages do not give is None, with the reason in ``RunMetrics.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
@@ -146,6 +147,11 @@ class _Run:
     def count(self, kind: PlanEventKind) -> int:
         return sum(event.kind == kind for event in self.events)
 
+    def edges_begun(self) -> Counter[int]:
+        """How many edges of its plans began at each step."""
+        started = (event for event in self.events if event.kind == PlanEventKind.EDGE_STARTED)
+        return Counter(event.step for event in started)
+
     def edges_rolled_out(self) -> int:
         return sum(event.edges_rolled_out for event in self.events if event.kind in PLANNING_ENDS)
 
@@ -230,11 +236,7 @@ class RunLog:
     def traces(self) -> list[RunTrace]:
         """Every run so far, in order."""
         runs = _split(self._plan_events)
-        executions: list[list[_Execution]] = [[] for _ in runs]
-        for execution in _pair(self._skill_events):
-            position = _position(execution.start, runs, self._last_step)
-            if position is not None:
-                executions[position].append(execution)
+        executions = _by_run(_pair(self._skill_events), runs, self._last_step)
         return [self._trace(run, own) for run, own in zip(runs, executions, strict=True)]
 
     @property
@@ -477,19 +479,25 @@ def _pair(events: Iterable[SkillEventMessage]) -> list[_Execution]:
     return executions
 
 
-def _position(
-    start: SkillEventMessage, runs: Sequence[_Run], last_step: Callable[[_Run], int]
-) -> int | None:
-    """The run in which an option started; None for one that was requested by hand.
+def _by_run(
+    executions: Iterable[_Execution], runs: Sequence[_Run], last_step: Callable[[_Run], int]
+) -> list[list[_Execution]]:
+    """The options of each run, in order; one that was requested by hand may belong to none.
 
-    One run may end at the step at which the next begins: then the stamps decide.
+    One run may end at the step at which the next begins. Each has as many options that begin
+    there as it began edges.
     """
-    fitting = [
-        i
-        for i, run in enumerate(runs)
-        if run.episode == start.episode and run.start.step <= start.step <= last_step(run)
-    ]
-    begun = [i for i in fitting if stamp_ns(runs[i].start.header) <= stamp_ns(start.header)]
-    if begun:
-        return begun[-1]
-    return fitting[0] if fitting else None
+    begun = [run.edges_begun() for run in runs]
+    found: list[list[_Execution]] = [[] for _ in runs]
+    for execution in executions:
+        episode, step = execution.start.episode, execution.start.step
+        fitting = [
+            i
+            for i, run in enumerate(runs)
+            if run.episode == episode and run.start.step <= step <= last_step(run)
+        ]
+        if fitting:
+            chosen = next((i for i in fitting if begun[i][step] > 0), fitting[-1])
+            begun[chosen][step] -= 1
+            found[chosen].append(execution)
+    return found

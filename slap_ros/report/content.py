@@ -114,7 +114,7 @@ def _report(name: str, reading: BagContents, trace: RunTrace, domain: Domain | N
         incidents=incidents(trace),
         chains=chains(trace, episode),
         atom_timeline=atom_timeline(trace, episode),
-        series=robot_series(trace, episode, recording),
+        series=robot_series(trace, episode, recording, domain),
         scene=scene(trace, episode, recording, domain),
         control_period_s=_period(recording),
         configuration=_setting(episode, info.configuration if info is not None else ()),

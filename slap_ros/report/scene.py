@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from math import nan
 
@@ -19,7 +19,7 @@ from slap_ros.messages.interfaces import BODIES
 from slap_ros.messages.protocols import MarkersMessage, StateMessage
 from slap_ros.physics.links import LINK_SHAPES
 from slap_ros.physics.panda import HAND, JOINTS, LINKS, link_poses
-from slap_ros.report.traces import ROBOT
+from slap_ros.report.traces import robot_types
 
 CUBE, TRIANGLE_LIST = 1, 11  # types of markers that are drawn
 MAX_BODIES = 64  # a frame
@@ -72,9 +72,9 @@ def scene(
     chosen = steps[:: 1 + len(steps) // MAX_FRAMES]
     if chosen[-1] != steps[-1]:
         chosen.append(steps[-1])
-    pictures, frames = _BodyFinder(recording, domain), []
+    pictures, frames = _BodyFinder(episode, recording, domain), []
     for step in chosen:
-        hand, arm = _arm(episode.states[step], recording)
+        hand, arm = _arm(episode.states[step], recording, robot_types(domain))
         bodies = (*hand, *pictures.of(episode.states[step]))
         frames.append(SceneFrame(step - trace.first_step, bodies, arm))
     return RecordedScene(tuple(frames)) if any(f.bodies or f.arm for f in frames) else None
@@ -83,18 +83,23 @@ def scene(
 class _BodyFinder:
     """Finds the bodies that were shown of a state."""
 
-    def __init__(self, recording: Recording, domain: Domain | None) -> None:
-        self._markers = recording.markers
-        self._stamps = sorted(recording.markers)
+    def __init__(
+        self, episode: RecordedEpisode, recording: Recording, domain: Domain | None
+    ) -> None:
+        # What is shown of a state has its stamp. The order is that of the steps.
+        stamps = {step: stamp_ns(state.header) for step, state in episode.states.items()}
+        shown = recording.markers
+        self._markers = {step: shown[at] for step, at in stamps.items() if at in shown}
+        self._steps = sorted(self._markers)
         self._domain = domain
 
     def of(self, state: StateMessage) -> tuple[VisibleBody, ...]:
-        """Those of the first markers since the state, for that is when they are published."""
+        """Those of its markers, or of the next state's that has some."""
         shown: Iterable[VisibleBody] = ()
-        if self._stamps:
-            since = bisect_left(self._stamps, stamp_ns(state.header))
-            newest = self._stamps[min(since, len(self._stamps) - 1)]
-            shown = _of_markers(self._markers[newest])
+        if self._steps:
+            since = bisect_left(self._steps, state.step)
+            step = self._steps[min(since, len(self._steps) - 1)]
+            shown = _of_markers(self._markers[step])
         elif self._domain is not None:
             shown = self._domain.display.bodies(decode_state(state, self._domain.types_by_name))
         return tuple(drawable(shown))[:MAX_BODIES]
@@ -120,10 +125,10 @@ HAND_SHAPES = tuple(shape for shape in LINK_SHAPES if shape.link >= HAND)
 
 
 def _arm(
-    state: StateMessage, recording: Recording
+    state: StateMessage, recording: Recording, robots: Collection[str]
 ) -> tuple[tuple[VisibleBody, ...], tuple[Vector, ...]]:
     """The hand's parts and the points of the arm, of a robot that has the Panda's joints."""
-    features = _robot_features(state, recording)
+    features = _robot_features(state, recording, robots)
     if "finger" in features:  # both are at the same distance from the middle
         features |= dict.fromkeys(FINGERS, features["finger"])
     names = [*(f"joint{i + 1}" for i in range(JOINTS)), *FINGERS]
@@ -141,10 +146,13 @@ def _arm(
     return tuple(parts), (*(link.position for link in links[:HAND]), wrist)
 
 
-def _robot_features(state: StateMessage, recording: Recording) -> dict[str, float]:
+def _robot_features(
+    state: StateMessage, recording: Recording, robots: Collection[str]
+) -> dict[str, float]:
+    """Those of the first robot, by name."""
     info = recording.domain_info
-    layouts = [t.feature_names for t in info.types if t.name == ROBOT] if info is not None else []
-    robots = [obj for obj in state.objects if obj.type == ROBOT]
-    if not layouts or not robots:
-        return {}
-    return dict(zip(layouts[0], map(float, robots[0].features), strict=False))
+    layouts = {t.name: t.feature_names for t in info.types} if info is not None else {}
+    for obj in state.objects:
+        if obj.type in robots and obj.type in layouts:
+            return dict(zip(layouts[obj.type], map(float, obj.features), strict=False))
+    return {}

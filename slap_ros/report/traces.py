@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from math import isfinite
 
 from slap_ros.bags.recording import RecordedEpisode, Recording
+from slap_ros.core import Domain
 from slap_ros.evaluation.metrics import RunTrace
 
-ROBOT = "robot"  # the type of what acts, in every domain
+UNKNOWN_DOMAINS_ROBOT = "robot"  # the type of what acts, where a domain is not known here
 HELD = "grasp_"  # how a body lies in the hand: nothing that moves by itself
 DIMENSIONS = ("rad", "m")  # units of what moves
 FLAT = 1e-9  # rad or m: less than that is rounding
@@ -43,8 +44,15 @@ class Series:
         return " ".join(f"{s},{y:.3f}" for s, y in zip(self.steps, level, strict=True))
 
 
+def robot_types(domain: Domain | None) -> frozenset[str]:
+    """Names of the types of what acts; a guess where the domain is not known here."""
+    if domain is None:
+        return frozenset({UNKNOWN_DOMAINS_ROBOT})
+    return frozenset(kind.name for kind in domain.robot_types)
+
+
 def robot_series(
-    trace: RunTrace, episode: RecordedEpisode, recording: Recording
+    trace: RunTrace, episode: RecordedEpisode, recording: Recording, domain: Domain | None
 ) -> tuple[Series, ...]:
     """Every feature of the robot that moves, in the order of its type.
 
@@ -52,13 +60,14 @@ def robot_series(
         trace: The run.
         episode: Its states.
         recording: Names and units of the robot's features.
+        domain: Which types are robots; None where it is not known here.
     """
     info = recording.domain_info
     steps = sorted(s for s in episode.states if trace.first_step <= s <= trace.last_step)
     if info is None or not steps:
         return ()
-    found = []
-    for message in (t for t in info.types if t.name == ROBOT):
+    found, robots = [], robot_types(domain)
+    for message in (t for t in info.types if t.name in robots):
         for i, (name, unit) in enumerate(
             zip(message.feature_names, message.feature_units, strict=False)
         ):
@@ -68,7 +77,7 @@ def robot_series(
                 step: float(obj.features[i])
                 for step in steps
                 for obj in episode.states[step].objects
-                if obj.type == ROBOT and i < len(obj.features) and isfinite(obj.features[i])
+                if obj.type == message.name and i < len(obj.features) and isfinite(obj.features[i])
             }
             if values:
                 relative = tuple(step - trace.first_step for step in values)

@@ -40,7 +40,7 @@ class Listener(RunClient):
 
 def parameters(record=None, seed=3, pace=0.0):
     return node_parameters(
-        RunSettings("obstacle2d", "fair", seed, 0, "lazy", record, pace, shortcuts="none")
+        RunSettings("obstacle2d", "fair", seed, 0, "lazy", record, pace=pace, shortcuts="none")
     )
 
 

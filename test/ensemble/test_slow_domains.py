@@ -96,7 +96,11 @@ def test_what_is_named_is_imported_before_anybody_sees_the_node(network, slow_do
     try:
         node = PerceptionNode(parameter_overrides=[Parameter("domain", value=slow_domain)])
         assert sys.modules["slow_domain"].IMPORTED_IN == "MainThread"
-        assert node.count_publishers(ATOMS.name) == 1
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        spinner = Spinner(executor)  # rclpy counts a moment later
+        assert spinner.spin_until(lambda: node.count_publishers(ATOMS.name) == 1, LIMIT)
         node.destroy_node()
+        executor.shutdown()
     finally:
         rclpy.shutdown()

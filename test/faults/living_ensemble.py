@@ -79,7 +79,7 @@ class Laboratory:
 @contextmanager
 def laboratory(seed, bag, pace):
     """An ensemble on a task, at so many steps a second; ``bag`` may be None."""
-    settings = RunSettings("obstacle2d", "fair", seed, 0, "lazy", bag, pace, shortcuts="none")
+    settings = RunSettings("obstacle2d", "fair", seed, 0, "lazy", bag, pace=pace, shortcuts="none")
     heard = []
 
     def client_node():

@@ -14,12 +14,12 @@ from ensemble.client import RunClient
 from ensemble.nodes import RunSettings, node_class, node_parameters
 from ensemble.spinner import Spinner
 from slap_ros.bags import evaluate_bag
-from slap_ros.messages.interfaces import STATE
+from slap_ros.messages.interfaces import PLAN_EVENT, STATE
 
 LIMIT = 60.0  # s, far more than anything here takes
 PACE = 40.0  # environment steps per second
 DAY = 86_400.0  # s
-SET_BY = (-0.3, -3.0, -DAY, 400.0 * DAY)  # s, in the middle of a run
+SET_BY = (-0.3, -3.0, -DAY, 400.0 * DAY)  # s
 
 
 class ClockLaboratory(Laboratory):
@@ -33,12 +33,17 @@ class ClockLaboratory(Laboratory):
         states = [message for type_name, message in self.heard if type_name == STATE]
         return [message.step for message in states if message.episode == episode]
 
+    def plans(self, episode):
+        return [m for name, m in self.heard if name == PLAN_EVENT and m.episode == episode]
+
     def solve_while_it_is_set(self, seed, set_by):
-        """Set the clock in a run, and the other way between it and the next."""
+        """Set the clock while planning, while executing, and between one run and the next."""
         episode = self.reset(seed)
         sent = self.client.send((), 0, 0, episode)
+        assert self.spinner.spin_until(lambda: self.plans(episode), LIMIT)
+        self.clock.set_by(-set_by)
         assert self.spinner.spin_until(lambda: len(self.steps(episode)) > 3, LIMIT)
-        self.clock.set_by(set_by)
+        self.clock.set_by(2.0 * set_by)
         assert self.spinner.spin_until(sent.done, LIMIT)
         ended = sent.result().get_result_async()
         assert self.spinner.spin_until(ended.done, LIMIT)
@@ -51,7 +56,7 @@ class ClockLaboratory(Laboratory):
 @contextmanager
 def laboratory(bag):
     """Everything in this process; ``bag`` is recorded."""
-    settings = RunSettings("obstacle2d", "fair", 3, 0, "lazy", bag, PACE, shortcuts="none")
+    settings = RunSettings("obstacle2d", "fair", 3, 0, "lazy", bag, pace=PACE, shortcuts="none")
     heard = []
     rclpy.init()
     executor, nodes = SingleThreadedExecutor(), []
@@ -81,6 +86,7 @@ def test_a_clock_that_is_set_changes_nothing_but_stamps(network, tmp_path):
     found = evaluate_bag(tmp_path / "bag")
     assert (found.damage, found.mismatches) == (None, [])
     lengths = [run.plan_length for run in found.runs]
+    assert all(0.0 < run.planning_seconds < LIMIT for run in found.runs)
     assert lengths == [result.plan_length for result in solved]
     # Nothing was done in the first episode; each has its initial state.
     assert found.compared == sum(lengths) + len(solved) + 1
