@@ -13,7 +13,7 @@ from slap_ros.planning.options import OptionResult
 
 @dataclass
 class RunStatistics:
-    """The sums of a run. Planning times come from the events' stamps, so that a bag has them too."""
+    """The sums of a run. Planning times are the events', so that a bag has them too."""
 
     first_step: int
     plans: int = 0

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 from slap_ros.errors import UnsafeCommandError
@@ -43,7 +43,6 @@ class DryRun:
     @classmethod
     def of(cls, recorded: RecordedMotion, limits: Limits) -> DryRun:
         """Check every waypoint: positions, velocities, accelerations, workspace. Nothing moves."""
-        limits = replace(limits, step=recorded.max_step)
         period_s = recorded.domain.execution.control_period_s
         motions, violations = [], []
         at = recorded.start

@@ -9,7 +9,7 @@ recorded states one after the other, each from rest to rest, and what the grippe
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from slap_ros.bags.reader import read_bag
@@ -23,7 +23,7 @@ from slap_ros.messages.decode import decode_goal, decode_state
 from slap_ros.physics.features import JOINT_FEATURES, ROBOT
 from slap_ros.physics.panda import MAX_STEP
 from slap_ros.relational import Object, State
-from slap_ros.robot.limits import Joints
+from slap_ros.robot.limits import Joints, Limits
 from slap_ros.robot.robot_world import GripperAction
 
 
@@ -53,10 +53,10 @@ class RecordedMotion:
         """Where the arm was at the beginning, rad."""
         return _joints(self.states[0])
 
-    @property
-    def max_step(self) -> Joints:
-        """How far the domain's world lets each joint go in a step, rad either way."""
-        return MAX_JOINT_STEP if HAND_OF_FORCES in self.domain.types else MAX_STEP
+    def limits_of(self, arm: Limits) -> Limits:
+        """An arm's limits, with as much in one command as the domain's world allows."""
+        step = MAX_JOINT_STEP if HAND_OF_FORCES in self.domain.types else MAX_STEP
+        return replace(arm, step=step)
 
 
 def read_recorded_motion(path: Path) -> RecordedMotion:

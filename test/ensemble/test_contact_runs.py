@@ -84,13 +84,17 @@ def _check_dry_run(bag: Path, steps: int) -> None:
     assert acting == [GripperAction.CLOSE, GripperAction.OPEN] * 2
     closing = [w for w in recorded.waypoints if w.gripper is GripperAction.CLOSE]
     assert all(w.gap == pytest.approx(0.04, abs=0.002) for w in closing)  # the cubes' edge
-    checked = DryRun.of(recorded, arm_limits("panda").scaled(0.5, TABLE_AT_BASE))
+    checked = DryRun.of(
+        recorded, recorded.limits_of(arm_limits("panda").scaled(0.5, TABLE_AT_BASE))
+    )
     checked.require_safe()
     assert len(checked.motions) == steps
     ends = np.array([motion.target for motion in checked.motions])
     starts = np.array([motion.start for motion in checked.motions])
     assert np.array_equal(starts[1:], ends[:-1])
-    off_table = DryRun.of(recorded, arm_limits("panda").scaled(0.5, Workspace()))
+    off_table = DryRun.of(
+        recorded, recorded.limits_of(arm_limits("panda").scaled(0.5, Workspace()))
+    )
     with pytest.raises(UnsafeCommandError, match="outside the workspace"):
         off_table.require_safe()
 
