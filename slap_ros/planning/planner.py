@@ -53,8 +53,8 @@ def require_skills(domain: Domain) -> None:
     if not domain.operators:
         by_hand = domain.acquisition is not None and domain.acquisition.operators
         advice = (
-            "`slap plan` plans with its hand-written operators, and its demonstrator has scripts "
-            "for skills (--skills demonstrator)"
+            "`slap plan` plans with its hand-written operators, and "
+            "`slap run --policy demonstrator` lets its demonstrator act"
             if by_hand
             else "give it operators and skills"
         )

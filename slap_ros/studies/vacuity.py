@@ -94,7 +94,7 @@ class OperatorVacuity:
         return any(policy.rate > ALLOWED for policy in self.policies)
 
     def as_json(self) -> dict[str, Any]:
-        """Every count."""
+        """Counts and rates of every policy."""
         return {
             "operator": self.operator,
             "starts": self.starts,
