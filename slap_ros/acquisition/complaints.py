@@ -38,6 +38,9 @@ class ComplaintClass(StrEnum):
     CIRCULAR_PRECONDITIONS = "circular_preconditions"
     GOAL_UNREACHABLE = "goal_unreachable"
     GOALS_NEVER_TOGETHER = "goals_never_together"
+    # a plan of the model's own
+    IMPOSSIBLE_STEP = "impossible_step"
+    GOAL_NOT_REACHED = "goal_not_reached"
     # rewards
     UNKNOWN_METRIC = "unknown_metric"
     WEIGHT_OUT_OF_RANGE = "weight_out_of_range"
@@ -117,6 +120,8 @@ _REMEDIES = {
     ComplaintClass.GOALS_NEVER_TOGETHER: (
         "What an action takes away and others need must be given back in the EFF+ of an action."
     ),
+    ComplaintClass.IMPOSSIBLE_STEP: "Before each step its PRE must hold.",
+    ComplaintClass.GOAL_NOT_REACHED: "After the last step all of the goal must hold.",
     ComplaintClass.UNKNOWN_METRIC: "Use the listed metrics only.",
     ComplaintClass.WEIGHT_OUT_OF_RANGE: "Weights are from 0 to 1.",
     ComplaintClass.WEIGHT_NOT_FINITE: "Weights are numbers from 0 to 1.",

@@ -103,17 +103,38 @@ class Inquiry:
             SlapError: No answer could be had; see :class:`~slap_ros.language.request.Client`.
         """
         while True:
-            request = self._request(question, rejected)
-            reply = self._complete(question.subject, request, rejected)
-            judged = _judge(question, reply)
-            self.budget.book(reply)
-            self._answers[question.subject] += 1
-            self.log.answer(
-                question.subject, request, reply, judged.cut, judged.complaints, self.budget
-            )
-            if judged.value is not None and not serious(judged.complaints):
-                return Answer(judged.value, reply.text, request.digest, tuple(judged.complaints))
-            rejected = Rejected(reply.text, judged.complaints)
+            answer = self.ask_once(question, rejected)
+            if isinstance(answer, Answer):
+                return answer
+            rejected = answer
+
+    def ask_once(
+        self, question: Question[D, T], rejected: Rejected | None = None
+    ) -> Answer[T] | Rejected:
+        """Ask for one answer, whether it passes or not.
+
+        Args:
+            question: What is asked.
+            rejected: An earlier answer, and why it will not do.
+
+        Returns:
+            The answer that passed, or the one that did not.
+
+        Raises:
+            ProposalRejectedError: The budget is spent already.
+            SlapError: No answer could be had; see :class:`~slap_ros.language.request.Client`.
+        """
+        request = self._request(question, rejected)
+        reply = self._complete(question.subject, request, rejected)
+        judged = _judge(question, reply)
+        self.budget.book(reply)
+        self._answers[question.subject] += 1
+        self.log.answer(
+            question.subject, request, reply, judged.cut, judged.complaints, self.budget
+        )
+        if judged.value is not None and not serious(judged.complaints):
+            return Answer(judged.value, reply.text, request.digest, tuple(judged.complaints))
+        return Rejected(reply.text, judged.complaints)
 
     def _request(self, question: Question[D, T], rejected: Rejected | None) -> Request:
         if rejected is None:

@@ -10,31 +10,24 @@ no plan, the actions themselves may be wrong, and the decomposition is asked for
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 
-from slap_ros.acquisition.drafts import DECOMPOSITION, check_decomposition, check_operator
-from slap_ros.acquisition.inquiry import Answer, Inquiry, Question, Rejected
+from slap_ros.acquisition.inquiry import Answer, Inquiry, Rejected
 from slap_ros.acquisition.problem import AcquisitionProblem
 from slap_ros.acquisition.proposal import Proposal, ProposalProvenance
 from slap_ros.acquisition.proposers import Templates
-from slap_ros.acquisition.rewards import check_rewards
+from slap_ros.acquisition.questions import (
+    Actions,
+    about_decomposition,
+    about_operator,
+    about_reward,
+    action_name,
+)
 from slap_ros.acquisition.verification import Verification, verify
 from slap_ros.errors import InvalidDomainError
-from slap_ros.language.formats import (
-    ActionDraft,
-    OperatorDraft,
-    RewardDraft,
-    parse_decomposition,
-    parse_operator,
-    parse_rewards,
-)
-from slap_ros.language.prompts import decomposition_question, operator_question, reward_question
-from slap_ros.language.schema import decomposition_schema, operator_schema, reward_schema
-from slap_ros.relational import LiftedOperator, RewardTemplate
+from slap_ros.relational import LiftedOperator
 
 ROUNDS = 4  # verifications of one decomposition in a row that may fail
 
-Actions = tuple[str, ...]
 Operators = dict[str, Answer[LiftedOperator]]  # by name, in the order of the actions
 
 
@@ -56,7 +49,7 @@ class LanguageProposer:
         """
         rejected: Rejected | None = None
         while True:
-            decomposition = self._inquiry.ask(self._decomposition(problem), rejected)
+            decomposition = self._inquiry.ask(about_decomposition(problem), rejected)
             answers, verification = self._operators_of(decomposition.value, problem)
             if verification.plan is not None:
                 return self._proposal(problem, decomposition, answers, verification)
@@ -66,7 +59,9 @@ class LanguageProposer:
         self, actions: Actions, problem: AcquisitionProblem
     ) -> tuple[Operators, Verification]:
         """Operators of a decomposition; without a plan if the actions are likely to be wrong."""
-        questions = {_name(action): self._operator(action, actions, problem) for action in actions}
+        questions = {
+            action_name(action): about_operator(action, actions, problem) for action in actions
+        }
         answers = {name: self._inquiry.ask(question) for name, question in questions.items()}
         verification = self._verify(answers, problem)
         for _ in range(ROUNDS - 1):
@@ -83,35 +78,6 @@ class LanguageProposer:
         plan = None if verification.plan is None else [str(step) for step in verification.plan]
         self._inquiry.log.verification(plan, verification.complaints, self._inquiry.budget)
         return verification
-
-    def _decomposition(
-        self, problem: AcquisitionProblem
-    ) -> Question[tuple[ActionDraft, ...], Actions]:
-        text = decomposition_question(problem.types, problem.predicates, problem.init, problem.goal)
-        return Question(
-            DECOMPOSITION,
-            "decomposition",
-            DECOMPOSITION,
-            text,
-            decomposition_schema(problem.types),
-            parse_decomposition,
-            partial(check_decomposition, problem=problem),
-        )
-
-    def _operator(
-        self, action: str, actions: Actions, problem: AcquisitionProblem
-    ) -> Question[OperatorDraft, LiftedOperator]:
-        name = _name(action)
-        text = operator_question(action, actions, problem.types, problem.predicates, problem.goal)
-        return Question(
-            f"operator {name}",
-            "operator",
-            name,
-            text,
-            operator_schema(name, problem.types, problem.predicates),
-            parse_operator,
-            partial(check_operator, name=name, problem=problem),
-        )
 
     def _proposal(
         self,
@@ -169,26 +135,7 @@ class LanguageRewarder:
             raise InvalidDomainError(
                 f"domain {problem.name} has no metrics, so there is nothing to make rewards of"
             )
-        questions = ((op.name, self._question(op, problem)) for op in operators)
+        questions = (
+            (op.name, about_reward(op, problem, self._with_definitions)) for op in operators
+        )
         return {name: self._inquiry.ask(question).value for name, question in questions}
-
-    def _question(
-        self, operator: LiftedOperator, problem: AcquisitionProblem
-    ) -> Question[RewardDraft, RewardTemplate]:
-        text = reward_question(
-            operator, problem.metrics, problem.predicates, self._with_definitions
-        )
-        return Question(
-            f"reward of {operator.name}",
-            "reward",
-            operator.name,
-            text,
-            reward_schema(problem.metrics, operator),
-            parse_rewards,
-            partial(check_rewards, operator=operator, problem=problem),
-        )
-
-
-def _name(action: str) -> str:
-    """Of ``Insert(?peg: peg, ?hole: hole)``, ``Insert``."""
-    return action.partition("(")[0]

@@ -12,8 +12,10 @@ from typing import Annotated
 import typer
 from rich.progress import TaskID
 
+from slap_ros.cli import language_study
 from slap_ros.cli.command_line import command_line
 from slap_ros.cli.console import console, exits, progress
+from slap_ros.cli.language_study import ModelOptions
 from slap_ros.cli.options import MAX_SEED, DomainName, Jobs, Preset, flat_options
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose, sampling
 from slap_ros.core import Domain
@@ -41,6 +43,7 @@ from slap_ros.studies import (
 from slap_ros.studies import goals as sampled
 from slap_ros.studies.comparison import Comparison
 from slap_ros.studies.figures import require_matplotlib
+from slap_ros.studies.planning_ablation import SEARCH, VARIANTS
 from slap_ros.studies.results import Data, Provenance, StudyReport, describe_library, write
 from slap_ros.studies.study_log import JobLog
 from slap_ros.studies.trainings import TrainingFolder
@@ -309,6 +312,71 @@ def _demonstrator(domain: str, preset: str | None, output: Path) -> DomainChoice
     require_writable(output)
     choice = DomainChoice(domain, preset or "", DEMONSTRATOR)
     return replace(choice, preset=open_domain(choice).preset)
+
+
+@app.command("planning_ablation")
+@exits
+@flat_options
+def planning_ablation_(
+    domain: DomainName,
+    variants: Annotated[
+        str, typer.Option(help="language+search, language, one_shot; separated by commas.")
+    ] = ",".join(VARIANTS),
+    plans: Annotated[int, typer.Option(min=1, help="Tasks to plan for.")] = 25,
+    attempts: Annotated[int, typer.Option(min=1, help="At operators, for one plan.")] = 10,
+    output: Output = RESULTS,
+    *,
+    options: ModelOptions,
+) -> None:
+    """LG-SAIL Table 2: operators of a language model, planned with by A* or by the model."""
+    require_matplotlib()
+    require_writable(output)
+    with _StudyBars() as bars:
+        report, settings = language_study.planning(domain, variants, plans, attempts, options, bars)
+    command = command_line("study", "planning_ablation", domain, **settings)
+    _write(output, report, Provenance(domain, command, settings))
+
+
+@app.command("models")
+@exits
+@flat_options
+def models_(
+    domain: DomainName,
+    plans: Annotated[int, typer.Option(min=1, help="Tasks to plan for.")] = 100,
+    attempts: Annotated[int, typer.Option(min=1, help="At operators, for one plan.")] = 10,
+    output: Output = RESULTS,
+    *,
+    options: ModelOptions,
+) -> None:
+    """LG-SAIL Tables 5 and 6: operators of several language models, planned with by A*."""
+    require_matplotlib()
+    require_writable(output)
+    with _StudyBars() as bars:
+        report, settings = language_study.planning(domain, SEARCH, plans, attempts, options, bars)
+    command = command_line("study", "models", domain, **settings)
+    _write(output, replace(report, study="models"), Provenance(domain, command, settings))
+
+
+@app.command("reward_ablation")
+@exits
+@flat_options
+def reward_ablation_(
+    domain: DomainName,
+    metrics: Annotated[
+        str, typer.Option(help="full, headers: what the model sees of them; by commas.")
+    ] = "full,headers",
+    trials: Annotated[int, typer.Option(min=1, help="Of each.")] = 25,
+    output: Output = RESULTS,
+    *,
+    options: ModelOptions,
+) -> None:
+    """LG-SAIL Table 3, Fig. 7: rewards of a language model, and what is wrong with them."""
+    require_matplotlib()
+    require_writable(output)
+    with _StudyBars() as bars:
+        report, settings = language_study.rewards(domain, metrics, trials, options, bars)
+    command = command_line("study", "reward_ablation", domain, **settings)
+    _write(output, report, Provenance(domain, command, settings))
 
 
 @app.command("table1")

@@ -30,10 +30,11 @@ from slap_ros.acquisition.complaints import (
 from slap_ros.acquisition.drafts import check_decomposition, check_operator
 from slap_ros.acquisition.problem import AcquisitionProblem
 from slap_ros.acquisition.proposers import ComposedRewarder, ManualProposer, propose
+from slap_ros.acquisition.questions import check_plan
 from slap_ros.acquisition.rewards import check_rewards
 from slap_ros.acquisition.verification import verify
 from slap_ros.errors import ProposalRejectedError
-from slap_ros.language.formats import parse_decomposition, parse_operator, parse_rewards
+from slap_ros.language.formats import parse_decomposition, parse_operator, parse_plan, parse_rewards
 from slap_ros.relational import Layout, LiftedOperator
 from slap_ros.relational.pddl import parse_domain, parse_problem
 
@@ -68,6 +69,10 @@ def of_reward(text: str) -> list[Complaint]:
 
 def of_set(*operators: LiftedOperator) -> list[Complaint]:
     return list(verify(operators, PEGS.problem).complaints)
+
+
+def of_plan(text: str) -> list[Complaint]:
+    return check_plan(parse_plan(text).draft, PEGS.operators, PEGS.problem)[1]
 
 
 def operator(pre: str, minus: str, plus: str, name: str = "Act") -> LiftedOperator:
@@ -122,6 +127,9 @@ EXAMPLES: list[tuple[ComplaintClass, Example]] = [
      lambda: of_set(operator("In(?peg, ?hole)", "", "In(?peg, ?hole) HandEmpty()"))),
     (C.GOAL_UNREACHABLE, lambda: of_set(PICK)),
     (C.GOALS_NEVER_TOGETHER, lambda: of_set(PICK, printed_insert())),
+    (C.IMPOSSIBLE_STEP, lambda: of_plan("[Insert(peg1, hole1)]")),
+    (C.IMPOSSIBLE_STEP, lambda: of_plan("[Fly(peg1)]")),
+    (C.GOAL_NOT_REACHED, lambda: of_plan("[Pick(peg1), Insert(peg1, hole1)]")),
     (C.UNKNOWN_METRIC, lambda: of_reward('{"depth": 0.2}')),
     (C.WEIGHT_OUT_OF_RANGE, lambda: of_reward("R = 2 * parallel_dis(?peg, ?hole)")),
     (C.WEIGHT_NOT_FINITE, lambda: of_reward("R = nan * parallel_dis(?peg, ?hole)")),

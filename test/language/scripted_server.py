@@ -169,6 +169,8 @@ def envelope(step: Step, body: dict[str, Any]) -> bytes:
 def subject_of(messages: Sequence[Mapping[str, str]]) -> str:
     """What is asked for, from the first question of a conversation."""
     question = next(m["content"] for m in messages if m["role"] == "user")
+    if question.startswith("Make a plan"):
+        return "plan"
     skill = re.search(r"^The skill: (\w+)", question, re.MULTILINE)
     if skill is None:
         return "decomposition"

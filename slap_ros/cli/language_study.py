@@ -1,0 +1,156 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``slap study``, where a language model is asked: LG-SAIL's Tables 2, 3, 5, 6 and Figure 7."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from slap_ros.acquisition.problem import AcquisitionProblem
+from slap_ros.cli.options import Preset
+from slap_ros.core import Domain, task_with_goal
+from slap_ros.domains import get_domain
+from slap_ros.errors import InvalidCassetteError, InvalidParameterError
+from slap_ros.language.cassette import ReplayingClient, open_client, with_recorded
+from slap_ros.language.settings import read_settings
+from slap_ros.studies import planning_ablation, reward_ablation
+from slap_ros.studies.comparison import StudyProgress
+from slap_ros.studies.model_attempts import Model, ModelsOnly
+from slap_ros.studies.results import StudyReport
+
+Data = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class ModelOptions:
+    """Whom to ask."""
+
+    model: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="As the server names it; `models` takes several. Default: SLAP_LANGUAGE_MODEL."
+        ),
+    ] = None
+    base_url: Annotated[
+        str | None, typer.Option(help="Of the server. Default: SLAP_LANGUAGE_BASE_URL.")
+    ] = None
+    language_settings: Annotated[Path | None, typer.Option(help="JSON; see docs/language.md.")] = (
+        None
+    )
+    cassette: Annotated[
+        str, typer.Option(help="live, record:FILE, or replay:FILE of a recording from a model.")
+    ] = "live"
+    goal: Annotated[
+        str | None, typer.Option(help="A goal's name. Default: the first of the domain's.")
+    ] = None
+    seed: Annotated[int, typer.Option(min=0, help="Of the tasks.")] = 0
+    preset: Preset = None
+
+    def models(self) -> dict[str, Model]:
+        """Everybody who is to be asked, by name.
+
+        Raises:
+            InvalidParameterError: A model twice, or several of one cassette.
+            InvalidCassetteError: The cassette was not recorded from a model.
+        """
+        names: Sequence[str | None] = self.model or (None,)
+        if len(set(names)) < len(names):
+            raise InvalidParameterError("--model names a model twice")
+        if len(names) > 1 and self.cassette != "live":
+            raise InvalidParameterError("--cassette is for one model at a time")
+        made = [self._model(name) for name in names]
+        return {model.settings.model: model for model in made}
+
+    def _model(self, name: str | None) -> Model:
+        settings = read_settings(self.language_settings, name, self.base_url)
+        client = open_client(self.cassette, settings)
+        if isinstance(client, ReplayingClient) and not client.cassette.from_a_model:
+            raise InvalidCassetteError(
+                f"{client.cassette.path} was not recorded from a model: what a script says is no "
+                "result of a study"
+            )
+        return Model(ModelsOnly(client), with_recorded(settings, client))
+
+    def problem(self, domain: Domain, index: int) -> AcquisitionProblem:
+        """A task of the domain."""
+        return AcquisitionProblem.of_task(
+            domain, task_with_goal(domain, self.seed, index, self.goal)
+        )
+
+    def as_settings(self) -> Data:
+        """What a report names, and its command repeats; never a key."""
+        return {
+            "preset": self.preset,
+            "goal": self.goal,
+            "seed": self.seed,
+            "base_url": self.base_url,
+        }
+
+
+def planning(
+    domain: str,
+    variants: str,
+    plans: int,
+    attempts: int,
+    options: ModelOptions,
+    bars: StudyProgress,
+) -> tuple[StudyReport, Data]:
+    """Who plans with a model's operators; see :mod:`slap_ros.studies.planning_ablation`.
+
+    Args:
+        domain: Its name.
+        variants: Separated by commas.
+        plans: Tasks.
+        attempts: For one plan at most.
+        options: Whom to ask.
+        bars: Show progress.
+
+    Returns:
+        The report, and the settings that made it.
+    """
+    chosen = variants.split(",")
+    if unknown := sorted(set(chosen) - set(planning_ablation.VARIANTS)):
+        raise InvalidParameterError(
+            f"--variants {', '.join(unknown)}: there are {', '.join(planning_ablation.VARIANTS)}"
+        )
+    models = options.models()
+    opened = get_domain(domain, options.preset)
+    problems = [options.problem(opened, index) for index in range(plans)]
+    report = planning_ablation.study(models, problems, chosen, attempts, bars)
+    settings = {"variants": variants, "plans": plans, "attempts": attempts, "model": [*models]}
+    return report, settings | options.as_settings()
+
+
+def rewards(
+    domain: str, metrics: str, trials: int, options: ModelOptions, bars: StudyProgress
+) -> tuple[StudyReport, Data]:
+    """What rewards are worth; see :mod:`slap_ros.studies.reward_ablation`.
+
+    Args:
+        domain: Its name.
+        metrics: What is shown of them, separated by commas.
+        trials: Of each.
+        options: Whom to ask.
+        bars: Show progress.
+
+    Returns:
+        The report, and the settings that made it.
+    """
+    shown = metrics.split(",")
+    if unknown := sorted(set(shown) - set(reward_ablation.METRICS)):
+        raise InvalidParameterError(
+            f"--metrics {', '.join(unknown)}: there are {', '.join(reward_ablation.METRICS)}"
+        )
+    models = options.models()
+    if len(models) > 1:
+        raise InvalidParameterError("rewards are asked of one model: give --model once")
+    opened = get_domain(domain, options.preset)
+    written = opened.acquisition.operators if opened.acquisition else opened.operators
+    ((name, model),) = models.items()
+    report = reward_ablation.study(model, options.problem(opened, 0), written, shown, trials, bars)
+    return report, {"metrics": metrics, "trials": trials, "model": [name], **options.as_settings()}

@@ -1,0 +1,182 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Attempts of a language model at operators, plans and rewards, each without a second chance.
+
+What studies count: an attempt at operators is a decomposition and an operator for each of its
+actions, asked for once. It succeeds where all pass their checks and chain to the goal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+from slap_ros.acquisition.attempt_log import AttemptLog
+from slap_ros.acquisition.complaints import Complaint, serious
+from slap_ros.acquisition.inquiry import Answer, Inquiry, Question
+from slap_ros.acquisition.problem import AcquisitionProblem
+from slap_ros.acquisition.questions import (
+    about_decomposition,
+    about_operator,
+    about_plan,
+    about_reward,
+)
+from slap_ros.acquisition.verification import verify
+from slap_ros.errors import InvalidCassetteError
+from slap_ros.language.budget import Budget, BudgetLimits
+from slap_ros.language.request import Client, Reply, Request
+from slap_ros.language.settings import LanguageSettings
+from slap_ros.relational import LiftedOperator
+
+D = TypeVar("D")
+T = TypeVar("T")
+
+SEED = "seed"  # a field of sampling: servers that know it answer differently to each
+
+
+class ModelsOnly:
+    """Whoever answers, as long as a model does: what a script says is no result."""
+
+    def __init__(self, client: Client) -> None:
+        """Ask this client."""
+        self._client = client
+
+    @property
+    def source(self) -> str:
+        """See :class:`~slap_ros.language.request.Client`."""
+        return self._client.source
+
+    def complete(self, request: Request, seconds_left: float) -> Reply:
+        """See :class:`~slap_ros.language.request.Client`.
+
+        Raises:
+            InvalidCassetteError: A script answered.
+        """
+        reply = self._client.complete(request, seconds_left)
+        if reply.scripted:
+            raise InvalidCassetteError(
+                f"{self.source} answers by a script: what it says is no result of a study. Ask a "
+                "model, or replay a cassette that was recorded from one"
+            )
+        return reply
+
+
+@dataclass(frozen=True)
+class Model:
+    """Whom a study asks.
+
+    Args:
+        client: Whoever answers.
+        settings: Which model, and how it samples.
+    """
+
+    client: Client
+    settings: LanguageSettings
+
+    def inquiry(self, number: int, limits: BudgetLimits) -> Inquiry:
+        """A conversation of its own for an attempt.
+
+        Args:
+            number: Of the attempt, which becomes the seed of the model's sampling.
+            limits: What it may cost.
+        """
+        sampling = {**self.settings.sampling, SEED: number}
+        settings = replace(self.settings, sampling=sampling)
+        return Inquiry(self.client, settings, Budget(limits), AttemptLog())
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """What came of it.
+
+    Args:
+        errors: Classes of what is wrong, by what was asked for; none where it passed.
+        tokens: Spent on it.
+        seconds: Waited.
+    """
+
+    errors: Mapping[str, tuple[str, ...]]
+    tokens: int
+    seconds: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing is wrong."""
+        return not self.errors
+
+
+class _Asker:
+    """Asks once for each thing, and collects what is wrong."""
+
+    def __init__(self, inquiry: Inquiry) -> None:
+        self._inquiry = inquiry
+        self._errors: dict[str, tuple[str, ...]] = {}
+
+    def ask(self, question: Question[D, T]) -> T | None:
+        """What the answer means; None where it does not pass."""
+        answer = self._inquiry.ask_once(question)
+        if isinstance(answer, Answer):
+            return answer.value
+        self.blame(question.subject, answer.complaints)
+        return None
+
+    def blame(self, subject: str, complaints: Iterable[Complaint]) -> None:
+        self._errors[subject] = tuple(sorted({str(c.kind) for c in serious(complaints)}))
+
+    def attempt(self) -> Attempt:
+        budget = self._inquiry.budget
+        return Attempt(self._errors, budget.tokens, budget.seconds)
+
+
+def attempt_operators(
+    inquiry: Inquiry, problem: AcquisitionProblem
+) -> tuple[Attempt, tuple[LiftedOperator, ...]]:
+    """Ask once for a decomposition and each of its operators.
+
+    Args:
+        inquiry: The conversation.
+        problem: What they are for.
+
+    Returns:
+        What came of it, and the operators; none unless the attempt passed.
+    """
+    asker = _Asker(inquiry)
+    actions = asker.ask(about_decomposition(problem)) or ()
+    answers = [asker.ask(about_operator(one, actions, problem)) for one in actions]
+    operators = tuple(answer for answer in answers if answer is not None)
+    if asker.attempt().passed:
+        verification = verify(operators, problem)
+        if verification.plan is None:
+            asker.blame("operators", verification.complaints)
+    attempt = asker.attempt()
+    return attempt, operators if attempt.passed else ()
+
+
+def attempt_plan(
+    inquiry: Inquiry, operators: Sequence[LiftedOperator], problem: AcquisitionProblem
+) -> Attempt:
+    """Ask once for a plan from operators that have one."""
+    asker = _Asker(inquiry)
+    asker.ask(about_plan(operators, problem))
+    return asker.attempt()
+
+
+def attempt_rewards(
+    inquiry: Inquiry,
+    operators: Sequence[LiftedOperator],
+    problem: AcquisitionProblem,
+    with_definitions: bool,
+) -> Attempt:
+    """Ask once for the reward of each operator.
+
+    Args:
+        inquiry: The conversation.
+        operators: Whose rewards.
+        problem: Whose metrics there are to choose among.
+        with_definitions: Whether the metrics' source is quoted.
+    """
+    asker = _Asker(inquiry)
+    for operator in operators:
+        asker.ask(about_reward(operator, problem, with_definitions))
+    return asker.attempt()

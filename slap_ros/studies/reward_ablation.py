@@ -1,0 +1,171 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a language model's rewards are worth when it sees the metrics' source, or their heads alone.
+
+LG-SAIL Table 3 and Figure 7.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
+
+from slap_ros.acquisition.complaints import REWARD_ERROR_GROUPS, ComplaintClass
+from slap_ros.acquisition.problem import AcquisitionProblem
+from slap_ros.errors import InvalidParameterError
+from slap_ros.evaluation.statistics import wilson_interval
+from slap_ros.language.budget import BudgetLimits
+from slap_ros.relational import LiftedOperator
+from slap_ros.studies.comparison import StudyProgress
+from slap_ros.studies.figures import LINES
+from slap_ros.studies.model_attempts import Attempt, Model, attempt_rewards
+from slap_ros.studies.results import MarkdownTable, StudyReport
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FULL, HEADERS = "full", "headers"
+METRICS = (FULL, HEADERS)  # what of the metrics is shown
+PAPER_TASK = {FULL: 0.92, HEADERS: 0.20}  # LG-SAIL Table 3: all rewards of a task are right
+PAPER_ERRORS = {FULL: 0.08, HEADERS: 0.80}  # Figure 7: tasks with an error
+MEASURED = """\
+In each trial the model is asked once for the reward of every operator; the operators are those
+written by hand. With *full*, the question quotes the source of every metric; with *headers*, names
+and types alone. A reward is right where it passes all checks: known metrics, arguments of their
+types, weights from 0 to 1, and at least one metric that an added atom rests on. *All* is the share
+of trials in which every reward is right, with Wilson's 95 % interval and the paper's share in
+brackets; the paper judges by people whether a reward is right. Errors are grouped into the paper's
+four classes; a trial can have several. The trial's number is the seed of the model's sampling."""
+
+
+@dataclass(frozen=True)
+class RewardTrials:
+    """All trials in which the same was shown.
+
+    Args:
+        metrics: What was shown of them, of :data:`METRICS`.
+        attempts: One per trial.
+    """
+
+    metrics: str
+    attempts: tuple[Attempt, ...]
+
+    def right(self, operator: str) -> int:
+        """Trials in which the reward of an operator is right."""
+        return sum(f"reward of {operator}" not in one.errors for one in self.attempts)
+
+    @property
+    def all_right(self) -> int:
+        """Trials in which every reward is right."""
+        return sum(one.passed for one in self.attempts)
+
+    @property
+    def groups(self) -> Counter[str]:
+        """Trials with an error of each of the paper's classes."""
+        return Counter(group for one in self.attempts for group in error_groups(one))
+
+
+def error_groups(attempt: Attempt) -> set[str]:
+    """The paper's classes of the errors of an attempt; what is in none goes under its own name."""
+    kinds = {ComplaintClass(kind) for kinds in attempt.errors.values() for kind in kinds}
+    found = {str(group) for group, members in REWARD_ERROR_GROUPS.items() if kinds & members}
+    grouped = frozenset().union(*REWARD_ERROR_GROUPS.values())
+    return found | {str(kind) for kind in kinds - grouped}
+
+
+def study(
+    model: Model,
+    problem: AcquisitionProblem,
+    operators: Sequence[LiftedOperator],
+    shown: Sequence[str],
+    trials: int,
+    progress: StudyProgress,
+) -> StudyReport:
+    """Ask for the rewards of all operators, again and again.
+
+    Args:
+        model: Whom to ask.
+        problem: Whose metrics there are to choose among.
+        operators: Whose rewards.
+        shown: Of :data:`METRICS`.
+        trials: Of each.
+        progress: Is called as trials end.
+
+    Returns:
+        The report.
+
+    Raises:
+        InvalidParameterError: The domain has no metrics or no operators.
+        InvalidCassetteError: A script answers, and no model.
+        SlapError: No model can be asked.
+    """
+    if not (problem.metrics and operators):
+        raise InvalidParameterError(
+            f"domain {problem.name} has no metrics, or no operators written by hand, to ask about"
+        )
+    progress.begin("rewards", trials * len(shown))
+    measured = []
+    for metrics in shown:
+        attempts = []
+        for number in range(trials):
+            inquiry = model.inquiry(number, BudgetLimits())
+            attempts.append(attempt_rewards(inquiry, operators, problem, metrics == FULL))
+            progress.advance()
+        measured.append(RewardTrials(metrics, tuple(attempts)))
+    names = [operator.name for operator in operators]
+    return StudyReport(
+        study="reward_ablation",
+        source="LG-SAIL Table 3, Figure 7",
+        title=f"Rewards of a language model: {problem.name}",
+        measured=MEASURED,
+        table=_table(measured, names),
+        found={
+            "trials": [
+                {
+                    "metrics": one.metrics,
+                    "all_right": one.all_right,
+                    "right": {name: one.right(name) for name in names},
+                    "errors": dict(sorted(one.groups.items())),
+                    "attempts": [asdict(attempt) for attempt in one.attempts],
+                }
+                for one in measured
+            ]
+        },
+        draw=lambda figure: draw(figure, measured, names),
+        size=(6.4, 3.0),
+    )
+
+
+def _table(measured: Sequence[RewardTrials], names: Sequence[str]) -> MarkdownTable:
+    rows = []
+    for one in measured:
+        count = len(one.attempts)
+        within = wilson_interval(one.all_right, count)
+        share = f"{one.all_right / count:.0%} [{within.low:.0%}, {within.high:.0%}]"
+        rows.append(
+            [
+                one.metrics,
+                f"{share} ({PAPER_TASK[one.metrics]:.0%})",
+                *(f"{one.right(name) / count:.0%}" for name in names),
+                f"{1 - one.all_right / count:.0%} ({PAPER_ERRORS[one.metrics]:.0%})",
+                ", ".join(f"{group} {number}" for group, number in one.groups.most_common()) or "-",
+            ]
+        )
+    return MarkdownTable(("metrics shown", "all", *names, "with an error", "of which"), rows)
+
+
+def draw(figure: Figure, measured: Sequence[RewardTrials], names: Sequence[str]) -> None:
+    """Bars of the share of right rewards, for each operator and for all."""
+    axes = figure.subplots()
+    for number, one in enumerate(measured):
+        counts = [one.all_right, *(one.right(name) for name in names)]
+        places = [place + (number - (len(measured) - 1) / 2) * 0.4 for place in range(len(counts))]
+        heights = [count / len(one.attempts) for count in counts]
+        axes.bar(places, heights, width=0.36, color=LINES[number], label=one.metrics)
+    axes.set_xticks(range(len(names) + 1), ["all", *names])
+    axes.set_ylim(0.0, 1.05)
+    axes.set_ylabel("share of trials that are right")
+    axes.legend(ncols=2, loc="lower right")
+    axes.grid(visible=False, axis="x")

@@ -1,0 +1,175 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Studies of language models count what was answered, and take no script for a model."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+
+import pytest
+from model_answers import SETTINGS, decomposition_json, operator_json
+from paper_problems import peg_in_hole
+from scripted_server import Step, serving
+from typer.testing import CliRunner
+
+from ensemble.cli.application import app
+from slap_ros.errors import ErrorCode, InvalidCassetteError
+from slap_ros.language.cassette import open_client
+from slap_ros.studies.model_attempts import Model, ModelsOnly
+from slap_ros.studies.planning_ablation import (
+    ALONE,
+    ONE_SHOT,
+    PAPER,
+    SEARCH,
+    expected_attempts,
+    one_shot_success,
+)
+from slap_ros.studies.planning_ablation import study as planning_ablation
+from slap_ros.studies.reward_ablation import FULL, HEADERS
+from slap_ros.studies.reward_ablation import study as reward_ablation
+
+PEGS = peg_in_hole()
+PICK, INSERT = PEGS.operators
+GOOD = {
+    "decomposition": [Step(decomposition_json(PEGS.operators))],
+    "operator Pick": [Step(operator_json(PICK))],
+    "operator Insert": [Step(operator_json(INSERT))],
+}
+COMMAND = ["study", "planning_ablation", "obstacle2d", "--model", "m"]
+STEPS = ["Pick(peg1)", "Insert(peg1, hole1)", "Pick(peg2)", "Insert(peg2, hole2)"]
+
+
+class Silent:
+    """Shows no progress."""
+
+    def begin(self, what: str, total: int) -> None: ...
+
+    def advance(self) -> None: ...
+
+    def report_failure(self, complaint: str) -> None: ...
+
+
+def plan_json(steps: Sequence[str]) -> str:
+    written = [step.rstrip(")").split("(") for step in steps]
+    return json.dumps(
+        {"plan": [{"action": name, "objects": rest.split(", ")} for name, rest in written]}
+    )
+
+
+def ask(script: Mapping[str, Sequence[Step]], variants: Sequence[str], plans: int = 2) -> dict:
+    with serving(script) as server:
+        settings = type(SETTINGS)(model="scripted", base_url=server.url, retry=SETTINGS.retry)
+        model = Model(open_client("live", settings), settings)
+        report = planning_ablation({"m": model}, [PEGS.problem] * plans, variants, 3, Silent())
+        seeds = [request["seed"] for request in server.requests]
+    assert len(set(seeds)) > 1 or plans == 1
+    return {tally["variant"]: tally for tally in report.found["tallies"]}
+
+
+def test_a_good_model_needs_one_attempt_and_the_planner_does_the_rest() -> None:
+    script = GOOD | {"plan": [Step(plan_json(STEPS))]}
+    found = ask(script, (SEARCH, ALONE, ONE_SHOT))
+    for variant in (SEARCH, ALONE, ONE_SHOT):
+        assert found[variant]["operators"] == (2, 2)
+        assert found[variant]["planning"] == (2, 2)
+        assert found[variant]["overall"] == (2, 2)
+        assert found[variant]["attempts"] == 1.0
+
+
+def test_what_is_wrong_is_counted_by_class_and_tried_again() -> None:
+    wrong = json.loads(operator_json(PICK))
+    wrong["preconditions"][0]["predicate"] = "Shiny"
+    script = GOOD | {
+        "operator Pick": [Step(json.dumps(wrong)), *GOOD["operator Pick"]],
+        "plan": [Step(plan_json(STEPS))],
+    }
+    found = ask(script, (SEARCH,))[SEARCH]
+    assert found["operators"] == (2, 3)
+    assert found["overall"] == (2, 2)
+    assert found["attempts"] == 1.5
+    assert found["errors"] == {"unknown_predicate": 1}
+    found = ask(script, (ONE_SHOT,))[ONE_SHOT]
+    assert found["overall"] == (1, 2)
+    assert found["operators"] == (1, 2)
+
+
+def test_a_plan_of_the_model_is_carried_out() -> None:
+    short = Step(plan_json(STEPS[:2]))
+    impossible = Step(plan_json(STEPS[1:]))
+    script = GOOD | {"plan": [short, impossible, Step(plan_json(STEPS))]}
+    found = ask(script, (ALONE,), plans=1)[ALONE]
+    assert found["operators"] == (3, 3)
+    assert found["planning"] == (1, 3)
+    assert found["attempts"] == 3.0
+    assert found["errors"] == {"goal_not_reached": 1, "impossible_step": 1}
+
+
+def test_the_printed_operators_never_chain() -> None:
+    printed = json.loads(operator_json(INSERT))
+    printed["add_effects"] = [a for a in printed["add_effects"] if a["predicate"] != "HandEmpty"]
+    found = ask(GOOD | {"operator Insert": [Step(json.dumps(printed))]}, (SEARCH,))[SEARCH]
+    assert found["operators"] == (0, 6)
+    assert found["overall"] == (0, 2)
+    assert found["attempts"] is None
+    assert found["errors"] == {"goals_never_together": 6}
+
+
+def test_rewards_are_judged_by_the_papers_classes() -> None:
+    good = Step('{"parallel_dis(?peg, ?hole)": 0.4}')
+    to_peg = Step('{"dis_to_obj(?peg)": 0.4}')
+    invented = Step('{"depth(?peg)": 0.4}')
+    script = {"reward of Pick": [to_peg], "reward of Insert": [good, invented, good, good]}
+    with serving(script) as server:
+        settings = type(SETTINGS)(model="scripted", base_url=server.url, retry=SETTINGS.retry)
+        model = Model(open_client("live", settings), settings)
+        report = reward_ablation(model, PEGS.problem, PEGS.operators, (FULL, HEADERS), 2, Silent())
+        asked = [request["messages"][-1]["content"] for request in server.requests]
+    full, headers = report.found["trials"]
+    assert (full["all_right"], headers["all_right"]) == (1, 2)
+    assert full["right"] == {"Pick": 2, "Insert": 1}
+    assert full["errors"] == {"hallucination": 1}
+    assert "return" in asked[0]  # the metrics' source
+    assert "return" not in asked[-1]
+
+
+def test_the_papers_arithmetic() -> None:
+    """Of its own table: attempts are what the two shares make them, and so is one shot."""
+    operators, planning, _, attempts = PAPER[SEARCH]
+    assert expected_attempts(operators, planning) == pytest.approx(attempts, abs=0.005)
+    operators, planning, _, attempts = PAPER[ALONE]
+    assert expected_attempts(operators, planning) == pytest.approx(attempts, abs=0.005)
+    operators, planning, overall, _ = PAPER[ONE_SHOT]
+    assert one_shot_success(operators, planning) == pytest.approx(overall, abs=0.005)
+
+
+def test_what_a_script_says_is_no_result(tmp_path) -> None:
+    with serving(GOOD) as server:
+        settings = type(SETTINGS)(model="scripted", base_url=server.url, retry=SETTINGS.retry)
+        client = ModelsOnly(open_client("live", settings))
+        with pytest.raises(InvalidCassetteError, match="no result of a study"):
+            planning_ablation(
+                {"m": Model(client, settings)}, [PEGS.problem], (SEARCH,), 1, Silent()
+            )
+        live = CliRunner().invoke(
+            app,
+            [*COMMAND, "--base-url", server.url, "--output", str(tmp_path)],
+        )
+    assert live.exit_code == ErrorCode.INVALID_CASSETTE
+    assert "no result of a study" in " ".join(live.stderr.split())
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_command_refuses_what_cannot_be() -> None:
+    def refusal(*arguments: str) -> str:
+        result = CliRunner().invoke(app, ["study", *arguments])
+        assert result.exit_code == ErrorCode.INVALID_PARAMETER, result.stderr
+        return " ".join(result.stderr.split())
+
+    obstacle = ("obstacle2d", "--model", "m", "--base-url", "http://127.0.0.1:9/v1")
+    assert "there are language+search, language, one_shot" in refusal(
+        "planning_ablation", *obstacle, "--variants", "tarot"
+    )
+    assert "names a model twice" in refusal("models", *obstacle, "--model", "m")
+    assert "there are full, headers" in refusal("reward_ablation", *obstacle, "--metrics", "half")
+    assert "has no metrics" in refusal("reward_ablation", *obstacle)
