@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from tools.imports import ROOT
-from tools.pictures import abstract_graph, animations, architecture, proposal, two_levels
+from tools.pictures import abstract_graph, animations, architecture, contact, proposal, two_levels
 
 IMAGES = ROOT / "docs" / "images"
 # Those that need nothing but this checkout. ``tools.pictures.report`` needs a browser, and
@@ -19,6 +19,8 @@ PICTURES: Mapping[str, Callable[[Path], None]] = {
     "architecture.svg": architecture.make,
     "cleanup_table.gif": animations.make_table,
     "cluttered_drawer.gif": animations.make_drawer,
+    "contact_drawer.gif": contact.make_drawer,
+    "contact_peg.gif": contact.make_peg,
     "proposal.svg": proposal.make,
     "side_by_side.gif": animations.make_side_by_side,
     "two_levels.svg": two_levels.make,

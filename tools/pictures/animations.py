@@ -22,9 +22,8 @@ from slap_ros.evaluation.approaches import Approach, approaches
 from slap_ros.evaluation.experiment import solve
 from slap_ros.physics.panda import CONTROL_PERIOD_S
 from slap_ros.physics.rendering import Camera
-from slap_ros.physics.scene import Scene
 from slap_ros.physics.viewpoint import Viewpoint
-from slap_ros.physics.visuals import SceneVisuals
+from slap_ros.physics.visuals import SceneVisuals, Visuals
 from slap_ros.planning.options import OptionKind
 from slap_ros.relational import State
 from slap_ros.shortcuts.shipped import chosen_library
@@ -49,7 +48,7 @@ class Subject:
         domain: By name.
         preset: Of the domain.
         seed: Of the task.
-        scene_of: The bodies of a state.
+        visuals_of: What there is to be seen, by a first state.
         viewpoint: Where it is seen from; its size does not matter.
         prepared: A state as it is drawn.
     """
@@ -57,7 +56,7 @@ class Subject:
     domain: str
     preset: str
     seed: int
-    scene_of: Callable[[State], Scene]
+    visuals_of: Callable[[State], Visuals]
     viewpoint: Viewpoint
     prepared: Callable[[State], State] = lambda state: state
 
@@ -94,16 +93,22 @@ TOWER = Subject(
     "obstacle_tower",
     "fair",
     1,
-    scene_of_tower,
+    lambda state: SceneVisuals(scene_of_tower(state)),
     Viewpoint(eye=(1.3, -0.95, 0.8), target=(0.31, -0.03, 0.27), field_of_view=42.0),
     lifted,
 )
-DRAWER = Subject("cluttered_drawer", "paper", 0, scene_of_drawer, cluttered_drawer.VIEWPOINT)
+DRAWER = Subject(
+    "cluttered_drawer",
+    "paper",
+    0,
+    lambda state: SceneVisuals(scene_of_drawer(state)),
+    cluttered_drawer.VIEWPOINT,
+)
 TABLE = Subject(
     "cleanup_table",
     "paper",
     0,
-    lambda state: scene_of_table(state, shipped()),
+    lambda state: SceneVisuals(scene_of_table(state, shipped())),
     cleanup_table.VIEWPOINT,
 )
 
@@ -190,7 +195,7 @@ def draw_panels(subject: Subject, recording: Recording) -> list[Image.Image]:
     width, height = (OVERSAMPLING * size for size in SIZE_PX)
     viewpoint = replace(subject.viewpoint, width=width, height=height)
     panels = []
-    with Camera(SceneVisuals(subject.scene_of(recording.states[0])), viewpoint) as camera:
+    with Camera(subject.visuals_of(recording.states[0]), viewpoint) as camera:
         for step, (state, caption) in enumerate(
             zip(recording.states, recording.captions, strict=True)
         ):
