@@ -20,6 +20,7 @@ PICTURES: Mapping[str, Callable[[Path], None]] = {
     "cleanup_table.gif": animations.make_table,
     "cluttered_drawer.gif": animations.make_drawer,
     "contact_drawer.gif": contact.make_drawer,
+    "contact_lid.gif": contact.make_lid,
     "contact_peg.gif": contact.make_peg,
     "proposal.svg": proposal.make,
     "side_by_side.gif": animations.make_side_by_side,

@@ -55,8 +55,9 @@ class Subject:
     seed: int = 0
 
 
-DRAWER = Subject("Stow Hammer", "stow_hammer", "Open", (-0.5, -0.55, 0.45), (-0.14, 0.0, 0.06))
+DRAWER = Subject("Stow Hammer", "stow_hammer", "Open", (-0.25, 0.62, 0.42), (-0.14, 0.0, 0.06))
 PEG = Subject("Peg in Hole", "peg_in_hole", "Insert", (-0.4, -0.5, 0.25), (-0.12, 0.0, -0.02))
+LID = Subject("Make Coffee", "make_coffee", "CloseLid", (-0.5, -0.45, 0.35), (0.0, 0.0, 0.06), 1)
 
 
 def make_drawer(path: Path) -> None:
@@ -67,6 +68,11 @@ def make_drawer(path: Path) -> None:
 def make_peg(path: Path) -> None:
     """A peg goes into a hole."""
     _make(path, PEG)
+
+
+def make_lid(path: Path) -> None:
+    """A lid is turned down."""
+    _make(path, LID)
 
 
 def _make(path: Path, subject: Subject) -> None:

@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -20,7 +21,7 @@ from slap_ros.domains.benchtop.learner_interface import learner_interface
 from slap_ros.domains.benchtop.metrics import COMMON
 from slap_ros.domains.benchtop.visualization import VIEW, display
 from slap_ros.physics.viewpoint import Viewpoint
-from slap_ros.relational import Metric, Predicate, State, Type
+from slap_ros.relational import Layout, Metric, Predicate, State, Type
 
 STEP_LIMIT = 1_000  # environment steps of a task
 HORIZON = 50  # environment steps of a learned skill, approach not counted
@@ -48,7 +49,8 @@ class BenchtopModel:
         holding: The one of them that says what is held.
         goals: By name; the first is trained for.
         acquisition: Operators, rewards and scripts written by hand, and the approach.
-        scene_of: The bodies of a state.
+        scene_of: The bodies of a state. Those that move and that the state does not have are left
+            out: who perceives may not know where they are.
         metrics: Beside those that every domain has and those that predicates rest on.
         static: Predicates that nothing changes.
         view: Where animations are seen from.
@@ -82,6 +84,10 @@ def benchtop_domain(
     Raises:
         InvalidDomainError: Its parts do not fit.
     """
+
+    def scene_of(state: State) -> ContactScene:
+        return without_missing(model.scene_of(state), state.layout)
+
     return Domain(
         name=name,
         preset=preset,
@@ -89,14 +95,14 @@ def benchtop_domain(
         predicates=model.predicates,
         action_space=ACTION_SPACE,
         sample_task=settings.sample,
-        make_world=lambda state: ContactWorld(model.scene_of(state), state),
+        make_world=lambda state: ContactWorld(scene_of(state), state),
         default_goal=next(iter(model.goals.values())),
         step_limit=STEP_LIMIT,
         execution=Execution(
             control_period_s=CONTROL_PERIOD_S,
-            settle=lambda state: settled(model.scene_of(state), state),
+            settle=lambda state: settled(scene_of(state), state),
         ),
-        display=display(model.scene_of, model.view),
+        display=display(scene_of, model.view),
         metrics=(*COMMON, *model.metrics),
         static=model.static,
         goals=model.goals,
@@ -105,3 +111,13 @@ def benchtop_domain(
         acquisition=model.acquisition,
         configuration=settings.as_configuration(),
     )
+
+
+@lru_cache(maxsize=256)
+def without_missing(scene: ContactScene, layout: Layout) -> ContactScene:
+    """The scene without the bodies that move and are no objects of a state."""
+    moving = {body.name for body in scene.free} | {body.name for body in scene.jointed}
+    missing = moving - layout.by_name.keys()
+    if not missing:
+        return scene
+    return replace(scene, bodies=tuple(b for b in scene.bodies if b.name not in missing))
