@@ -37,6 +37,7 @@ from slap_ros.contact.features import ROBOT, robot_features
 from slap_ros.contact.hand import hand_at, wrapped
 from slap_ros.contact.scene import TABLE, BoxPart, Compound, ContactScene, CylinderPart
 from slap_ros.contact.world import ACTION_SPACE, MAX_SHIFT, MAX_TURN, ContactWorld
+from slap_ros.domains.bowls.scenery import GRIP, REST_HEIGHT, bowl
 from slap_ros.domains.groceries.scenery import GROCERIES
 from slap_ros.domains.make_coffee.scenery import POD_HALF, pod
 from slap_ros.domains.stow_hammer.scenery import RADIUS, hammer
@@ -103,6 +104,7 @@ OF_DOMAINS = {
         name: Graspable(thing.body, thing.rest_height, grip=(0.0, 0.0, thing.grasp_height))
         for name, thing in GROCERIES.items()
     },
+    "bowls": {"bowl": Graspable(bowl("bowl"), REST_HEIGHT, grip=GRIP)},
 }
 EVERYTHING = GRASPABLE | {n: thing for things in OF_DOMAINS.values() for n, thing in things.items()}
 

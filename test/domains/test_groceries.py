@@ -18,6 +18,7 @@ from slap_ros.errors import InvalidParameterError, UnknownObjectError
 from slap_ros.learning.demonstrator import demonstrate
 from slap_ros.learning.domain_choice import DomainChoice, open_domain
 from slap_ros.physics.panda import FINGER_OPEN
+from slap_ros.relational import Column
 
 DOMAIN = get_domain("groceries")
 
@@ -108,6 +109,18 @@ def test_things_differ_in_shape_and_width():
     assert widths[0] < 0.03
     assert 0.06 < widths[-1] < 2.0 * FINGER_OPEN - 0.015
     assert len({len(thing.body.parts) for thing in GROCERIES.values()}) == 3
+
+
+def test_learners_observe_which_thing_it_is():
+    """Its sizes are among its features, so that one policy can pick all of them."""
+    state = DOMAIN.task(0).initial_state.alone()
+    things = Column(tuple(state.layout.object(name) for name in names_of(state)))
+    interface = DOMAIN.learning.interface
+    features = interface.objects(state, interface.hand(state), things)[0]
+    assert features.shape == (6, 14)
+    sizes = ("rest_height", "half_width", "grasp_height")
+    assert (features[:, -3:] == state.gather(things, sizes)[0] / 0.05).all()
+    assert len(np.unique(features[:, -3:], axis=0)) == 6
 
 
 def test_opening_and_constant_motions_do_nothing_useful():

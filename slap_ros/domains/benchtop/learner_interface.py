@@ -11,7 +11,7 @@ import numpy as np
 from slap_ros.contact.features import ROBOT
 from slap_ros.contact.hand import LEASH
 from slap_ros.core import LearnerInterface
-from slap_ros.domains.benchtop.features import THING
+from slap_ros.domains.benchtop.features import DRAWER, LID, REST_HEIGHT, THING
 from slap_ros.domains.benchtop.metrics import REST_SPEED, REST_SPIN
 from slap_ros.domains.benchtop.state_access import (
     ANGULAR,
@@ -23,16 +23,18 @@ from slap_ros.domains.benchtop.state_access import (
     positions,
 )
 from slap_ros.physics.panda import FINGER_OPEN
-from slap_ros.relational import Column, Object, Predicate, State
+from slap_ros.relational import Column, Object, Predicate, State, Type
 from slap_ros.relational.predicates import Bools
 from slap_ros.relational.state import Array
 
 DISTANCE_SCALE = 0.2  # m, the scale of what is observed
+SIZE_SCALE = 0.05  # m
 SPEED_SCALE = 0.5  # m/s
 OPENING_SCALE = {"m": 0.1, "rad": 1.0}
 FALLEN = -0.05  # m, the height of what fell off the table
 LENGTH_M = 0.05  # the scale of distances and margins
 FINGERS = ("left_finger", "right_finger")
+OF_ALL = {feature.name for kind in (THING, DRAWER, LID) for feature in kind.features}
 
 
 def learner_interface(held: Predicate) -> LearnerInterface:
@@ -72,7 +74,7 @@ def _robot(state: State, hand: Array) -> Array:
 
 
 def _object_features(state: State, hand: Array, column: Column) -> Array:
-    """Where from the hand and how turned; of things also how fast; of joints how far open."""
+    """Where from the hand, how turned, which sizes; of things how fast; of joints how far open."""
     kind = column.objects[0].type
     if kind.is_a(ROBOT):
         return np.zeros((*state.data.shape[:-1], len(column.objects), 0))
@@ -86,7 +88,15 @@ def _object_features(state: State, hand: Array, column: Column) -> Array:
     if "opening" in kind.column:
         scale = OPENING_SCALE[kind.features[kind.column["opening"]].unit]
         parts.append(state.gather(column, ("opening",)) / scale)
+    if sizes := _sizes(kind):
+        parts.append(state.gather(column, sizes) / SIZE_SCALE)
     return np.concatenate(parts, axis=-1)
+
+
+def _sizes(kind: Type) -> tuple[str, ...]:
+    """What tells things of one type apart: the sizes that it alone has, and how high they stand."""
+    own = tuple(feature.name for feature in kind.features if feature.name not in OF_ALL)
+    return (REST_HEIGHT.name, *own) if own and kind.is_a(THING) else own
 
 
 def _distances(state: State, hand: Array, column: Column) -> Array:
