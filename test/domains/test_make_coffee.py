@@ -22,7 +22,7 @@ from drawer_states import (
 from slap_ros.domains import get_domain
 from slap_ros.domains.benchtop import drawers
 from slap_ros.domains.benchtop.cabinet import TRAVEL
-from slap_ros.domains.benchtop.state_access import pose_of
+from slap_ros.domains.benchtop.state_access import hand_position, pose_of, position_of
 from slap_ros.domains.make_coffee.scenery import (
     BOTTOM,
     HOLDER_RADIUS,
@@ -180,6 +180,17 @@ def test_a_lid_stays_where_it_is_left():
 def test_a_pod_fits_with_some_room():
     assert pytest.approx(0.004) == HOLDER_RADIUS - POD_RADIUS
     assert SHAPE.headroom > 2.0 * POD_HALF
+
+
+def test_an_approach_does_not_depend_on_the_order_of_objects():
+    """Operators that were proposed have their objects in an order of their own."""
+    state = in_drawer(changed(DOMAIN.task(14).initial_state, "cabinet", opening=TRAVEL))
+    pod, cabinet = map(state.layout.object, ("pod", "cabinet"))
+    for objects in ((pod, cabinet), (cabinet, pod)):
+        with DOMAIN.make_world(state) as world:
+            after = carry_out(world, DOMAIN.acquisition.approach(state, objects))
+            hand = math.dist(hand_position(after), position_of(after, pod))
+            assert 0.04 < hand < 0.05
 
 
 def test_an_approach_ends_behind_the_lid():

@@ -191,6 +191,24 @@ def test_a_hammer_that_is_let_fall_is_not_stowed():
     assert not any(done.values()), done
 
 
+def test_a_grasp_that_was_not_lifted_is_begun_again():
+    """The hand is empty for all that predicates say, so any operator may come next."""
+    state = DOMAIN.task(7).initial_state
+    hammer, cabinet = map(state.layout.object, ("hammer0", "cabinet0"))
+    acquisition = DOMAIN.acquisition
+    with DOMAIN.make_world(state) as world:
+        pick = acquisition.scripts["Pick"](state, (hammer,))
+        while float(world.state.get(hammer, "held")) < 0.5:
+            world.step(pick(world.state))
+        grasped = world.state
+        assert {"HandEmpty()", "OnTable(hammer0)"} <= found_in(grasped)
+        for objects in ((hammer,), (cabinet,)):
+            world.reset(grasped)
+            after = carry_out(world, acquisition.approach(grasped, objects))
+            assert float(after.get(hammer, "held")) == 0.0
+            assert found_in(after) == found_in(grasped)
+
+
 def test_a_drawer_that_is_pushed_fast_keeps_its_hammer_within_reach_of_the_goal():
     """A hammer slides in a drawer that is pushed as fast as the hand can, yet stays In."""
     state = opened(SCRIPTED.task(8).initial_state, "cabinet0", 0.15)

@@ -16,6 +16,7 @@ from collections.abc import Callable
 import numpy as np
 
 from slap_ros.core import Approach, Policy
+from slap_ros.domains.benchtop.features import THING
 from slap_ros.domains.benchtop.hand_motion import KEEP, OPEN, HandGoal
 from slap_ros.domains.benchtop.scripts import Move, follow, over, release, travel_height
 from slap_ros.domains.benchtop.state_access import held_thing
@@ -41,6 +42,26 @@ def from_above(state: State, objects: tuple[Object, ...]) -> Vector:
     return UP
 
 
+def carried(state: State, objects: tuple[Object, ...]) -> Object | None:
+    """The object in the hand, if there is another one to which it is brought.
+
+    What is grasped and is none of a skill's objects, or the only one, is let go first: a pick that
+    failed halfway begins again.
+    """
+    held = held_thing(state)
+    return held if held in objects and len(objects) > 1 else None
+
+
+def acted_on(state: State, objects: tuple[Object, ...]) -> Object:
+    """What a skill acts on: an operator that was not written by hand has its objects in any order.
+
+    It is what the carried object is brought to; else the thing that is named; else the last object.
+    """
+    brought = carried(state, objects)
+    others = [obj for obj in objects if (obj is not brought if brought else obj.type.is_a(THING))]
+    return (others or objects)[-1]
+
+
 def make_approach(
     acts_at: ActsAt,
     outwards: Outwards = from_above,
@@ -57,7 +78,7 @@ def make_approach(
     """
 
     def approach(state: State, objects: tuple[Object, ...]) -> Policy:
-        empty = held_thing(state) is None
+        empty = carried(state, objects) is None
         acts, out = acts_at(state, objects), outwards(state, objects)
         goal = begin_at(state, objects, acts, out, STRAIGHT if empty else turned)
         gripper = OPEN if empty else KEEP

@@ -9,14 +9,13 @@ from collections.abc import Mapping
 
 from slap_ros.core import Policy, Script
 from slap_ros.domains.benchtop import drawers
-from slap_ros.domains.benchtop.approach import UP, make_approach
+from slap_ros.domains.benchtop.approach import UP, acted_on, carried, make_approach
 from slap_ros.domains.benchtop.cabinet import CABINET
 from slap_ros.domains.benchtop.hand_motion import CLOSE, OPEN, GoalOf, HandGoal
 from slap_ros.domains.benchtop.scripts import GENTLE, Move, follow, grasp, over, release
 from slap_ros.domains.benchtop.state_access import (
     axis_of,
     hand_position,
-    held_thing,
     pose_of,
     position_of,
     standing_on,
@@ -41,21 +40,21 @@ SHUT = 0.05  # rad, at which the lid is let go
 
 def acts_at(state: State, objects: tuple[Object, ...]) -> HandGoal:
     """Where a skill acts: a handle, a pod, the back of a lid; or where a held pod is inserted."""
-    held, last = held_thing(state), objects[-1]
-    if held is not None:
-        return inserting(held, last)(state)
-    if last.type.is_a(POD):
-        return at_pod(state, last)
-    if last.type.is_a(HOLDER):
-        return at_lid(state, last)
-    return drawers.at_handle(state, last)
+    pod, there = carried(state, objects), acted_on(state, objects)
+    if pod is not None:
+        return inserting(pod, there)(state)
+    if there.type.is_a(POD):
+        return at_pod(state, there)
+    if there.type.is_a(HOLDER):
+        return at_lid(state, there)
+    return drawers.at_handle(state, there)
 
 
 def outwards(state: State, objects: tuple[Object, ...]) -> Vector:
     """A skill begins above where it acts, but CloseLid behind it."""
-    last = objects[-1]
-    behind = held_thing(state) is None and last.type.is_a(HOLDER)
-    return axis_of(state, last) if behind else UP
+    there = acted_on(state, objects)
+    behind = carried(state, objects) is None and there.type.is_a(HOLDER)
+    return axis_of(state, there) if behind else UP
 
 
 APPROACH = make_approach(acts_at, outwards, lambda _: TRAVEL_HEIGHT)

@@ -9,12 +9,12 @@ from collections.abc import Mapping
 
 from slap_ros.core import Policy, Script
 from slap_ros.domains.benchtop import drawers
+from slap_ros.domains.benchtop.approach import acted_on, carried
 from slap_ros.domains.benchtop.hand_motion import CLOSE, OPEN, GoalOf, HandGoal, nearest_turn
 from slap_ros.domains.benchtop.scripts import GENTLE, Move, follow, grasp, over, release
 from slap_ros.domains.benchtop.state_access import (
     hand_position,
     hand_yaw,
-    held_thing,
     position_of,
     value,
     yaw_of,
@@ -32,12 +32,10 @@ AHEAD = 0.5 * math.pi  # yaw of a hand that the arm has easily everywhere
 
 def acts_at(state: State, objects: tuple[Object, ...]) -> HandGoal:
     """Where a skill acts: a hammer's middle, a handle, or where a held hammer is at its place."""
-    held, last = held_thing(state), objects[-1]
-    if held is not None:
-        return stowing(held, last)(state)
-    if last.type.is_a(HAMMER):
-        return at_hammer(state, last)
-    return drawers.at_handle(state, last)
+    hammer, there = carried(state, objects), acted_on(state, objects)
+    if hammer is not None:
+        return stowing(hammer, there)(state)
+    return at_hammer(state, there) if there.type.is_a(HAMMER) else drawers.at_handle(state, there)
 
 
 def at_hammer(state: State, hammer: Object) -> HandGoal:
