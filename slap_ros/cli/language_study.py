@@ -112,6 +112,10 @@ def planning(
 
     Returns:
         The report, and the settings that made it.
+
+    Raises:
+        InvalidParameterError: There is no such variant, or a model is named twice.
+        InvalidCassetteError: The cassette was not recorded from a model.
     """
     chosen = variants.split(",")
     if unknown := sorted(set(chosen) - set(planning_ablation.VARIANTS)):
@@ -140,6 +144,10 @@ def rewards(
 
     Returns:
         The report, and the settings that made it.
+
+    Raises:
+        InvalidParameterError: There is no such choice of what is shown, or more than one model.
+        InvalidCassetteError: The cassette was not recorded from a model.
     """
     shown = metrics.split(",")
     if unknown := sorted(set(shown) - set(reward_ablation.METRICS)):

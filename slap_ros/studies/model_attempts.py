@@ -156,7 +156,16 @@ def attempt_operators(
 def attempt_plan(
     inquiry: Inquiry, operators: Sequence[LiftedOperator], problem: AcquisitionProblem
 ) -> Attempt:
-    """Ask once for a plan from operators that have one."""
+    """Ask once for a plan.
+
+    Args:
+        inquiry: The conversation.
+        operators: From which there is a plan.
+        problem: Where to start, and what to reach.
+
+    Returns:
+        What came of it.
+    """
     asker = _Asker(inquiry)
     asker.ask(about_plan(operators, problem))
     return asker.attempt()
@@ -175,6 +184,9 @@ def attempt_rewards(
         operators: Whose rewards.
         problem: Whose metrics there are to choose among.
         with_definitions: Whether the metrics' source is quoted.
+
+    Returns:
+        What came of it.
     """
     asker = _Asker(inquiry)
     for operator in operators:

@@ -157,7 +157,13 @@ def _table(measured: Sequence[RewardTrials], names: Sequence[str]) -> MarkdownTa
 
 
 def draw(figure: Figure, measured: Sequence[RewardTrials], names: Sequence[str]) -> None:
-    """Bars of the share of right rewards, for each operator and for all."""
+    """Bars of the share of right rewards, for each operator and for all.
+
+    Args:
+        figure: To draw into.
+        measured: A series each.
+        names: Of the operators.
+    """
     axes = figure.subplots()
     for number, one in enumerate(measured):
         counts = [one.all_right, *(one.right(name) for name in names)]
