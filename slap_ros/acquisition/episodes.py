@@ -70,7 +70,7 @@ def save_episodes(path: Path, episodes: Episodes) -> None:
 
 
 def load_episodes(path: Path, types: Mapping[str, Type]) -> Episodes:
-    """Read episodes.
+    """Read what :func:`save_episodes` wrote.
 
     Args:
         path: Of the file.

@@ -20,7 +20,7 @@ from slap_ros.language.cassette import ReplayingClient, open_client, with_record
 from slap_ros.language.settings import read_settings
 from slap_ros.studies import planning_ablation, reward_ablation
 from slap_ros.studies.comparison import StudyProgress
-from slap_ros.studies.model_attempts import Model, ModelsOnly
+from slap_ros.studies.model_attempts import LanguageModel, ModelsOnly
 from slap_ros.studies.results import StudyReport
 
 Data = dict[str, Any]
@@ -51,7 +51,7 @@ class ModelOptions:
     seed: Annotated[int, typer.Option(min=0, help="Of the tasks.")] = 0
     preset: Preset = None
 
-    def models(self) -> dict[str, Model]:
+    def models(self) -> dict[str, LanguageModel]:
         """Everybody who is to be asked, by name.
 
         Raises:
@@ -66,7 +66,7 @@ class ModelOptions:
         made = [self._model(name) for name in names]
         return {model.settings.model: model for model in made}
 
-    def _model(self, name: str | None) -> Model:
+    def _model(self, name: str | None) -> LanguageModel:
         settings = read_settings(self.language_settings, name, self.base_url)
         client = open_client(self.cassette, settings)
         if isinstance(client, ReplayingClient) and not client.cassette.from_a_model:
@@ -74,7 +74,7 @@ class ModelOptions:
                 f"{client.cassette.path} was not recorded from a model: what a script says is no "
                 "result of a study"
             )
-        return Model(ModelsOnly(client), with_recorded(settings, client))
+        return LanguageModel(ModelsOnly(client), with_recorded(settings, client))
 
     def problem(self, domain: Domain, index: int) -> AcquisitionProblem:
         """A task of the domain."""

@@ -58,7 +58,7 @@ class Piece(NamedTuple):
                     yield (-y / length, x / length, 0.0)
 
 
-class Obstacle(NamedTuple):
+class SettlingObstacle(NamedTuple):
     """What a body must not be in."""
 
     piece: Piece
@@ -85,19 +85,20 @@ def settled(scene: ContactScene, state: State) -> State:
     """
     index = StateIndex.of(scene, state.layout)
     snapshot = index.read(state)
-    obstacles = [Obstacle(piece) for piece in _standing(scene, state)]
+    obstacles = [SettlingObstacle(piece) for piece in _standing(scene, state)]
     obstacles += [
-        Obstacle(Piece.of(BoxPart(half), pose), fixed=False) for pose, half in snapshot.hand.boxes()
+        SettlingObstacle(Piece.of(BoxPart(half), pose), fixed=False)
+        for pose, half in snapshot.hand.boxes()
     ]
     bodies = list(snapshot.bodies)
     resting = {i for i, body in enumerate(bodies) if body.still and i != snapshot.held}
     for i in sorted(set(range(len(bodies))) - resting):
         pieces = _pieces(scene.free[i], bodies[i].pose)
-        obstacles += [Obstacle(piece, fixed=False) for piece in pieces]
+        obstacles += [SettlingObstacle(piece, fixed=False) for piece in pieces]
     for i in sorted(resting, key=lambda i: bodies[i].pose.position[2]):
         pose = _put(scene.free[i], bodies[i].pose, obstacles)
         bodies[i] = bodies[i]._replace(pose=pose)
-        obstacles += [Obstacle(piece) for piece in _pieces(scene.free[i], pose)]
+        obstacles += [SettlingObstacle(piece) for piece in _pieces(scene.free[i], pose)]
     return index.write(state, snapshot._replace(bodies=tuple(bodies)))
 
 
@@ -113,7 +114,7 @@ def _pieces(body: Compound, pose: Pose) -> list[Piece]:
     return [Piece.of(part, pose) for part in body.parts]
 
 
-def _put(body: Compound, measured: Pose, obstacles: Sequence[Obstacle]) -> Pose:
+def _put(body: Compound, measured: Pose, obstacles: Sequence[SettlingObstacle]) -> Pose:
     """A body flat, out of everything, and down on what is just below it."""
     pose = _flat(body, measured) or measured
     reach = body.at(pose).radius + 2.0 * FLOATING
@@ -149,7 +150,7 @@ def _flat(body: Compound, pose: Pose) -> Pose | None:
     return Pose(pose.position, normalised(multiply(normalised(turn), pose.quaternion)))
 
 
-def _moved_out(body: Compound, pose: Pose, near: Sequence[Obstacle]) -> Pose:
+def _moved_out(body: Compound, pose: Pose, near: Sequence[SettlingObstacle]) -> Pose:
     """Moved the shorter way out of whatever it is in deepest, again and again."""
     for _ in range(ROUNDS):
         shift = max(_shifts(body, pose, near), key=lambda shift: math.hypot(*shift), default=None)
@@ -160,7 +161,7 @@ def _moved_out(body: Compound, pose: Pose, near: Sequence[Obstacle]) -> Pose:
     return pose
 
 
-def _shifts(body: Compound, pose: Pose, near: Sequence[Obstacle]) -> Iterator[Vector]:
+def _shifts(body: Compound, pose: Pose, near: Sequence[SettlingObstacle]) -> Iterator[Vector]:
     """The ways out of everything that a body is in."""
     for piece, obstacle, overlap in _overlaps(body, pose, near):
         if min(overlap.upward, overlap.sideways) <= APART:
@@ -173,7 +174,7 @@ def _shifts(body: Compound, pose: Pose, near: Sequence[Obstacle]) -> Iterator[Ve
             yield (0.0, 0.0, math.copysign(overlap.upward, 1.0 if above else -1.0))
 
 
-def _height(body: Compound, pose: Pose, near: Sequence[Obstacle]) -> float:
+def _height(body: Compound, pose: Pose, near: Sequence[SettlingObstacle]) -> float:
     """How far above what it lies on a body is, m; 0 where nothing is just below it."""
     gaps = [
         -overlap.upward
@@ -187,8 +188,8 @@ def _height(body: Compound, pose: Pose, near: Sequence[Obstacle]) -> float:
 
 
 def _overlaps(
-    body: Compound, pose: Pose, near: Sequence[Obstacle]
-) -> Iterator[tuple[Piece, Obstacle, Overlap]]:
+    body: Compound, pose: Pose, near: Sequence[SettlingObstacle]
+) -> Iterator[tuple[Piece, SettlingObstacle, Overlap]]:
     for piece in _pieces(body, pose):
         for obstacle in near:
             yield piece, obstacle, _overlap(piece, obstacle.piece)

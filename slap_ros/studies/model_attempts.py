@@ -63,7 +63,7 @@ class ModelsOnly:
 
 
 @dataclass(frozen=True)
-class Model:
+class LanguageModel:
     """Whom a study asks.
 
     Args:

@@ -19,7 +19,7 @@ from slap_ros.evaluation.statistics import wilson_interval
 from slap_ros.language.budget import BudgetLimits
 from slap_ros.studies.comparison import StudyProgress
 from slap_ros.studies.figures import LINES
-from slap_ros.studies.model_attempts import Attempt, Model, attempt_operators, attempt_plan
+from slap_ros.studies.model_attempts import Attempt, LanguageModel, attempt_operators, attempt_plan
 from slap_ros.studies.results import MarkdownTable, StudyReport
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ def one_shot_success(operators: float, planning: float) -> float:
 
 
 def study(
-    models: Mapping[str, Model],
+    models: Mapping[str, LanguageModel],
     problems: Sequence[AcquisitionProblem],
     variants: Sequence[str],
     most_attempts: int,
@@ -178,7 +178,7 @@ def study(
 
 
 def _try(
-    name: str, model: Model, variant: str, problem: AcquisitionProblem, seeds: range
+    name: str, model: LanguageModel, variant: str, problem: AcquisitionProblem, seeds: range
 ) -> PlanTrial:
     attempts: list[Attempt] = []
     plans: list[Attempt] = []

@@ -20,7 +20,7 @@ from slap_ros.language.budget import BudgetLimits
 from slap_ros.relational import LiftedOperator
 from slap_ros.studies.comparison import StudyProgress
 from slap_ros.studies.figures import LINES
-from slap_ros.studies.model_attempts import Attempt, Model, attempt_rewards
+from slap_ros.studies.model_attempts import Attempt, LanguageModel, attempt_rewards
 from slap_ros.studies.results import MarkdownTable, StudyReport
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def error_groups(attempt: Attempt) -> set[str]:
 
 
 def study(
-    model: Model,
+    model: LanguageModel,
     problem: AcquisitionProblem,
     operators: Sequence[LiftedOperator],
     shown: Sequence[str],

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from ensemble.cli.application import app
 from slap_ros.errors import ErrorCode, InvalidCassetteError
 from slap_ros.language.cassette import open_client
-from slap_ros.studies.model_attempts import Model, ModelsOnly
+from slap_ros.studies.model_attempts import LanguageModel, ModelsOnly
 from slap_ros.studies.planning_ablation import (
     ALONE,
     ONE_SHOT,
@@ -60,7 +60,7 @@ def plan_json(steps: Sequence[str]) -> str:
 def ask(script: Mapping[str, Sequence[Step]], variants: Sequence[str], plans: int = 2) -> dict:
     with serving(script) as server:
         settings = type(SETTINGS)(model="scripted", base_url=server.url, retry=SETTINGS.retry)
-        model = Model(open_client("live", settings), settings)
+        model = LanguageModel(open_client("live", settings), settings)
         report = planning_ablation({"m": model}, [PEGS.problem] * plans, variants, 3, Silent())
         seeds = [request["seed"] for request in server.requests]
     assert len(set(seeds)) > 1 or plans == 1
@@ -122,7 +122,7 @@ def test_rewards_are_judged_by_the_papers_classes() -> None:
     script = {"reward of Pick": [to_peg], "reward of Insert": [good, invented, good, good]}
     with serving(script) as server:
         settings = type(SETTINGS)(model="scripted", base_url=server.url, retry=SETTINGS.retry)
-        model = Model(open_client("live", settings), settings)
+        model = LanguageModel(open_client("live", settings), settings)
         report = reward_ablation(model, PEGS.problem, PEGS.operators, (FULL, HEADERS), 2, Silent())
         asked = [request["messages"][-1]["content"] for request in server.requests]
     full, headers = report.found["trials"]
@@ -149,7 +149,7 @@ def test_what_a_script_says_is_no_result(tmp_path) -> None:
         client = ModelsOnly(open_client("live", settings))
         with pytest.raises(InvalidCassetteError, match="no result of a study"):
             planning_ablation(
-                {"m": Model(client, settings)}, [PEGS.problem], (SEARCH,), 1, Silent()
+                {"m": LanguageModel(client, settings)}, [PEGS.problem], (SEARCH,), 1, Silent()
             )
         live = CliRunner().invoke(
             app,

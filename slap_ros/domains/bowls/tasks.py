@@ -292,6 +292,9 @@ def fixed_station(name: str, pose: Pose, gap: float = 0.0) -> Station:
         name: Which.
         pose: Of its frame.
         gap: To be left around it, m.
+
+    Returns:
+        What takes room, without room for a hand.
     """
     body = PLATE_BODY if name == "plate" else FURNITURE[name].body
     boxes = (

@@ -176,7 +176,13 @@ def basket_station(pose: Pose) -> Station:
 
 
 def grasp_goal(thing: Grocery, pose: Pose, yaw: float) -> HandGoal:
-    """The hand around a thing that stands at a pose."""
+    """The hand around a thing.
+
+    Args:
+        thing: To be grasped.
+        pose: At which it stands.
+        yaw: Of the hand, rad.
+    """
     x, y, z = pose.position
     return HandGoal((x, y, z + thing.grasp_height), yaw)
 

@@ -110,12 +110,24 @@ def tip_of(state: State, peg: Object) -> Vector:
 
 
 def tip_seen_from(state: State, peg: Object, hole: Object) -> Vector:
-    """The same in a hole's frame."""
+    """The tip of a peg in a hole's frame.
+
+    Args:
+        state: A single one.
+        peg: Whose tip.
+        hole: Whose frame.
+    """
     return pose_of(state, hole).inverse().apply(tip_of(state, peg))
 
 
 def turn_between(state: State, peg: Object, hole: Object) -> float:
-    """How a peg is turned about the vertical, seen from a hole, rad."""
+    """How a peg is turned about the vertical, seen from a hole, rad.
+
+    Args:
+        state: A single one.
+        peg: What is turned.
+        hole: From whose frame.
+    """
     back = pose_of(state, hole).inverse().quaternion
     x, y, _ = rotate(back, leading(state, peg))
     return math.atan2(y, x)

@@ -79,7 +79,7 @@ def seat(mouth: Vector, yaw: float) -> Pose:
 
 @lru_cache(maxsize=16)
 def scene(clearance: float) -> ContactScene:
-    """All bodies.
+    """Table, pegs and plates with holes.
 
     Args:
         clearance: What the holes are wider than a peg.
