@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 
 from slap_ros.core import Policy
-from slap_ros.domains.benchtop.approach import make_approach
+from slap_ros.domains.benchtop.approach import acted_on, carried, make_approach
 from slap_ros.domains.benchtop.hand_motion import CLOSE, OPEN, HandGoal, nearest_turn
 from slap_ros.domains.benchtop.scripts import (
     CLEARANCE,
@@ -19,12 +19,7 @@ from slap_ros.domains.benchtop.scripts import (
     over,
     release,
 )
-from slap_ros.domains.benchtop.state_access import (
-    held_thing,
-    position_of,
-    standing_on,
-    yaw_of,
-)
+from slap_ros.domains.benchtop.state_access import position_of, standing_on, yaw_of
 from slap_ros.relational import Object, State
 
 QUARTER = 0.5 * math.pi  # rad; turned by it, a cube looks the same
@@ -32,11 +27,10 @@ QUARTER = 0.5 * math.pi  # rad; turned by it, a cube looks the same
 
 def acts_at(state: State, objects: tuple[Object, ...]) -> HandGoal:
     """Where the hand is when it grasps a cube, or when the cube that it holds is in its place."""
-    *_, last = objects
-    held = held_thing(state)
+    held, obj = carried(state, objects), acted_on(state, objects)
     if held is None:
-        return HandGoal(position_of(state, last), nearest_turn(yaw_of(state, last), QUARTER))
-    return carry(held, standing_on(state, held, last))(state)
+        return HandGoal(position_of(state, obj), nearest_turn(yaw_of(state, obj), QUARTER))
+    return carry(held, standing_on(state, held, obj))(state)
 
 
 APPROACH = make_approach(acts_at)
