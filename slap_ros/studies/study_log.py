@@ -20,7 +20,7 @@ class StudyLog:
     """A file of JSON lines: what the study is, then an entry per result, as they come."""
 
     def __init__(self, path: Path, command: str) -> None:
-        """Open the log of a study, or begin it.
+        """Open the log of a study; the file begins with its first entry.
 
         Args:
             path: Of the file.
@@ -28,20 +28,26 @@ class StudyLog:
 
         Raises:
             InvalidParameterError: It is the log of another study, or none.
-            OSError: It cannot be read or written.
+            OSError: It cannot be read.
         """
         self._path = path
+        self._command = command
         self.found: list[Any] = []  # the entries that were there already
         if path.exists():
             self._read(command)
-        else:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            self.append({"command": command})
 
     def append(self, entry: Mapping[str, Any]) -> None:
-        """Write an entry."""
+        """Write an entry.
+
+        Raises:
+            OSError: It cannot be written.
+        """
+        lines = [entry]
+        if not self._path.exists():
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            lines = [{"command": self._command}, entry]
         with self._path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(entry) + "\n")
+            file.write("".join(json.dumps(line) + "\n" for line in lines))
 
     def remove(self) -> None:
         """Remove the file, once its study is written."""

@@ -215,6 +215,14 @@ def test_a_study_goes_on_where_it_was_stopped(installed, tmp_path):
     assert "--seed 9` has done so far" in ran.stderr
 
 
+def test_a_study_that_is_refused_leaves_nothing_behind(installed, tmp_path):
+    ran = slap(
+        "study", "demonstrations", "untaught", "--goal", "x", "--output", str(tmp_path / "results")
+    )
+    assert ran.exit_code == ErrorCode.UNKNOWN_GOAL
+    assert not list(tmp_path.glob("results/*"))
+
+
 def test_study_of_vacuity_counts_what_policies_do_without_eyes(installed, tmp_path):
     data = study("vacuity", tmp_path, "--starts", "4")
     operators = {one["operator"]: one for one in data["found"]["operators"]}
