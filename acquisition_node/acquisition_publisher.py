@@ -74,7 +74,7 @@ class AcquisitionPublisher:
             operators_pddl=operators,
             rewards=[
                 RewardTerm(
-                    operator=template.operator,
+                    operator_name=template.operator,
                     metric=term.metric.name,
                     arguments=[variable.name for variable in term.arguments],
                     weight=term.weight,

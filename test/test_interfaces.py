@@ -19,6 +19,15 @@ INTERFACES = sorted(
     ),
     key=lambda entry: entry.name,
 )
+# Keywords of C++, in which ROS 2 compiles the messages, that a field may well be called.
+RESERVED = {
+    "auto", "bool", "case", "catch", "char", "class", "const", "continue", "default", "delete",
+    "do", "double", "else", "enum", "explicit", "export", "extern", "false", "float", "for",
+    "friend", "goto", "if", "inline", "int", "long", "namespace", "new", "not", "operator", "or",
+    "private", "protected", "public", "register", "requires", "return", "short", "signed", "static",
+    "struct", "switch", "template", "this", "throw", "true", "try", "union", "unsigned", "using",
+    "virtual", "void", "volatile", "while",
+}  # fmt: skip
 OBVIOUS = {"Header header", "uint32 episode", "uint32 replans", "uint32 graph_edges"}
 
 
@@ -51,3 +60,12 @@ def test_numbers_say_their_unit_or_meaning(interface):
             assert line.strip() in {"uint8 kind", "uint8 phase", *OBVIOUS} or "episode" in line, (
                 line
             )
+
+
+@pytest.mark.parametrize("interface", INTERFACES, ids=lambda entry: entry.name)
+def test_no_field_has_a_name_that_does_not_compile(interface):
+    fields = re.findall(
+        r"^[\w/]+(?:\[\d*\])? +(\w+) *(?:#.*)?$", interface.read_text(), re.MULTILINE
+    )
+    assert fields or interface.name == "ErrorCode.msg"
+    assert not RESERVED & set(fields)
