@@ -17,7 +17,7 @@ from commands import LIMIT, ros2, solve, started, wait_for_task
 from ensemble.client import RunClient
 from ensemble.interfaces import DOMAIN, JOINT_STATES, MARKERS, PLAN_EVENTS, STATE, TASK
 from ensemble.spinner import temporary_node
-from slap_ros.bags import evaluate_bag, read_bag
+from slap_ros.bags import evaluate_bag, read_bag, replay_bag
 
 ROOT = Path(__file__).parents[2]
 EXECUTABLES = (
@@ -42,7 +42,12 @@ def test_the_executables_of_the_readme_are_there():
 
 
 @pytest.mark.parametrize(
-    ("domain", "options"), [("obstacle2d", ["shortcuts:=none"]), ("obstacle_tower", [])]
+    ("domain", "options"),
+    [
+        ("obstacle2d", ["shortcuts:=none"]),
+        ("obstacle_tower", []),
+        ("stack_at_target", ["skills:=demonstrator"]),
+    ],
 )
 def test_a_launched_ensemble_solves_what_it_is_asked_for(cli, tmp_path, domain, options):
     launch = ["ros2", "launch", "slap_ros", "ensemble.launch.py", f"domain:={domain}", "seed:=1"]
@@ -60,6 +65,7 @@ def test_a_launched_ensemble_solves_what_it_is_asked_for(cli, tmp_path, domain, 
         found = evaluate_bag(tmp_path / bag)
         assert found.runs[-1].success
         assert found.runs[-1].plan_length == plan_length
+        assert replay_bag(tmp_path / bag).identical
     if domain == "obstacle_tower":
         check_playing(tmp_path / "ours")
 
