@@ -118,11 +118,11 @@ def box_paths(body: VisibleBody, view: Projection, canvas: Canvas) -> tuple[str,
 def corners(body: VisibleBody) -> list[Vector]:
     """The corners of a box, or of the one around a body of triangles."""
     pose = pose_of(body)
-    xs, ys, zs = _ranges(body)
+    xs, ys, zs = extents(body)
     return [pose.apply(corner) for corner in product(xs, ys, zs)]
 
 
-def _ranges(body: VisibleBody) -> list[tuple[float, float]]:
+def extents(body: VisibleBody) -> list[tuple[float, float]]:
     """From where to where it reaches along its own axes, m."""
     if body.triangles:
         return [(min(values), max(values)) for values in zip(*body.triangles, strict=True)]

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 from slap_ros.core import VisibleBody
 from slap_ros.drawing.meshes import body_paths
+from slap_ros.drawing.occlusion import painting_order
 from slap_ros.drawing.projection import (
     OBLIQUE,
     SIDE,
@@ -163,7 +164,7 @@ def _order(
     samples: Sequence[VisibleBody],
     has_arm: bool,
 ) -> tuple[int, ...]:
-    """What stands still first, the largest of it before all, then from far to near."""
+    """From back to front; else what stands still first, the largest of it before all."""
 
     def rank(number: int) -> tuple[bool, float]:
         if number == len(samples):
@@ -173,7 +174,8 @@ def _order(
             return False, -x * y * z
         return True, view.depth(frame.bodies[number].position) if number < len(frame.bodies) else 0
 
-    return tuple(sorted(range(len(samples) + has_arm), key=rank))
+    ranks = [rank(number) for number in range(len(samples) + has_arm)]
+    return tuple(painting_order(frame.bodies, view, ranks))
 
 
 def _hex(body: VisibleBody) -> str:
