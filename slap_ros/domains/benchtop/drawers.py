@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -39,7 +40,6 @@ from slap_ros.relational import (
     State,
     Variable,
 )
-from slap_ros.relational.predicates import Bools
 from slap_ros.relational.state import Array
 
 # -- where its parts are --------------------------------------------------------------------------
@@ -136,22 +136,16 @@ IS_CABINET_OPEN = is_open(CABINET, OPENING)
 IS_CABINET_CLOSE = is_closed(CABINET, CLOSURE)
 
 
-def _free_space_margin(state: State) -> Array:
-    closed = IS_CABINET_CLOSE.margin
-    assert closed is not None
-    least: Array = closed(state, state.layout.column_of(CABINET)).min(axis=-1, keepdims=True)
+def _free_space(state: State) -> Array:
+    """How much less than allowed the widest drawer is open, as the margin of one atom."""
+    (closed,) = IS_CABINET_CLOSE.conditions
+    margins = closed.margin(state, (state.layout.column_of(CABINET),))
+    least: Array = margins.min(axis=-1, keepdims=True)
     return least
 
 
-def _free_space(state: State) -> Bools:
-    return _free_space_margin(state) >= 0.0
-
-
-HAS_FREE_SPACE = Predicate(
-    "HasFreeSpace",
-    (),
-    _free_space,
-    _free_space_margin,
+HAS_FREE_SPACE = replace(
+    Predicate.threshold("HasFreeSpace", (), _free_space),
     description="every drawer is closed, so there is room to pull one open",
 )
 PREDICATES = (IS_CABINET_OPEN, IS_CABINET_CLOSE, HAS_FREE_SPACE)
