@@ -48,7 +48,8 @@ SIZES = tuple(Feature(name, "m") for name in HALVES)
 RIM = (Feature("rim_radius", "m"), Feature("rim_height", "m"))  # where a bowl is grasped
 
 # A surface's frame is the middle of where things stand on it. What stands there is on the table as
-# well, so to say; what stands on the plate is not.
+# well, so to say; what stands on the plate is not. All of a bowl has to leave a surface before the
+# table is below it: a bowl that is pushed over an edge is not lifted by that.
 SURFACE = Type("surface", (*PLACE.features, *SIZES), PLACE)
 PLATE = Type("plate", PLACE.features, PLACE)
 BOWL = Type("bowl", (*THING.features, *RIM), THING)
@@ -73,13 +74,13 @@ def _rim_dis(state: State, bowls: Column) -> Array:
 
 
 def rise(state: State, bowl: Object) -> float:
-    """The height of the bowl's underside over the table, or over a surface under its middle."""
+    """The height of the bowl's underside over the table, or over a surface that it is over."""
     x, y, z = position_of(state, bowl)
-    top = 0.0
+    radius, top = value(state, bowl, "rim_radius"), 0.0
     for surface in state.layout.of_type(SURFACE):
         dx, dy, _ = pose_of(state, surface).inverse().apply((x, y, z))
         length, width = value(state, surface, "half_length"), value(state, surface, "half_width")
-        if abs(dx) <= length and abs(dy) <= width:
+        if abs(dx) <= length + radius and abs(dy) <= width + radius:
             top = max(top, value(state, surface, "z"))
     return z - value(state, bowl, "rest_height") - top
 
@@ -89,7 +90,8 @@ def _rise(state: State, bowls: Column) -> Array:
     apart = positions(state, bowls)[..., :, None, :] - positions(state, surfaces)[..., None, :, :]
     along, up = axes(state, surfaces)[..., None, :, :], np.array([0.0, 0.0, 1.0])
     dx, dy = (np.abs((apart * axis).sum(axis=-1)) for axis in (along, np.cross(up, along)))
-    length, width = (state.stack(surfaces, name)[..., None, :] for name in HALVES)
+    radius = state.stack(bowls, "rim_radius")[..., :, None]
+    length, width = (radius + state.stack(surfaces, name)[..., None, :] for name in HALVES)
     heights = np.where(
         (dx <= length) & (dy <= width), state.stack(surfaces, "z")[..., None, :], 0.0
     )
@@ -112,7 +114,7 @@ RISE = Metric(
     "rise",
     (BOWL,),
     "m",
-    "Height of the bowl's underside over the table, or over a surface under its middle.",
+    "Height of the bowl's underside over the table, or over a surface that it is over.",
     _rise,
     rise,
     NormalisedForm.fraction(FULL_LIFT),

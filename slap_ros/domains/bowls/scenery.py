@@ -29,11 +29,11 @@ OAK: Colour = (0.55, 0.38, 0.22, 1.0)
 
 SIDES = 8  # walls
 WALL = 0.003  # half as thick as walls and bottom are
-RIM_RADIUS = 0.048  # from the middle to the middle of a wall
+RIM_RADIUS = 0.0395  # from the middle to the middle of a wall; too wide to be grasped across
 OUTSIDE = (RIM_RADIUS + WALL) / math.cos(math.pi / SIDES)  # from the middle to a corner
 BOWL_HEIGHT = 0.045
 BOWL_MASS = 0.15
-GRASPED_BELOW = 0.011  # the rim's upper edge
+GRASPED_BELOW = 0.006  # the upper edge of the rim
 
 
 def _wall(number: int) -> BoxPart:
