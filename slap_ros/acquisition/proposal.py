@@ -9,8 +9,16 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from slap_ros.acquisition.problem import AcquisitionProblem
-from slap_ros.relational import LiftedAtom, LiftedOperator, RewardTemplate
+from slap_ros.acquisition.problem import AcquisitionProblem, metrics_of
+from slap_ros.core import Domain
+from slap_ros.relational import (
+    LiftedAtom,
+    LiftedOperator,
+    Metric,
+    RewardTemplate,
+    RewardTerm,
+    Variable,
+)
 from slap_ros.relational.pddl import write_domain, write_problem
 
 VERSION = 1
@@ -65,9 +73,9 @@ class Proposal:
             "format": "slap_ros proposal",
             "version": VERSION,
             "problem": self.problem,
-            "operators": [_operator_data(operator) for operator in self.operators],
+            "operators": [operator_data(operator) for operator in self.operators],
             "rewards": [
-                _template_data(self.rewards[operator.name])
+                template_data(self.rewards[operator.name])
                 for operator in self.operators
                 if operator.name in self.rewards
             ],
@@ -92,7 +100,8 @@ class Proposal:
         return domain, task
 
 
-def _operator_data(operator: LiftedOperator) -> dict[str, Any]:
+def operator_data(operator: LiftedOperator) -> dict[str, Any]:
+    """What JSON can hold of an operator."""
     return {
         "name": operator.name,
         "parameters": [{"name": v.name, "type": v.type.name} for v in operator.parameters],
@@ -110,7 +119,8 @@ def _atoms_data(atoms: frozenset[LiftedAtom]) -> list[dict[str, Any]]:
     ]
 
 
-def _template_data(template: RewardTemplate) -> dict[str, Any]:
+def template_data(template: RewardTemplate) -> dict[str, Any]:
+    """What JSON can hold of a reward."""
     return {
         "operator": template.operator,
         "terms": [
@@ -122,3 +132,62 @@ def _template_data(template: RewardTemplate) -> dict[str, Any]:
             for term in template.terms
         ],
     }
+
+
+def read_operator(data: Any, domain: Domain) -> LiftedOperator:
+    """The operator of :func:`operator_data`, in a domain's words.
+
+    Raises:
+        LookupError, TypeError, AttributeError: It is not of that form, or of another domain.
+        InvalidDomainError: Its parts do not fit.
+    """
+    types, predicates = domain.types_by_name, {p.name: p for p in domain.predicates}
+    variables = {v["name"]: Variable(v["name"], types[v["type"]]) for v in data["parameters"]}
+
+    def atoms(part: str) -> frozenset[LiftedAtom]:
+        return frozenset(
+            LiftedAtom(
+                predicates[atom["predicate"]],
+                tuple(variables[name] for name in atom["arguments"]),
+            )
+            for atom in data[part]
+        )
+
+    return LiftedOperator(
+        str(data["name"]),
+        tuple(variables.values()),
+        atoms("preconditions"),
+        atoms("add_effects"),
+        atoms("delete_effects"),
+    )
+
+
+def read_template(data: Any, operator: LiftedOperator, domain: Domain) -> RewardTemplate:
+    """The reward of :func:`template_data`, in a domain's words.
+
+    Args:
+        data: As JSON has it.
+        operator: Whose reward it is.
+        domain: Whose metrics it uses.
+
+    Raises:
+        LookupError, TypeError, ValueError: It is not of that form, or of another domain.
+    """
+    metrics = {metric.name: metric for metric in rewarded_metrics(domain)}
+    variables = {variable.name: variable for variable in operator.parameters}
+    terms = tuple(
+        RewardTerm(
+            metrics[term["metric"]],
+            tuple(variables[name] for name in term["arguments"]),
+            float(term["weight"]),
+        )
+        for term in data["terms"]
+    )
+    return RewardTemplate(str(data["operator"]), terms)
+
+
+def rewarded_metrics(domain: Domain) -> tuple[Metric, ...]:
+    """What rewards can be made of in a domain, those of its hand-written rewards included."""
+    written = domain.acquisition.rewards.values() if domain.acquisition else ()
+    used = (term.metric for template in written for term in template.terms)
+    return tuple(dict.fromkeys((*metrics_of(domain.predicates), *domain.metrics, *used)))

@@ -38,10 +38,10 @@ class SacSettings:
     batch_size: int = 128
     steps_per_update: int = 2
     learning_rate: float = 1e-3
-    discount: float = 0.95
-    tau: float = 0.01
+    discount: float = 0.98
+    tau: float = 0.005
     entropy_per_action: float = -1.0
-    random_steps: int = 400
+    random_steps: int = 800
     capacity: int = 200_000
 
     def __post_init__(self) -> None:

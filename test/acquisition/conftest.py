@@ -4,10 +4,14 @@
 
 from __future__ import annotations
 
+import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from slap_ros.domains import forget_domains
 
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent / "language")]
@@ -19,3 +23,21 @@ def no_settings_of_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in (*names, "HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY"):
         monkeypatch.delenv(name, raising=False)
         monkeypatch.delenv(name.lower(), raising=False)
+
+
+@pytest.fixture
+def points_installed(
+    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[None]:
+    """The domain `points` by its name, in this process and in those that it starts."""
+    information = tmp_path_factory.mktemp("site") / "points-1.0.dist-info"
+    information.mkdir()
+    (information / "METADATA").write_text("Name: points\nVersion: 1.0\n")
+    (information / "entry_points.txt").write_text("[slap_ros.domains]\npoints = points:make\n")
+    folders = [str(information.parent), str(HERE)]
+    monkeypatch.syspath_prepend(folders[0])
+    before = filter(None, [os.environ.get("PYTHONPATH")])
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([*folders, *before]))
+    forget_domains()
+    yield
+    forget_domains()

@@ -15,6 +15,7 @@ from points import (
     POINTS,
     PUT,
     REWARDS,
+    STEP,
     P,
     T,
     hand_xy,
@@ -162,7 +163,7 @@ def towards_the_thing(env, close):
     """The shortest way to the thing; then grasps it, or hovers right above it."""
     part = next(env.mdp.groundings.split(env._rows, env._numbers))
     thing = part.pick(part.state.gather(part.columns[0], ("x", "y")))
-    way = (thing - hand_xy(part.state)) / 0.02
+    way = (thing - hand_xy(part.state)) / STEP
     arrived = np.linalg.norm(way, axis=-1, keepdims=True) < 0.5
     return np.concatenate([way, np.where(arrived & close, 1.0, 0.0)], axis=-1)
 

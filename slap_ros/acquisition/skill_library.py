@@ -1,0 +1,260 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Libraries of learned skills on disk: a folder per skill, readable without torch, never a pickle.
+
+::
+
+    models/skills/stow_hammer/
+      library.json             format, domain, preset, goal, command, settings, steps, progress
+      Open-1f3a90c2/           name and digest of the lifted operator
+        skill.json             operator, reward, key, horizon, checksum, record
+        policy.safetensors     weights
+
+What is damaged is not used: a skill that cannot be read is refused with a reason, and the rest of
+the library is used without it. A library of another domain or of a newer format is refused as a
+whole.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from safetensors.numpy import save
+
+from slap_ros.acquisition.observations import SIZE
+from slap_ros.acquisition.proposal import (
+    operator_data,
+    read_operator,
+    read_template,
+    template_data,
+)
+from slap_ros.acquisition.retrieval import signature_of
+from slap_ros.acquisition.reward import check_template
+from slap_ros.acquisition.skill import LearnedSkill
+from slap_ros.core import Domain
+from slap_ros.errors import InvalidDomainError, InvalidLibraryError, InvalidRewardError
+from slap_ros.learning.action_map import ActionMap
+from slap_ros.learning.library_files import (
+    load_policy,
+    policy_tensors,
+    read_object,
+    replace_folder,
+    save_policy,
+    write_object,
+)
+from slap_ros.learning.mlp_policy import ACTIVATIONS, MlpPolicy
+from slap_ros.relational import LiftedOperator, RewardTemplate
+
+FORMAT = 1
+LIBRARY, SKILL, POLICY = "library.json", "skill.json", "policy.safetensors"
+MAX_HORIZON = 10_000  # environment steps
+
+
+def operator_digest(operator: LiftedOperator) -> str:
+    """Eight hexadecimal digits that tell lifted operators apart."""
+    return sha256(json.dumps(operator_data(operator)).encode()).hexdigest()[:8]
+
+
+@dataclass(frozen=True)
+class AcquiredSkill:
+    """What was learned for an operator, and how.
+
+    Args:
+        operator: What it does.
+        template: The dense part of its reward.
+        policy: What was learned.
+        horizon: Environment steps of the policy at most.
+        record: Figures by name: success, vacuity, steps, seed, what it began from.
+    """
+
+    operator: LiftedOperator
+    template: RewardTemplate
+    policy: MlpPolicy
+    horizon: int
+    record: Mapping[str, Any] = field(default_factory=dict, compare=False)
+
+    @property
+    def folder_name(self) -> str:
+        """The operator's name and digest."""
+        return f"{self.operator.name}-{operator_digest(self.operator)}"
+
+    def in_domain(self, domain: Domain) -> LearnedSkill:
+        """The skill, to be executed."""
+        return LearnedSkill(self.operator, self.policy, domain, self.horizon)
+
+
+@dataclass(frozen=True)
+class SkillLibrary:
+    """Skills of a domain.
+
+    Args:
+        domain: Its name.
+        skills: Those that could be read, in order of their folders.
+        record: How the library was made: preset, goal, command, settings, progress.
+        refused: Why the others were not read.
+    """
+
+    domain: str
+    skills: tuple[AcquiredSkill, ...] = ()
+    record: Mapping[str, Any] = field(default_factory=dict)
+    refused: tuple[InvalidLibraryError, ...] = ()
+
+    @property
+    def digest(self) -> str:
+        """What was learned, as 16 hexadecimal digits; empty where that is nothing."""
+        if not self.skills:
+            return ""
+        whole = sha256()
+        for skill in self.skills:
+            whole.update(skill.folder_name.encode() + save(policy_tensors(skill.policy)))
+        return whole.hexdigest()[:16]
+
+
+def acquired_domain(domain: Domain, library: SkillLibrary) -> Domain:
+    """The domain with a library's operators and skills in the place of its own.
+
+    Args:
+        domain: Whose predicates, worlds and approach are used.
+        library: Of that domain.
+
+    Returns:
+        A domain like any other; what is static in it is what was static before.
+    """
+    return replace(
+        domain,
+        operators=tuple(skill.operator for skill in library.skills),
+        skills={skill.operator.name: skill.in_domain(domain) for skill in library.skills},
+        static=domain.static_predicates,
+    )
+
+
+def save_skill_library(path: Path, library: SkillLibrary) -> None:
+    """Write a library as a folder, in place of the one that may be there."""
+
+    def write(folder: Path) -> None:
+        for skill in library.skills:
+            save_skill(folder / skill.folder_name, skill)
+        about = {"format": FORMAT, "domain": library.domain, **library.record}
+        write_object(folder / LIBRARY, about)
+
+    replace_folder(path, write)
+
+
+def load_skill_library(path: Path, domain: Domain) -> SkillLibrary:
+    """Read a library.
+
+    Raises:
+        InvalidLibraryError: There is none, or it is damaged as a whole, newer than this version,
+            or another domain's.
+    """
+    about = read_library_record(path)
+    if about["domain"] != domain.name:
+        raise InvalidLibraryError(
+            f"{path}: skills of domain {about['domain']!r}, not of {domain.name!r}"
+        )
+    skills, refused = [], []
+    for folder in sorted(entry for entry in path.iterdir() if entry.is_dir()):
+        try:
+            skills.append(load_skill(folder, domain))
+        except InvalidLibraryError as error:
+            refused.append(error)
+    record = {k: v for k, v in about.items() if k not in ("format", "domain")}
+    return SkillLibrary(domain.name, tuple(skills), record, tuple(refused))
+
+
+def read_library_record(path: Path) -> dict[str, Any]:
+    """What is said of a library, without its skills.
+
+    Raises:
+        InvalidLibraryError: There is none, or it is damaged or newer than this version.
+    """
+    if not path.is_dir():
+        raise InvalidLibraryError(f"{path}: no such folder; `slap acquire DOMAIN` makes one")
+    about = read_object(path / LIBRARY)
+    if about.get("format") != FORMAT:
+        raise InvalidLibraryError(
+            f"{path}: format {about.get('format')!r}, this version of slap_ros reads {FORMAT}; "
+            "acquire the skills again or use the version of slap_ros that made them"
+        )
+    if not isinstance(about.get("domain"), str):
+        raise InvalidLibraryError(f"{path / LIBRARY}: damaged: it names no domain")
+    return about
+
+
+# -- one skill ------------------------------------------------------------------------------------
+
+
+def save_skill(folder: Path, skill: AcquiredSkill) -> None:
+    """Write one skill into a folder, which is made where there is none."""
+    folder.mkdir(parents=True, exist_ok=True)
+    checksum = save_policy(folder / POLICY, skill.policy)
+    write_object(
+        folder / SKILL,
+        {
+            "operator": operator_data(skill.operator),
+            "reward": template_data(skill.template),
+            "key": signature_of(skill.operator).as_json(),
+            "horizon": skill.horizon,
+            "activation": skill.policy.activation,
+            "squashed": skill.policy.squashed,
+            "record": dict(skill.record),
+            "sha256": checksum,
+        },
+    )
+
+
+def load_skill(folder: Path, domain: Domain) -> AcquiredSkill:
+    """Read one skill.
+
+    Args:
+        folder: Named after it, where it is part of a library.
+        domain: Whose words its operator is in.
+
+    Raises:
+        InvalidLibraryError: It is damaged, or of another domain.
+    """
+    about = read_object(folder / SKILL)
+    try:
+        operator = read_operator(about["operator"], domain)
+        template = read_template(about["reward"], operator, domain)
+        check_template(template, operator)
+        horizon, record = int(about["horizon"]), dict(about["record"])
+        activation, squashed = str(about["activation"]), bool(about["squashed"])
+        checksum = str(about["sha256"])
+        if not 1 <= horizon <= MAX_HORIZON:
+            raise ValueError(f"its horizon is {horizon:.3g} steps")
+        if activation not in ACTIVATIONS:
+            raise ValueError(f"its activation is {activation!r}")
+    except (InvalidDomainError, InvalidRewardError) as error:
+        raise InvalidLibraryError(f"{folder / SKILL}: does not fit together: {error}") from error
+    except (LookupError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise InvalidLibraryError(
+            f"{folder / SKILL}: damaged, or of another domain than {domain.name}: {error!r}"
+        ) from error
+    policy = load_policy(folder / POLICY, checksum, SKILL)
+    policy = replace(policy, activation=activation, squashed=squashed)
+    skill = AcquiredSkill(operator, template, policy, horizon, record)
+    _require_fit(skill, folder, domain)
+    return skill
+
+
+def _require_fit(skill: AcquiredSkill, folder: Path, domain: Domain) -> None:
+    """Refuse a renamed skill, and a policy of other observations or actions."""
+    if folder.name not in (skill.folder_name, skill.operator.name):
+        raise InvalidLibraryError(
+            f"{folder}: the operator inside is {skill.folder_name}; the folder was renamed or the "
+            "file changed"
+        )
+    size, actions = skill.policy.normalisation.mean.size, skill.policy.log_std.size
+    expected = ActionMap(domain, gripper=True).size
+    if (size, actions) != (SIZE, expected):
+        raise InvalidLibraryError(
+            f"{folder}: the policy observes {size} features and has {actions} actions, skills of "
+            f"{domain.name} have {SIZE} and {expected}: learned with another version of slap_ros, "
+            "acquire it again"
+        )

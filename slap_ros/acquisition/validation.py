@@ -1,0 +1,166 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a policy is worth: its success from given states, and whether constant actions do as well.
+
+Success is that of a stage of a plan: everything that is expected holds in some step of the horizon,
+and nothing that the operator deletes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slap_ros.acquisition.groundings import Groundings
+from slap_ros.acquisition.reward import SkillReward
+from slap_ros.acquisition.rollouts import StageTarget
+from slap_ros.acquisition.skill_env import Initiation, SkillMdp
+from slap_ros.core import Domain, VectorWorld
+from slap_ros.relational import AtomSpace, GroundOperator, Layout, LiftedOperator, State
+from slap_ros.relational.state import Array
+
+SIDE_BY_SIDE = 8  # worlds that are stepped together
+# Observations, shape (n, size), to actions, shape (n, actions).
+Act = Callable[[NDArray[np.float32]], Array | NDArray[np.float32]]
+
+
+@dataclass(frozen=True)
+class Vacuity:
+    """How well the best policy does that knows nothing.
+
+    Args:
+        success: Share of states from which it succeeds.
+        policy: Its name; empty where none succeeds.
+    """
+
+    success: float
+    policy: str = ""
+
+
+class SkillTrials:
+    """Trials of one skill from given states, each the same for whatever policy."""
+
+    def __init__(
+        self,
+        domain: Domain,
+        reward: SkillReward,
+        initiations: Sequence[Initiation],
+        horizon: int,
+    ) -> None:
+        """Prepare the trials.
+
+        Args:
+            domain: Whose worlds are stepped.
+            reward: Of the skill.
+            initiations: Where it begins, one for each trial.
+            horizon: Environment steps of each.
+        """
+        self._domain, self._initiations, self._horizon = domain, initiations, horizon
+        groundings = list(dict.fromkeys(one.grounding for one in initiations))
+        self._mdp = SkillMdp(domain, reward, Groundings(groundings))
+        self._targets: dict[int, tuple[AtomSpace, StageTarget]] = {}
+        self._worlds: dict[Layout, VectorWorld] = {}
+
+    def success(self, act: Act) -> float:
+        """Share of trials in which a policy succeeds."""
+        return float(np.mean([done for _, done in self.results(act)]))
+
+    def results(self, act: Act) -> Iterator[tuple[int, bool]]:
+        """Whether a policy succeeds, for the number of each trial."""
+        by_layout: dict[Layout, list[int]] = {}
+        for number, initiation in enumerate(self._initiations):
+            by_layout.setdefault(initiation.state.layout, []).append(number)
+        for numbers in by_layout.values():
+            for i in range(0, len(numbers), SIDE_BY_SIDE):
+                some = numbers[i : i + SIDE_BY_SIDE]
+                yield from zip(some, self._run(some, act), strict=True)
+
+    def vacuity(self, rng: np.random.Generator) -> Vacuity:
+        """The best of constant and random actions."""
+        best = Vacuity(0.0)
+        for name, act in blind_policies(self._mdp.action_map.size, rng).items():
+            success = self.success(act)
+            if success > best.success:
+                best = Vacuity(success, name)
+        return best
+
+    def _run(self, numbers: Sequence[int], act: Act) -> list[bool]:
+        """Run trials over the same objects side by side."""
+        worlds = self._begin(numbers)
+        which = np.array(
+            [self._mdp.groundings.number(self._initiations[i].grounding) for i in numbers]
+        )
+        n = len(numbers)  # the other worlds stand still
+        done = [False] * n
+        state = worlds.states
+        for _ in range(self._horizon):
+            padded = self._mdp.groundings.rows(state.data[:n])
+            commands = np.zeros((len(state.data), len(self._domain.action_space.axes)))
+            commands[:n] = self._mdp.action_map(
+                act(self._mdp.observe(padded, which)).astype(np.float64)
+            )
+            state = worlds.step(commands)
+            padded = self._mdp.groundings.rows(state.data[:n])
+            _, effects = self._mdp.rewards(padded, which)
+            for i in map(int, np.flatnonzero(effects)):
+                done[i] = done[i] or self._reached(numbers[i], State(state.layout, state.data[i]))
+            if all(done):
+                break
+        return done
+
+    def _begin(self, numbers: Sequence[int]) -> VectorWorld:
+        """Worlds side by side, the first of them in the states where these trials begin."""
+        states = [self._initiations[i].state for i in numbers]
+        layout = states[0].layout
+        if layout not in self._worlds:
+            spare = [states[0]] * (SIDE_BY_SIDE - len(states))
+            self._worlds[layout] = self._domain.make_vector_world([*states, *spare])
+        for i, state in enumerate(states):
+            self._worlds[layout].reset(i, state)
+        return self._worlds[layout]
+
+    def _reached(self, number: int, state: State) -> bool:
+        """Whether a trial whose effects are reached has disturbed nothing else."""
+        if number not in self._targets:
+            initiation = self._initiations[number]
+            space = self._domain.atom_space(initiation.state)
+            operator = _ground(self._mdp.reward.operator, initiation, space)
+            target = StageTarget.of(operator, space.abstract(initiation.state))
+            self._targets[number] = space, target
+        space, target = self._targets[number]
+        return target.reached(space.abstract(state))
+
+
+def _ground(operator: LiftedOperator, initiation: Initiation, space: AtomSpace) -> GroundOperator:
+    binding = dict(zip(operator.parameters, initiation.objects, strict=True))
+    pre, add, delete = (
+        space.mask(atom.ground(binding) for atom in atoms)
+        for atoms in (operator.preconditions, operator.add_effects, operator.delete_effects)
+    )
+    return GroundOperator(operator, initiation.objects, pre, add, delete)
+
+
+def blind_policies(actions: int, rng: np.random.Generator) -> Mapping[str, Act]:
+    """Policies that see nothing: every action's extremes, nothing at all, and random actions.
+
+    Args:
+        actions: How many a policy has.
+        rng: Draws the random ones.
+    """
+
+    def constant(action: Array) -> Act:
+        return lambda observations: np.tile(action, (len(observations), 1))
+
+    def random(observations: NDArray[np.float32]) -> Array:
+        return rng.uniform(-1.0, 1.0, (len(observations), actions))
+
+    policies: dict[str, Act] = {"nothing": constant(np.zeros(actions)), "random": random}
+    for i in range(actions):
+        for sign in (-1.0, 1.0):
+            extreme = np.zeros(actions)
+            extreme[i] = sign
+            policies[f"action {i} at {sign:+.0f}"] = constant(extreme)
+    return policies
