@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 TORCH := torch==2.13.0  # pinned: another version trains other policies from the same seed
 METADATA := pyproject.toml setup.py setup.cfg embedded_ros/pyproject.toml
 
-.PHONY: help install demo test test-ros faults lint format docs clean
+.PHONY: help install demo test test-ros faults reproduce lint format docs clean
 
 help:  ## Show what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -57,6 +57,9 @@ test-ros: $(VENV)/.installed  ## Run the tests that face ROS 2 on a sourced Jazz
 
 faults: $(VENV)/.tested  ## Inject many more faults than the tests do, for about an hour
 	$(BIN)/pytest -q test/faults --fault-cases $(or $(CASES),100)
+
+reproduce: $(VENV)/.tested  ## Make every published figure again; says first what that takes
+	$(BIN)/python -m tools.reproduce $(FIGURES)
 
 lint: $(VENV)/.tested  ## Check style and types
 	$(BIN)/ruff check . embedded_ros
