@@ -46,6 +46,7 @@ class RunSettings:
     index: int
     planner: str
     record: Path | None  # the bag's folder; None: no recorder
+    goal: str = ""  # by name, or as atoms; empty: the task's own
     skills: str = ""  # see slap_ros.learning.domain_choice
     pace: float = 0.0  # environment steps per second; 0: as fast as commands come
     shortcuts: str = ""  # a library's folder, or none; empty: the shipped one
@@ -94,6 +95,7 @@ def _world_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int
         "skills": settings.skills,
         "seed": settings.seed,
         "index": settings.index,
+        "goal": settings.goal,
     }
     if settings.world == SIM:
         return {"sim_node": task | {"pace": settings.pace}}

@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ensemble.parameters import MAX_SEED, parameter
+from slap_ros.core import Domain, Task, task_with_goal
 from slap_ros.learning.domain_choice import DomainChoice
 
 
@@ -19,6 +20,7 @@ class WorldParameters:
     seed: int = parameter(0, "samples the first task", high=MAX_SEED)
     skills: str = parameter("", "none, demonstrator; empty: those that the domain itself has")
     index: int = parameter(0, "which of the seed's tasks")
+    goal: str = parameter("", "of the first task: by name, or as atoms; empty: its own")
 
     @property
     def choice(self) -> DomainChoice:
@@ -28,3 +30,11 @@ class WorldParameters:
             InvalidParameterError: Skills that are not known.
         """
         return DomainChoice(self.domain, self.preset, self.skills)
+
+    def first_task(self, domain: Domain) -> Task:
+        """The first task; where the goal has a name, one that has the goal's objects.
+
+        Raises:
+            SlapError: The goal cannot be had in this task.
+        """
+        return task_with_goal(domain, self.seed, self.index, self.goal)

@@ -30,6 +30,7 @@ ARGUMENTS = {
     "skills": ("", "none, demonstrator; empty: those that the domain itself has"),
     "seed": ("0", "samples the task"),
     "index": ("0", "which of the seed's tasks"),
+    "goal": ("", "of the task, by name or as atoms; empty: its own"),
     "planner": ("lazy", "lazy, exhaustive or ff"),
     "shortcuts": ("", "folder of a shortcut library, or none; empty: the shipped one"),
     "samples": ("16", "attempts of a shortcut in the model; the shortest is used"),
@@ -69,7 +70,7 @@ def _discovery_range() -> list[Action]:
 
 def _worlds() -> list[Node]:
     """The simulator, or the bridge with or without a mock robot behind it."""
-    task = {name: _value(name, str) for name in ("domain", "preset", "skills")}
+    task = {name: _value(name, str) for name in ("domain", "preset", "skills", "goal")}
     task |= {"seed": _value("seed", int), "index": _value("index", int)}
     arm = {"arm": _value("arm", str)}
     noise = {name: _value(name, float) for name in ("latency", "pose_noise", "dropout")}

@@ -14,7 +14,8 @@ ROS Parameters:
     domain (string, "obstacle_tower"): which domain; one with a Panda.
     preset (string, ""): one that obeys the joints' speed limit; empty: the domain's first.
     skills (string, ""): as sim_node's.
-    seed (int, 0), index (int, 0): the task whose objects there are, unless a scene says so.
+    seed (int, 0), index (int, 0), goal (string, ""): the task whose objects there are, unless a
+        scene says so; the goal as sim_node's.
     scene (string, ""): a scene file; empty: the sampled task's objects, in frames detected_NAME.
     arm (string, "panda"): panda or fr3: limits, and the prefix of joints and frames.
     speed (double, 0.5): fraction of the arm's velocity and acceleration limits, above 0 to 1.
@@ -119,7 +120,7 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
         super().destroy_node()
 
     def _sampled_state(self) -> State:
-        return self._domain.task(self._settings.seed, self._settings.index).initial_state
+        return self._settings.first_task(self._domain).initial_state
 
     def _diagnostics(self) -> dict[str, object]:
         idle = self._robot.clock.now_s() - self._since_s > self._settings.hold_after

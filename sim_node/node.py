@@ -10,6 +10,8 @@ ROS Parameters:
         the other nodes.
     seed (int, 0): samples the first task.
     index (int, 0): which of the seed's tasks.
+    goal (string, ""): of the first task, by name or as atoms; empty: its own. Where the goal has a
+        name, the first task of that stream that has the goal's objects.
     pace (double, 0.0): environment steps per second, for watching; 0: as fast as commands come.
     visualize (bool, true): publish markers, frames and joint states.
 
@@ -82,7 +84,8 @@ class SimNode(LockstepWorld[SimParameters]):
         self._timer: Timer | None = None  # until the next state is due
         visualize = self._settings.visualize
         self._visualizer = Visualizer(self, self._domain) if visualize else None
-        self._open_sampled(self._settings.seed, self._settings.index)
+        first = self._settings.first_task(self._domain)
+        self._begin(first, self._settings.seed, self._settings.index)
 
     # -- commands and steps ---------------------------------------------------------------------
 
@@ -118,10 +121,8 @@ class SimNode(LockstepWorld[SimParameters]):
         if request.initial_state.objects:
             self._begin(self._given_task(request), UNSAMPLED, 0)
         else:
-            self._open_sampled(request.seed, request.index)
-
-    def _open_sampled(self, seed: int, index: int) -> None:
-        self._begin(self._domain.task(seed, index), seed, index)
+            task = self._domain.task(request.seed, request.index)
+            self._begin(task, request.seed, request.index)
 
     def _begin(self, task: Task, seed: int, index: int) -> None:
         self._world = self._domain.make_world(task.initial_state)

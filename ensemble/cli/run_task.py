@@ -96,6 +96,7 @@ def _request(options: RunOptions, domain: Domain, task: Task) -> RunRequest:
         options.index,
         options.planner,
         record=None,
+        goal=options.goal or "",
         skills=options.choice.skills,
         pace=options.pace,
         patience=options.patience,

@@ -7,7 +7,7 @@ as anything moves. For tests, and for trying the bridge out before there is a ro
 
 ROS Parameters:
     domain (string, "obstacle_tower"), preset (string, ""), skills (string, ""), seed (int, 0),
-        index (int, 0): the task in whose initial state the world is.
+        index (int, 0), goal (string, ""): the task in whose initial state the world is.
     arm (string, "panda"): prefix of joints and frames.
     trajectory_action (string, "ARM_arm_controller/follow_joint_trajectory"),
     gripper_action (string, "franka_gripper/gripper_action"): names of the actions, as the bridge's.
@@ -78,7 +78,7 @@ class MockRobot(Node):
         domain = open_domain(settings.choice)
         period_s = domain.execution.control_period_s / settings.pace
         noise = NoiseModel(_noise_settings(settings), np.random.default_rng(settings.noise_seed))
-        self._plant = Plant(domain, domain.task(settings.seed, settings.index).initial_state)
+        self._plant = Plant(domain, settings.first_task(domain).initial_state)
         self._counts = Counter(motions=0, grips=0, refused=0, aborted=0, canceled=0)
         self._controllers = MockControllers(
             self, self._plant, noise, settings, period_s, self._counts

@@ -55,6 +55,18 @@ def solved(record: Path, **options: object) -> object:
     return metrics
 
 
+def test_a_goal_by_name_has_its_objects_in_the_world(network, tmp_path):
+    """What this seed's first task lacks: the world is in the first task that has it."""
+    domain = get_domain("groceries")
+    assert "cereal" not in domain.task(1).initial_state.layout.by_name
+    goal = ["--goal", "task3", "--seed", "1", "--record", str(tmp_path / "bag"), "--in-process"]
+    ran = CliRunner().invoke(app, ["run", "groceries", "--policy", "demonstrator", *goal])
+    assert ran.exit_code == 0, ran.output
+    (episode,) = Recording.of(read_bag(tmp_path / "bag")).episodes.values()
+    assert {obj.name for obj in episode.states[0].objects} >= {"cereal", "basket"}
+    assert [str(atom.predicate) for atom in episode.task.goal] == ["In"]
+
+
 def test_a_run_is_recorded_evaluated_replayed_and_reported(network, tmp_path):
     live = solved(tmp_path / "bag")
     assert [option.name for option in live.options] == ["Pick", "Place"] * 2
