@@ -113,8 +113,9 @@ def _read(name: str, text: str, now: object) -> object:
     except ValueError:
         numbers = []
     if not 1 <= len(numbers) <= 2 or numbers[0] > numbers[-1]:
+        wanted = "low..high" if is_range else "a whole number" if kind is int else "a number"
         raise InvalidParameterError(
-            f"setting {name!r} is {now}, which {_shortened(repr(text))} cannot replace"
-            + ("; give low..high" if is_range else "")
+            f"setting {name!r} is {now}, which {_shortened(repr(text))} cannot replace; "
+            f"give {wanted}"
         )
     return (numbers[0], numbers[-1]) if is_range else numbers[0]

@@ -164,6 +164,16 @@ def test_settings_that_do_not_exist(domain):
         get_domain(domain.name, "fair:colour=3")
 
 
+def test_what_a_setting_can_be_is_said():
+    for name, text, wanted in (
+        ("peg_in_hole", "clearance=wide", "'clearance' is 5.0, which 'wide' .*; give a number"),
+        ("peg_in_hole", "height=1..0", "'1..0' cannot replace; give low..high"),
+        ("stack_at_target", "cubes=2.5", "which '2.5' cannot replace; give a whole number"),
+    ):
+        with pytest.raises(InvalidParameterError, match=wanted):
+            get_domain(name, f"fair:{text}")
+
+
 @pytest.mark.parametrize("clearance", ["0", "-3", "0.0", "-1e-9", "1e9"])
 def test_clearances_that_cannot_be(clearance):
     with pytest.raises(InvalidParameterError) as refusal:
