@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from itertools import permutations
 
+import numpy as np
 import pytest
 from scattered_states import BENCHTOP, STATES, metrics_of, scattered
 
@@ -79,3 +80,29 @@ def test_nothing_is_held_and_on_the_table(name):
     assert not any((truth[:, held] & truth[:, lying]).any() for held, lying in pairs)
     held = [i for n, i in of.items() if n.startswith("Holding")]
     assert (truth[:, of["HandEmpty()"]] != truth[:, held].any(axis=1)).all()
+
+
+@pytest.mark.parametrize("name", BENCHTOP)
+def test_what_learners_observe_is_relative_to_the_hand(name):
+    """All that is at the bench moved by as much as the hand looks the same."""
+    domain, batch = get_domain(name), scattered(name)
+    interface = domain.learning.interface
+    columns = [batch.layout.column_of(obj.type) for obj in batch.objects]
+    shifted = batch.data.copy()
+    for obj in batch.objects:
+        for feature, way in (("x", 0.1), ("y", -0.2), ("target_x", 0.1), ("target_y", -0.2)):
+            if feature in obj.type.column:
+                shifted[:, batch.layout.column(obj, feature)] += way
+    seen, moved = (
+        [
+            interface.robot(state, hand),
+            *(interface.objects(state, hand, column) for column in columns),
+            *(interface.distance(state, hand, column) for column in columns),
+            *(interface.separation(state, batch.objects[0], column) for column in columns),
+        ]
+        for state in (batch, State(batch.layout, shifted))
+        for hand in (interface.hand(state),)
+    )
+    for one, other in zip(seen, moved, strict=True):
+        assert len(one) == STATES
+        np.testing.assert_allclose(one, other, rtol=0.0, atol=EXACT)
