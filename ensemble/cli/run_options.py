@@ -13,6 +13,7 @@ import typer
 from ensemble.patience import IMPATIENT, PATIENT
 from slap_ros.bags.writer import require_new
 from slap_ros.cli.options import MAX_INDEX, DomainName, Goal, Index, Json, Planner, Preset, Seed
+from slap_ros.cli.render import Size, picture_size
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import require_writable
@@ -77,6 +78,7 @@ class RunOptions:
     render: Annotated[
         Path | None, typer.Option(help="Write an animation of the run: a .gif or .mp4.")
     ] = None
+    size: Size = None
     report: Annotated[
         Path | None, typer.Option(help="Report the run on a page, as `slap report` does: a .html.")
     ] = None
@@ -123,6 +125,9 @@ class RunOptions:
             )
         if not self.live and (self.watched or self.live_port is not None):
             raise InvalidParameterError("--watched and --live-port are for --live")
+        if self.size is not None and self.render is None:
+            raise InvalidParameterError("--size is for --render")
+        picture_size(self.size)
         if self.record is not None:
             require_new(self.record)
             require_writable(self.record)

@@ -24,7 +24,7 @@ from ensemble.robot_parameters import parse_mock_robot
 from ensemble.run import RunRequest
 from ensemble.run import run as run_ensemble
 from slap_ros.cli.console import console, print_json, styled
-from slap_ros.cli.render import check_renderable
+from slap_ros.cli.render import check_renderable, picture_size
 from slap_ros.cli.render import render as write_animation
 from slap_ros.cli.report import write_report
 from slap_ros.core import Domain, Task, task_with_goal
@@ -70,7 +70,7 @@ def run_task(options: RunOptions) -> int:
             code = write_report([bag], options.report)
     if options.render is not None:
         decoded = [decode_state(message, domain.types_by_name) for message in states]
-        write_animation(domain, decoded, options.render)
+        write_animation(domain, decoded, options.render, picture_size(options.size))
     return int(metrics.error_code) or code
 
 

@@ -18,7 +18,7 @@ from slap_ros.bags import BagEvaluation, bag_info, evaluate_bag, read_bag, repla
 from slap_ros.bags.recording import Recording
 from slap_ros.cli.console import console, exits, print_json, styled
 from slap_ros.cli.options import Json
-from slap_ros.cli.render import check_renderable
+from slap_ros.cli.render import Size, check_renderable, picture_size
 from slap_ros.cli.render import render as write_animation
 from slap_ros.errors import DamagedBagError, ErrorCode
 from slap_ros.evaluation.metrics import RunMetrics, known
@@ -106,8 +106,10 @@ def _table(run: RunMetrics) -> Table:
 def render(
     bag: BagPath,
     output: Annotated[Path, typer.Option(help="The .gif or .mp4 to write.")],
+    size: Size = None,
 ) -> int:
     """Write an animation of the recorded states."""
+    pixels = picture_size(size)
     found = read_bag(bag)
     recording = Recording.of(found)
     domain = recording.domain()
@@ -118,7 +120,7 @@ def render(
     if not states:
         raise DamagedBagError(f"{bag} has no states, so there is nothing to render")
     check_renderable(domain, states[0], output)
-    write_animation(domain, states, output)
+    write_animation(domain, states, output, pixels)
     return _warn(found.damage)
 
 

@@ -4,16 +4,45 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from slap_ros.cli.console import console, progress
-from slap_ros.core import Animate, Domain
-from slap_ros.drawing.body_pictures import visible, write_body_animation
+from slap_ros.core import Animate, Domain, PictureSize
+from slap_ros.drawing.body_pictures import SIZE, visible, write_body_animation
 from slap_ros.errors import InvalidParameterError, StorageFullError
 from slap_ros.files import require_writable
 from slap_ros.physics.animation import WRITERS
 from slap_ros.relational import State
+
+LARGEST = PictureSize(3840, 2160)
+Size = Annotated[
+    str | None, typer.Option(help="Of the animation, as 960x720 pixels. Default: the domain's own.")
+]
+
+
+def picture_size(text: str | None) -> PictureSize | None:
+    """The size that an option states.
+
+    Raises:
+        InvalidParameterError: It is none, or larger than ``LARGEST``, or not even.
+    """
+    if text is None:
+        return None
+    found = re.fullmatch(r"([0-9]{1,5})x([0-9]{1,5})", text, re.ASCII)
+    if found is not None:
+        size = PictureSize(int(found[1]), int(found[2]))
+        within = all(2 <= n <= most for n, most in zip(size, LARGEST, strict=True))
+        if within and not any(n % 2 for n in size):
+            return size
+    raise InvalidParameterError(
+        f"--size is two even numbers of pixels up to {LARGEST.width}x{LARGEST.height}, such as "
+        f"960x720, not {text!r}"
+    )
 
 
 def check_renderable(domain: Domain, state: State, path: Path) -> None:
@@ -40,13 +69,16 @@ def check_renderable(domain: Domain, state: State, path: Path) -> None:
     require_writable(path)
 
 
-def render(domain: Domain, states: Sequence[State], path: Path) -> None:
+def render(
+    domain: Domain, states: Sequence[State], path: Path, size: PictureSize | None = None
+) -> None:
     """Write an animation.
 
     Args:
         domain: Of the states.
         states: One per frame.
         path: The file; its ending gives the format.
+        size: Of the frames; None: as the domain has it.
 
     Raises:
         StorageFullError: It cannot be written.
@@ -54,7 +86,7 @@ def render(domain: Domain, states: Sequence[State], path: Path) -> None:
     with progress() as bar:
         task = bar.add_task("rendering", total=len(states))
         try:
-            _animation(domain)(path, states, lambda done: bar.update(task, completed=done))
+            _animation(domain)(path, states, size, lambda done: bar.update(task, completed=done))
         except OSError as error:
             raise StorageFullError(f"cannot write {path}: {error.strerror or error}") from error
     console.print(f"animation: {path}")
@@ -65,6 +97,6 @@ def _animation(domain: Domain) -> Animate:
     if domain.display.animate is not None:
         return domain.display.animate
     period_s = domain.execution.control_period_s
-    return lambda path, states, progress: write_body_animation(
-        path, domain.display, states, period_s, progress
+    return lambda path, states, size, progress: write_body_animation(
+        path, domain.display, states, period_s, size or SIZE, progress
     )

@@ -4,7 +4,7 @@
 
 from slap_ros.core.acquisition import Acquisition, Approach, Script
 from slap_ros.core.action_space import Action, ActionSpace, GripperAxis
-from slap_ros.core.display import Animate, Display, VisibleBody
+from slap_ros.core.display import Animate, Display, PictureSize, VisibleBody
 from slap_ros.core.domain import Domain, Execution, Goal
 from slap_ros.core.domain_factory import DomainFactory, presets
 from slap_ros.core.goals import task_with_goal
@@ -18,6 +18,7 @@ __all__ = [
     "Action",
     "ActionSpace",
     "Animate",
+    "PictureSize",
     "Approach",
     "Display",
     "Domain",

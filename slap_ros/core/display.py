@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from slap_ros.geometry.pose import Pose
 from slap_ros.relational import State
@@ -28,8 +29,16 @@ class VisibleBody:
     triangles: tuple[tuple[float, float, float], ...] = ()
 
 
-# Writes states, one per control step, as a GIF or MP4; calls back with the frames done so far.
-Animate = Callable[[Path, Sequence[State], Callable[[int], None]], None]
+class PictureSize(NamedTuple):
+    """Of a picture, in pixels; even, as a video wants it."""
+
+    width: int
+    height: int
+
+
+# Writes states, one per control step, as a GIF or MP4, of a size (None: its own); calls back with
+# the frames done so far.
+Animate = Callable[[Path, Sequence[State], PictureSize | None, Callable[[int], None]], None]
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from slap_ros.core import Animate, VisibleBody
+from slap_ros.core import Animate, PictureSize, VisibleBody
 from slap_ros.geometry.pose import IDENTITY
 from slap_ros.motion.arm_shapes import ARM_SHAPES, BASE
 from slap_ros.physics.panda import LINKS, link_poses
@@ -60,10 +61,18 @@ def animation(
         The function that writes it, one frame per control step.
     """
 
-    def animate(path: Path, states: Sequence[State], progress: Callable[[int], None]) -> None:
+    def animate(
+        path: Path,
+        states: Sequence[State],
+        size: PictureSize | None,
+        progress: Callable[[int], None],
+    ) -> None:
         from slap_ros.physics.rendering import Camera, write_animation  # only here are they needed
 
-        with Camera(visuals_of(states[0]), view) as camera:
+        seen_from = view or Viewpoint()
+        if size is not None:
+            seen_from = replace(seen_from, width=size.width, height=size.height)
+        with Camera(visuals_of(states[0]), seen_from) as camera:
             write_animation(path, camera, states, period_s, progress)
 
     return animate

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.core import Display, VisibleBody
+from slap_ros.core import Display, PictureSize, VisibleBody
 from slap_ros.drawing.projection import (
     AXES,
     LIGHT,
@@ -34,7 +34,7 @@ from slap_ros.geometry.pose import rotate
 from slap_ros.physics.animation import Picture, write_pictures
 from slap_ros.relational import State
 
-WIDTH, HEIGHT = 640, 480  # pixels; even, as a video wants it
+SIZE = PictureSize(640, 480)
 SMOOTHING = 2  # pixels drawn for each of the picture, along each edge
 MARGIN = 0.08  # around what moves, of its extent
 SURROUNDINGS = 2.0  # bodies up to so much larger than the extent of what moves are shown whole
@@ -53,6 +53,7 @@ def write_body_animation(
     display: Display,
     states: Sequence[State],
     period_s: float,
+    size: PictureSize,
     progress: Callable[[int], None],
 ) -> None:
     """Write an animation of the bodies of a domain, one frame per state.
@@ -62,6 +63,7 @@ def write_body_animation(
         display: Shows bodies, the arm among them.
         states: One per frame; not empty.
         period_s: How long each is shown.
+        size: Of the frames.
         progress: Told the number of frames drawn so far, after each.
 
     Raises:
@@ -69,11 +71,11 @@ def write_body_animation(
     """
     scenes = [visible(display, state) for state in states]
     view = viewpoint(scenes)
-    canvas = canvas_of(scenes, view)
+    canvas = canvas_of(scenes, view, size)
 
     def pictures() -> Iterator[Picture]:
         for done, bodies in enumerate(scenes, start=1):
-            yield draw_bodies(bodies, view, canvas)
+            yield draw_bodies(bodies, view, canvas, size)
             progress(done)
 
     write_pictures(path, pictures(), period_s)
@@ -92,8 +94,16 @@ def viewpoint(scenes: Sequence[Sequence[VisibleBody]]) -> Projection:
     return TOP if len(places) and np.ptp(places[:, 2]) < STILL else OBLIQUE
 
 
-def canvas_of(scenes: Sequence[Sequence[VisibleBody]], view: Projection) -> Canvas:
-    """Room for all that moves and what is not much larger, in the shape of the picture."""
+def canvas_of(
+    scenes: Sequence[Sequence[VisibleBody]], view: Projection, size: PictureSize
+) -> Canvas:
+    """Room for all that moves and what is not much larger, in the shape of the picture.
+
+    Args:
+        scenes: The bodies of each picture.
+        view: From where they are seen.
+        size: Of the pictures.
+    """
     points = [
         np.array([[view.project(corner) for corner in corners(body)] for body in bodies])
         for bodies in scenes
@@ -104,8 +114,8 @@ def canvas_of(scenes: Sequence[Sequence[VisibleBody]], view: Projection) -> Canv
     small = np.ptp(flat, axis=1).max(axis=1) <= SURROUNDINGS * extent
     shown = np.concatenate([*(p.reshape(-1, 2) for p in moving), flat[small].reshape(-1, 2)])
     canvas = Canvas.around(map(tuple, shown.tolist()), MARGIN)
-    width = max(canvas.width, canvas.height * WIDTH / HEIGHT)
-    height = width * HEIGHT / WIDTH
+    width = max(canvas.width, canvas.height * size.width / size.height)
+    height = width * size.height / size.width
     return Canvas(
         canvas.left - (width - canvas.width) / 2,
         canvas.top + (height - canvas.height) / 2,
@@ -122,24 +132,27 @@ def _moved(first: Floats, now: Floats) -> list[Floats]:
     return [first[moved], now[moved]] if moved.any() else []
 
 
-def draw_bodies(bodies: Sequence[VisibleBody], view: Projection, canvas: Canvas) -> Picture:
+def draw_bodies(
+    bodies: Sequence[VisibleBody], view: Projection, canvas: Canvas, size: PictureSize
+) -> Picture:
     """Draw bodies, the nearer ones before the farther ones.
 
     Args:
         bodies: Each can be drawn.
         view: From where they are seen.
-        canvas: The part of the view that is drawn.
+        canvas: The part of the view that is drawn, in the shape of the picture.
+        size: Of the picture.
 
     Returns:
-        Shape (HEIGHT, WIDTH, 3).
+        Shape (height, width, 3).
     """
-    sheet = _Sheet.empty(WIDTH * SMOOTHING, HEIGHT * SMOOTHING)
+    sheet = _Sheet.empty(size.width * SMOOTHING, size.height * SMOOTHING)
     for body in sorted(bodies, key=lambda body: _rank(body, view)):
         _draw_body(sheet, body, view, canvas)
     from PIL import Image  # with the physics: those who render nothing need none of it
 
     large = Image.fromarray(sheet.outlined())
-    return np.asarray(large.resize((WIDTH, HEIGHT), Image.Resampling.BOX))
+    return np.asarray(large.resize(size, Image.Resampling.BOX))
 
 
 def _rank(body: VisibleBody, view: Projection) -> tuple[bool, float]:

@@ -242,6 +242,9 @@ def test_what_cannot_be_rendered_is_refused_before_anything_runs(tmp_path):
     for arguments, words in (
         (["obstacle_tower", "--render", tmp_path / "a.avi"], "ends in .gif or .mp4, not 'a.avi'"),
         (["obstacle_tower", "--render", tmp_path / "a"], "ends in .gif or .mp4, not 'a'"),
+        (["obstacle_tower", "--size", "640x480"], "--size is for --render"),
+        (["obstacle_tower", "--render", tmp_path / "a.gif", "--size", "641x480"], "not '641x480'"),
+        (["obstacle_tower", "--render", tmp_path / "a.gif", "--size", "9999x2"], "not '9999x2'"),
     ):
         result = slap("run", *arguments)
         assert result.returncode == 15
@@ -251,11 +254,25 @@ def test_what_cannot_be_rendered_is_refused_before_anything_runs(tmp_path):
 def test_a_recorded_tower_is_rendered_frame_by_frame(network, tmp_path):
     bag, gif, mp4 = tmp_path / "bag", tmp_path / "run.gif", tmp_path / "run.mp4"
     goal = ("--goal", "(Holding robot block1)")
-    run = slap("run", "obstacle_tower", *goal, "--record", bag, "--render", mp4, "--json")
+    run = slap(
+        "run",
+        "obstacle_tower",
+        *goal,
+        "--record",
+        bag,
+        "--render",
+        mp4,
+        "--json",
+        "--size",
+        "320x200",
+    )
     assert run.returncode == 0, run.stderr
     rendered = slap("bag", "render", bag, "--output", gif)
     assert rendered.returncode == 0, rendered.stderr
     frames = json.loads(run.stdout)["plan_length"] + 1
     with Image.open(gif) as picture:
         assert picture.n_frames == frames
-    assert cv2.VideoCapture(str(mp4)).get(cv2.CAP_PROP_FRAME_COUNT) == frames
+    video = cv2.VideoCapture(str(mp4))
+    assert video.get(cv2.CAP_PROP_FRAME_COUNT) == frames
+    width, height = (video.get(p) for p in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
+    assert (width, height) == (320, 200)

@@ -13,9 +13,9 @@ import pytest
 from PIL import Image
 
 from slap_ros.cli.render import check_renderable, render
-from slap_ros.core import Display, VisibleBody
+from slap_ros.core import Display, PictureSize, VisibleBody
 from slap_ros.domains import get_domain
-from slap_ros.drawing.body_pictures import HEIGHT, WIDTH, canvas_of, draw_bodies, viewpoint, visible
+from slap_ros.drawing.body_pictures import SIZE, canvas_of, draw_bodies, viewpoint, visible
 from slap_ros.drawing.projection import OBLIQUE, SIDE, TOP, box_triangles
 from slap_ros.errors import InvalidParameterError
 
@@ -30,11 +30,11 @@ def box(place, size=0.2, colour=RED, **more):
 
 
 def picture(*bodies, view=SIDE):
-    return draw_bodies(bodies, view, canvas_of([bodies], view))
+    return draw_bodies(bodies, view, canvas_of([bodies], view, SIZE), SIZE)
 
 
 def at_centre(*bodies):
-    return picture(*bodies)[HEIGHT // 2, WIDTH // 2].astype(int)
+    return picture(*bodies)[SIZE.height // 2, SIZE.width // 2].astype(int)
 
 
 def is_red(pixel):
@@ -78,8 +78,8 @@ def test_a_mesh_is_drawn_as_the_box_of_the_same_triangles():
     local = replace(solid, position=(0.0, 0.0, 0.0))
     triangles = tuple(tuple(corner) for one in box_triangles(local) for corner in one)
     mesh = replace(solid, triangles=triangles)
-    canvas = canvas_of([[solid]], OBLIQUE)
-    one, other = (draw_bodies([body], OBLIQUE, canvas).astype(int) for body in (solid, mesh))
+    canvas = canvas_of([[solid]], OBLIQUE, SIZE)
+    one, other = (draw_bodies([body], OBLIQUE, canvas, SIZE).astype(int) for body in (solid, mesh))
     assert (np.abs(one - other).max(axis=2) > 8).mean() < 0.02  # outlines between its faces
 
 
@@ -99,12 +99,12 @@ def test_flat_worlds_are_looked_at_squarely(places, view):
 def test_whatever_moves_is_in_every_picture_and_a_wide_floor_does_not_shrink_it():
     floor = VisibleBody("floor", (0, 0, -1), UPRIGHT, (100.0, 100.0, 0.1), BLUE)
     scenes = [[floor, box((x, 0, 0.0))] for x in (0.0, 0.3, 2.0)]
-    canvas = canvas_of(scenes, SIDE)
+    canvas = canvas_of(scenes, SIDE, SIZE)
     assert canvas.left < -0.1
     assert canvas.left + canvas.width > 2.1
     assert canvas.width < 4.0
     for bodies in scenes:
-        assert any(map(is_red, draw_bodies(bodies, SIDE, canvas).reshape(-1, 3).astype(int)))
+        assert any(map(is_red, draw_bodies(bodies, SIDE, canvas, SIZE).reshape(-1, 3).astype(int)))
 
 
 def test_bodies_that_cannot_be_are_left_out():
@@ -118,7 +118,7 @@ def test_bodies_that_cannot_be_are_left_out():
     display = Display(bodies=lambda _: odd, arm=lambda _: [box((0, 0, 0))])
     assert visible(display, STATE) == [box((0, 0, 0))]
     flat = box((0, 0, 0), 0.0)
-    assert picture(flat).shape == (HEIGHT, WIDTH, 3)
+    assert picture(flat).shape == (SIZE.height, SIZE.width, 3)
 
 
 def test_a_domain_without_bodies_is_refused_before_anything_runs(tmp_path):
@@ -126,13 +126,14 @@ def test_a_domain_without_bodies_is_refused_before_anything_runs(tmp_path):
         check_renderable(replace(FLAT, display=Display()), STATE, tmp_path / "a.gif")
 
 
-def test_a_run_is_rendered_frame_by_frame(tmp_path):
+@pytest.mark.parametrize("size", [SIZE, (320, 480)])
+def test_a_run_is_rendered_frame_by_frame(tmp_path, size):
     world = FLAT.make_world(STATE)
     states = [STATE, *(world.step(np.array([0.1, -0.1, 0.0])) for _ in range(4))]
     check_renderable(FLAT, STATE, tmp_path / "run.gif")
-    render(FLAT, states, tmp_path / "run.gif")
+    render(FLAT, states, tmp_path / "run.gif", PictureSize(*size))
     with Image.open(tmp_path / "run.gif") as shown:
-        assert (shown.n_frames, shown.size) == (5, (WIDTH, HEIGHT))
+        assert (shown.n_frames, shown.size) == (5, size)
         assert shown.info["duration"] == 100  # ms, the control period
         pixels = []
         for frame in range(5):
@@ -149,7 +150,7 @@ def test_no_simulator_is_needed():
         "domain = get_domain('obstacle2d')\n"
         "scene = visible(domain.display, domain.task(0).initial_state)\n"
         "view = viewpoint([scene])\n"
-        "print(draw_bodies(scene, view, canvas_of([scene], view)).shape)\n"
+        "print(draw_bodies(scene, view, canvas_of([scene], view, SIZE), SIZE).shape)\n"
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
-    assert run.stdout.strip() == str((HEIGHT, WIDTH, 3)), run.stderr
+    assert run.stdout.strip() == str((SIZE.height, SIZE.width, 3)), run.stderr
