@@ -12,7 +12,7 @@ from math import pi
 from slap_ros.contact.scene import TABLE, BoxPart, Compound, ContactScene, CylinderPart, Part
 from slap_ros.domains.groceries.model import GROCERY
 from slap_ros.geometry.pose import Pose, from_rotation_vector
-from slap_ros.physics.scene import WOOD, Colour
+from slap_ros.physics.scene import Colour
 from slap_ros.relational import State
 
 LYING = from_rotation_vector((0.0, 0.5 * pi, 0.0))  # of a cylinder, along x
@@ -85,6 +85,7 @@ STEEL: Colour = (0.60, 0.65, 0.72, 1.0)
 MEAT: Colour = (0.70, 0.35, 0.30, 1.0)
 COCOA: Colour = (0.35, 0.20, 0.12, 1.0)
 KETCHUP: Colour = (0.85, 0.10, 0.10, 1.0)
+WICKER: Colour = (0.50, 0.36, 0.20, 1.0)
 
 GROCERIES: Mapping[str, Grocery] = {
     thing.body.name: thing
@@ -196,7 +197,7 @@ _WALLS = tuple(
 BASKET_BODY = Compound(
     "basket",
     (_standing_box(OUTER, OUTER, 0.5 * FLOOR_HEIGHT, on=-FLOOR_HEIGHT), *_WALLS),
-    colour=WOOD,
+    colour=WICKER,
 )
 
 
