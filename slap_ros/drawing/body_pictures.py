@@ -97,7 +97,7 @@ def viewpoint(scenes: Sequence[Sequence[VisibleBody]]) -> Projection:
 def canvas_of(
     scenes: Sequence[Sequence[VisibleBody]], view: Projection, size: PictureSize
 ) -> Canvas:
-    """Room for all that moves and what is not much larger, in the shape of the picture.
+    """The room for all that moves and what is not much larger, in the shape of the picture.
 
     Args:
         scenes: The bodies of each picture.
