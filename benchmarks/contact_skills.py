@@ -40,6 +40,8 @@ from slap_ros.contact.world import ACTION_SPACE, MAX_SHIFT, MAX_TURN, ContactWor
 from slap_ros.domains.bowls.scenery import GRIP, REST_HEIGHT, bowl
 from slap_ros.domains.groceries.scenery import GROCERIES
 from slap_ros.domains.make_coffee.scenery import POD_HALF, pod
+from slap_ros.domains.peg_in_hole.demonstrator import BEHIND
+from slap_ros.domains.peg_in_hole.scenery import PEG_RADIUS, RED, peg
 from slap_ros.domains.stow_hammer.scenery import RADIUS, hammer
 from slap_ros.geometry.pose import (
     NO_ROTATION,
@@ -104,6 +106,7 @@ OF_DOMAINS = {
         name: Graspable(thing.body, thing.rest_height, grip=(0.0, 0.0, thing.grasp_height))
         for name, thing in GROCERIES.items()
     },
+    "peg_in_hole": {"peg": Graspable(peg("peg", RED), PEG_RADIUS, grip=(-BEHIND, 0.0, 0.0))},
     "bowls": {"bowl": Graspable(bowl("bowl"), REST_HEIGHT, grip=GRIP)},
 }
 EVERYTHING = GRASPABLE | {n: thing for things in OF_DOMAINS.values() for n, thing in things.items()}

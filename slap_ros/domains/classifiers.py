@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from slap_ros.relational import Column, State
+from slap_ros.relational import Column, State, Type
 from slap_ros.relational.predicates import Bools, Classifier
 from slap_ros.relational.state import Array
 
@@ -16,6 +16,16 @@ TINY = float(np.finfo(np.float64).tiny)
 def always(state: State, column: Column) -> Bools:
     """True of every object: what its type alone says."""
     return np.ones((*state.data.shape[:-1], len(column.objects)), dtype=bool)
+
+
+def is_a(kind: Type) -> Classifier:
+    """The classifier of objects of a type, or of one below it."""
+
+    def classifier(state: State, column: Column) -> Bools:
+        truth = np.array([obj.type.is_a(kind) for obj in column.objects])
+        return np.broadcast_to(truth, (*state.data.shape[:-1], len(truth)))
+
+    return classifier
 
 
 def flag(state: State, column: Column, feature: str) -> Bools:

@@ -9,7 +9,7 @@ from functools import lru_cache, partial
 
 import numpy as np
 
-from slap_ros.domains.classifiers import is_held, is_not_held, none_is_held, strictly
+from slap_ros.domains.classifiers import is_a, is_held, is_not_held, none_is_held, strictly
 from slap_ros.domains.cluttered_drawer.blocking import (
     SIDES,
     BlockingRelations,
@@ -26,17 +26,9 @@ from slap_ros.relational.state import Array
 RelationsOf = Callable[[State], BlockingRelations]
 
 
-def _is_a(kind: Type) -> Classifier:
-    def classifier(state: State, column: Column) -> Bools:
-        truth = np.array([obj.type.is_a(kind) for obj in column.objects])
-        return np.broadcast_to(truth, (*state.data.shape[:-1], len(truth)))
-
-    return classifier
-
-
 def _is_none(kind: Type) -> Classifier:
-    is_a = _is_a(kind)
-    return lambda state, column: ~is_a(state, column)
+    is_one = is_a(kind)
+    return lambda state, column: ~is_one(state, column)
 
 
 def _gripper_empty(state: State, _: Column) -> Bools:
@@ -86,13 +78,13 @@ def predicates(clearance: FingerClearance) -> tuple[Predicate, ...]:
     """All of them; blocks block where they leave less than this clearance."""
     relations = cache_latest(partial(blocking_relations, clearance))
     return (
-        Predicate("IsRobot", (ROBOT,), _is_a(ROBOT)),
-        Predicate("IsBlock", (THING,), _is_a(BLOCK)),
-        Predicate("IsTable", (SURFACE,), _is_a(TABLE)),
-        Predicate("IsDrawer", (SURFACE,), _is_a(DRAWER)),
-        Predicate("IsMovable", (THING,), _is_a(BLOCK)),
+        Predicate("IsRobot", (ROBOT,), is_a(ROBOT)),
+        Predicate("IsBlock", (THING,), is_a(BLOCK)),
+        Predicate("IsTable", (SURFACE,), is_a(TABLE)),
+        Predicate("IsDrawer", (SURFACE,), is_a(DRAWER)),
+        Predicate("IsMovable", (THING,), is_a(BLOCK)),
         Predicate("NotIsMovable", (THING,), _is_none(BLOCK)),
-        Predicate("IsTargetBlock", (BLOCK,), _is_a(TARGET)),
+        Predicate("IsTargetBlock", (BLOCK,), is_a(TARGET)),
         Predicate("NotIsTargetBlock", (BLOCK,), _is_none(TARGET)),
         Predicate.threshold("ReadyPick", (ROBOT, BLOCK), _ready_margin),
         Predicate.threshold("NotReadyPick", (ROBOT, BLOCK), _not_ready_margin),

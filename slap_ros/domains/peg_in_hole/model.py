@@ -6,8 +6,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from slap_ros.domains.benchtop.features import PLACE, THING
 from slap_ros.domains.benchtop.metrics import (
     AXIAL_DIS,
@@ -19,30 +17,21 @@ from slap_ros.domains.benchtop.metrics import (
 )
 from slap_ros.domains.benchtop.operators import atom, operator, reward
 from slap_ros.domains.benchtop.predicates import hand_empty, holding, is_clear, on_table
-from slap_ros.relational import Column, Predicate, State, Type, Variable
+from slap_ros.domains.classifiers import is_a
+from slap_ros.relational import Predicate, Type, Variable
 from slap_ros.relational.metrics import at_most, within
-from slap_ros.relational.predicates import Bools, Classifier
 
 PEG = Type("peg", THING.features, THING)
 HOLE = Type("hole", PLACE.features, PLACE)
 TYPES = (PLACE, THING, PEG, HOLE)
 
-# The paper has 50 mm for both distances, which is true before a peg is in its hole.
+# The paper has 50 mm for both distances: by that, a peg on top of a plate is in its hole.
 MOST_RADIAL = 0.01  # m
 MOST_AXIAL = 0.015  # m, either way
 MOST_ANGLE = math.acos(0.95)  # rad
 
-
-def _is_a(kind: Type) -> Classifier:
-    def classifier(state: State, column: Column) -> Bools:
-        truth = np.array([obj.type.is_a(kind) for obj in column.objects])
-        return np.broadcast_to(truth, (*state.data.shape[:-1], len(truth)))
-
-    return classifier
-
-
-IS_PEG = Predicate("IsPeg", (PLACE,), _is_a(PEG), description="its type says so")
-IS_HOLE = Predicate("IsHole", (PLACE,), _is_a(HOLE), description="its type says so")
+IS_PEG = Predicate("IsPeg", (PLACE,), is_a(PEG), description="its type says so")
+IS_HOLE = Predicate("IsHole", (PLACE,), is_a(HOLE), description="its type says so")
 HOLDING, ON_TABLE = holding(PEG), on_table(PEG)
 HAND_EMPTY = hand_empty(HOLDING)
 IN = Predicate.of(
