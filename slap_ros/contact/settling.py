@@ -3,7 +3,7 @@
 """Measured poses of things at rest, put where they can be: flat, on what they lie on, apart.
 
 A cube measured 2 mm inside a drawer's wall would be flung about in the planner's model, and one
-measured 2 mm above the table would fall. What moves, and what is in the hand, is left as it is.
+measured 2 mm above the table would fall. What is in the hand is left as it is.
 """
 
 from __future__ import annotations
@@ -81,7 +81,8 @@ def settled(scene: ContactScene, state: State) -> State:
         state: As measured; the hand, what it holds, drawers and lids are where they are.
 
     Returns:
-        The state in which bodies at rest lie flat on what is just below them, and are in nothing.
+        The state in which nothing is in anything else, as far as there is room, and in which bodies
+        at rest lie flat on what is just below them.
     """
     index = StateIndex.of(scene, state.layout)
     snapshot = index.read(state)
@@ -91,14 +92,15 @@ def settled(scene: ContactScene, state: State) -> State:
         for pose, half in snapshot.hand.boxes()
     ]
     bodies = list(snapshot.bodies)
-    resting = {i for i, body in enumerate(bodies) if body.still and i != snapshot.held}
-    for i in sorted(set(range(len(bodies))) - resting):
-        pieces = _pieces(scene.free[i], bodies[i].pose)
-        obstacles += [SettlingObstacle(piece, fixed=False) for piece in pieces]
-    for i in sorted(resting, key=lambda i: bodies[i].pose.position[2]):
-        pose = _put(scene.free[i], bodies[i].pose, obstacles)
+    if snapshot.held is not None:
+        held = _pieces(scene.free[snapshot.held], bodies[snapshot.held].pose)
+        obstacles += [SettlingObstacle(piece, fixed=False) for piece in held]
+    loose = [i for i in range(len(bodies)) if i != snapshot.held]
+    for i in sorted(loose, key=lambda i: bodies[i].pose.position[2]):
+        still = bodies[i].still
+        pose = _put(scene.free[i], bodies[i].pose, obstacles, still)
         bodies[i] = bodies[i]._replace(pose=pose)
-        obstacles += [SettlingObstacle(piece) for piece in _pieces(scene.free[i], pose)]
+        obstacles += [SettlingObstacle(piece, still) for piece in _pieces(scene.free[i], pose)]
     return index.write(state, snapshot._replace(bodies=tuple(bodies)))
 
 
@@ -114,13 +116,19 @@ def _pieces(body: Compound, pose: Pose) -> list[Piece]:
     return [Piece.of(part, pose) for part in body.parts]
 
 
-def _put(body: Compound, measured: Pose, obstacles: Sequence[SettlingObstacle]) -> Pose:
-    """A body flat, out of everything, and down on what is just below it."""
-    pose = _flat(body, measured) or measured
-    reach = body.at(pose).radius + 2.0 * FLOATING
-    middle = body.at(pose).pose.position
-    near = [obstacle for obstacle in obstacles if _near(obstacle.piece, middle, reach)]
+def _put(
+    body: Compound, measured: Pose, obstacles: Sequence[SettlingObstacle], still: bool
+) -> Pose:
+    """A body out of everything; one that lies still is flat, too, and down on what is below it."""
+    pose = measured
+    if still:
+        pose = _flat(body, measured) or measured
+    around = body.at(pose)
+    reach = around.radius + 2.0 * FLOATING
+    near = [one for one in obstacles if _near(one.piece, around.pose.position, reach)]
     pose = _moved_out(body, pose, near)
+    if not still:
+        return pose
     x, y, z = pose.position
     pose = Pose((x, y, z - _height(body, pose, near)), pose.quaternion)
     return _moved_out(body, pose, near)

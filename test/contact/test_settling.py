@@ -31,6 +31,7 @@ from slap_ros.contact.hand import hand_at
 from slap_ros.contact.scene import TABLE, ContactScene, box
 from slap_ros.contact.settling import settled
 from slap_ros.contact.world import ContactWorld
+from slap_ros.errors import InvalidStateError
 from slap_ros.geometry.pose import Pose, from_rotation_vector, from_yaw, multiply
 from slap_ros.physics.features import POSE_FEATURES, body_features
 from slap_ros.relational import State
@@ -158,3 +159,18 @@ def test_a_thing_between_open_fingers_is_not_in_them():
 def test_a_state_that_is_right_stays_as_it_is():
     for scene, state in PLACES.values():
         assert np.abs(settled(scene, state).data - state.data).max() < 1e-9
+
+
+def test_what_moves_is_in_nothing_either_and_stays_as_it_is_turned():
+    state = start(Setting(hand=AWAY))
+    cube = state.layout.object("cube")
+    inside = state.replace({(cube, "vx"): 0.3, (cube, "z"): 0.005})
+    with ContactWorld(BENCH, state) as world:
+        with pytest.raises(InvalidStateError, match="inside one another"):
+            world.reset(inside)
+        seen = settled(BENCH, inside)
+        world.reset(seen)
+    assert seen.get(cube, "z") == pytest.approx(0.02)
+    assert seen.get(cube, "vx") == 0.3
+    above = state.replace({(cube, "vx"): 0.3, (cube, "z"): 0.03})
+    assert settled(BENCH, above).get(cube, "z") == 0.03  # nothing says that it lies on the table
