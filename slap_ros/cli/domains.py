@@ -15,7 +15,7 @@ from slap_ros.cli.console import console, print_json
 from slap_ros.cli.options import Json, Preset
 from slap_ros.core import Domain
 from slap_ros.domains import domain_names, get_domain, preset_names
-from slap_ros.errors import InvalidDomainError, UnknownObjectError
+from slap_ros.errors import InvalidDomainError, InvalidParameterError, UnknownObjectError
 from slap_ros.relational import LiftedOperator, Metric, Predicate
 from slap_ros.relational.metrics import typed_arguments, variable_names
 
@@ -37,6 +37,8 @@ def domains(
         else:
             _show(one)
         return
+    if preset is not None:
+        raise InvalidParameterError("--preset is for one domain: slap domains DOMAIN --preset NAME")
     found = list(_available())
     if json:
         print_json([_data(one) for one in found])

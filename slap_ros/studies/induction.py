@@ -35,8 +35,8 @@ in each step, and from nothing else: no name, no objects and no end of a script 
 counts where atoms stay for {hold_steps} environment steps, and where some are added. With the
 operators
 A* plans for {tasks} fresh tasks of each goal. A task counts where the plan has as few operators as
-the shortest plan with the hand-written operators, which is of the paper's length; "longest" and
-"no plan" tell of the others. Preconditions are too many that the hand-written operator with the
+the shortest plan with the hand-written operators, which is of the paper's length. Tasks for which
+these have no plan are left out. Preconditions are too many that the hand-written operator with the
 same effects does not have."""
 
 
@@ -52,12 +52,18 @@ class GoalPlans:
 
     goal: str
     lengths: tuple[int | None, ...]
-    shortest: tuple[int, ...]
+    shortest: tuple[int | None, ...]
+
+    @property
+    def pairs(self) -> list[tuple[int | None, int]]:
+        """Both lengths of the tasks for which hand-written operators have a plan."""
+        both = zip(self.lengths, self.shortest, strict=True)
+        return [(ours, best) for ours, best in both if best is not None]
 
     @property
     def as_short(self) -> int:
         """Tasks whose plan has as few operators."""
-        return sum(ours == best for ours, best in zip(self.lengths, self.shortest, strict=True))
+        return sum(ours == best for ours, best in self.pairs)
 
 
 @dataclass(frozen=True)
@@ -79,7 +85,7 @@ class Induction:
     @property
     def complete(self) -> bool:
         """Whether every task of every goal has a plan as short as with hand-written operators."""
-        return all(goal.as_short == len(goal.lengths) for goal in self.goals)
+        return all(goal.as_short == len(goal.pairs) for goal in self.goals)
 
     def as_json(self) -> dict[str, Any]:
         """Operators, plans and what is too many."""
@@ -104,12 +110,15 @@ class Induction:
 
 def _cell(goal: GoalPlans) -> str:
     """Of how many tasks the plan is as short; how long the others' are."""
-    found = [length for length in goal.lengths if length is not None]
-    parts = [f"{goal.as_short} of {len(goal.lengths)}"]
-    if missing := len(goal.lengths) - len(found):
+    found = [(ours, best) for ours, best in goal.pairs if ours is not None]
+    parts = [f"{goal.as_short} of {len(goal.pairs)}"]
+    if missing := len(goal.pairs) - len(found):
         parts.append(f"{missing} no plan")
-    if found and goal.as_short < len(found):
-        parts.append(f"longest {max(found)}, not {max(goal.shortest)}")
+    if longer := [(ours, best) for ours, best in found if ours != best]:
+        ours, best = max(longer)
+        parts.append(f"{ours} operators, not {best}")
+    if beyond := len(goal.lengths) - len(goal.pairs):
+        parts.append(f"{beyond} left out")
     return "; ".join(parts)
 
 
@@ -170,7 +179,7 @@ def _induced(
     induced = induce_operators(traces, hold_steps_of(domain.execution.control_period_s))
     operators = tuple(one.operator for one in induced)
     goals = tuple(
-        GoalPlans(goal, tuple(_lengths(operators, domain, tasks)), _known(shortest[goal]))
+        GoalPlans(goal, tuple(_lengths(operators, domain, tasks)), shortest[goal])
         for goal, tasks in posed.items()
     )
     too_many = {
@@ -201,20 +210,6 @@ def _too_many(operator: LiftedOperator, by_hand: Sequence[LiftedOperator]) -> fr
             ):
                 return operator.preconditions - renamed(other.preconditions)
     return frozenset()
-
-
-def _known(lengths: Sequence[int | None]) -> tuple[int, ...]:
-    """Lengths of hand-written operators' plans, of which there is one for every task.
-
-    Raises:
-        InvalidParameterError: There is none for a task.
-    """
-    known = tuple(length for length in lengths if length is not None)
-    if len(known) < len(lengths):
-        raise InvalidParameterError(
-            "the hand-written operators have no plan for some tasks; see `slap check`"
-        )
-    return known
 
 
 def _lengths(
@@ -272,7 +267,7 @@ def draw(figure: Figure, found: Sequence[Induction]) -> None:
     goals = [goal.goal or "task's own" for goal in found[0].goals]
     for number, one in enumerate(found):
         places = [i + 0.2 * (number - (len(found) - 1) / 2) for i in range(len(goals))]
-        shares = [100 * goal.as_short / len(goal.lengths) for goal in one.goals]
+        shares = [100 * goal.as_short / max(1, len(goal.pairs)) for goal in one.goals]
         name = f"{one.demonstrations} demonstration{'s' * (one.demonstrations > 1)}"
         axes.plot(shares, places, "o", color=LINES[number % len(LINES)], label=name)
     axes.axvline(100, color=MUTED, linewidth=1)

@@ -150,26 +150,36 @@ def study(
             for policy in blind_policies(domain.action_space)
         )
         found.append(OperatorVacuity(name, len(own), lost.get(name, 0), policies))
-    return _report(choice, _horizon(domain), found)
+    never = [operator.name for operator in domain.operators if operator.name not in starts]
+    return _report(choice, _horizon(domain), found, never)
 
 
-def _report(choice: DomainChoice, horizon: int, found: Sequence[OperatorVacuity]) -> StudyReport:
+def _report(
+    choice: DomainChoice, horizon: int, found: Sequence[OperatorVacuity], never: Sequence[str]
+) -> StudyReport:
     if not found:
         raise InvalidParameterError(
             f"no operator of {choice.name} began in any demonstration; see `slap study "
             "demonstrations`"
         )
     names = [policy.policy for policy in found[0].policies]
+    measured = MEASURED.format(horizon=horizon, allowed=ALLOWED, limit=APPROACH_LIMIT)
+    if never:
+        measured += f"\n\nNo demonstration of this preset had a start of {', '.join(never)}."
     return StudyReport(
         study="vacuity",
         source="",
         title=f"Is there anything to learn: {choice.name}",
-        measured=MEASURED.format(horizon=horizon, allowed=ALLOWED, limit=APPROACH_LIMIT),
+        measured=measured,
         table=MarkdownTable(
             ["operator", "starts", "approaches lost", *names, "vacuous"],
             [one.as_row() for one in found],
         ),
-        found={"horizon": horizon, "operators": [one.as_json() for one in found]},
+        found={
+            "horizon": horizon,
+            "operators": [one.as_json() for one in found],
+            **({"without_starts": list(never)} if never else {}),
+        },
         draw=lambda figure: draw(figure, found),
         size=(7.6, 1.4 + 0.4 * len(found)),
     )

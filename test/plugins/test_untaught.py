@@ -227,6 +227,9 @@ def test_study_of_vacuity_counts_what_policies_do_without_eyes(installed, tmp_pa
     data = study("vacuity", tmp_path, "--starts", "4")
     operators = {one["operator"]: one for one in data["found"]["operators"]}
     assert "Pick" in operators
+    assert set(operators) | set(data["found"].get("without_starts", ())) == {
+        operator.name for operator in TAUGHT.operators
+    }
     for one in operators.values():
         assert 0 < one["starts"] <= 4
         assert [policy["policy"] for policy in one["policies"]] == [
