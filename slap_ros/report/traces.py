@@ -11,7 +11,7 @@ from slap_ros.bags.recording import RecordedEpisode, Recording
 from slap_ros.core import Domain
 from slap_ros.evaluation.metrics import RunTrace
 
-UNKNOWN_DOMAINS_ROBOT = "robot"  # the type of what acts, where a domain is not known here
+USUAL = frozenset({"robot"})  # types of what acts, where a domain names none
 HELD = "grasp_"  # how a body lies in the hand: nothing that moves by itself
 DIMENSIONS = ("rad", "m")  # units of what moves
 FLAT = 1e-9  # rad or m: less than that is rounding
@@ -45,10 +45,9 @@ class Series:
 
 
 def robot_types(domain: Domain | None) -> frozenset[str]:
-    """Names of the types of what acts; a guess where the domain is not known here."""
-    if domain is None:
-        return frozenset({UNKNOWN_DOMAINS_ROBOT})
-    return frozenset(kind.name for kind in domain.robot_types)
+    """Names of the types of what acts; the usual one where the domain names none."""
+    named = domain.robot_types if domain is not None else ()
+    return frozenset(kind.name for kind in named) or USUAL
 
 
 def robot_series(

@@ -108,7 +108,7 @@ def bench(network, install_domain, tmp_path):
         pace=50.0, shortcuts="none",
     )  # fmt: skip
     nodes = node_parameters(settings)
-    nodes["planner_node"] = {**nodes["planner_node"], "observation_timeout": 1.0}
+    nodes["planner_node"] = {**nodes["planner_node"], "observation_timeout": 3.0}
     heard = []
     with (
         temporary_node(lambda: RunClient(lambda *message: heard.append(message), (FAULT,))) as (

@@ -288,6 +288,26 @@ def test_several_runs_in_one_episode_and_in_several() -> None:
     assert options == [[("A", 3, "canceled")], [("B", 2, "reached")], [("C", 1, "reached")]]
 
 
+def test_an_option_is_of_the_run_that_began_it_whatever_the_clock_says() -> None:
+    """One run ends at the step at which the next begins; its last option takes no step."""
+    story = Story()
+    story.task()
+    story.states(0, 0)
+    story.planning(0)
+    story.plan_event(PlanEventKind.EDGE_STARTED, 0)
+    story.skill(SkillEventKind.STARTED, 0, "A")
+    story.skill(SkillEventKind.FAILED, 0, "A")
+    story.plan_event(PlanEventKind.FAILED, 0, error_code=53)
+    story.now_ns -= 10**12  # the clock is set back
+    story.planning(0)
+    story.plan_event(PlanEventKind.EDGE_STARTED, 0)
+    story.skill(SkillEventKind.STARTED, 0, "B")
+    story.states(1, 2, atoms=GOAL)
+    story.skill(SkillEventKind.REACHED, 2, "B")
+    story.plan_event(PlanEventKind.SOLVED, 2)
+    assert [[option.name for option in run.options] for run in story.runs()] == [["A"], ["B"]]
+
+
 def test_what_began_before_the_recording_is_no_run() -> None:
     story = Story()
     story.task()

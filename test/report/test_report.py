@@ -9,6 +9,7 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -19,9 +20,13 @@ from typer.testing import CliRunner
 
 from ensemble.cli.application import app
 from slap_ros.bags import evaluate_bag
+from slap_ros.bags.recording import Recording
 from slap_ros.errors import InvalidParameterError, StorageFullError
-from slap_ros.messages.interfaces import ATOMS, DOMAIN_INFO, MARKERS
+from slap_ros.evaluation.metrics import RunLog
+from slap_ros.messages.interfaces import ATOMS, DOMAIN_INFO, MARKERS, STATE
+from slap_ros.relational import Type
 from slap_ros.report import check_output, read_report, render, write_page
+from slap_ros.report.traces import robot_series
 
 MIB = 2**20
 Bags = dict[str, Path]
@@ -107,6 +112,46 @@ def test_what_cannot_be_drawn_is_left_out(script: Script, tmp_path: Path, number
     shown = script.domain.display.bodies(script.domain.task(7).initial_state)
     assert left == {body.name for body in shown[2:]}
     page_of(tmp_path / "bag")
+
+
+def test_a_clock_that_was_set_shows_the_same(script: Script, bags: Bags, tmp_path: Path) -> None:
+    """Set back by a day in the middle of the run: what is shown of a state goes by its step."""
+    messages = with_markers(script)
+    moment = next(i for i, m in enumerate(messages) if m.type_name == STATE and m.message.step == 7)
+    for item in messages[moment:]:
+        headers = [marker.header for marker in getattr(item.message, "markers", ())]
+        for header in headers[:1] or [item.message.header]:  # all markers of a state share one
+            header.stamp.sec -= 86_400
+    record(tmp_path / "set", messages)
+    (told,), (plain,) = (read_report(bag).runs for bag in (tmp_path / "set", bags["pure"]))
+    assert told.scene == plain.scene
+    assert [span.start for span in told.spans] == [span.start for span in plain.spans]
+
+
+def test_the_robot_is_what_its_domain_calls_one(script: Script) -> None:
+    renamed = copy.deepcopy(script.messages)
+    for item in renamed:
+        for part in (*getattr(item.message, "types", ()), *getattr(item.message, "objects", ())):
+            for name in ("name", "type"):
+                if getattr(part, name, "") == "robot":
+                    setattr(part, name, "gantry")
+    gantry = Type("gantry")
+    domain = replace(
+        script.domain, types=(*script.domain.types, gantry), robot_types=frozenset({gantry})
+    )
+    log, recordings = RunLog(), (Recording(), Recording())
+    for messages, recording in zip((script.messages, renamed), recordings, strict=True):
+        for item in messages:
+            recording.add(item.type_name, item.message)
+    for item in script.messages:
+        log.add(item.type_name, item.message)
+    (trace,) = log.traces()
+    usual, found = (
+        robot_series(trace, recording.episodes[1], recording, known)
+        for recording, known in zip(recordings, (script.domain, domain), strict=True)
+    )
+    assert usual
+    assert found == usual
 
 
 def test_a_run_whose_first_markers_are_nowhere_is_told(script: Script, tmp_path: Path) -> None:
