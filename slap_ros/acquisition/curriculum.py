@@ -39,6 +39,7 @@ from slap_ros.acquisition.skill_library import (
 from slap_ros.acquisition.skill_training import Round
 from slap_ros.acquisition.task_source import ROLLOUTS, VALIDATION, TaskSource
 from slap_ros.errors import InvalidParameterError, UnsolvableError
+from slap_ros.learning.mlp_policy import MlpPolicy
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.learning.workers import Workers, in_order
 from slap_ros.relational import LiftedOperator
@@ -292,22 +293,22 @@ class Curriculum:
             judged[: self.settings.judged],
             settings,
             str(self.folder / name),
-            self._beginning(name) if not state.rounds else "",
+            None if state.rounds else self._beginning(name),
         )
 
-    def _beginning(self, name: str) -> str:
-        """The folder of the known skill that a first round begins with; empty for none."""
+    def _beginning(self, name: str) -> MlpPolicy | None:
+        """The policy of the known skill that a first round begins with; None for none."""
         operator: LiftedOperator = self._operators[name]
         keys = {path: self.encoder.encode(skill.operator) for path, skill in self.known.items()}
         found = nearest(self.encoder.encode(operator), keys)
         if found is None or found[1] < self.settings.least_similarity:
-            return ""
+            return None
         path, similarity = found
         self._states[name].beginning = {
             "skill": self.known[path].folder_name,
             "similarity": round(similarity, 3),
         }
-        return path
+        return self.known[path].policy
 
     def _take(self, name: str, outcome: Round, rollouts: Sequence[PlanRollout]) -> None:
         """Take note of a round."""

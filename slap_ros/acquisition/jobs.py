@@ -22,6 +22,7 @@ from slap_ros.acquisition.task_source import TaskSource
 from slap_ros.acquisition.validation import SkillTrials
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidStateError
+from slap_ros.learning.mlp_policy import MlpPolicy
 
 InitiationRecord = tuple[int, tuple[str, ...], tuple[float, ...]]  # task, objects, state
 
@@ -51,7 +52,7 @@ def learn(
     fresh: Sequence[InitiationRecord],
     settings: AcquisitionSettings,
     folder: str,
-    beginning: str,
+    beginning: MlpPolicy | None,
 ) -> dict[str, Any]:
     """Learn one skill for one round.
 
@@ -63,7 +64,7 @@ def learn(
         fresh: Where checkpoints are judged from.
         settings: All hyper-parameters.
         folder: Where the skill is learned.
-        beginning: Folder of the skill that the first round begins with; empty for none.
+        beginning: The policy of another skill that the first round begins with.
 
     Returns:
         The :class:`~slap_ros.acquisition.skill_training.Round` as JSON, with the number of start
@@ -79,14 +80,13 @@ def learn(
     training = SkillTraining(
         domain, reward, horizon_of(domain), settings, source.seed, Path(folder)
     )
-    policy = load_skill(Path(beginning), domain).policy if beginning else None
     accepted, refused = _accepted(source, domain, starts)
     judged, _ = _accepted(source, domain, fresh)
     if not accepted:
         raise InvalidStateError(
             f"{domain.name} refuses all {len(starts)} states in which {operator} is to be learned"
         )
-    outcome = training.run(number, accepted, judged or accepted, policy)
+    outcome = training.run(number, accepted, judged or accepted, beginning)
     return {**asdict(outcome), "refused": refused}
 
 

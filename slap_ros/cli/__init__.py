@@ -7,7 +7,19 @@ from __future__ import annotations
 import typer
 
 from slap_ros import __version__
-from slap_ros.cli import bag, check, domains, evaluate, plan, propose, report, study, train
+from slap_ros.cli import (
+    acquire,
+    bag,
+    check,
+    domains,
+    evaluate,
+    plan,
+    propose,
+    report,
+    skills,
+    study,
+    train,
+)
 from slap_ros.cli import doctor as doctor_command
 from slap_ros.cli.console import exits
 from slap_ros.cli.options import flat_options
@@ -28,6 +40,8 @@ app.command("propose")(exits(flat_options(propose.propose)))
 app.command("evaluate")(exits(evaluate.evaluate))
 app.command("report")(exits(report.report))
 app.command("train")(exits(flat_options(train.train)))
+app.command("acquire")(exits(flat_options(acquire.acquire)))
+app.command("skills")(exits(skills.skills))
 app.add_typer(study.app, name="study")
 app.add_typer(bag.app, name="bag")
 app.command("check")(exits(check.check))

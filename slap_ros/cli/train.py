@@ -116,10 +116,10 @@ def train(options: TrainOptions) -> int:
     settings = options.training_settings(domain)
     for folder in (options.library_folder, options.work_folder):
         require_writable(folder)
-    _require_torch()
+    require_torch()
     began, folder = monotonic(), options.library_folder
     distribution = TaskDistribution(domain.name, domain.preset, options.seed)
-    with _workers(options.jobs, options.ray) as workers, _TrainingBars() as bars:
+    with training_workers(options.jobs, options.ray) as workers, _TrainingBars() as bars:
         library = Training(distribution, settings, options.work_folder, workers, bars).run()
     library = replace(library, record={"command": options.command, **library.record})
     save_library(folder, library)
@@ -133,11 +133,17 @@ def train(options: TrainOptions) -> int:
     return 0
 
 
-def _workers(jobs: int, ray: str | None) -> AbstractContextManager[Workers]:
+def training_workers(jobs: int, ray: str | None) -> AbstractContextManager[Workers]:
+    """So many processes, or the Ray cluster at an address."""
     return local_workers(jobs) if ray is None else ray_workers(ray)
 
 
-def _require_torch() -> None:
+def require_torch() -> None:
+    """Refuse to train without what training needs.
+
+    Raises:
+        InvalidParameterError: It is not installed.
+    """
     try:
         import stable_baselines3  # noqa: F401
     except ImportError as error:

@@ -25,13 +25,18 @@ ZERO_TOO = frozenset({"alternatives", "refinements", "shortcuts"})  # other coun
 BELOW_1 = math.nextafter(1.0, 0.0)
 RANGES: Mapping[str, tuple[float, float]] = {  # of fractions; all others are finite
     "discount": (0.0, BELOW_1),
+    "enough": (0.0, 1.0),
     "entropy": (0.0, sys.float_info.max),
     "gae_lambda": (0.0, 1.0),
     "learning_rate": (math.ulp(0.0), 1.0),
     "least_saving": (0.0, BELOW_1),
+    "least_similarity": (0.0, 1.0),
     "log_std": (-20.0, 2.0),
+    "progress": (0.0, 1.0),
+    "rehearsal": (0.0, BELOW_1),
     "scale": (math.ulp(0.0), sys.float_info.max),
     "spread": (0.0, sys.float_info.max),
+    "tau": (math.ulp(0.0), 1.0),
     "temperature": (0.0, sys.float_info.max),
 }
 

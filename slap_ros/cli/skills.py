@@ -1,0 +1,79 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``slap skills``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from slap_ros.acquisition.proposal import operator_data, template_data
+from slap_ros.acquisition.skill_library import (
+    AcquiredSkill,
+    SkillLibrary,
+    load_skill_library,
+    read_library_record,
+)
+from slap_ros.cli.console import console, print_json, styled
+from slap_ros.cli.options import Json
+from slap_ros.domains import get_domain
+
+
+def skills(
+    library: Annotated[Path, typer.Argument(help="A folder that `slap acquire` made.")],
+    json: Json = False,
+) -> None:
+    """Show a library of skills: operators, rewards, success, and what each began from."""
+    about = read_library_record(library)
+    read = load_skill_library(library, get_domain(about["domain"], about.get("preset")))
+    if json:
+        print_json(_data(read))
+        return
+    for skill in read.skills:
+        _show(skill)
+    for reason in read.refused:
+        console.print(styled("warning", "yellow", f" a skill is left out: {reason}"))
+    progress = about.get("progress_on_fresh_tasks")
+    reached = "" if progress is None else f", task progress {progress:.2f} on fresh tasks"
+    console.print(f"{len(read.skills)} skills of {read.domain}, digest {read.digest}{reached}")
+
+
+def _data(library: SkillLibrary) -> dict[str, Any]:
+    return {
+        "domain": library.domain,
+        "digest": library.digest,
+        "skills": [
+            {
+                "operator": operator_data(skill.operator),
+                "reward": template_data(skill.template),
+                "horizon": skill.horizon,
+                **skill.record,
+            }
+            for skill in library.skills
+        ],
+        "refused": [str(reason) for reason in library.refused],
+        "record": dict(library.record),
+    }
+
+
+def _show(skill: AcquiredSkill) -> None:
+    operator, record = skill.operator, skill.record
+    console.print(f"{operator}")
+    for label, atoms in (
+        ("PRE", operator.preconditions),
+        ("EFF-", operator.delete_effects),
+        ("EFF+", operator.add_effects),
+    ):
+        console.print(f"  {label:5}{', '.join(sorted(map(str, atoms))) or '-'}")
+    console.print(f"  {'R':5}{' + '.join(map(str, skill.template.terms))}")
+    if "success" not in record:
+        return
+    blind = record.get("vacuity") or {}
+    began = record.get("began_with") or {}
+    console.print(
+        f"  success {record['success']:.2f} from fresh states, of constant and random actions "
+        f"{blind.get('success', float('nan')):.2f}; {record['steps']} environment steps; began "
+        f"with {began.get('skill', 'random weights')}"
+    )
