@@ -113,8 +113,10 @@ class StateSynchronizer:
             return self.latest is not None and self.latest.episode.number >= episode
 
         def unseen_failure() -> SlapError | None:
-            latest = self.latest
-            return None if latest and latest.episode is self.episode else self.failure
+            current, latest = self.episode, self.latest
+            if current is None or current.number < episode:
+                return None
+            return None if latest and latest.episode is current else self.failure
 
         await wait_until(self._node, lambda: seen() or unseen_failure() or monotonic() > deadline)
         if failure := unseen_failure():
