@@ -33,11 +33,10 @@ Demonstrations are recorded by the domain's demonstrator, on tasks of the traini
 that neither this page nor training uses elsewhere. Operators are induced from the atoms that hold
 in each step, and from nothing else: no name, no objects and no end of a script is shown. A change
 counts where atoms stay for {hold_steps} environment steps, and where some are added. With the
-operators
-A* plans for {tasks} fresh tasks of each goal. A task counts where the plan has as few operators as
-the shortest plan with the hand-written operators, which is of the paper's length. Tasks for which
-these have no plan are left out. Preconditions are too many that the hand-written operator with the
-same effects does not have."""
+operators A* plans for {tasks} fresh tasks of each goal. A task counts where the plan has as few
+operators as the shortest plan with the hand-written operators, which is of the paper's length.
+Tasks for which these have no plan are left out. Preconditions are too many that the hand-written
+operator with the same effects does not have."""
 
 
 @dataclass(frozen=True)
