@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping
 
 from slap_ros.core import Policy, Script
-from slap_ros.domains.benchtop.approach import make_approach
+from slap_ros.domains.benchtop.approach import UP, acted_on, carried, make_approach
 from slap_ros.domains.benchtop.hand_motion import CLOSE, OPEN, GoalOf, HandGoal
 from slap_ros.domains.benchtop.scripts import Move, follow, grasp, over, release
 from slap_ros.domains.benchtop.state_access import (
@@ -134,17 +134,16 @@ def turn_between(state: State, peg: Object, hole: Object) -> float:
 
 
 def acts_at(state: State, objects: tuple[Object, ...]) -> HandGoal:
-    """Where the hand grasps a peg, or has the tip of one at the mouth of a hole."""
-    peg, *holes = objects
-    return inserting(state, peg, holes[0], FACE) if holes else grasping(state, peg)
+    """Where the hand grasps a peg, or has the tip of the one that it holds at a hole's mouth."""
+    peg, other = carried(state, objects), acted_on(state, objects)
+    return grasping(state, other) if peg is None else inserting(state, peg, other, FACE)
 
 
 def outwards(state: State, objects: tuple[Object, ...]) -> Vector:
     """From a hole against its axis; from a peg upwards."""
-    _, *holes = objects
-    if not holes:
-        return (0.0, 0.0, 1.0)
-    x, y, z = axis_of(state, holes[0])
+    if carried(state, objects) is None:
+        return UP
+    x, y, z = axis_of(state, acted_on(state, objects))
     return (-x, -y, -z)
 
 
