@@ -52,7 +52,8 @@ def _run(name: str, make: Callable[[], Node]) -> int:
 def _spin(make: Callable[[], Node]) -> None:
     node = start_node(make)
     try:
-        rclpy.spin(node)
+        if rclpy.ok():  # not stopped while the node was made: rclpy's executor would print an error
+            rclpy.spin(node)
     finally:
         node.destroy_node()
 

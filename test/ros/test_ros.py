@@ -51,7 +51,7 @@ def test_the_executables_of_the_readme_are_there():
 )
 def test_a_launched_ensemble_solves_what_it_is_asked_for(cli, tmp_path, domain, options):
     launch = ["ros2", "launch", "slap_ros", "ensemble.launch.py", f"domain:={domain}", "seed:=1"]
-    launch += [f"record:={tmp_path / 'ours'}", *options]
+    launch += [f"record:={tmp_path / 'ours'}", "patience:=5.0", *options]
     record = ["ros2", "bag", "record", "--all", "--output", tmp_path / "theirs"]
     with (
         started(record, tmp_path / "record.txt"),
@@ -97,7 +97,8 @@ def test_embedded_and_real_nodes_solve_a_task_together(
         for name in NODES:
             command, environment = embedded if name in embedded_nodes else real
             output = tmp_path / f"{name}.txt"
-            options = ["-p", "shortcuts:=none"] if name in ("planner_node", "skill_server") else []
+            options = ["-p", "patience:=5.0"] if name != "sim_node" else []
+            options += ["-p", "shortcuts:=none"] if name in ("planner_node", "skill_server") else []
             call = [*command, name, "--ros-args", *options]
             stack.enter_context(started(call, output, **environment))
         assert solve() > 0
