@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -42,6 +43,29 @@ def cuboid(half: Vector) -> ConvexPiece:
     x, y, z = half
     corners = product((-x, x), (-y, y), (-z, z))
     return ConvexPiece(tuple(corners), _FACES)
+
+
+def prism(radius_m: float, length_m: float, sides: int) -> ConvexPiece:
+    """A prism about z in place of a cylinder, with the origin in its middle.
+
+    Args:
+        radius_m: Of the circle that its corners are on.
+        length_m: From end to end.
+        sides: How many, three or more.
+
+    Returns:
+        The prism; its corners at the lower end come before those at the upper end.
+    """
+    angles = [2.0 * math.pi * k / sides for k in range(sides)]
+    rim = [(radius_m * math.cos(angle), radius_m * math.sin(angle)) for angle in angles]
+    vertices = tuple((x, y, sign * 0.5 * length_m) for sign in (-1.0, 1.0) for x, y in rim)
+    triangles: list[tuple[int, int, int]] = []
+    for k in range(sides):
+        after = (k + 1) % sides
+        triangles += [(k, after, sides + after), (k, sides + after, sides + k)]
+    for k in range(1, sides - 1):
+        triangles += [(0, k + 1, k), (sides, sides + k, sides + k + 1)]
+    return ConvexPiece(vertices, tuple(triangles))
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,9 +9,10 @@ from pathlib import Path
 from types import TracebackType
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slap_ros.geometry.pose import Pose, Vector
-from slap_ros.meshes.solid import ConvexPiece
+from slap_ros.meshes.solid import ConvexPiece, prism
 from slap_ros.physics.animation import Picture, write_pictures
 from slap_ros.physics.bullet import pybullet
 from slap_ros.physics.scene import GREY, Colour
@@ -25,7 +26,10 @@ FINGER_JOINTS = (9, 10)
 STAND = VisualShape((0.1, 0.1, 0.2125), GREY)  # what the base is on
 STAND_AT = Pose((0.0, 0.0, -0.2125))
 UP: Vector = (0.0, 0.0, 1.0)
+SIDES = 32  # of what cylinders are drawn as
 NEAR, FAR = 0.05, 5.0  # m, what is closer or further is not drawn
+
+Corners = NDArray[np.float64]
 
 
 class Camera:
@@ -97,8 +101,7 @@ class Camera:
         if isinstance(geometry, ConvexPiece):
             look = self._piece(geometry, shape.colour)
         elif isinstance(geometry, Cylinder):
-            radius, length = geometry
-            look = self._visual(shape.colour, pybullet.GEOM_CYLINDER, radius=radius, length=length)
+            look = self._cylinder(geometry, shape.colour)
         else:
             look = self._visual(shape.colour, pybullet.GEOM_BOX, halfExtents=geometry)
         added: int = pybullet.createMultiBody(0.0, -1, look, physicsClientId=self.client)
@@ -106,15 +109,24 @@ class Camera:
 
     def _piece(self, piece: ConvexPiece, colour: Colour) -> int:
         """A piece with corners of their own for each triangle, so that faces look flat."""
-        corners = np.array(piece.vertices)[np.array(piece.triangles)]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        corners, normals = _faces(piece)
+        return self._mesh(corners, np.repeat(normals[:, None], 3, axis=1), colour)
+
+    def _cylinder(self, cylinder: Cylinder, colour: Colour) -> int:
+        """Smooth all around and flat at its ends, which PyBullet's own cylinders are not."""
+        corners, normals = _faces(prism(*cylinder, SIDES))
+        around = np.abs(normals[:, None, 2:]) < 0.5
+        outwards = corners * (1.0, 1.0, 0.0) / cylinder.radius_m
+        return self._mesh(corners, np.where(around, outwards, normals[:, None]), colour)
+
+    def _mesh(self, corners: Corners, normals: Corners, colour: Colour) -> int:
+        """Triangles with corners of their own, and the normals there, shapes (n, 3, 3)."""
         return self._visual(
             colour,
             pybullet.GEOM_MESH,
             vertices=corners.reshape(-1, 3).tolist(),
             indices=list(range(3 * len(corners))),
-            normals=np.repeat(normals, 3, axis=0).tolist(),
+            normals=normals.reshape(-1, 3).tolist(),
         )
 
     def _visual(self, colour: Colour, kind: int, **geometry: object) -> int:
@@ -122,6 +134,13 @@ class Camera:
             kind, rgbaColor=colour, physicsClientId=self.client, **geometry
         )
         return shape
+
+
+def _faces(piece: ConvexPiece) -> tuple[Corners, Corners]:
+    """The corners of each triangle, shape (n, 3, 3), and its normal, shape (n, 3)."""
+    corners = np.array(piece.vertices)[np.array(piece.triangles)]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return corners, normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
 def write_animation(

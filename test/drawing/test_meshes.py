@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from slap_ros.core import VisibleBody
-from slap_ros.domains.benchtop.visualization import SIDES, prism
+from slap_ros.domains.benchtop.visualization import SIDES, prism_triangles
 from slap_ros.drawing.meshes import MOST_TRIANGLES, body_paths
 from slap_ros.drawing.projection import OBLIQUE, SIDE, TOP, Canvas, box_paths, box_triangles
 from slap_ros.geometry.pose import from_rotation_vector
@@ -22,7 +22,7 @@ BOX = VisibleBody(
     (1.0, 0.0, 0.0, 1.0),
 )
 CANVAS = Canvas(-1.0, 1.0, 2.0, 2.0)
-PRISM = replace(BOX, triangles=prism(0.05, 0.2))
+PRISM = replace(BOX, triangles=prism_triangles(0.05, 0.2))
 
 
 def outwards(body: VisibleBody) -> VisibleBody:

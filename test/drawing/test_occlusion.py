@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from slap_ros.core import VisibleBody
-from slap_ros.domains.benchtop.visualization import prism
+from slap_ros.domains.benchtop.visualization import prism_triangles
 from slap_ros.drawing.occlusion import painting_order
 from slap_ros.drawing.projection import OBLIQUE, SIDE, TOP, Projection
 from slap_ros.geometry.pose import from_rotation_vector, rotation_matrix
@@ -67,7 +67,7 @@ def test_a_drawer_is_hidden_by_the_cabinet_that_it_is_in():
     roof = VisibleBody("roof", (0.5, 0.0, 0.1), still, (0.2, 0.2, 0.01), WHITE)
     floor = replace(roof, position=(0.5, 0.0, 0.0))
     bottom = replace(roof, position=(0.4, 0.0, 0.05), size=(0.2, 0.15, 0.01))
-    rod = replace(roof, position=(0.4, 0.0, 0.075), triangles=prism(0.01, 0.03))
+    rod = replace(roof, position=(0.4, 0.0, 0.075), triangles=prism_triangles(0.01, 0.03))
     bodies = [roof, rod, bottom, floor]
     for ranks in ([0, 1, 2, 3], [3, 2, 1, 0], [1, 3, 0, 2]):
         assert painting_order(bodies, OBLIQUE, ranks) == [3, 2, 1, 0]

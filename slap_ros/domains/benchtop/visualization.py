@@ -4,10 +4,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from functools import lru_cache
-from itertools import pairwise
 
 from slap_ros.contact.arm import CONTROL_PERIOD_S
 from slap_ros.contact.features import ROBOT
@@ -17,12 +15,13 @@ from slap_ros.contact.visuals import ContactVisuals
 from slap_ros.core import Display, VisibleBody
 from slap_ros.domains.visualization import animation, arm_bodies
 from slap_ros.geometry.pose import Pose, Vector
+from slap_ros.meshes.solid import prism
 from slap_ros.physics.features import JOINT_FEATURES
 from slap_ros.physics.viewpoint import Viewpoint
 from slap_ros.relational import State
 
 SceneOf = Callable[[State], ContactScene]
-VIEW = Viewpoint(eye=(1.3, -0.95, 0.75), target=(0.47, 0.0, 0.14))
+VIEW = Viewpoint(eye=(1.12, -0.84, 0.66), target=(0.46, 0.0, 0.14))
 SIDES = 12  # of the prism that a cylinder is shown as
 
 
@@ -73,7 +72,9 @@ def _links(scene: ContactScene, state: State) -> list[tuple[Link, Pose]]:
 
 def _visible(link: Link, part: Part, pose: Pose) -> VisibleBody:
     x, y, z = part.bounding_box.half
-    triangles = prism(part.radius_m, part.length_m) if isinstance(part, CylinderPart) else ()
+    triangles = (
+        prism_triangles(part.radius_m, part.length_m) if isinstance(part, CylinderPart) else ()
+    )
     return VisibleBody(
         link.name,
         *pose.compose(part.pose),
@@ -84,19 +85,7 @@ def _visible(link: Link, part: Part, pose: Pose) -> VisibleBody:
 
 
 @lru_cache(maxsize=256)
-def prism(radius_m: float, length_m: float) -> tuple[Vector, ...]:
-    """The triangles of a prism around z in place of a cylinder, three corners each, m."""
-    half = 0.5 * length_m
-    rim = [
-        (radius_m * math.cos(angle), radius_m * math.sin(angle))
-        for angle in (2.0 * math.pi * k / SIDES for k in range(SIDES))
-    ]
-    corners: list[Vector] = []
-    for (a, b), (c, d) in zip(rim, (*rim[1:], rim[0]), strict=True):
-        corners += [(a, b, -half), (c, d, -half), (c, d, half)]
-        corners += [(a, b, -half), (c, d, half), (a, b, half)]
-    x, y = rim[0]
-    for (a, b), (c, d) in pairwise(rim[1:]):
-        corners += [(x, y, half), (a, b, half), (c, d, half)]
-        corners += [(x, y, -half), (c, d, -half), (a, b, -half)]
-    return tuple(corners)
+def prism_triangles(radius_m: float, length_m: float) -> tuple[Vector, ...]:
+    """The triangles that a cylinder about z is shown as, three corners each, m."""
+    vertices, triangles = prism(radius_m, length_m, SIDES)
+    return tuple(vertices[corner] for triangle in triangles for corner in triangle)
