@@ -13,6 +13,7 @@ from slap_ros.errors import InvalidParameterError
 Range = tuple[float, float]
 Spot = tuple[float, float]  # x, y
 
+ANY = -1  # instead of a number
 TRIES = 1_000  # arrangements drawn before there is said to be no room
 DARTS = 10  # for each thing of an arrangement
 BENCH_LIMITS = {
@@ -53,3 +54,22 @@ def spread_out(
         f"there is no room for {count} things {apart} m apart within x from {x[0]} to {x[1]} m "
         f"and y from {y[0]} to {y[1]} m; give more room or fewer things"
     )
+
+
+def some_of(rng: np.random.Generator, total: int, count: int, first: int = ANY) -> list[int]:
+    """Numbers from 0 up to a total, drawn at random.
+
+    Args:
+        rng: Draws them.
+        total: Of numbers that there are.
+        count: How many are wanted.
+        first: The one that is surely among them, and comes first; :data:`ANY` for none.
+
+    Returns:
+        Different ones, in random order.
+    """
+    numbers = [int(number) for number in rng.permutation(total)]
+    if first != ANY:
+        numbers.remove(first)
+        numbers.insert(0, first)
+    return numbers[:count]

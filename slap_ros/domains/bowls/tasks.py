@@ -23,7 +23,7 @@ from slap_ros.domains.benchtop.room import (
     upright,
     within_reach,
 )
-from slap_ros.domains.benchtop.tasks import BENCH_LIMITS, Range
+from slap_ros.domains.benchtop.tasks import ANY, BENCH_LIMITS, Range, some_of
 from slap_ros.domains.bowls.demonstrator import rim_at
 from slap_ros.domains.bowls.model import BOWL, ON, PLATE, SPOTS, SURFACE
 from slap_ros.domains.bowls.scenery import (
@@ -42,7 +42,6 @@ from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, from_yaw
 from slap_ros.relational import GroundAtom, Object, State
 
-ANY = -1  # instead of a task's number
 TRIES = 300  # scenes drawn before there is said to be no room
 DARTS = 30  # for each piece of furniture, and for each bowl
 HOME = hand_at((0.45, 0.0, 0.35))
@@ -95,7 +94,7 @@ class RandomBowlTasks(TaskSettings):
         Raises:
             InvalidParameterError: There is no room for so many bowls.
         """
-        numbers = chosen(rng, self.bowls, self.task)
+        numbers = some_of(rng, len(SPOTS), self.bowls, self.task)
         for _ in range(TRIES):
             poses = self._draw(rng, [ON_TOP_OF[n] for n in numbers if n in ON_TOP_OF])
             task = None if poses is None else with_bowls(rng, poses, numbers)
@@ -153,7 +152,7 @@ class PaperBowlTasks(TaskSettings):
             InvalidParameterError: There is no room for so many bowls.
         """
         for _ in range(TRIES):
-            numbers = chosen(rng, self.bowls, self.task)
+            numbers = some_of(rng, len(SPOTS), self.bowls, self.task)
             poses = {"plate": self._near(rng, PLATE_PLACE, PLATE_HEIGHT)}
             for name, place in PLACES.items():
                 poses[name] = self._near(rng, place, FURNITURE[name].height)
@@ -165,24 +164,6 @@ class PaperBowlTasks(TaskSettings):
     def _near(self, rng: np.random.Generator, place: tuple[float, float], height: float) -> Pose:
         x, y = (float(v) for v in np.add(place, rng.uniform(-self.aside, self.aside, 2)))
         return Pose((x, y, height))
-
-
-def chosen(rng: np.random.Generator, count: int, task: int) -> list[int]:
-    """Numbers of spots, drawn at random.
-
-    Args:
-        rng: Draws.
-        count: Of them.
-        task: The one that comes first; :data:`ANY` for any.
-
-    Returns:
-        Different numbers.
-    """
-    numbers = [int(number) for number in rng.permutation(len(SPOTS))]
-    if task != ANY:
-        numbers.remove(task)
-        numbers.insert(0, task)
-    return numbers[:count]
 
 
 def with_bowls(rng: np.random.Generator, poses: Poses, numbers: Sequence[int]) -> Task | None:

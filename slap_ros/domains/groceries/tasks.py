@@ -18,7 +18,7 @@ from slap_ros.domains.benchtop.features import place_features, thing_features
 from slap_ros.domains.benchtop.hand_motion import HandGoal
 from slap_ros.domains.benchtop.presets import STEP_LIMIT
 from slap_ros.domains.benchtop.room import HIGHEST, ROOM, Station, palm_space, within_reach
-from slap_ros.domains.benchtop.tasks import BENCH_LIMITS, Range
+from slap_ros.domains.benchtop.tasks import ANY, BENCH_LIMITS, Range, some_of
 from slap_ros.domains.groceries.model import BASKET, GRASP_HEIGHT, GROCERY, HALF_WIDTH, IN, NAMES
 from slap_ros.domains.groceries.scenery import BASKET_BODY, FLOOR_HEIGHT, GROCERIES, Grocery
 from slap_ros.domains.variation import TaskSettings
@@ -27,7 +27,6 @@ from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, from_yaw
 from slap_ros.relational import GroundAtom, Object, State
 
-ANY = -1  # instead of a task's number
 MOST = 6  # things, by default
 TRIES = 200  # scenes drawn before there is said to be no room
 PLACES = 60  # drawn for a thing before the scene is given up
@@ -61,7 +60,7 @@ class RandomGroceryTasks(TaskSettings):
         Raises:
             InvalidParameterError: There is no room for so many things.
         """
-        names = chosen(rng, self.things, self.task)
+        names = [NAMES[i] for i in some_of(rng, len(NAMES), self.things, self.task)]
         for _ in range(TRIES):
             task = self._draw(rng, names)
             if task is not None:
@@ -119,31 +118,13 @@ class PaperGroceryTasks(TaskSettings):
 
     def sample(self, rng: np.random.Generator) -> Task:
         """A task to put one thing into the basket."""
-        names = chosen(rng, self.things, self.task)
+        names = [NAMES[i] for i in some_of(rng, len(NAMES), self.things, self.task)]
         poses = []
         for name, i in zip(names, rng.permutation(len(SLOTS)), strict=False):
             x, y = SLOTS[i]
             dx, dy = (float(d) for d in rng.uniform(-self.aside, self.aside, 2))
             poses.append(Pose((x + dx, y + dy, GROCERIES[name].rest_height)))
         return make_task(Pose((0.58, 0.0, FLOOR_HEIGHT)), names, poses)
-
-
-def chosen(rng: np.random.Generator, count: int, task: int) -> list[str]:
-    """Names of things, drawn at random.
-
-    Args:
-        rng: Draws.
-        count: Of them.
-        task: The number of the one that comes first; :data:`ANY` for any.
-
-    Returns:
-        Different names.
-    """
-    names = [NAMES[i] for i in rng.permutation(len(NAMES))]
-    if task != ANY:
-        names.remove(NAMES[task])
-        names.insert(0, NAMES[task])
-    return names[:count]
 
 
 def make_task(basket: Pose, names: Sequence[str], poses: Sequence[Pose]) -> Task:
