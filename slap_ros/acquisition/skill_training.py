@@ -124,7 +124,7 @@ class SkillTraining:
         in_round = 0 if number == len(self._rounds) else len(self._rounds[number].segments)
         learner = self._learner(mdp, initiations, number, in_round)
         trials = SkillTrials(self.domain, self.reward, fresh, self.horizon)
-        self._resume(learner, done, in_round, beginning)
+        self._resume(learner, number, done, in_round, beginning)
         if number == len(self._rounds):
             self._begin_round(learner, trials)
         while not self._rounds[-1].over:
@@ -149,22 +149,30 @@ class SkillTraining:
         return int.from_bytes(sha256(text.encode()).digest()[:4], "little")
 
     def _resume(
-        self, learner: SkillLearner, done: int, in_round: int, beginning: MlpPolicy | None
+        self,
+        learner: SkillLearner,
+        number: int,
+        done: int,
+        in_round: int,
+        beginning: MlpPolicy | None,
     ) -> None:
-        """Go on from the last checkpoint of this round, or begin it with the best one so far.
+        """Go on from the last checkpoint; a round begins with the best one where it is better.
 
         Args:
             learner: To go on with.
+            number: Of the round.
             done: Segments so far, of all rounds.
             in_round: Of this round.
             beginning: What a first round begins with.
         """
         types = self.domain.types_by_name
         earlier = [load_episodes(self._episodes(i), types) for i in range(done)]
-        if in_round:
-            learner.resume(self._checkpoint(done), earlier)
-        elif (self.folder / "best.pt").exists() and self._rounds:
-            learner.resume(self.folder / "best.pt", earlier)
+        if done:
+            # Where none has succeeded yet, the last one has learned most.
+            previous = self._rounds[number - 1]
+            worse = not in_round and previous.segments[-1] < previous.success
+            path = self.folder / "best.pt" if worse else self._checkpoint(done)
+            learner.resume(path, earlier)
         elif beginning is not None:
             learner.begin_with(beginning)
 
