@@ -140,6 +140,16 @@ def test_surfaces_count_as_the_table_and_the_plate_does_not():
     assert atoms(above("plate", 0.04), held=1.0) == {f"Holding({bowl})", "IsClear(plate)"}
 
 
+def test_every_bowl_stands_on_the_table_or_on_furniture_at_first():
+    """Beside a corner of the furniture, too."""
+    for goal in DOMAIN.goals:
+        for index in range(20):
+            state = DOMAIN.task(500, index, goal).initial_state
+            space = DOMAIN.atom_space(state)
+            held = {str(atom) for atom in space.decode(space.abstract(state))}
+            assert {f"OnTable({bowl})" for bowl in bowls_of(state)} <= held
+
+
 def test_constant_motions_do_nothing_useful():
     done = dict.fromkeys(CONSTANT, 0)
     for number in (2, 7):

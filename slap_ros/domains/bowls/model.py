@@ -80,7 +80,7 @@ def rise(state: State, bowl: Object) -> float:
     for surface in state.layout.of_type(SURFACE):
         dx, dy, _ = pose_of(state, surface).inverse().apply((x, y, z))
         length, width = value(state, surface, "half_length"), value(state, surface, "half_width")
-        if abs(dx) <= length + radius and abs(dy) <= width + radius:
+        if math.hypot(max(abs(dx) - length, 0.0), max(abs(dy) - width, 0.0)) <= radius:
             top = max(top, value(state, surface, "z"))
     return z - value(state, bowl, "rest_height") - top
 
@@ -91,10 +91,9 @@ def _rise(state: State, bowls: Column) -> Array:
     along, up = axes(state, surfaces)[..., None, :, :], np.array([0.0, 0.0, 1.0])
     dx, dy = (np.abs((apart * axis).sum(axis=-1)) for axis in (along, np.cross(up, along)))
     radius = state.stack(bowls, "rim_radius")[..., :, None]
-    length, width = (radius + state.stack(surfaces, name)[..., None, :] for name in HALVES)
-    heights = np.where(
-        (dx <= length) & (dy <= width), state.stack(surfaces, "z")[..., None, :], 0.0
-    )
+    length, width = (state.stack(surfaces, name)[..., None, :] for name in HALVES)
+    beside = np.hypot(np.maximum(dx - length, 0.0), np.maximum(dy - width, 0.0))
+    heights = np.where(beside <= radius, state.stack(surfaces, "z")[..., None, :], 0.0)
     gap = state.stack(bowls, "z") - state.stack(bowls, "rest_height")
     highest: Array = heights.max(axis=-1, initial=0.0)
     return gap - highest
