@@ -14,6 +14,7 @@ ROS Parameters:
     task_timeout (double, 10.0): seconds to wait for a task.
     domain (string, ""), preset (string, ""): imported at the start; empty: whichever the simulator
         announces.
+    skills (string, ""): as perception_node's.
     patience (double, 1.0): factor of all deadlines, for slow domains and machines.
 
 Publishers:
