@@ -76,6 +76,15 @@ def test_the_hand_has_room_everywhere(preset):
             stations.append(here)
 
 
+def test_every_bowl_can_be_picked_at_first():
+    """Also one on the table beside the corner of a surface."""
+    for seed in range(60):
+        state = DOMAIN.task(seed, goal="task6").initial_state
+        space = DOMAIN.atom_space(state)
+        atoms = {str(atom) for atom in space.decode(space.abstract(state))}
+        assert {f"OnTable({bowl})" for bowl in bowls_of(state)} <= atoms
+
+
 def test_tasks_differ():
     tasks = [DOMAIN.task(seed) for seed in range(20)]
     assert len({task.initial_state.key for task in tasks}) == 20
