@@ -148,6 +148,7 @@ def test_every_bowl_stands_on_the_table_or_on_furniture_at_first():
             space = DOMAIN.atom_space(state)
             held = {str(atom) for atom in space.decode(space.abstract(state))}
             assert {f"OnTable({bowl})" for bowl in bowls_of(state)} <= held
+            assert all(abs(float(state.get(bowl, "y"))) < 0.5 - OUTSIDE for bowl in bowls_of(state))
 
 
 def test_constant_motions_do_nothing_useful():

@@ -13,6 +13,7 @@ import numpy as np
 
 from slap_ros.contact.features import ROBOT, robot_features
 from slap_ros.contact.hand import hand_at
+from slap_ros.contact.scene import TABLE
 from slap_ros.core import Task
 from slap_ros.domains.benchtop.features import place_features
 from slap_ros.domains.benchtop.presets import STEP_LIMIT
@@ -222,7 +223,7 @@ def _bowl_pose(
         pose = Pose((x, y, top + REST_HEIGHT), from_yaw(float(rng.uniform(-math.pi, math.pi))))
         goals = (rim_at(pose), rim_at(_on_plate(pose, poses["plate"])))
         has_room = all(map(bowl_station(pose, poses["plate"]).leaves_room, stations))
-        if has_room and all(map(within_reach, goals)):
+        if has_room and _on_table(x, y) and all(map(within_reach, goals)):
             return pose
     return None
 
@@ -244,6 +245,12 @@ def _spot(rng: np.random.Generator, number: int, poses: Poses) -> tuple[float, f
     }[number]
     low, high = (reach + OUTSIDE + gap for gap in BESIDE)
     return (*_beside(rng, poses[name], (low, high)), 0.0)
+
+
+def _on_table(x: float, y: float) -> bool:
+    """Whether all of a bowl is over the table."""
+    (u, v, _), (length, width, _) = TABLE.pose.position, TABLE.bounding_box.half
+    return abs(x - u) <= length - OUTSIDE and abs(y - v) <= width - OUTSIDE
 
 
 def _within(bounds: Range, number: float) -> bool:
