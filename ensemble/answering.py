@@ -24,7 +24,7 @@ def error_to_answer(node: Node, error: Exception) -> SlapError:
     """
     if isinstance(error, SlapError):
         return error
-    node.get_logger().error(format_exc())
+    _log_traceback(node)
     return InternalError(
         f"{type(error).__name__}: {error} (where it was raised is in the log of {node.get_name()})"
     )
@@ -43,8 +43,14 @@ def domain_error(node: Node, domain: str, error: Exception) -> SlapError:
     """
     if isinstance(error, SlapError):
         return error_from(error.code, f"domain {domain}: {error}")
-    node.get_logger().error(format_exc())
+    _log_traceback(node)
     return InvalidDomainError(
         f"domain {domain} raised {type(error).__name__}: {error} (the log of {node.get_name()} "
         "says where)"
     )
+
+
+def _log_traceback(node: Node) -> None:
+    """Of what is being handled; not so once the node is shut down: then all that goes on fails."""
+    if node.context.ok():
+        node.get_logger().error(format_exc())

@@ -162,7 +162,10 @@ class LockstepWorld(Node, ABC, Generic[P]):
             self._show(state, stamp)
         except Exception as raised:  # of a domain's code: nobody but people misses the picture
             error = domain_error(self, self._domain.name, raised)
-            self.get_logger().error(f"not shown: {error}", throttle_duration_sec=QUIET)
+            if (
+                self.context.ok()
+            ):  # else nothing can be published any more, and it is nobody's fault
+                self.get_logger().error(f"not shown: {error}", throttle_duration_sec=QUIET)
 
     # -- episodes -------------------------------------------------------------------------------
 

@@ -20,7 +20,6 @@ BENCH_LIMITS = {
     "x": (0.3, 0.8),  # what the hand reaches
     "y": (-0.5, 0.5),
     "yaw": (-math.pi, math.pi),
-    "apart": (0.0, 0.5),
 }
 
 

@@ -38,7 +38,7 @@ class StackTasks(TaskSettings):
         apart: Between the middles of what stands on the table, at least.
     """
 
-    limits: ClassVar = BENCH_LIMITS | {"cubes": (2, 4), "blocked": (0, 1)}
+    limits: ClassVar = BENCH_LIMITS | {"cubes": (2, 4), "blocked": (0, 1), "apart": (0.0, 0.5)}
 
     cubes: int = 2
     blocked: int = 0
