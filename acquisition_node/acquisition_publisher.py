@@ -1,12 +1,13 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the acquisition node tells of a proposal: events, feedback, and the result."""
+"""What the acquisition node publishes: events, the feedback and result of a proposal, skills."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 from rclpy.action.server import ServerGoalHandle
@@ -14,11 +15,13 @@ from rclpy.node import Node
 from slap_msgs.action import ProposeOperators
 from slap_msgs.msg import AcquisitionEvent, RewardTerm
 
+from acquisition_node.trainer import Event
 from ensemble import encode
-from ensemble.interfaces import ACQUISITION_EVENTS
+from ensemble.interfaces import ACQUISITION_EVENTS, SKILLS
 from slap_ros.acquisition.attempt_log import Entry
 from slap_ros.acquisition.problem import AcquisitionProblem
 from slap_ros.acquisition.proposal import Proposal
+from slap_ros.acquisition.skill_library import SkillLibrary
 from slap_ros.errors import SlapError, TaskCanceledError
 
 
@@ -30,6 +33,7 @@ class AcquisitionPublisher:
         self._node = node
         topic = ACQUISITION_EVENTS
         self._events = node.create_publisher(topic.type, topic.name, topic.qos)
+        self._libraries = node.create_publisher(SKILLS.type, SKILLS.name, SKILLS.qos)
         self._episode = 0
         self._answers = 0
 
@@ -44,10 +48,9 @@ class AcquisitionPublisher:
             return  # it ends the proposal, and is told then
         if entry["event"] == "answer":
             self._answers += 1
-            self._publish(AcquisitionEvent.ANSWERED, **_judged(entry), **_answered(entry))
+            self.answered(entry)
         else:
-            plan = entry["plan"] or []
-            self._publish(AcquisitionEvent.VERIFIED, **_judged(entry), plan=plan)
+            self.verified(entry)
         goal.publish_feedback(
             ProposeOperators.Feedback(
                 attempt=self._answers,
@@ -56,15 +59,67 @@ class AcquisitionPublisher:
             )
         )
 
-    def finished(self, plan: Sequence[str]) -> None:
-        """A proposal passed the checks."""
-        self._publish(AcquisitionEvent.FINISHED, plan=list(plan))
+    def answered(self, entry: Entry) -> None:
+        """A model has answered."""
+        self._publish(AcquisitionEvent.ANSWERED, **_judged(entry), **_answered(entry))
 
-    def failed(self, error: SlapError) -> None:
-        """None did, or it was canceled."""
+    def verified(self, entry: Entry) -> None:
+        """The planner has judged all operators together."""
+        plan = entry["plan"] or []
+        self._publish(AcquisitionEvent.VERIFIED, **_judged(entry), plan=plan)
+
+    def finished(self, plan: Sequence[str], operators: Sequence[str] = ()) -> None:
+        """A proposal passed the checks."""
+        self._publish(AcquisitionEvent.FINISHED, plan=list(plan), operators=list(operators))
+
+    def failed(self, error: SlapError, subject: str = "") -> None:
+        """None did, or it was canceled; or no skills came of one."""
         canceled = error.code == TaskCanceledError.code
         kind = AcquisitionEvent.CANCELED if canceled else AcquisitionEvent.FAILED
-        self._publish(kind, error_code=int(error.code), error_msg=str(error))
+        code, message = int(error.code), str(error)
+        self._publish(kind, subject=subject, error_code=code, error_msg=message)
+
+    def rolled_out(self, event: Event) -> None:
+        """A plan was carried out with the skills at hand."""
+        self._publish(
+            AcquisitionEvent.ROLLED_OUT,
+            subject=event["failed"],
+            complaints=event["reasons"],
+            plan=event["plan"],
+            iteration=event["iteration"],
+            task=event["task"],
+            progress=float(event["progress"]),
+        )
+
+    def judged(self, event: Event) -> None:
+        """A skill was trained for a round."""
+        self._publish(
+            AcquisitionEvent.JUDGED,
+            subject=event["skill"],
+            iteration=event["iteration"],
+            success=list(map(float, event["success"])),
+            segment_steps=event["segment_steps"],
+        )
+
+    def acquired(self, folder: Path, library: SkillLibrary, operators: str) -> None:
+        """A library is there, for everyone to take on.
+
+        Args:
+            folder: Absolute.
+            library: As it was read there.
+            operators: As PDDL text.
+        """
+        progress = float(library.record["progress_on_fresh_tasks"])
+        self._publish(AcquisitionEvent.ACQUIRED, digest=library.digest, progress=progress)
+        self._libraries.publish(
+            SKILLS.type(
+                header=encode.header(self._node.get_clock().now().to_msg()),
+                domain=library.domain,
+                folder=str(folder),
+                digest=library.digest,
+                operators_pddl=operators,
+            )
+        )
 
     def result(self, proposal: Proposal, problem: AcquisitionProblem) -> ProposeOperators.Result:
         """The action's result for a proposal that passed."""

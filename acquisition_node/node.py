@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Proposes operators and rewards for the task of an episode (LG-SAIL §4).
+"""Proposes operators and rewards for the task of an episode, and acquires skills (LG-SAIL §4).
 
 ROS Parameters:
     language_settings (string, ""): JSON file with model, server and sampling; see
@@ -9,6 +9,13 @@ ROS Parameters:
         SLAP_LANGUAGE_MODEL and SLAP_LANGUAGE_BASE_URL.
     cassette (string, "live"): live, record:FILE, replay:FILE, or off.
     demonstrations (string, ""): bags for the proposer ``induced``, separated by blanks.
+    output (string, "runs/skills"): folder for libraries of skills, and for what is learned for
+        them. A goal has a folder of its own there, in which the same goal goes on.
+    settings (string, "small"), changes (string, ""): how skills are learned, as ``slap acquire``
+        has it; changes as ``rollouts=20 sac.discount=0.9``.
+    steps (int, 150000): environment steps that a goal may learn for at most.
+    jobs (int, 1): processes that learn.
+    begin_with (string, ""): libraries that skills may begin with, separated by blanks.
     attempts (int, 40), tokens (int, 400000), seconds (double, 900.0): the most that one goal may
         spend on a language model.
     task_timeout (double, 10.0): seconds to wait for a task.
@@ -19,19 +26,24 @@ ROS Parameters:
 
 Publishers:
     slap/acquisition_events (slap_msgs/AcquisitionEvent): questions' answers and what is wrong with
-        them.
-    diagnostics (diagnostic_msgs/DiagnosticArray): proposals asked for and made; 1 Hz.
+        them; plans that are carried out while skills are learned, and judgements of skills.
+    slap/skills (slap_msgs/SkillLibrary): the newest library that was acquired; latched.
+    diagnostics (diagnostic_msgs/DiagnosticArray): proposals and trainings asked for and made; 1 Hz.
 
 Subscribers:
     slap/domain, slap/task: see ``ensemble.observation``.
+    slap/skills: as all nodes do, to follow the domain with these skills.
 
 Action servers:
     slap/propose_operators (slap_msgs/ProposeOperators): one proposal.
+    slap/acquire_skills (slap_msgs/AcquireSkills): the skills that a goal takes. They are learned in
+        a process of its own, which ends when the goal is canceled or the node ends.
 """
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable, Coroutine
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -41,71 +53,111 @@ from typing import Any
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.node import Node
-from slap_msgs.action import ProposeOperators
+from slap_msgs.action import AcquireSkills, ProposeOperators
 
 from acquisition_node.acquisition_publisher import AcquisitionPublisher
-from acquisition_node.inquiry_parameters import InquiryParameters
-from acquisition_node.proposal_request import ProposalRequest, make_proposal
+from acquisition_node.proposal_job import ProposalJob
+from acquisition_node.skill_acquisition import SkillAcquisition
+from acquisition_node.trainer import Trainer
+from acquisition_node.training_request import TrainingRequest, goal_in_words
+from ensemble.acquisition_parameters import AcquisitionParameters
 from ensemble.answering import error_to_answer
 from ensemble.common_parameters import CommonParameters
 from ensemble.diagnostics import DiagnosticsPublisher
 from ensemble.entry_point import run_node
 from ensemble.episode_tracker import EpisodeTracker
 from ensemble.futures import submit, wait_for_first, wait_until
-from ensemble.interfaces import PROPOSE_OPERATORS
+from ensemble.interfaces import ACQUIRE_SKILLS, PROPOSE_OPERATORS
 from ensemble.observation import Episode
 from ensemble.parameters import read_parameters
 from ensemble.refusals import Refusals
 from slap_ros.errors import BusyError, EpisodeChangedError, NoTaskError, TaskCanceledError
 from slap_ros.messages.decode import decode_goal
 
+SKILLS_SUBJECT = "skills"  # of events about an acquisition as a whole
 THREADS = 2  # a canceled proposal may still wait for its model while the next one begins
 
 
 class AcquisitionNode(Node):
-    """Makes proposals: the server of ``propose_operators``."""
+    """Makes proposals, and has the skills of their operators learned in a process of its own."""
 
     def __init__(self, **kwargs: Any) -> None:
-        """Serve the action ``propose_operators``; ``kwargs`` are the node's."""
+        """Serve both actions; ``kwargs`` are the node's."""
         super().__init__("acquisition_node", **kwargs)
-        self._settings = read_parameters(self, InquiryParameters)
+        self._settings = read_parameters(self, AcquisitionParameters)
         common = read_parameters(self, CommonParameters)
         common.imported()
         self._timeout_s = self._settings.task_timeout * common.patience
         self._busy = False
-        self._counts = Counter(asked=0, proposed=0)
+        self._trainer: Trainer | None = None  # while skills are learned
+        self._counts = Counter(asked=0, proposed=0, trainings=0, acquired=0)
         self._workers = ThreadPoolExecutor(THREADS, thread_name_prefix="proposing")
         refusals = Refusals(self)
         self._episodes = EpisodeTracker(
             self, lambda _: None, lambda *_: None, refusals, common.skills
         )
         self._publisher = AcquisitionPublisher(self)
-        self._actions = ActionServer(
-            self,
-            PROPOSE_OPERATORS.type,
-            PROPOSE_OPERATORS.name,
-            self._execute,
-            cancel_callback=lambda _: CancelResponse.ACCEPT,
-        )
+        self._actions = [
+            ActionServer(
+                self,
+                served.type,
+                served.name,
+                execute,
+                cancel_callback=lambda _: CancelResponse.ACCEPT,
+            )
+            for served, execute in (
+                (PROPOSE_OPERATORS, self._execute_proposal),
+                (ACQUIRE_SKILLS, self._execute_acquisition),
+            )
+        ]
         DiagnosticsPublisher(self, lambda: {**self._counts, **refusals.counts})
 
     def destroy_node(self) -> None:
-        """Stop the threads as well."""
+        """Stop the threads and the trainer as well."""
         self._workers.shutdown(wait=False, cancel_futures=True)
+        if self._trainer is not None:
+            self._trainer.stop()
         self._episodes.destroy()
-        self._actions.destroy()
+        for server in self._actions:
+            server.destroy()
         super().destroy_node()
 
-    async def _execute(self, goal: ServerGoalHandle) -> ProposeOperators.Result:
+    async def _execute_proposal(self, goal: ServerGoalHandle) -> ProposeOperators.Result:
         self._counts["asked"] += 1
+        result = await self._execute(goal, self._propose, "")
+        self._counts["proposed"] += result.success
+        return result
+
+    async def _execute_acquisition(self, goal: ServerGoalHandle) -> AcquireSkills.Result:
+        self._counts["trainings"] += 1
+        result = await self._execute(goal, self._acquire, SKILLS_SUBJECT)
+        self._counts["acquired"] += result.success
+        return result
+
+    async def _execute(
+        self,
+        goal: ServerGoalHandle,
+        answer: Callable[[ServerGoalHandle, Episode], Coroutine[None, None, Any]],
+        subject: str,
+    ) -> Any:
+        """Answer a goal, one at a time; errors are in the result, and in an event.
+
+        Args:
+            goal: What is asked for.
+            answer: Makes the result.
+            subject: Of the event.
+
+        Returns:
+            The result of the goal's action.
+        """
         try:
-            result = await self._propose(goal)
+            result = await self._alone(goal, answer)
         except Exception as raised:
             error = error_to_answer(self, raised)
-            self._publisher.failed(error)
-            result = ProposeOperators.Result(error_code=int(error.code), error_msg=str(error))
+            self._publisher.failed(error, subject)
+            kind = AcquireSkills if subject else ProposeOperators
+            result = kind.Result(error_code=int(error.code), error_msg=str(error))
         if result.success:
-            self._counts["proposed"] += 1
             goal.succeed()
         elif result.error_code == TaskCanceledError.code:
             goal.canceled()
@@ -113,13 +165,16 @@ class AcquisitionNode(Node):
             goal.abort()
         return result
 
-    async def _propose(self, goal: ServerGoalHandle) -> ProposeOperators.Result:
+    async def _alone(
+        self,
+        goal: ServerGoalHandle,
+        answer: Callable[[ServerGoalHandle, Episode], Coroutine[None, None, Any]],
+    ) -> Any:
         if self._busy:
-            raise BusyError("another proposal is under way; cancel it first")
+            raise BusyError("another proposal or training is under way; cancel it first")
         self._busy = True
         try:
-            episode = await self._episode(goal.request.episode)
-            return await self._answer(goal, episode)
+            return await answer(goal, await self._episode(goal.request.episode))
         finally:
             self._busy = False
 
@@ -142,10 +197,10 @@ class AcquisitionNode(Node):
             )
         return episode
 
-    async def _answer(self, goal: ServerGoalHandle, episode: Episode) -> ProposeOperators.Result:
+    async def _propose(self, goal: ServerGoalHandle, episode: Episode) -> ProposeOperators.Result:
         asked = goal.request
         atoms = decode_goal(asked.goal, episode.space) or episode.task.goal
-        request = ProposalRequest(
+        proposal = ProposalJob(
             domain=episode.domain,
             task=replace(episode.task, goal=atoms),
             proposer=asked.proposer or "manual",
@@ -155,12 +210,41 @@ class AcquisitionNode(Node):
         self._publisher.started(episode.number)
         canceled = partial(getattr, goal, "is_cancel_requested")
         show = partial(self._publisher.entry, goal)
-        job = submit(self._workers, partial(make_proposal, request, show, canceled))
+        job = submit(self._workers, partial(proposal.run, show, canceled))
         if not await wait_for_first(self, job, canceled):
             raise TaskCanceledError("the proposal was canceled")
-        problem, proposal = job.result().result()
-        self._publisher.finished(proposal.plan or ())
-        return self._publisher.result(proposal, problem)
+        problem, made = job.result().result()
+        self._publisher.finished(made.plan or ())
+        return self._publisher.result(made, problem)
+
+    async def _acquire(self, goal: ServerGoalHandle, episode: Episode) -> AcquireSkills.Result:
+        asked, domain = goal.request, episode.domain
+        atoms = decode_goal(asked.goal, episode.space) or episode.task.goal
+        request = TrainingRequest(
+            domain=domain,
+            goal=goal_in_words(domain, episode.task, atoms),
+            proposer=asked.proposer,
+            rewarder=asked.rewarder,
+            steps=asked.step_budget,
+            seed=asked.seed,
+            kept=self._episodes.library_folder,
+        )
+        arguments = request.arguments(self._settings)
+        self._trainer = trainer = Trainer(arguments)
+        self._publisher.started(episode.number)
+        canceled = partial(getattr, goal, "is_cancel_requested")
+        training = SkillAcquisition(goal, domain, trainer, self._publisher)
+        job = submit(self._workers, training.run)
+        try:
+            if await wait_for_first(self, job, canceled):
+                return job.result().result()
+            trainer.stop()
+            await wait_until(self, job.done)
+        finally:
+            self._trainer = None
+        raise TaskCanceledError(
+            f"canceled; what was learned stays beside {arguments[-1]}, where the same goal goes on"
+        )
 
 
 def main() -> int:

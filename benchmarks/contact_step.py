@@ -18,10 +18,12 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from statistics import median
 from tempfile import TemporaryDirectory
 from time import process_time
 from typing import Any
 
+from benchmarks.contact_pieces import without
 from benchmarks.printing import show
 from benchmarks.workbench import (
     BENCH,
@@ -201,6 +203,25 @@ def hand_rate(script: Script) -> float:
         return len(actions) / (process_time() - began)
 
 
+def stepping_share(script: Script) -> float:
+    """How much of a step of the contact world PyBullet's ``stepSimulation`` takes, up to 1."""
+    begin, _ = script
+    actions = _actions(script)
+    step, spent = pybullet.stepSimulation, 0.0
+
+    def timed(client: int) -> None:
+        nonlocal spent
+        began = process_time()
+        step(client)
+        spent += process_time() - began
+
+    with ContactWorld(BENCH, begin) as world, without(pybullet, "stepSimulation", timed):
+        began = process_time()
+        for action in actions:
+            world.step(action)
+        return spent / (process_time() - began)
+
+
 def arm_rate(arm: ArticulatedArm, script: Script) -> float:
     """Control steps a second of the articulated arm's physics."""
     begin, _ = script
@@ -256,7 +277,12 @@ def figures() -> dict[str, dict[str, float]]:
     for name, script in situations().items():
         rates = [(arm_rate(arm, script), hand_rate(script)) for _ in range(ROUNDS)]
         arms, hands = max(rate for rate, _ in rates), max(rate for _, rate in rates)
-        rows[name] = {"arm_per_s": arms, "hand_per_s": hands, "ratio": hands / arms}
+        rows[name] = {
+            "arm_per_s": arms,
+            "hand_per_s": hands,
+            "ratio": hands / arms,
+            "stepping_percent": 100.0 * median(stepping_share(script) for _ in range(ROUNDS)),
+        }
     arm.close()
     return rows
 

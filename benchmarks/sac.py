@@ -5,7 +5,7 @@
     python -m benchmarks.sac [--updates 400]
 
 CPU time, on one thread, variants in turn so that they meet the same load. The environment costs
-nothing here; `slap acquire` says how many environment steps a CPU second its whole loop does.
+nothing here; ``benchmarks.skill_learning`` measures the whole loop.
 """
 
 from __future__ import annotations
@@ -77,7 +77,10 @@ def main() -> None:
         "stable-baselines3, its defaults ([256, 256], batch 256)": make(SAC),
         "stable-baselines3, our sizes ([64, 64], batch 128)": make(SAC, **same),
         "ours ([64, 64], batch 128)": make(LeanSac, **fused),
+        "ours, layers of the critics normalised, as skills learn": make(LeanSac, **fused),
     }
+    *_, as_skills_learn = learners.values()
+    as_skills_learn.normalise_critics()
     times: dict[str, list[float]] = {name: [] for name in learners}
     for _ in range(ROUNDS):
         for name, learner in learners.items():

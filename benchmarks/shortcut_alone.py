@@ -12,6 +12,7 @@ import argparse
 from statistics import fmean
 
 from benchmarks.printing import show
+from slap_ros.acquisition.domain_choice import DomainChoice
 from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.learning.task_distribution import TaskDistribution
@@ -74,7 +75,7 @@ def measure(shortcut: Shortcut, domain: Domain, starts: list[Start]) -> dict[str
 def explore(name: str) -> list[ExplorationResult]:
     """What training found, from which it is known where a shortcut begins."""
     settings = training_settings("ours", get_domain(name)).exploration
-    distribution = TaskDistribution(name, "fair", 0)
+    distribution = TaskDistribution(DomainChoice(name, "fair"), 0)
     found = (jobs.explore(distribution, index, settings) for index in range(settings.tasks))
     return [ExplorationResult.from_json(data) for data in found]
 

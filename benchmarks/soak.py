@@ -31,10 +31,13 @@ from ensemble.launcher import ProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.spinner import Spinner, temporary_node
 from slap_ros.cli.console import progress
-from slap_ros.evaluation.metrics import RunLog
+from slap_ros.domains import get_domain
+from slap_ros.evaluation.run_log import RunLog
 from slap_ros.files import pretty_json
+from slap_ros.shortcuts.library import load_library
+from slap_ros.shortcuts.shipped import shipped_library
 from slap_ros.studies.figures import LINES, picture, require_matplotlib
-from slap_ros.studies.results import MarkdownTable
+from slap_ros.studies.results import MarkdownTable, describe_library
 from slap_ros.versions import versions
 
 if TYPE_CHECKING:
@@ -91,7 +94,7 @@ which 14.0 MiB allocated by C code; another run had as many Python objects after
 
     python -m benchmarks.soak --tasks {tasks} --output docs/results
 
-Every number: [soak.json](soak.json).
+Every number: [soak.json](soak.json). The library's digest is `{digest}`.
 """
 
 
@@ -255,17 +258,31 @@ def table(soaked: Soaked) -> MarkdownTable:
     )
 
 
+def _library() -> dict[str, Any]:
+    """Whose shortcuts the ensemble plans with: those that ship."""
+    path = shipped_library(DOMAIN)
+    assert path is not None
+    return describe_library(DOMAIN, load_library(path, get_domain(DOMAIN)))
+
+
 def write(folder: Path, soaked: Soaked) -> None:
     """Write the page, the picture and the numbers."""
     folder.mkdir(parents=True, exist_ok=True)
+    library = _library()
     page = PAGE.format(
         tasks=soaked.tasks[-1],
         domain=DOMAIN,
         solved=soaked.solved,
         minutes=soaked.seconds / 60,
         table=table(soaked).as_markdown(),
+        digest=library["digest"],
     )
-    data = {"domain": DOMAIN, "versions": dict(versions()), "found": soaked.as_json()}
+    data = {
+        "domain": DOMAIN,
+        "library": library,
+        "versions": dict(versions()),
+        "found": soaked.as_json(),
+    }
     drawing = picture(lambda figure: draw(figure, soaked), SIZE)
     for ending, content in {"md": page, "json": pretty_json(data) + "\n", "svg": drawing}.items():
         (folder / f"soak.{ending}").write_text(content, encoding="utf-8")

@@ -28,7 +28,7 @@ from ensemble.interfaces import (
     Topic,
 )
 from ensemble.offered_qos import subscribe_as_offered
-from slap_ros.evaluation.metrics import RunLog
+from slap_ros.evaluation.run_log import RunLog
 from slap_ros.relational import GroundAtom
 
 FOLLOWED = (DOMAIN, TASK, STATE, ATOMS, PLAN, PLAN_EVENTS, SKILL_EVENTS)
@@ -59,6 +59,7 @@ class RunClient(Node):
         """
         super().__init__("slap_run", **kwargs)
         self.log = RunLog()
+        self.newest: dict[str, Any] = {}  # message of each type
         self._on_message = on_message
         for topic in (*FOLLOWED, *(topic for topic in shown if topic not in FOLLOWED)):
             self._follow(topic)
@@ -74,6 +75,7 @@ class RunClient(Node):
 
     def _follow(self, topic: Topic) -> None:
         def callback(message: Any) -> None:
+            self.newest[topic.type_name] = message
             self.log.add(topic.type_name, message)
             self._on_message(topic.type_name, message)
 

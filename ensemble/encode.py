@@ -14,7 +14,6 @@ from std_msgs.msg import Header
 
 from slap_ros.core import Action, ActionSpace, Domain, Skill, Task
 from slap_ros.errors import SlapError
-from slap_ros.learning.domain_choice import DomainChoice
 from slap_ros.messages.decode import NANOSECONDS
 from slap_ros.perception import Percept
 from slap_ros.planning.options import OptionKind
@@ -38,17 +37,8 @@ def header(stamp: Time) -> Header:
     return Header(stamp=stamp, frame_id=FRAME)
 
 
-def domain_info(domain: Domain, choice: DomainChoice, stamp: Time) -> msgs.DomainInfo:
-    """Which world runs.
-
-    Args:
-        domain: Types, predicates, operators and configuration are its.
-        choice: What it was opened by.
-        stamp: When it is announced.
-
-    Returns:
-        The message, with the versions of all that runs it.
-    """
+def domain_info(domain: Domain, stamp: Time) -> msgs.DomainInfo:
+    """Which world runs, whose skills it has, and the versions of all that runs it."""
     moved = domain.action_space.displacement_axes
     return msgs.DomainInfo(
         header=header(stamp),
@@ -71,7 +61,7 @@ def domain_info(domain: Domain, choice: DomainChoice, stamp: Time) -> msgs.Domai
         action_names=[axis.name for axis in moved],
         action_units=[axis.unit for axis in moved],
         control_period=domain.execution.control_period_s,
-        configuration=key_values({**domain.configuration, **choice.configuration}),
+        configuration=key_values(domain.configuration),
         versions=key_values(versions()),
     )
 
@@ -218,12 +208,15 @@ def fault(error: SlapError, episode: int, opened_ns: int, step: int) -> msgs.Epi
 
 def plan_edge(edge: PlanEdge, space: AtomSpace) -> msgs.PlanEdge:
     """One edge of a plan, with the atoms that are expected at its end."""
+    target = edge.target
     return msgs.PlanEdge(
         kind=edge.option.kind.value,
         name=edge.option.skill.name,
         attempt=edge.option.attempt,
         objects=[obj.name for obj in edge.option.objects],
-        expected_atoms=atoms(space.decode(edge.target)),
+        expected_atoms=atoms(space.decode(target.required)),
+        others_may_appear=not target.exact,
+        forbidden_atoms=[] if target.exact else atoms(space.decode(target.forbidden)),
         predicted_steps=edge.predicted_steps,
     )
 

@@ -16,6 +16,7 @@ from rclpy.node import Node
 from ensemble.network import start_node
 from ensemble.startup import leave_quietly
 from slap_ros.errors import ErrorCode, SlapError
+from slap_ros.signals import forget_interrupt
 
 
 def run_node(name: str, make: Callable[[], Node]) -> int:
@@ -36,6 +37,7 @@ def _run(name: str, make: Callable[[], Node]) -> int:
             signal.signal(signal.SIGINT, signal.default_int_handler)  # for rclpy to go on with
         _spin(make)
     except (KeyboardInterrupt, ExternalShutdownException):
+        forget_interrupt()
         return 0
     except SlapError as error:
         return _refuse(name, error, error.code)

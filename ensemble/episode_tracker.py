@@ -1,26 +1,28 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which episode is under way, from the latched topics ``domain`` and ``task``."""
+"""Which episode is under way, from the latched topics ``domain``, ``task`` and ``skills``."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Coroutine
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
 from typing import Generic, TypeVar
 
 from rclpy.node import Node
-from slap_msgs.msg import DomainInfo
+from slap_msgs.msg import DomainInfo, SkillLibrary
 from slap_msgs.msg import Task as TaskMessage
 
 from ensemble.answering import domain_error, error_to_answer
 from ensemble.futures import run_in_executor
-from ensemble.interfaces import DOMAIN, TASK, Topic
+from ensemble.interfaces import DOMAIN, SKILLS, TASK, Topic
 from ensemble.observation import Episode
 from ensemble.refusals import Refusals
 from ensemble.steady_time import create_timer
+from slap_ros.acquisition.domain_choice import DomainChoice, open_domain
 from slap_ros.core import Domain, Task
-from slap_ros.errors import SkillsChangedError, SlapError
-from slap_ros.learning.domain_choice import DomainChoice, open_domain
+from slap_ros.errors import SlapError
 from slap_ros.messages.decode import decode_goal, decode_state, stamp_ns
 
 RIVAL_PERIOD = 1.0  # s, between two looks at whether another simulator is still there
@@ -41,10 +43,11 @@ def subscribe(node: Node, topic: Topic, callback: Callable[..., None]) -> None:
 
 
 class EpisodeTracker(Generic[T]):
-    """Follows ``slap/domain`` and ``slap/task``, which may arrive in either order.
+    """Follows ``slap/domain``, ``slap/task`` and ``slap/skills``, which may arrive in any order.
 
     Whatever takes time, such as the import of a domain, is done in a thread. What cannot be used is
-    refused: it is counted and logged, and the episode that is under way goes on.
+    refused: it is counted and logged, and the episode that is under way goes on. A library of
+    skills is taken on with the first episode of a domain that is announced with its digest.
     """
 
     def __init__(
@@ -63,7 +66,7 @@ class EpisodeTracker(Generic[T]):
                 SlapError is refused.
             on_episode: Called with each new episode, and with what was prepared for it.
             refusals: Where refused domains and tasks are counted.
-            skills: What the node was given: domains with others are refused; empty: with none.
+            skills: What the node was given: domains with others are refused; empty: none is.
         """
         self.current: Episode | None = None
         self.refusal: SlapError | None = None  # why the newest task, or its domain, was refused
@@ -73,10 +76,13 @@ class EpisodeTracker(Generic[T]):
         self._skills = skills
         self._choices: dict[str, DomainChoice] = {}  # by name: the newest that was opened
         self._domains: dict[str, Domain] = {}  # by name: what it stands for
+        self._folders: dict[str, str] = {}  # of libraries that were acquired, by digest
         self._domain: DomainInfo | None = None  # the newest
         self._task: TaskMessage | None = None  # the newest that is not a rival's
+        self._opened: TaskMessage | None = None  # the task of the current episode
         self._simulator: frozenset[Endpoint] = frozenset()  # which publish tasks
         self._rival: tuple[TaskMessage, frozenset[Endpoint]] | None = None  # another simulator's
+        subscribe(node, SKILLS, self._on_skills)
         subscribe(node, DOMAIN, self._on_domain)
         subscribe(node, TASK, self._on_task)
         create_timer(node, RIVAL_PERIOD, self._check_rival)
@@ -93,6 +99,12 @@ class EpisodeTracker(Generic[T]):
             self._domain = message
             self._start(self._load(message))
 
+    def _on_skills(self, message: SkillLibrary) -> None:
+        known = message.digest in self._folders
+        self._folders[message.digest] = message.folder
+        if not known and self._domain is not None:  # it may have been refused without
+            self._start(self._load(self._domain))
+
     def _on_task(self, message: TaskMessage) -> None:
         if message == self._task:
             return
@@ -105,6 +117,12 @@ class EpisodeTracker(Generic[T]):
         if message.domain in self._domains:
             self._start(self._open(message))
 
+    @property
+    def library_folder(self) -> Path | None:
+        """Of the skills that the current domain has; None where they are of no library."""
+        choice = self._choices.get(self.current.domain.name) if self.current else None
+        return choice.library_folder if choice else None
+
     def _start(self, work: Coroutine[None, None, None]) -> None:
         self._node.executor.create_task(work)
 
@@ -114,6 +132,9 @@ class EpisodeTracker(Generic[T]):
             choice = self._announced(message)
             if self._choices.get(choice.name) == choice:
                 return
+            # Its next task must not be opened with the skills that it had before.
+            self._domains.pop(choice.name, None)
+            self._choices.pop(choice.name, None)
             domain = await run_in_executor(self._workers, lambda: open_domain(choice))
         except Exception as raised:  # of a domain's code
             self._refuse("refused_domains", error_to_answer(self._node, raised))
@@ -121,8 +142,9 @@ class EpisodeTracker(Generic[T]):
         if self._choices.get(choice.name) == choice:
             return  # announced twice meanwhile
         self._choices[choice.name], self._domains[choice.name] = choice, domain
-        if self._task is not None and self._task.domain == choice.name:
-            await self._open(self._task)
+        task = self._task
+        if task is not None and task.domain == choice.name and task is not self._opened:
+            await self._open(task)
 
     def _announced(self, message: DomainInfo) -> DomainChoice:
         """The domain to be opened.
@@ -132,16 +154,14 @@ class EpisodeTracker(Generic[T]):
             InvalidParameterError: Skills that are not known here.
         """
         choice = DomainChoice.announced(message)
-        if self._skills and self._skills != choice.skills:
-            raise SkillsChangedError(
-                f"{choice.name} runs with skills {choice.skills or 'of its own'}, but "
-                f"{self._node.get_name()} was given {self._skills}: start every node with the same "
-                "parameter skills"
-            )
-        return choice
+        if choice.digest in self._folders:
+            return replace(choice, skills=self._folders[choice.digest])
+        return choice.with_skills_of(self._node.get_name(), self._skills)
 
     async def _open(self, message: TaskMessage) -> None:
-        domain = self._domains[message.domain]
+        domain = self._domains.get(message.domain)
+        if domain is None:  # announced with other skills meanwhile: opened once they are loaded
+            return
         try:
             episode, prepared = await run_in_executor(
                 self._workers, lambda: self._made(message, domain)
@@ -149,8 +169,9 @@ class EpisodeTracker(Generic[T]):
         except Exception as raised:  # of a domain's code
             self._refuse("refused_tasks", domain_error(self._node, domain.name, raised))
             return
-        if message is self._task:  # not overtaken meanwhile
-            self.current, self.refusal = episode, None
+        # One that was overtaken meanwhile is opened all the same: what overtook it may be refused.
+        if message is self._task or self._opened is not self._task:
+            self.current, self.refusal, self._opened = episode, None, message
             self._simulator = frozenset(self._publishers())
             self._on_episode(episode, prepared)
 

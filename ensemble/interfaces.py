@@ -16,7 +16,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
-from slap_msgs.action import ExecuteSkill, ProposeOperators, SolveTask
+from slap_msgs.action import AcquireSkills, ExecuteSkill, ProposeOperators, SolveTask
 from slap_msgs.msg import (
     AbstractState,
     AcquisitionEvent,
@@ -27,6 +27,7 @@ from slap_msgs.msg import (
     PlanEvent,
     RobotCommand,
     SkillEvent,
+    SkillLibrary,
     Task,
 )
 from slap_msgs.srv import ListSkills, ResetTask
@@ -94,6 +95,7 @@ PLAN = _topic("slap/plan", Plan)
 PLAN_EVENTS = _topic("slap/plan_events", PlanEvent)
 SKILL_EVENTS = _topic("slap/skill_events", SkillEvent)
 ACQUISITION_EVENTS = _topic("slap/acquisition_events", AcquisitionEvent)
+SKILLS = _topic("slap/skills", SkillLibrary)
 DIAGNOSTICS = _topic("diagnostics", DiagnosticArray)
 MARKERS = _topic("slap/markers", MarkerArray)
 TF = _topic("tf", TFMessage)
@@ -110,6 +112,7 @@ RECORDED = (
     PLAN_EVENTS,
     SKILL_EVENTS,
     ACQUISITION_EVENTS,
+    SKILLS,
     MARKERS,
     TF,
     JOINT_STATES,
@@ -131,3 +134,4 @@ CLOSE_BAG = Call("slap/close_bag", Trigger)
 SOLVE_TASK = Call("slap/solve_task", SolveTask)
 EXECUTE_SKILL = Call("slap/execute_skill", ExecuteSkill)
 PROPOSE_OPERATORS = Call("slap/propose_operators", ProposeOperators)
+ACQUIRE_SKILLS = Call("slap/acquire_skills", AcquireSkills)

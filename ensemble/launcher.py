@@ -10,7 +10,6 @@ import signal
 import subprocess
 import sys
 from collections.abc import Mapping
-from types import TracebackType
 from typing import Protocol, Self
 
 from rclpy.executors import Executor
@@ -50,12 +49,7 @@ class NodeLauncher(Protocol):
 
     def __enter__(self) -> Self: ...
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None: ...
+    def __exit__(self, *_: object) -> None: ...
 
 
 class ProcessLauncher:
@@ -82,12 +76,7 @@ class ProcessLauncher:
         if code is not None:
             raise _died(name, code)
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         # SIGTERM rather than SIGINT: it also ends a node quietly that is still importing.
         for process in self.processes.values():
             process.terminate()
@@ -106,7 +95,7 @@ def _start(name: str, parameters: Mapping[str, str | int | float]) -> subprocess
     # A session of its own keeps the terminal's Ctrl-C from the nodes, which are to be stopped in
     # order. The parent's death signal keeps them from outliving a killed parent.
     return subprocess.Popen(
-        command, stdout=sys.stderr, start_new_session=True, preexec_fn=_die_with_parent
+        command, stdout=sys.stderr, start_new_session=True, preexec_fn=die_with_parent
     )
 
 
@@ -118,7 +107,8 @@ def _as_yaml(value: str | int | float) -> str:
     return text if "." in text else text.replace("e", ".0e")  # 1e-12 is a text in YAML
 
 
-def _die_with_parent() -> None:
+def die_with_parent() -> None:
+    """Let a process that is being started die with the thread that starts it."""
     if sys.platform == "linux":
         LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
@@ -157,12 +147,7 @@ class InProcessLauncher:
     def require(self, name: str) -> None:
         """Nothing to check, as above."""
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._destroy()
 
     def _destroy(self) -> None:

@@ -11,19 +11,30 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import Counter
+from dataclasses import replace
 from typing import Any, Generic, TypeVar
 
 from builtin_interfaces.msg import Time
 from rclpy.node import Node
-from slap_msgs.msg import RobotCommand
+from slap_msgs.msg import RobotCommand, SkillLibrary
 from slap_msgs.srv import ResetTask
 
 from ensemble import encode
 from ensemble.answering import domain_error, error_to_answer
 from ensemble.diagnostics import DiagnosticsPublisher
-from ensemble.interfaces import COMMAND, DOMAIN, FAULT, RESET_TASK, STATE, TASK, VOLATILE
+from ensemble.interfaces import (
+    COMMAND,
+    DOMAIN,
+    FAULT,
+    RESET_TASK,
+    SKILLS,
+    STATE,
+    TASK,
+    VOLATILE,
+)
 from ensemble.parameters import read_parameters
 from ensemble.world_parameters import WorldParameters
+from slap_ros.acquisition.domain_choice import open_domain
 from slap_ros.core import Action, Task
 from slap_ros.errors import (
     ErrorCode,
@@ -32,7 +43,6 @@ from slap_ros.errors import (
     StaleCommandError,
     UnsafeCommandError,
 )
-from slap_ros.learning.domain_choice import open_domain
 from slap_ros.messages.decode import decode_command, stamp_ns
 from slap_ros.relational import State
 
@@ -71,6 +81,7 @@ class LockstepWorld(Node, ABC, Generic[P]):
         super().__init__(name, **kwargs)
         self._settings = read_parameters(self, parameters)
         self._domain = open_domain(self._settings.choice)
+        self._acquired: SkillLibrary | None = None  # to be taken on with the next episode
         self._episode = 0
         self._step = 0
         self._opened_ns = 0  # the stamp of the episode's task
@@ -83,6 +94,7 @@ class LockstepWorld(Node, ABC, Generic[P]):
         self._faults = self.create_publisher(FAULT.type, FAULT.name, FAULT.qos)
         # Volatile: commands from before this node started answer another world's states.
         self.create_subscription(COMMAND.type, COMMAND.name, self._on_command, VOLATILE)
+        self.create_subscription(SKILLS.type, SKILLS.name, self._on_skills, SKILLS.qos)
         self.create_service(RESET_TASK.type, RESET_TASK.name, self._on_reset)
         DiagnosticsPublisher(self, self._diagnostics)
 
@@ -171,7 +183,7 @@ class LockstepWorld(Node, ABC, Generic[P]):
 
     def _publish_domain(self) -> None:
         """Say what runs, also before there is a first state."""
-        self._domains.publish(encode.domain_info(self._domain, self._settings.choice, self._now()))
+        self._domains.publish(encode.domain_info(self._domain, self._now()))
 
     def _open_episode(self, task: Task, seed: int, index: int) -> None:
         """Publish a task and its initial state, as step 0 of a new episode.
@@ -198,6 +210,7 @@ class LockstepWorld(Node, ABC, Generic[P]):
         self, request: ResetTask.Request, response: ResetTask.Response
     ) -> ResetTask.Response:
         try:
+            self._take_on_skills()
             self._reset(request)
         except Exception as raised:  # of a domain's code, for a state that it never thought of
             error = error_to_answer(self, raised)
@@ -206,6 +219,21 @@ class LockstepWorld(Node, ABC, Generic[P]):
             response.error_code = int(ErrorCode.NONE)
         response.episode = self._episode
         return response
+
+    def _on_skills(self, message: SkillLibrary) -> None:
+        if message.domain == self._domain.name:
+            self._acquired = message
+
+    def _take_on_skills(self) -> None:
+        """Open the domain with the skills that were acquired meanwhile, if any were.
+
+        Raises:
+            SlapError: The library cannot be used here; the next episode has the skills as they are.
+        """
+        library, self._acquired = self._acquired, None
+        if library is not None:
+            choice = replace(self._settings.choice, skills=library.folder, digest=library.digest)
+            self._domain = open_domain(choice)
 
     def _now(self) -> Time:
         return self.get_clock().now().to_msg()

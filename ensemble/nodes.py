@@ -47,7 +47,7 @@ class RunSettings:
     planner: str
     record: Path | None  # the bag's folder; None: no recorder
     goal: str = ""  # by name, or as atoms; empty: the task's own
-    skills: str = ""  # see slap_ros.learning.domain_choice
+    skills: str = ""  # see slap_ros.acquisition.domain_choice
     pace: float = 0.0  # environment steps per second; 0: as fast as commands come
     shortcuts: str = ""  # a library's folder, or none; empty: the shipped one
     samples: int = DEFAULT.samples  # attempts of a shortcut in the model
@@ -58,6 +58,8 @@ class RunSettings:
     mock: Mapping[str, str | int | float] = field(default_factory=dict)
     bridge: Mapping[str, str | int | float] = field(default_factory=dict)
     perception: Mapping[str, str | int | float] = field(default_factory=dict)
+    # Parameters of the acquisition node that are not the default; None: it does not run.
+    acquisition: Mapping[str, str | int | float] | None = None
 
 
 def node_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int | float]]:
@@ -82,6 +84,8 @@ def node_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int |
         "skill_server": learned | waiting | common,
         "planner_node": {"planner": settings.planner, **learned, **common},
     }
+    if settings.acquisition is not None:
+        nodes["acquisition_node"] = {**settings.acquisition, **common}
     if settings.record is not None:
         nodes["recorder_node"] = {"bag": str(settings.record)}
     return nodes

@@ -16,9 +16,11 @@ from ensemble.client import OnMessage, RunClient
 from ensemble.interfaces import Topic
 from ensemble.launcher import InProcessLauncher, NodeLauncher, ProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
+from ensemble.skill_request import LACKING, SkillRequest, SkillRequester
 from ensemble.spinner import Spinner, temporary_node
 from slap_ros.errors import (
     AlreadyRunningError,
+    ErrorCode,
     NodeDiedError,
     NotReadyError,
     RunTimeoutError,
@@ -48,6 +50,7 @@ class RunRequest:
     import_s: float = 0.0  # s that importing the domain took, which every node does as well
     in_process: bool = False
     shown: Collection[Topic] = ()  # to be followed as well, for the eye
+    skills: SkillRequest | None = None  # to be acquired where the run lacks some; None: it fails
 
 
 def run(request: RunRequest, on_message: OnMessage) -> RunMetrics:
@@ -95,17 +98,23 @@ def _drive(
     recording = request.settings.record is not None
     ready_s = READY_TIMEOUT + IMPORTS * request.import_s
     ready_s = min(ready_s * request.settings.patience, request.timeout_s)
-    if not spinner.spin_until(lambda: client.ready(recording), ready_s):
+    requester = SkillRequester(client, spinner, request.settings.patience)
+
+    def ready() -> bool:
+        return client.ready(recording) and (request.skills is None or requester.ready())
+
+    if not spinner.spin_until(ready, ready_s):
         raise NotReadyError(
             f"the ensemble did not come up within {ready_s:.0f} s; try `slap doctor`, or "
             "--patience if the domain or the machine is slow"
         )
     failure: SlapError | None = None
     try:
-        _solve(request, client, spinner)
+        _solve_with_skills(request, client, spinner, requester)
     except SlapError as error:
         failure = error
     finally:
+        requester.destroy()
         if recording:
             failure = _close_bag(client, spinner, launcher, request.settings.patience) or failure
     runs = client.log.runs()
@@ -116,9 +125,53 @@ def _drive(
     return replace(runs[-1], error_code=failure.code, error_msg=str(failure))
 
 
-def _solve(request: RunRequest, client: RunClient, spinner: Spinner) -> None:
-    sent = client.send(request.goal, request.step_limit, request.max_replans)
+def _solve_with_skills(
+    request: RunRequest, client: RunClient, spinner: Spinner, requester: SkillRequester
+) -> None:
+    """Solve the task; where skills are lacking, have them acquired first, and try it once more.
+
+    Args:
+        request: What to run.
+        client: Follows it.
+        spinner: Spins the client.
+        requester: Asks for skills.
+
+    Raises:
+        SlapError: Why it is not solved, where that is not in the log.
+    """
     end = monotonic() + request.timeout_s
+    failure: SlapError | None = None
+    try:
+        _solve(request, client, spinner, end)
+    except SlapError as error:
+        failure = error
+    runs = client.log.runs()
+    code = failure.code if failure is not None else runs[-1].error_code if runs else ErrorCode.NONE
+    if request.skills is None or code not in LACKING:
+        if failure is not None:
+            raise failure
+        return
+    acquired = requester.acquire(request.skills, request.goal, end - monotonic())
+    _solve(request, client, spinner, end, requester.begin_again(acquired.digest))
+
+
+def _solve(
+    request: RunRequest, client: RunClient, spinner: Spinner, end: float, episode: int = 0
+) -> None:
+    """Solve the task of an episode, and wait for all that tells of it.
+
+    Args:
+        request: What to run.
+        client: Follows it.
+        spinner: Spins the client.
+        end: When to give up, s.
+        episode: Its number; 0: whichever is under way.
+
+    Raises:
+        SlapError: Why it is not solved, where that is not in the log.
+    """
+    before = len(client.log.runs())
+    sent = client.send(request.goal, request.step_limit, request.max_replans, episode)
     try:
         if not spinner.spin_until(sent.done, end - monotonic()):
             raise RunTimeoutError(f"the planner did not answer within {request.timeout_s} s")
@@ -130,7 +183,8 @@ def _solve(request: RunRequest, client: RunClient, spinner: Spinner) -> None:
         raise
     outcome = result.result().result
     complete = spinner.spin_until(
-        lambda: client.log.complete, LOG_TIMEOUT * request.settings.patience
+        lambda: len(client.log.runs()) > before and client.log.complete,
+        LOG_TIMEOUT * request.settings.patience,
     )
     if not complete and outcome.error_code:
         raise error_from(outcome.error_code, outcome.error_msg)

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict, deque
+from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from time import monotonic
 from typing import NamedTuple
@@ -12,6 +12,7 @@ from typing import NamedTuple
 from rclpy.node import Node
 from slap_msgs.msg import AbstractState, EpisodeFault, ObjectCentricState
 
+from ensemble.early_messages import EarlyMessages
 from ensemble.episode_tracker import EpisodeTracker, subscribe
 from ensemble.futures import wait_until
 from ensemble.interfaces import ATOMS, FAULT, STATE
@@ -60,7 +61,7 @@ class StateSynchronizer:
         self._refusals = Refusals(node)
         self._states: OrderedDict[Key, ObjectCentricState] = OrderedDict()  # without atoms
         self._atoms: OrderedDict[Key, AbstractState] = OrderedDict()  # without a state
-        self._early: deque[Pair] = deque(maxlen=WAITING)  # of no episode that is known
+        self._early: EarlyMessages[Pair] = EarlyMessages(WAITING, lambda pair: pair.state)
         self._fault: EpisodeFault | None = None  # the newest
         self._episodes = EpisodeTracker(node, prepare, self._open, self._refusals, skills)
         subscribe(node, STATE, self._on_state)
@@ -131,9 +132,7 @@ class StateSynchronizer:
         return self.latest
 
     def _open(self, episode: Episode, _: None) -> None:
-        early = [pair for pair in self._early if episode.has(pair.state)]
-        self._early.clear()
-        if early:
+        if early := self._early.take(episode):
             self._observe(episode, max(early, key=lambda pair: pair.state.step))
 
     def _on_state(self, message: ObjectCentricState) -> None:
@@ -156,7 +155,7 @@ class StateSynchronizer:
     def _take(self, pair: Pair) -> None:
         episode, known = self._episodes.current, self.latest
         if episode is None or not episode.has(pair.state):
-            self._early.append(pair)
+            self._early.add(pair)
         elif known is None or known.episode is not episode or pair.state.step > known.step:
             self._observe(episode, pair)
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ensemble.parameters import MAX_SEED, parameter
+from slap_ros.acquisition.domain_choice import DomainChoice
 from slap_ros.core import Domain, Task, task_with_goal
-from slap_ros.learning.domain_choice import DomainChoice
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class WorldParameters:
     domain: str = parameter("obstacle2d", "which domain")
     preset: str = parameter("", "the domain's; empty: its first, which of ours is fair")
     seed: int = parameter(0, "samples the first task", high=MAX_SEED)
-    skills: str = parameter("", "none, demonstrator; empty: those that the domain itself has")
+    skills: str = parameter("", "none, demonstrator, or a library's folder; empty: what ships")
     index: int = parameter(0, "which of the seed's tasks")
     goal: str = parameter("", "of the first task: by name, or as atoms; empty: its own")
 

@@ -19,8 +19,8 @@ ROS Parameters:
     noise_seed (int, 0): noise is a function of it, of the episode and of its states.
     domain (string, ""), preset (string, ""): imported before the node has servers; empty: whichever
         the simulator announces, in a thread.
-    skills (string, ""): whose skills the domain has: none, demonstrator; empty: whichever the
-        simulator announces. A domain that is announced with others is refused.
+    skills (string, ""): whose skills the domain has: none, demonstrator, or a library's folder;
+        empty: whichever the simulator announces. A domain that is announced with others is refused.
     patience (double, 1.0): factor of all deadlines, for slow domains and machines.
 
 Publishers:
@@ -31,12 +31,12 @@ Publishers:
 
 Subscribers:
     slap/domain (slap_msgs/DomainInfo), slap/task (slap_msgs/Task): what to perceive.
+    slap/skills (slap_msgs/SkillLibrary): acquired skills, taken on when an episode has them.
     slap/state (slap_msgs/ObjectCentricState): perceived one by one.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from typing import Any
 
 import numpy as np
@@ -47,6 +47,7 @@ from ensemble import encode
 from ensemble.answering import domain_error
 from ensemble.common_parameters import CommonParameters
 from ensemble.diagnostics import DiagnosticsPublisher
+from ensemble.early_messages import EarlyMessages
 from ensemble.entry_point import run_node
 from ensemble.episode_tracker import EpisodeTracker, subscribe
 from ensemble.interfaces import ATOMS, FAULT, STATE
@@ -75,7 +76,9 @@ class PerceptionNode(Node):
         self._perceiver: Perceiver
         self._perceived = 0
         self._step = BEFORE_FIRST  # of the newest state perceived in this episode
-        self._early: deque[ObjectCentricState] = deque(maxlen=qos.EPISODE.depth)
+        self._early: EarlyMessages[ObjectCentricState] = EarlyMessages(
+            qos.EPISODE.depth, lambda message: message
+        )
         self._atoms = self.create_publisher(ATOMS.type, ATOMS.name, ATOMS.qos)
         self._faults = self.create_publisher(FAULT.type, FAULT.name, FAULT.qos)
         self._refusals = Refusals(self)
@@ -93,9 +96,7 @@ class PerceptionNode(Node):
     def _open(self, episode: Episode, perceiver: Perceiver) -> None:
         self._perceiver = perceiver
         self._step = BEFORE_FIRST
-        early = [message for message in self._early if episode.has(message)]
-        self._early.clear()
-        for message in early:
+        for message in self._early.take(episode):
             self._perceive(message, episode)
 
     def _perceiver_of(self, episode: Episode) -> Perceiver:
@@ -110,7 +111,7 @@ class PerceptionNode(Node):
         if episode is not None and episode.has(message):
             self._perceive(message, episode)
         else:
-            self._early.append(message)  # of an episode whose task is still to come, perhaps
+            self._early.add(message)  # of an episode whose task is still to come, perhaps
 
     def _perceive(self, message: ObjectCentricState, episode: Episode) -> None:
         """Perceive a state, each once and in the order of steps."""

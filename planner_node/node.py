@@ -10,8 +10,8 @@ ROS Parameters:
     server_timeout (double, 5.0): seconds without a skill server after which a run fails.
     domain (string, ""), preset (string, ""): imported before the node has servers; empty: whichever
         the simulator announces, in a thread.
-    skills (string, ""): whose skills the domain has: none, demonstrator; empty: whichever the
-        simulator announces. A domain that is announced with others is refused.
+    skills (string, ""): whose skills the domain has: none, demonstrator, or a library's folder;
+        empty: whichever the simulator announces. A domain that is announced with others is refused.
     patience (double, 1.0): factor of all deadlines, for slow domains and machines.
 
 Publishers:
@@ -21,7 +21,8 @@ Publishers:
         1 Hz.
 
 Subscribers:
-    slap/domain, slap/task, slap/state, slap/atoms, slap/fault: see ``ensemble.observation``.
+    slap/domain, slap/task, slap/skills, slap/state, slap/atoms, slap/fault: see
+        ``ensemble.observation``.
 
 Action servers:
     slap/solve_task (slap_msgs/SolveTask): solve an episode's task.

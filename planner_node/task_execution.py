@@ -146,7 +146,7 @@ class TaskExecution:
         """Hold for a step, to perceive the same again."""
         hold = hold_option(self._latest.episode.domain.action_space)
         try:
-            return await self._execute(PlanEdge(hold, 0, hold.skill.step_limit))
+            return await self._execute(PlanEdge(hold, hold.target(0), hold.skill.step_limit))
         except SlapError as error:
             return OptionResult(error.code, str(error))
 
@@ -160,6 +160,8 @@ class TaskExecution:
         job = submit(self.workers, lambda: self.planner.plan(state, self.goal_mask))
         await self._wait(job)
         result: PlanningResult = job.result().result()
+        if result.fails:
+            self.node.get_logger().warning(f"the plan fails in the model: {result.fails}")
         rolled_out = result.edges_rolled_out
         done = self._event(PlanEvent.PLANNED, edges_rolled_out=rolled_out)
         self._statistics.planning_ns += done - started
@@ -186,6 +188,8 @@ class TaskExecution:
             edge=encode.plan_edge(edge, start.episode.space),
             step_budget=budget,
         )
+        if not self.skills.server_is_ready():  # before it is found, a goal would reach nobody
+            await self._wait(Future(), condition=self.skills.server_is_ready)
         sent = self.skills.send_goal_async(request)
         if not await self._wait(sent, ANSWER_TIMEOUT * self.patience):
             raise NodeDiedError(f"skill_server did not accept {edge} in time")

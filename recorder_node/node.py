@@ -23,7 +23,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from time import monotonic, monotonic_ns
+from time import monotonic_ns
 from typing import Any
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -51,7 +51,9 @@ from slap_ros.bags.writer import BagWriter, require_new
 from slap_ros.errors import InvalidParameterError
 from slap_ros.versions import versions
 
-QUIET = 0.2  # s without a message, after which nothing more is expected
+# Looks for a message in vain, after which nothing more is expected; one every POLL_PERIOD, 0.2 s in
+# all. Not a time: in that, a process that is kept waiting has not looked.
+QUIET = 10
 ENDLESS = (
     DIAGNOSTICS,
     JOINT_STATES,
@@ -88,7 +90,7 @@ class RecorderNode(Node):
         self._writer: BagWriter | None = None
         self._closed = False
         self._started_ns = self.get_clock().now().nanoseconds - monotonic_ns()
-        self._newest_s = monotonic()
+        self._looks = 0  # in vain, since the newest message
         self._written = 0  # messages
         for topic in RECORDED:
             self._subscribe(topic)
@@ -118,7 +120,7 @@ class RecorderNode(Node):
         if self._closed:
             return
         if topic not in ENDLESS:
-            self._newest_s = monotonic()
+            self._looks = 0
         record = Record(name, topic.type_name, self._now_ns(), bytes(raw))
         if self._writer is not None:
             self._write(record)
@@ -148,11 +150,16 @@ class RecorderNode(Node):
         self._written += 1
 
     async def _on_close(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        await wait_until(self, lambda: monotonic() - self._newest_s > QUIET)
+        self._looks = 0
+        await wait_until(self, self._is_quiet)
         response.success = self._writer is not None
         response.message = str(self._path) if response.success else "nothing was recorded"
         self._close()
         return response
+
+    def _is_quiet(self) -> bool:
+        self._looks += 1
+        return self._looks > QUIET
 
     def _close(self) -> None:
         self._closed = True

@@ -47,6 +47,7 @@ Subscribers:
     slap/command (slap_msgs/RobotCommand): refused unless it answers the current state and is safe.
     joint_states (sensor_msgs/JointState): of arm and fingers.
     tf, tf_static (tf2_msgs/TFMessage): detections, and where cameras are.
+    slap/skills (slap_msgs/SkillLibrary): acquired skills, taken on with the next episode.
 
 Services:
     slap/reset_task (slap_msgs/ResetTask): opens an episode in the state that is measured, whatever

@@ -6,8 +6,8 @@ ROS Parameters:
     domain (string, "obstacle2d"): which domain.
     preset (string, ""): the domain's, as fair (random tasks) or paper (the paper's start states);
         empty: its first, which of our domains is fair.
-    skills (string, ""): none, demonstrator; empty: those that the domain itself has. Announced to
-        the other nodes.
+    skills (string, ""): none, demonstrator, or the folder of a library of acquired skills; empty:
+        what ships, else those that the domain itself has. Announced to the other nodes.
     seed (int, 0): samples the first task.
     index (int, 0): which of the seed's tasks.
     goal (string, ""): of the first task, by name or as atoms; empty: its own. Where the goal has a
@@ -27,6 +27,7 @@ Publishers:
 Subscribers:
     slap/command (slap_msgs/RobotCommand): refused unless it answers the current state and is in
         the action space.
+    slap/skills (slap_msgs/SkillLibrary): acquired skills, taken on with the next episode.
 
 Services:
     slap/reset_task (slap_msgs/ResetTask): opens a new episode.

@@ -10,8 +10,8 @@ ROS Parameters:
         perceived; perception that debounces takes its time.
     domain (string, ""), preset (string, ""): imported before the node has servers; empty: whichever
         the simulator announces, in a thread.
-    skills (string, ""): whose skills the domain has: none, demonstrator; empty: whichever the
-        simulator announces. A domain that is announced with others is refused.
+    skills (string, ""): whose skills the domain has: none, demonstrator, or a library's folder;
+        empty: whichever the simulator announces. A domain that is announced with others is refused.
     patience (double, 1.0): factor of all deadlines, for slow domains and machines.
 
 Publishers:
@@ -20,7 +20,7 @@ Publishers:
     diagnostics (diagnostic_msgs/DiagnosticArray): skills run, messages refused; 1 Hz.
 
 Subscribers:
-    slap/domain, slap/task, slap/state, slap/atoms, slap/fault: see
+    slap/domain, slap/task, slap/skills, slap/state, slap/atoms, slap/fault: see
         ``ensemble.observation``. A fault ends the skill under way, or the next, with its code.
 
 Services:
@@ -156,8 +156,9 @@ class SkillServer(Node):
 
     def _start(self, request: ExecuteSkill.Goal, start: Observation) -> OptionExecution:
         option, target = requested_option(request, start, self._shortcuts)
-        actions, hold_steps = start.episode.domain.action_space, self._settings.hold_steps
-        return OptionExecution(option, target, actions, start.state, hold_steps)
+        episode, hold_steps = start.episode, self._settings.hold_steps
+        actions = episode.domain.action_space
+        return OptionExecution(option, target, episode.space, actions, start.state, hold_steps)
 
     def _on_observation(self, observation: Observation) -> None:
         if self._execution is not None:

@@ -12,15 +12,15 @@ from slap_msgs.msg import PlanEdge
 from ensemble.observation import Observation
 from ensemble.shortcuts import ShortcutProvider
 from slap_ros.errors import UnknownSkillError
-from slap_ros.messages.decode import decode_atoms
+from slap_ros.messages.decode import decode_target
 from slap_ros.planning.options import HOLD, Option, OptionKind, given_option, hold_option
-from slap_ros.relational import Object
+from slap_ros.relational import Object, Target
 
 
 def requested_option(
     request: ExecuteSkill.Goal, start: Observation, provider: ShortcutProvider
-) -> tuple[Option, int]:
-    """The option that a goal asks for and the abstract state in which it shall end.
+) -> tuple[Option, Target]:
+    """The option that a goal asks for and where it shall end.
 
     Args:
         request: The goal.
@@ -28,7 +28,7 @@ def requested_option(
         provider: The shortcuts that there are.
 
     Returns:
-        The option, and its target as a mask over the episode's atom space.
+        The option, and its target over the episode's atom space.
 
     Raises:
         EpisodeChangedError: The goal is for another episode.
@@ -38,9 +38,10 @@ def requested_option(
     episode, edge = start.episode, request.edge
     start.require_episode(request.episode)
     if edge.name == HOLD:
-        return hold_option(episode.domain.action_space), 0
+        hold = hold_option(episode.domain.action_space)
+        return hold, hold.target(0)
     objects = [episode.space.layout.object(name) for name in edge.objects]
-    target = decode_atoms(edge.expected_atoms, episode.space)
+    target = decode_target(edge, episode.space)
     if edge.kind == OptionKind.SHORTCUT.value:
         return _shortcut(edge, objects, start, target, provider), target
     return given_option(episode.domain, edge.name, objects), target
@@ -50,7 +51,7 @@ def _shortcut(
     edge: PlanEdge,
     objects: Sequence[Object],
     start: Observation,
-    target: int,
+    target: Target,
     provider: ShortcutProvider,
 ) -> Option:
     """The shortcut that an edge names, from where the robot is."""
@@ -64,7 +65,7 @@ def _shortcut(
     option = grounded.option(
         name,
         space.project(start.abstract, known),
-        space.project(target, known),
+        target.projected(space, known),
         edge.attempt,
     )
     if option is None:

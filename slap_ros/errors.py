@@ -86,6 +86,8 @@ class ErrorCode(IntEnum):
 
     # 130-149: acquisition; from 140 on, proposals and language models
     INVALID_REWARD = 130
+    TRAINER_DIED = 131
+    NOTHING_LEARNED = 132
     PROPOSAL_REJECTED = 140
     MALFORMED_ANSWER = 141
     CASSETTE_MISS = 142
@@ -386,6 +388,18 @@ class InvalidRewardError(SlapError):
     """A reward that does not fit its operator, or that cannot be weighed."""
 
     code = ErrorCode.INVALID_REWARD
+
+
+class TrainerDiedError(SlapError):
+    """The process that learns skills ended before it was done; what it learned is kept."""
+
+    code = ErrorCode.TRAINER_DIED
+
+
+class NothingLearnedError(SlapError):
+    """No skill came of an acquisition; the message says why."""
+
+    code = ErrorCode.NOTHING_LEARNED
 
 
 class ProposalRejectedError(SlapError):

@@ -30,6 +30,16 @@ def exit_code(error: KeyboardInterrupt) -> int:
     return 128 + (signal.SIGTERM if isinstance(error, TerminatedError) else signal.SIGINT)
 
 
+def forget_interrupt() -> None:
+    """Let the process exit with its own code after a KeyboardInterrupt that was caught.
+
+    CPython notes one that leaves a string passed to ``exec``, as a dataclass is made by, and never
+    sees it caught: at the end of ``python -m`` it kills itself with SIGINT (``Py_RunMain``). The
+    note is cleared whenever another string runs.
+    """
+    exec("")  # noqa: S102
+
+
 def exit_at_once_on_signals() -> None:
     """Let a signal end the process with a line and a code, from now on.
 
@@ -62,16 +72,32 @@ def signals_raised() -> Iterator[None]:
 
 
 @contextmanager
-def interrupts_held_back() -> Iterator[None]:
-    """Hold SIGINT back in between, and for good in processes that are started meanwhile.
+def signals_held_back() -> Iterator[None]:
+    """Raise what arrives in between at its end; SIGINT never reaches processes started meanwhile.
 
-    The terminal sends Ctrl-C to all of them. It is the parent that ends its workers.
+    An error that is raised while a lock is taken, or a process started, leaves the lock taken and
+    the process unknown. The terminal sends Ctrl-C to all processes; the parent ends its workers.
+
+    Raises:
+        KeyboardInterrupt: SIGINT arrived.
+        TerminatedError: SIGTERM arrived.
     """
+    arrived: list[int] = []
+    main = threading.current_thread() is threading.main_thread()  # no other is ever interrupted
+    ours = [number for number in WORDS if main and signal.getsignal(number) is _raise]
+    for number in ours:
+        signal.signal(number, lambda number, _: arrived.append(number))
+    # The mask is inherited. It alone holds nothing back: another thread may take the signal, and
+    # Python then raises its error in the main thread all the same.
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for number in ours:
+            signal.signal(number, _raise)
+        if arrived:
+            signal.raise_signal(arrived[0])
 
 
 def _exit_at_once(number: int, _: FrameType | None) -> None:

@@ -11,13 +11,14 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from rclpy.logging import LoggingSeverity, set_logger_level
 
 sys.path.insert(0, str(Path(__file__).parent))  # for the helpers of all tests
 
 import leftovers
 
-# Apart from those of embedded_ros' own tests, and within what UDP ports allow.
-DOMAIN_IDS = range(150, 200)
+# Apart from those of embedded_ros' own tests, and below the ports that the kernel gives to anybody.
+DOMAIN_IDS = range(2, 60)
 _next_ids = itertools.cycle(DOMAIN_IDS)
 _numbers = itertools.count()
 PORTS = 250  # UDP ports of a DDS domain, domain 0 from 7400 on
@@ -52,6 +53,12 @@ def nothing_is_left(monkeypatch):
     leftovers.kill_marked(leftovers.TEST, mark, newest)
 
 
+@pytest.fixture(autouse=True)
+def no_network(monkeypatch):
+    """A test that opens a network without the fixture fails, rather than meet another one there."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", "none: this test lacks the fixture network")
+
+
 @pytest.fixture
 def network(monkeypatch):
     """A DDS domain that no other worker, and no other run of these tests, uses meanwhile."""
@@ -60,12 +67,21 @@ def network(monkeypatch):
         for name in ("ROS_AUTOMATIC_DISCOVERY_RANGE", "CYCLONEDDS_URI"):
             monkeypatch.setenv(name, "")  # so that it is put back as it was
             monkeypatch.delenv(name)
+        # What an earlier test set by --log-level outlives its context, in ROS 2 as well.
+        set_logger_level("", LoggingSeverity.INFO)
         yield number
 
 
 @pytest.fixture
 def other_network():
     """One more."""
+    with _domain() as number:
+        yield number
+
+
+@pytest.fixture(scope="module")
+def module_network():
+    """One for what several tests of a module share; not set in the environment."""
     with _domain() as number:
         yield number
 

@@ -10,10 +10,13 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 RUN, TEST = "SLAP_ROS_TEST_RUN", "SLAP_ROS_TEST"
 KEPT = b"multiprocessing.resource_tracker"  # one for the whole of pytest
+STARTING_S = 1.0  # after which what has no environment is taken to have been given none
+KERNEL_THREAD = 0x00200000  # PF_KTHREAD in Linux' sched.h
 
 
 def newest_pid():
@@ -26,17 +29,30 @@ def marked(name, value, since=0):
     if newest_pid() < since:  # counting has begun again
         since = 0
     mark = f"{name}={value}".encode()
-    found = []
-    for folder in Path("/proc").glob("[0-9]*"):
-        if int(folder.name) <= since:
-            continue
-        try:
-            environment = (folder / "environ").read_bytes().split(b"\0")
-            if mark in environment and KEPT not in (folder / "cmdline").read_bytes():
-                found.append(int(folder.name))
-        except OSError:
-            continue  # it has ended, or is another user's
-    return [pid for pid in found if pid != os.getpid()]
+    running = [int(folder.name) for folder in Path("/proc").glob("[0-9]*")]
+    deadline = time.monotonic() + STARTING_S
+    return [
+        pid
+        for pid in running
+        if pid > since and pid != os.getpid() and mark in _environment(pid, deadline)
+    ]
+
+
+def _environment(pid, deadline):
+    """What a process was given; nothing for one that has ended, or is another user's."""
+    folder = Path(f"/proc/{pid}")
+    try:
+        # Whoever started it is told before the kernel shows what it was given.
+        while not (given := (folder / "environ").read_bytes()):
+            if is_zombie(pid) or _is_kernels(pid) or time.monotonic() > deadline:
+                return []
+        return [] if KEPT in (folder / "cmdline").read_bytes() else given.split(b"\0")
+    except OSError:
+        return []
+
+
+def _is_kernels(pid):
+    return bool(int(_status(pid)[6]) & KERNEL_THREAD)
 
 
 def kill_marked(name, value, since=0):
@@ -54,9 +70,14 @@ def kill_marked(name, value, since=0):
 def is_zombie(pid):
     """Whether a process has ended, and its parent has not asked."""
     try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] in "ZX"
+        return _status(pid)[0] in "ZX"
     except OSError:
         return True
+
+
+def _status(pid):
+    """What ``/proc/PID/stat`` says from the state on, behind a name with any characters in it."""
+    return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
 
 
 def start_guard():

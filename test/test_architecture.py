@@ -10,6 +10,7 @@ import pytest
 
 from tools.imports import ABOVE_THE_CORE, ROOT, all_imports
 
+LONGEST = 60  # lines of a function, its docstring among them
 NODES = tuple(name for name in ABOVE_THE_CORE if name != "ensemble")
 
 # From the top. A package imports packages of lower floors, and of its own floor those to the
@@ -68,6 +69,37 @@ def test_who_never_imports_whom(imports):
     assert asking <= {"relational", "files", "errors"}
 
 
+def test_nothing_that_is_read_is_executed():
+    """Answers of models, libraries, bags and cassettes become names and numbers, and no code."""
+    executing = {"eval", "exec", "compile", "__import__", "literal_eval", "from_string"}
+    serialising = {"pickle", "marshal", "shelve", "dill"}
+    found = []
+    packages = (
+        "acquisition",
+        "bags",
+        "language",
+        "learning",
+        "messages",
+        "relational",
+        "shortcuts",
+    )
+    paths = [path for name in packages for path in sorted((ROOT / "slap_ros" / name).rglob("*.py"))]
+    assert len(paths) > len(packages)
+    for path in paths:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = set()
+            if isinstance(node, ast.Name):
+                names = {node.id}
+            elif isinstance(node, ast.Attribute) and node.attr in ("literal_eval", "from_string"):
+                names = {node.attr}
+            elif isinstance(node, ast.Import | ast.ImportFrom):
+                names = {alias.name.partition(".")[0] for alias in node.names}
+                names |= {getattr(node, "module", None)}
+            if bad := names & (executing | serialising):
+                found.append(f"{path.relative_to(ROOT)}:{node.lineno}: {', '.join(bad)}")
+    assert not found, "\n".join(found)
+
+
 def test_no_circle_of_packages_at_run_time(imports):
     """Follows from the order above; said by itself, as the order may change."""
     graph = {package: set() for package in ORDER}
@@ -94,13 +126,26 @@ def test_contributing_lists_the_same_floors():
 
 
 def test_no_class_name_means_two_things():
-    """A reader who searches for a name finds one class."""
+    """A reader who searches for a name finds one class; an underscore parts no meanings."""
     defined = {}
     for folder in ("slap_ros", *ABOVE_THE_CORE):
         for path in sorted((ROOT / folder).rglob("*.py")):
             for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
                 if isinstance(node, ast.ClassDef):
                     where = f"{path.relative_to(ROOT)}:{node.lineno}"
-                    defined.setdefault(node.name, []).append(where)
+                    defined.setdefault(node.name.lstrip("_"), []).append(where)
     twice = {name: places for name, places in defined.items() if len(places) > 1}
     assert not twice, "\n".join(f"{name}: {', '.join(p)}" for name, p in twice.items())
+
+
+def test_no_function_is_long():
+    long = []
+    for folder in ("slap_ros", *ABOVE_THE_CORE, "benchmarks", "examples", "launch", "tools"):
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                    lines = (node.end_lineno or node.lineno) - node.lineno + 1
+                    if lines > LONGEST:
+                        where = f"{path.relative_to(ROOT)}:{node.lineno}"
+                        long.append(f"{where}: {node.name}, {lines} lines")
+    assert not long, "\n".join(long)

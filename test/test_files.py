@@ -20,10 +20,11 @@ from slap_ros.errors import SlapError
 from slap_ros.files import parse_json, parse_yaml, read_bytes, read_text
 from slap_ros.language.cassette import read_cassette
 from slap_ros.language.settings import read_settings
+from slap_ros.learning.library_files import ABOUT
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.meshes.decomposition import load_mesh
 from slap_ros.robot.scene_config import read_scene_config
-from slap_ros.shortcuts.library import LIBRARY, load_library
+from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.shipped import require_usable
 from slap_ros.studies.trainings import TrainingFolder, read_curve
 
@@ -70,8 +71,8 @@ READERS = {
     "domain.pddl": lambda path: plan(str(path), path),
     "operators.txt": lambda path: read_operators(path, None),
     "scene.yaml": lambda path: read_scene_config(path, TOWER),
-    LIBRARY: lambda path: load_library(path.parent, TOWER),
-    f"./{LIBRARY}": lambda path: require_usable(str(path.parent)),
+    ABOUT: lambda path: load_library(path.parent, TOWER),
+    f"./{ABOUT}": lambda path: require_usable(str(path.parent)),
     "explored.json": lambda path: WorkFolder(path.parent).cached("explored", dict, dict),
     "settings.json": lambda path: TrainingFolder(path.parent).distribution(),
     "progress.jsonl": read_curve,

@@ -67,7 +67,9 @@ def test_colcon_sees_both_packages_with_their_build_types(checkout):
 
 
 @pytest.mark.parametrize("options", [[], ["--symlink-install"]], ids=["plain", "symlinks"])
-def test_colcon_builds_executables_where_ros2_run_looks_for_them(checkout, options, tmp_path):
+def test_colcon_builds_executables_where_ros2_run_looks_for_them(
+    checkout, network, options, tmp_path
+):
     # slap_msgs needs ament_cmake to be built; colcon is content with a sign that it was.
     built = checkout / "install" / "slap_msgs" / "share" / "slap_msgs"
     built.mkdir(parents=True)
@@ -129,7 +131,7 @@ def install(names, folder):
                 (folder / top).symlink_to(distribution.locate_file(top))
 
 
-def test_the_published_wheels_run_in_an_empty_environment(checkout, tmp_path):
+def test_the_published_wheels_run_in_an_empty_environment(checkout, tmp_path, network):
     """With what they require and no more, away from any checkout, shipped shortcuts included."""
     shutil.rmtree(checkout / "models")
     shutil.copytree(ROOT / "models", checkout / "models")
@@ -152,8 +154,9 @@ def test_the_published_wheels_run_in_an_empty_environment(checkout, tmp_path):
     empty = tmp_path / "empty"
     empty.mkdir()
     environment = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "AMENT"))}
+    options = ("--seed", "1", "--json", "--patience", "10")  # for a loaded machine
     run = subprocess.run(
-        [python.with_name("slap"), "run", "obstacle2d", "--seed", "1", "--json"],
+        [python.with_name("slap"), "run", "obstacle2d", *options],
         cwd=empty,
         env={**environment, "PYTHONPATH": str(libraries)},
         capture_output=True,

@@ -6,9 +6,12 @@ import shlex
 
 import pytest
 
-from tools.reproduce import PUBLISHED, differences, figures
+from slap_ros.domains import get_domain
+from slap_ros.shortcuts.library import load_library
+from slap_ros.shortcuts.shipped import shipped_library
+from tools.reproduce import PUBLISHED, differences, figures, main
 
-BY_A_BENCHMARK = {"soak"}  # an hour of a whole ensemble; its page names the command
+BY_A_BENCHMARK = {"soak"}  # half an hour of a whole ensemble; its page names the command
 
 
 def test_every_figure_has_its_command():
@@ -18,6 +21,31 @@ def test_every_figure_has_its_command():
         program, group, study, domain, *_ = shlex.split(figure.command)
         assert (program, group) == ("slap", "study")
         assert figure.name == f"{study}_{domain}"
+
+
+def test_the_page_has_the_commands_that_are_run():
+    page = (PUBLISHED.parent / "reproducing.md").read_text(encoding="utf-8")
+    rows = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| ")]
+    run = [cell.strip("`") for row in rows for cell in row if cell.startswith("`slap study")]
+    shown = [row for row in rows if "not run" not in " ".join(row)]
+    assert {c for row in shown for c in run if f"`{c}`" in row} == {f.command for f in figures()}
+
+
+def test_what_will_be_done_is_said_first(capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)  # where nothing is made so far
+    assert main(["--list"]) == 0
+    said = capsys.readouterr().out
+    assert all(f"  {figure.command}\n" in said for figure in figures())
+    assert "min of training" in said
+    assert said.splitlines()[-1].startswith(f"{len(figures())} figures to make: ")
+    assert not list(tmp_path.iterdir())
+
+
+def test_work_folders_are_those_of_the_libraries_that_ship(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (figure,) = figures(["dynamics_obstacle2d"])
+    library = load_library(shipped_library("obstacle2d"), get_domain("obstacle2d"))
+    assert [shlex.join(command) for command in figure.trainings] == [library.record["command"]]
 
 
 def test_other_numbers_are_found_and_times_are_not_compared():

@@ -21,13 +21,14 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
+from slap_ros.domains import get_domain
+from slap_ros.shortcuts.library import load_library
+from slap_ros.shortcuts.shipped import shipped_library
+from slap_ros.studies.reproducing import NOT_MEASURED, TRAINING_MINUTES, published
 from tools.imports import ROOT
 
 PUBLISHED = ROOT / "docs" / "results"
 OUTPUT = Path("runs") / "reproduced"
-# Of one core, as measured on the machine that made the published figures; others: not measured.
-MINUTES = {"table1_obstacle2d": 4}
-TRAINING_MINUTES = {"obstacle2d": 6, "obstacle_tower": 104}
 
 
 @dataclass(frozen=True)
@@ -39,12 +40,16 @@ class Figure:
         source: What of a paper it makes again; empty for those that are none of a paper's.
         command: That made it.
         found: Its numbers.
+        measured: Seconds of one core that it took, or None, and what of it they are.
+        training: The command that made the work folder that it reads, if it reads one.
     """
 
     name: str
     source: str
     command: str
     found: Any
+    measured: tuple[float | None, str]
+    training: tuple[str, ...] = ()
 
     @property
     def again(self) -> Path:
@@ -52,17 +57,32 @@ class Figure:
         return OUTPUT / f"{self.name}.json"
 
     @property
+    def made(self) -> bool:
+        """Whether it is there already; the study refuses to replace what another command made."""
+        if not self.again.exists():
+            return False
+        command = json.loads(self.again.read_text(encoding="utf-8")).get("command")
+        return bool(command == self.command)
+
+    @property
     def trainings(self) -> list[tuple[str, ...]]:
         """Commands that make the work folders it reads, where they are missing."""
         words = shlex.split(self.command)
         folders = [Path(after) for word, after in pairwise(words) if word == "--work"]
-        return [("slap", "train", words[3]) for folder in folders if not folder.is_dir()]
+        return [self.training for folder in folders if not folder.is_dir()]
+
+    @property
+    def minutes(self) -> float | None:
+        """Of one core, trainings included; None where nothing of it was measured."""
+        known = [self.measured[0] / 60.0] if self.measured[0] is not None else []
+        known += [TRAINING_MINUTES.get(training[2], 0) for training in self.trainings]
+        return sum(known) if known else None
 
     def duration(self) -> str:
         """In words."""
-        known = MINUTES.get(self.name)
+        seconds, what = self.measured
+        words = NOT_MEASURED if seconds is None else f"{seconds / 60:.0f} min{what}"
         extra = sum(TRAINING_MINUTES.get(training[2], 0) for training in self.trainings)
-        words = "not measured" if known is None else f"{known} min"
         return f"{words}, and {extra} min of training" if extra else words
 
 
@@ -73,13 +93,27 @@ def figures(names: Sequence[str] = ()) -> list[Figure]:
         LookupError: There is none of a name.
     """
     found = {
-        path.stem: Figure(path.stem, data.get("source", ""), data["command"], data["found"])
-        for path in sorted(PUBLISHED.glob("*.json"))
-        if "command" in (data := json.loads(path.read_text(encoding="utf-8")))
+        name: Figure(
+            name,
+            one.data["source"],
+            one.data["command"],
+            one.data["found"],
+            one.core_seconds,
+            _training(one.data["domain"]),
+        )
+        for name, one in published(PUBLISHED).items()
     }
     if unknown := set(names) - set(found):
         raise LookupError(f"no figure {', '.join(unknown)}; there are {', '.join(found)}")
     return [figure for name, figure in found.items() if not names or name in names]
+
+
+def _training(domain: str) -> tuple[str, ...]:
+    """The command that trained the library that ships for a domain, if one ships."""
+    folder = shipped_library(domain)
+    if folder is None:
+        return ()
+    return tuple(shlex.split(load_library(folder, get_domain(domain)).record["command"]))
 
 
 def make(figure: Figure) -> None:
@@ -116,6 +150,27 @@ def compare(figure: Figure) -> str:
     return f"{len(different)} numbers differ, the first at {different[0]}"
 
 
+def _total(figures: Sequence[Figure]) -> str:
+    """How much there is to do, in words."""
+    known = [figure.minutes for figure in figures if figure.minutes is not None]
+    unknown = len(figures) - len(known)
+    return (
+        f"{len(figures)} figures to make: {sum(known):.0f} min of one core at least for "
+        f"{len(known)} of them; {unknown} are {NOT_MEASURED}"
+    )
+
+
+def _made_again(figure: Figure) -> str:
+    """Make a figure if it is not there yet, and say how it came out."""
+    if not figure.made:
+        print(f"{figure.name}:", flush=True)
+        try:
+            make(figure)
+        except subprocess.CalledProcessError as error:  # as where no model can be asked
+            return f"not made, a command ended with {error.returncode}"
+    return compare(figure)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Make figures again; 1 if one differs."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
@@ -124,18 +179,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     chosen = figures(options.names)
     for figure in chosen:
-        state = "there" if figure.again.exists() else figure.duration()
+        state = "there" if figure.made else figure.duration()
         print(f"{figure.name} ({figure.source or 'not of a paper'}): {state}")
         print(f"  {figure.command}")
+    print(_total([figure for figure in chosen if not figure.made]), flush=True)
     if options.list:
         return 0
     results = {}
     for figure in chosen:
         began = monotonic()
-        if not figure.again.exists():
-            print(f"{figure.name}:", flush=True)
-            make(figure)
-        results[figure.name] = compare(figure)
+        results[figure.name] = _made_again(figure)
         print(f"{figure.name}: {results[figure.name]} ({(monotonic() - began) / 60:.1f} min)")
     return int(any(result != "the same" for result in results.values()))
 

@@ -132,7 +132,7 @@ def test_waiting_coroutines_cost_nothing(node: Node, executor_class: type) -> No
     executor.shutdown()
     spinner.join()
     assert sorted(results) == list(range(20))
-    assert used < 0.1, f"{used:.3f} s of processor time in 1 s of waiting"
+    assert used < 0.3, f"{used:.3f} s of processor time in 1 s of waiting"
 
 
 @pytest.mark.usefixtures("no_look_around")

@@ -191,7 +191,7 @@ def test_an_idle_node_sleeps(run: Run) -> None:
     code = MAIN.format(spin=spin).replace("rclpy.ok())", "time.process_time() - began)")
     status, out, _ = run(code=code).finish()
     assert status == 0
-    assert float(out.split()[-1]) < 0.15  # s of processor time in 3 s: 5 %, generously
+    assert float(out.split()[-1]) < 0.6  # s of processor time: one that never sleeps takes 3 s
 
 
 def test_a_stopped_reader_does_not_freeze_the_publisher(run: Run, domain: int) -> None:

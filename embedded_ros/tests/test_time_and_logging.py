@@ -74,7 +74,7 @@ def test_simulated_time_drives_clock_and_timers(context: None) -> None:
     assert calls == [1_500_000_000]
     tick(1.9, 1)
     tick(2.0, 2)
-    tick(0.5, 2)  # began anew
+    tick(0.5, 2)  # began again
     tick(1.5, 3)
     node.set_parameters([Parameter("use_sim_time", value=False)])
     assert time.time_ns() <= node.get_clock().now().nanoseconds <= time.time_ns()

@@ -7,8 +7,8 @@ from __future__ import annotations
 from typing import Any
 
 from slap_ros.cli.console import console, styled
-from slap_ros.messages.events import PlanEventKind, SkillEventKind
-from slap_ros.messages.interfaces import PLAN, PLAN_EVENT, SKILL_EVENT
+from slap_ros.messages.events import AcquisitionEventKind, PlanEventKind, SkillEventKind
+from slap_ros.messages.interfaces import ACQUISITION_EVENT, PLAN, PLAN_EVENT, SKILL_EVENT
 
 
 class EventPrinter:
@@ -30,6 +30,22 @@ class EventPrinter:
             console.print(styled("diverged", "yellow", f": {message.error_msg}"))
         elif type_name == PLAN_EVENT and message.kind == PlanEventKind.FAILED:
             console.print(styled("failed", "red", f": {message.error_msg}"))
+        elif type_name == ACQUISITION_EVENT:
+            self._acquisition(message)
+
+    def _acquisition(self, message: Any) -> None:
+        if message.kind == AcquisitionEventKind.FINISHED:
+            console.print(f"operators proposed: plan {', '.join(message.plan)}")
+        elif message.kind == AcquisitionEventKind.JUDGED:
+            steps = (len(message.success) - 1) * message.segment_steps
+            console.print(
+                f"{message.subject}: success {message.success[0]:.2f}, "
+                f"{message.success[-1]:.2f} after {steps} steps"
+            )
+        elif message.kind == AcquisitionEventKind.ACQUIRED:
+            console.print(
+                f"skills acquired: library {message.digest}, task progress {message.progress:.2f}"
+            )
 
     def _skill(self, message: Any) -> None:
         if message.kind == SkillEventKind.STARTED:

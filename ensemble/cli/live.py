@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from types import TracebackType
 from typing import Any, Self
 
 from rich.console import Console, Group
@@ -13,7 +12,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from slap_ros.evaluation.metrics import AtomNames, atom_names, describe
+from slap_ros.evaluation.atom_names import AtomNames, atom_names, describe
 from slap_ros.messages.events import PlanEventKind
 from slap_ros.messages.interfaces import ATOMS, PLAN, PLAN_EVENT, STATE
 from slap_ros.messages.protocols import (
@@ -162,10 +161,5 @@ class Dashboard:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._live.stop()

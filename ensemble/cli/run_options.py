@@ -11,19 +11,23 @@ from typing import Annotated
 import typer
 
 from ensemble.patience import IMPATIENT, PATIENT
+from slap_ros.acquisition.domain_choice import SHIPPED
+from slap_ros.acquisition.proposal_request import (
+    MANUAL,
+    PROPOSERS,
+    REWARDERS,
+    require_known,
+)
 from slap_ros.bags.writer import require_new
 from slap_ros.cli.options import MAX_INDEX, DomainName, Goal, Index, Json, Planner, Preset, Seed
 from slap_ros.cli.render import Size, picture_size
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts
+from slap_ros.cli.skill_choice import Skills
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import require_writable
-from slap_ros.learning.domain_choice import DEMONSTRATOR, SHIPPED, DomainChoice
 from slap_ros.planning.execution import MAX_REPLANS
 from slap_ros.report import check_output
 from slap_ros.robot.worlds import MOCK, ROBOT, SIM, WORLDS
-
-OWN_SKILLS = "skills"
-POLICIES = {OWN_SKILLS: SHIPPED, DEMONSTRATOR: DEMONSTRATOR}  # whose skills a domain is opened with
 
 
 @dataclass(frozen=True)
@@ -44,13 +48,7 @@ class RunOptions:
     shortcuts: Shortcuts = None
     samples: Samples = SAMPLES
     planner: Planner = "lazy"
-    policy: Annotated[
-        str,
-        typer.Option(
-            help="skills: the domain's own; demonstrator: hand-written operators and scripts, "
-            "where skills are still to be acquired."
-        ),
-    ] = OWN_SKILLS
+    skills: Skills = SHIPPED
     max_replans: Annotated[
         int, typer.Option(min=0, max=MAX_INDEX, help="Plans after the first.")
     ] = MAX_REPLANS
@@ -111,6 +109,23 @@ class RunOptions:
     mock: Annotated[
         str, typer.Option(help="The mock robot's parameters, as latency=0.05,pose_noise=0.003.")
     ] = ""
+    acquire: Annotated[
+        bool,
+        typer.Option(
+            "--acquire",
+            help="Where a plan or a skill is lacking, or fails again: acquire skills, and solve "
+            "the task with them. Give --timeout the time that this takes.",
+        ),
+    ] = False
+    proposer: Annotated[
+        str, typer.Option(help="With --acquire, of operators: manual, induced or language.")
+    ] = MANUAL
+    rewarder: Annotated[
+        str, typer.Option(help="With --acquire, of rewards: manual, composed or language.")
+    ] = MANUAL
+    acquisition: Annotated[
+        str, typer.Option(help="Parameters of acquisition_node, as steps=20000,jobs=2.")
+    ] = ""
     perception: Annotated[
         str, typer.Option(help="Noise of perception, as position_noise=0.002,debounce=3.")
     ] = ""
@@ -119,10 +134,7 @@ class RunOptions:
     def __post_init__(self) -> None:
         """Refuse what can be refused without the domain; see the class."""
         self._check_world()
-        if self.policy not in POLICIES:
-            raise InvalidParameterError(
-                f"--policy must be one of {', '.join(POLICIES)}, not {self.policy!r}"
-            )
+        self._check_acquisition()
         if not self.live and (self.watched or self.live_port is not None):
             raise InvalidParameterError("--watched and --live-port are for --live")
         if self.size is not None and self.render is None:
@@ -146,10 +158,12 @@ class RunOptions:
         if self.mock and world != MOCK:
             raise InvalidParameterError(f"--mock is for --world mock, not for --world {world}")
 
-    @property
-    def choice(self) -> DomainChoice:
-        """The domain to run."""
-        return DomainChoice(self.domain, self.preset or "", POLICIES[self.policy])
+    def _check_acquisition(self) -> None:
+        require_known("--proposer", self.proposer, PROPOSERS)
+        require_known("--rewarder", self.rewarder, REWARDERS)
+        said = self.acquisition or (self.proposer, self.rewarder) != (MANUAL, MANUAL)
+        if said and not self.acquire:
+            raise InvalidParameterError("--acquisition, --proposer and --rewarder: for --acquire")
 
     @property
     def foxglove_is_optional(self) -> bool:

@@ -5,31 +5,35 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import monotonic, sleep
 from typing import Any
 
+from ensemble.acquisition_parameters import AcquisitionParameters
 from ensemble.cli.event_printer import EventPrinter
 from ensemble.cli.live import Dashboard
 from ensemble.cli.run_options import RunOptions
 from ensemble.client import OnMessage
 from ensemble.foxglove_server import SHOWN_TOPICS, FoxgloveServer, foxglove_installed
+from ensemble.interfaces import ACQUISITION_EVENTS
 from ensemble.nodes import RunSettings
 from ensemble.parameters import parse_parameters
 from ensemble.perception_parameters import PerceptionParameters
 from ensemble.robot_parameters import parse_mock_robot
 from ensemble.run import RunRequest
 from ensemble.run import run as run_ensemble
+from ensemble.skill_request import SkillRequest
 from slap_ros.cli.console import console, print_json, styled
 from slap_ros.cli.render import check_renderable, picture_size
 from slap_ros.cli.render import render as write_animation
 from slap_ros.cli.report import write_report
+from slap_ros.cli.skill_choice import open_chosen
 from slap_ros.core import Domain, Task, task_with_goal
+from slap_ros.errors import NoSkillsError
 from slap_ros.evaluation.metrics import RunMetrics, known
-from slap_ros.learning.domain_choice import open_domain
 from slap_ros.messages.decode import decode_state
 from slap_ros.messages.interfaces import STATE
 from slap_ros.messages.protocols import StateMessage
@@ -49,7 +53,7 @@ def run_task(options: RunOptions) -> int:
     """
     # Everything that can be refused is refused before a node is started.
     began = monotonic()
-    domain = open_domain(options.choice)
+    domain = open_chosen(options.domain, options.preset, options.skills)
     imported_s = monotonic() - began
     task = task_with_goal(domain, options.seed, options.index, options.goal)
     request = replace(_request(options, domain, task), import_s=imported_s)
@@ -97,7 +101,7 @@ def _request(options: RunOptions, domain: Domain, task: Task) -> RunRequest:
         options.planner,
         record=None,
         goal=options.goal or "",
-        skills=options.choice.skills,
+        skills=options.skills,
         pace=options.pace,
         patience=options.patience,
         shortcuts=options.shortcuts or "",
@@ -106,6 +110,7 @@ def _request(options: RunOptions, domain: Domain, task: Task) -> RunRequest:
         scene=str(options.scene or ""),
         mock=parse_mock_robot(options.mock),
         perception=perception,
+        acquisition=_acquisition(options),
     )
     return RunRequest(
         settings,
@@ -113,7 +118,16 @@ def _request(options: RunOptions, domain: Domain, task: Task) -> RunRequest:
         max_replans=options.max_replans,
         timeout_s=options.timeout,
         in_process=options.in_process,
+        skills=SkillRequest(options.proposer, options.rewarder) if options.acquire else None,
+        shown=(ACQUISITION_EVENTS,) if options.acquire else (),
     )
+
+
+def _acquisition(options: RunOptions) -> dict[str, str | int | float] | None:
+    """The parameters of the acquisition node; None where it is not to run."""
+    if not options.acquire:
+        return None
+    return parse_parameters(options.acquisition, AcquisitionParameters, "acquisition")
 
 
 def _check_planning(options: RunOptions, domain: Domain, task: Task) -> frozenset[GroundAtom]:
@@ -122,7 +136,8 @@ def _check_planning(options: RunOptions, domain: Domain, task: Task) -> frozense
     Raises:
         SlapError: It is no goal of the task; or planner, library or pictures are not there.
     """
-    make_planner(options.planner, domain, task.initial_state)
+    with suppress(*(NoSkillsError,) if options.acquire else ()):
+        make_planner(options.planner, domain, task.initial_state)
     chosen_library(options.shortcuts, domain, options.planner)
     if options.render is not None:
         check_renderable(domain, task.initial_state, options.render)
@@ -144,7 +159,7 @@ def _run(request: RunRequest, options: RunOptions, keep_states: OnMessage) -> Ru
     with _foxglove(options) as server, _event_view(options.live) as view:
         listeners: list[OnMessage] = [view, keep_states]
         if server is not None:
-            request = replace(request, shown=SHOWN_TOPICS)
+            request = replace(request, shown=SHOWN_TOPICS)  # acquisition events among them
             listeners.append(server)
 
         def on_message(type_name: str, message: Any) -> None:

@@ -2,105 +2,50 @@
 # SPDX-License-Identifier: Apache-2.0
 """LG-SAIL's Algorithm 1: the plan is the curriculum.
 
-Carry out plans with the skills at hand, train what fails from where it failed, judge, and again,
-until nothing fails. Skills that do not fail are never trained. Every result is kept in a work
-folder, so that the same command continues where it was interrupted::
+An iteration of :meth:`Curriculum.run` is one of the algorithm:
 
-    runs/skills/points-training/
-      settings.json            what is acquired
-      iteration0/rollouts.json, fresh.json
-      iteration0/Pick.json     how the round of this skill went
-      Pick/                    its training; see skill_training
-      vacuity.json
+- *reset, plan, roll out*: plans are carried out with the skills at hand (``rollouts``);
+- *collect failed skills with their simulator states*: the ``initiation_states`` of rollouts;
+- *train them from these states*: those that ``skill_selection`` chooses, each in its
+  ``skill_training``; a new one begins with the *retrieved* known skill (``warm_start``);
+- a *dead end*, which is ours: what never succeeds is learned from scratch, and what comes before
+  it (``dead_ends``);
+- *write back*: the best checkpoint is a skill at hand of the next iteration;
+- *until nothing fails*, or progress is enough twice, or the budget is spent.
+
+Skills that do not fail are never trained. What is known between iterations is a
+``CurriculumState``. Every result is kept in a ``curriculum_folder``, so that the same command
+continues where it was interrupted.
 """
 
 from __future__ import annotations
 
-import json
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from hashlib import sha256
+from functools import partial
 from pathlib import Path
 from statistics import fmean
-from typing import Any, Protocol
+from typing import Any
 
 from slap_ros.acquisition import jobs
-from slap_ros.acquisition.jobs import InitiationRecord, initiation_record
-from slap_ros.acquisition.retrieval import MetricSignatureEncoder, SkillEncoder, nearest
-from slap_ros.acquisition.rollouts import PlanRollout, Stage, StageEnd
+from slap_ros.acquisition.curriculum_callback import CurriculumCallback, OngoingRound
+from slap_ros.acquisition.curriculum_folder import CurriculumFolder
+from slap_ros.acquisition.curriculum_state import CurriculumState
+from slap_ros.acquisition.dead_ends import DeadEnd
+from slap_ros.acquisition.initiation_states import InitiationStates
+from slap_ros.acquisition.jobs import LearningJob, horizon_of
+from slap_ros.acquisition.library_record import library_record, skill_record
+from slap_ros.acquisition.retrieval import METRICS, MetricSignatureEncoder, SkillEncoder
+from slap_ros.acquisition.rollouts import PlanRollout
 from slap_ros.acquisition.settings import AcquisitionSettings
-from slap_ros.acquisition.skill_library import (
-    AcquiredSkill,
-    SkillLibrary,
-    load_skill,
-    operator_digest,
-)
-from slap_ros.acquisition.skill_training import Round
-from slap_ros.acquisition.task_source import ROLLOUTS, VALIDATION, TaskSource
-from slap_ros.errors import InvalidParameterError, UnsolvableError
-from slap_ros.learning.mlp_policy import MlpPolicy
-from slap_ros.learning.work_folder import WorkFolder
-from slap_ros.learning.workers import Workers, in_order
-from slap_ros.relational import LiftedOperator
-from slap_ros.versions import versions
+from slap_ros.acquisition.skill_library import AcquiredSkill, SkillLibrary, load_skill
+from slap_ros.acquisition.skill_selection import NO_PROGRESS, SkillSelection, select_skills
+from slap_ros.acquisition.task_source import TaskSource, fresh_tasks, training_tasks
+from slap_ros.acquisition.warm_start import WarmStarts
+from slap_ros.errors import UnsolvableError
+from slap_ros.learning.workers import Workers, run_in_order
 
 TWICE = 2  # enough progress in a row
-
-
-class CurriculumCallback(Protocol):
-    """Receives the events of a curriculum."""
-
-    def on_progress(self, what: str, done: int, total: int) -> None:
-        """Some of a step's jobs are done.
-
-        Args:
-            what: The step, in words.
-            done: Jobs done so far; 0 as the step begins.
-            total: Jobs of the step.
-        """
-        ...
-
-    def on_rollouts(self, iteration: int, progress: float, failures: dict[str, int]) -> None:
-        """Plans were carried out.
-
-        Args:
-            iteration: From 0.
-            progress: Mean task progress.
-            failures: How often each operator's stage failed.
-        """
-        ...
-
-    def on_judged(self, iteration: int, skill: str, outcome: Round) -> None:
-        """A skill was trained for a round.
-
-        Args:
-            iteration: From 0.
-            skill: The operator's name.
-            outcome: How it went.
-        """
-        ...
-
-
-@dataclass
-class _SkillState:
-    """What is known of one operator's skill.
-
-    Args:
-        rounds: Learned so far.
-        success: Of the best checkpoint, as last judged; below 0 before the first judgement.
-        stale: Rounds in a row without progress.
-        starts: Digest of the start states of the last round.
-        steps: Environment steps learned.
-        beginning: What its first round began with, for the record.
-    """
-
-    rounds: int = 0
-    success: float = -1.0
-    stale: int = 0
-    starts: str = ""
-    steps: int = 0
-    beginning: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass
@@ -114,6 +59,8 @@ class Curriculum:
         workers: Where jobs run.
         callback: Receives its events.
         known: Skills that new ones may begin with, by the path of their folders.
+        kept: Skills that are there already, by the path of their folders. They are used as they
+            are, and learned further only where they fail.
         encoder: Gives operators the keys by which these are found.
     """
 
@@ -124,14 +71,18 @@ class Curriculum:
     callback: CurriculumCallback
     known: dict[str, AcquiredSkill] = field(default_factory=dict)
     encoder: SkillEncoder = field(default_factory=MetricSignatureEncoder)
+    kept: dict[str, AcquiredSkill] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self._work = WorkFolder(self.folder)
+        self._results = CurriculumFolder(self.folder)
         self._domain = self.source.make_domain()
+        self._segment_steps = self.settings.segment_steps(horizon_of(self._domain))
         self._operators = {operator.name: operator for operator in self.source.operators()}
-        self._states = {name: _SkillState() for name in self._operators}
-        self._progress: list[float] = []
-        self._left: dict[str, Any] = {}  # what could not be learned, and why
+        self._kept_folders = {skill.operator.name: path for path, skill in self.kept.items()}
+        self._kept = {name: self.kept[path] for name, path in self._kept_folders.items()}
+        least = self.settings.least_similarity
+        self._fresh_tasks = fresh_tasks(self.settings.validation)
+        self._warm_starts = WarmStarts(self._kept, self.known, self.encoder, least)
 
     def run(self) -> SkillLibrary:
         """Acquire until nothing fails, progress is enough twice, or the budget is spent.
@@ -143,281 +94,181 @@ class Curriculum:
             InvalidParameterError: The folder has another curriculum, or is damaged.
             UnsolvableError: No task has a plan.
         """
-        self._require_same_settings()
+        self._results.require_same(self._as_json())
+        state = CurriculumState.initial(self._operators)
         iteration = 0
-        while True:
-            rollouts = self._carry_out(iteration, "rollouts", self._rollout_tasks(iteration))
-            self._require_plans(rollouts)
-            self._progress.append(fmean(rollout.progress for rollout in rollouts))
-            failures = Counter(stage.operator for stage in _failures(rollouts))
-            self.callback.on_rollouts(iteration, self._progress[-1], dict(failures))
-            ended = self._ended(failures)
-            if ended:
-                return self._library(ended, iteration)
-            fresh = self._carry_out(iteration, "fresh", self._fresh_tasks())
-            if not self._train(iteration, rollouts, fresh, failures):
-                return self._library("no progress", iteration)
+        while not (ended := self._iterate(iteration, state)):
             iteration += 1
+        return self._library(ended, iteration, state)
 
-    def _ended(self, failures: Counter[str]) -> str:
+    def _iterate(self, iteration: int, state: CurriculumState) -> str:
+        """Carry out plans, and train what fails from where it fails.
+
+        Args:
+            iteration: From 0.
+            state: Takes note of what comes of it.
+
+        Returns:
+            Why the curriculum is over; empty where it is not.
+        """
+        tasks = training_tasks(iteration, self.settings.rollouts)
+        rollouts = self._roll_out(iteration, "rollouts", tasks, state)
+        require_plans(rollouts, self.source)
+        state.task_progress.append(fmean(rollout.progress for rollout in rollouts))
+        self.callback.on_rollouts(iteration, rollouts)
+        if over := self._why_over(rollouts, state):
+            return over
+        fresh = self._roll_out(iteration, "fresh", self._fresh_tasks, state)
+        selection = select_skills(rollouts, state, self.settings)
+        state.not_trained = dict(selection.not_trained)
+        if not selection.operators:
+            return NO_PROGRESS
+        self._start_over(iteration, selection.dead_ends, state)
+        self._train(iteration, self._rounds(selection, rollouts, fresh, state), state)
+        return ""
+
+    def _why_over(self, rollouts: Sequence[PlanRollout], state: CurriculumState) -> str:
         """Why the curriculum is over; empty where it is not."""
-        if not failures:
+        if not any(rollout.plan or rollout.unplanned for rollout in rollouts):
+            return "the goal holds at the start of every task"
+        if not any(rollout.failure for rollout in rollouts):
             return "nothing fails"
-        latest = self._progress[-TWICE:]
+        latest = state.task_progress[-TWICE:]
         if len(latest) == TWICE and min(latest) >= self.settings.progress:
             return "progress is enough"
-        if self._steps_left() < self.settings.segment_steps(jobs.horizon_of(self._domain)):
+        if self._steps_left(state) < self._segment_steps:
             return "the budget is spent"
         return ""
 
     # -- carrying out plans -----------------------------------------------------------------------
 
-    def _rollout_tasks(self, iteration: int) -> range:
-        first = ROLLOUTS + iteration * self.settings.rollouts
-        return range(first, first + self.settings.rollouts)
-
-    def _fresh_tasks(self) -> range:
-        return range(VALIDATION, VALIDATION + self.settings.validation)
-
-    def _carry_out(self, iteration: int, name: str, tasks: range) -> list[PlanRollout]:
-        work = [(self.source, index, self._skills()) for index in tasks]
-        return self._work.cached(
-            f"iteration{iteration}/{name}",
-            lambda: self._run_jobs("carrying out plans", jobs.carry_out, work),
-            lambda data: [PlanRollout.from_json(one) for one in data],
+    def _roll_out(
+        self, iteration: int, name: str, tasks: range, state: CurriculumState
+    ) -> list[PlanRollout]:
+        """Carry out plans with the skills at hand: those that were learned, or else are kept."""
+        learned = {name: str(self._skill(name, state)) for name in state.learned}
+        work = [(self.source, index, self._kept_folders | learned) for index in tasks]
+        return self._results.rollouts(
+            iteration, name, lambda: self._run("carrying out plans", jobs.carry_out, work)
         )
 
-    def _require_plans(self, rollouts: Sequence[PlanRollout]) -> None:
-        """Leave out tasks without a plan, as long as some have one."""
-        without = [rollout for rollout in rollouts if rollout.unplanned]
-        if len(without) == len(rollouts):
-            goal = self.source.goal or "its own goal"
-            raise UnsolvableError(
-                f"none of {len(rollouts)} tasks of {self.source.domain} has a plan for {goal}: "
-                f"{without[0].unplanned}; give other operators, or another goal"
-            )
-
-    def _skills(self) -> dict[str, str]:
-        """The folders of the skills at hand, by operator name."""
-        return {
-            name: str(self._skill_folder(name))
-            for name, state in self._states.items()
-            if state.rounds
-        }
-
-    def _skill_folder(self, name: str) -> Path:
-        digest = operator_digest(self._operators[name])
-        return self.folder / name / f"{name}-{digest}"
+    def _skill(self, name: str, state: CurriculumState) -> Path:
+        """The folder of a skill that was learned."""
+        return self._results.skill(self._operators[name], state.skills[name].attempt)
 
     # -- training ---------------------------------------------------------------------------------
 
-    def _train(
+    def _start_over(
+        self, iteration: int, dead_ends: Sequence[DeadEnd], state: CurriculumState
+    ) -> None:
+        """Forget the skills that have led into dead ends, and those that ended there."""
+        for dead_end in dead_ends:
+            self.callback.on_dead_end(iteration, dead_end)
+            for name in (dead_end.before, dead_end.skill):
+                state.skills[name] = state.skills[name].from_scratch()
+
+    def _rounds(
         self,
-        iteration: int,
+        selection: SkillSelection,
         rollouts: Sequence[PlanRollout],
         fresh: Sequence[PlanRollout],
-        failures: Counter[str],
-    ) -> bool:
-        """Train what failed; whether there was anything left to be trained.
+        state: CurriculumState,
+    ) -> list[LearningJob]:
+        """A round of training per selected skill; the first one of a skill begins warm.
 
         Args:
-            iteration: From 0.
+            selection: Which skills, and for how long.
             rollouts: On training tasks.
             fresh: On tasks that training never sees.
-            failures: How often each operator's stage failed.
+            state: Of the curriculum.
         """
-        chosen = [name for name, _ in failures.most_common() if self._may_train(name, rollouts)]
-        if not chosen:
-            return False
-        chosen = sorted(chosen[: max(1, self._steps_left() // self.settings.skill_steps)])
-        share = min(self.settings.skill_steps, self._steps_left() // len(chosen))
-        settings = replace(self.settings, skill_steps=share)
-        work = [self._job(name, settings, rollouts, fresh) for name in chosen]
-        outcomes = self._work.cached(
-            f"iteration{iteration}/rounds",
-            lambda: self._run_jobs("learning skills", jobs.learn, work),
-            lambda data: [_round(one) for one in data],
-        )
-        for name, outcome in zip(chosen, outcomes, strict=True):
-            self._take(name, outcome, rollouts)
-            self.callback.on_judged(iteration, name, outcome)
-        return True
+        settings = replace(self.settings, skill_steps=selection.steps)
+        rounds = []
+        for name in selection.operators:
+            skill = state.skills[name]
+            number, attempt = skill.rounds, skill.attempt
+            again = number or attempt
+            warm_start = None if again else self._warm_starts.find(self._operators[name])
+            states = InitiationStates.of(name, rollouts), InitiationStates.of(name, fresh)
+            if attempt and not number:
+                states = states[0].for_another, states[1]
+            folder = self._results.training(name, attempt)
+            rounds.append(
+                LearningJob(
+                    self.source, name, number, *states, settings, folder, warm_start, attempt
+                )
+            )
+        return rounds
 
-    def _may_train(self, name: str, rollouts: Sequence[PlanRollout]) -> bool:
-        """Whether there are states to learn from, and a hope that it is worth while."""
-        failed, succeeded = _starts(name, rollouts)
-        if not failed:
-            self._left[name] = {"why": StageEnd.NOT_APPROACHED.value}
-            return False
-        state = self._states[name]
-        if state.stale < self.settings.patience:
-            return True
-        changed = state.starts != _digest(failed + succeeded)
-        new = changed and len(self._progress) > 1 and self._progress[-1] > self._progress[-2]
-        if not new:
-            ends = Counter(s.end for s in _failures(rollouts) if s.operator == name)
-            atoms = Counter(a for s in _failures(rollouts) if s.operator == name for a in s.atoms)
-            self._left[name] = {
-                "why": "no progress",
-                "states": len(failed),
-                "ends": dict(ends),
-                "atoms": dict(atoms.most_common(3)),
-            }
-        return new
+    def _train(self, iteration: int, rounds: Sequence[LearningJob], state: CurriculumState) -> None:
+        """Train skills for a round each, and take note of how it went."""
+        left = self._steps_left(state)
+        outcomes = self._results.rounds(iteration, lambda: self._learn(iteration, rounds, left))
+        for job, outcome in zip(rounds, outcomes, strict=True):
+            state.skills[job.operator] = state.skills[job.operator].after(job, outcome)
+            self.callback.on_judged(iteration, job.operator, outcome)
 
-    def _job(
-        self,
-        name: str,
-        settings: AcquisitionSettings,
-        rollouts: Sequence[PlanRollout],
-        fresh: Sequence[PlanRollout],
-    ) -> tuple[Any, ...]:
-        """The arguments of :func:`slap_ros.acquisition.jobs.learn`.
-
-        Args:
-            name: Of the operator.
-            settings: With the steps that are left for it.
-            rollouts: On training tasks.
-            fresh: On tasks that training never sees.
-        """
-        failed, succeeded = _starts(name, rollouts)
-        share = self.settings.rehearsal
-        rehearsed = succeeded[: round(len(failed) * share / (1.0 - share))]
-        judged = [start for part in _starts(name, fresh) for start in part]
-        state = self._states[name]
-        return (
-            self.source,
-            name,
-            state.rounds,
-            failed + rehearsed,
-            judged[: self.settings.judged],
-            settings,
-            str(self.folder / name),
-            None if state.rounds else self._beginning(name),
-        )
-
-    def _beginning(self, name: str) -> MlpPolicy | None:
-        """The policy of the known skill that a first round begins with; None for none."""
-        operator: LiftedOperator = self._operators[name]
-        keys = {path: self.encoder.encode(skill.operator) for path, skill in self.known.items()}
-        found = nearest(self.encoder.encode(operator), keys)
-        if found is None or found[1] < self.settings.least_similarity:
-            return None
-        path, similarity = found
-        self._states[name].beginning = {
-            "skill": self.known[path].folder_name,
-            "similarity": round(similarity, 3),
-        }
-        return self.known[path].policy
-
-    def _take(self, name: str, outcome: Round, rollouts: Sequence[PlanRollout]) -> None:
-        """Take note of a round."""
-        state = self._states[name]
-        better = outcome.success > max(outcome.initial, state.success if state.rounds else -1.0)
-        state.stale = 0 if better else state.stale + 1
-        state.starts = _digest([start for part in _starts(name, rollouts) for start in part])
-        if not state.rounds and state.beginning:
-            state.beginning["success"] = outcome.initial
-        state.rounds += 1
-        state.success = outcome.success
-        horizon = jobs.horizon_of(self._domain)
-        state.steps += len(outcome.segments) * self.settings.segment_steps(horizon)
-
-    def _steps_left(self) -> int:
-        return self.settings.total_steps - sum(state.steps for state in self._states.values())
+    def _learn(self, iteration: int, rounds: Sequence[LearningJob], left: int) -> list[Any]:
+        self.callback.on_learning(iteration, [OngoingRound.of(job) for job in rounds], left)
+        return self._run("learning skills", jobs.learn, [(job,) for job in rounds])
 
     # -- the result -------------------------------------------------------------------------------
 
-    def _library(self, ended: str, iteration: int) -> SkillLibrary:
-        learned = [name for name, state in self._states.items() if state.rounds]
-        fresh = self._carry_out(iteration, "final", self._fresh_tasks()) if learned else []
-        vacuity = self._vacuity(learned, fresh)
-        skills = []
-        for name in learned:
-            skill = load_skill(self._skill_folder(name), self._domain)
-            state = self._states[name]
-            record = {
-                "success": state.success,
-                "vacuity": vacuity[name],
-                "steps": state.steps,
-                "rounds": state.rounds,
-                "seed": self.source.seed,
-                "began_with": state.beginning,
-            }
-            skills.append(
-                AcquiredSkill(skill.operator, skill.template, skill.policy, skill.horizon, record)
-            )
-        record = {
-            "preset": self.source.preset,
-            "goal": self.source.goal,
-            "seed": self.source.seed,
-            "ended": ended,
-            "left": self._left if ended == "no progress" else {},
-            "progress": self._progress,
-            "progress_on_fresh_tasks": fmean(r.progress for r in fresh) if fresh else 1.0,
-            "steps": sum(state.steps for state in self._states.values()),
-            "settings": asdict(self.settings),
-            "versions": dict(versions()),
-        }
+    def _library(self, ended: str, iteration: int, state: CurriculumState) -> SkillLibrary:
+        """What was learned, and what was kept as it was."""
+        fresh = self._roll_out(iteration, "final", self._fresh_tasks, state)
+        vacuity = self._vacuity(state.learned, fresh)
+        skills = [skill for name, skill in self._kept.items() if name not in state.learned]
+        for name in state.learned:
+            skill = load_skill(self._skill(name, state), self._domain)
+            record = skill_record(state.skills[name], vacuity[name], self.source.seed)
+            skills.append(replace(skill, record=record))
         ordered = sorted(skills, key=lambda skill: skill.folder_name)
+        record = library_record(self.source, self.settings, state, ended, fresh)
         return SkillLibrary(self.source.domain, tuple(ordered), record)
 
     def _vacuity(self, names: Sequence[str], fresh: Sequence[PlanRollout]) -> dict[str, Any]:
-        starts = {name: [s for part in _starts(name, fresh) for s in part] for name in names}
+        """What policies that see nothing are worth in each skill's place; None where untried."""
+        starts = {name: InitiationStates.of(name, fresh).all for name in names}
         begun = [name for name in names if starts[name]]
         work = [(self.source, name, starts[name], self.settings.judged) for name in begun]
-        found: list[Any] = self._work.cached(
-            "vacuity",
-            lambda: self._run_jobs("trying constant actions", jobs.vacuity, work),
-            lambda data: list(data),
+        found = self._results.vacuity(
+            lambda: self._run("trying constant actions", jobs.vacuity, work)
         )
         return dict.fromkeys(names) | dict(zip(begun, found, strict=True))
 
     # -- plumbing ---------------------------------------------------------------------------------
 
-    def _require_same_settings(self) -> None:
-        """Refuse a folder with another curriculum."""
+    def _steps_left(self, state: CurriculumState) -> int:
+        return self.settings.total_steps - state.steps
+
+    def _as_json(self) -> dict[str, Any]:
+        """All that the results depend on."""
         known = sorted(skill.folder_name for skill in self.known.values())
-        own = {"source": self.source.as_json(), **asdict(self.settings), "known": known}
-        own = json.loads(json.dumps(own))
-        if self._work.cached("settings", lambda: own, lambda theirs: theirs) != own:
-            raise InvalidParameterError(
-                f"{self.folder} has another training; give another folder, or remove this one"
-            )
+        data = {"source": self.source.as_json(), **asdict(self.settings), "known": known}
+        if self.encoder.name != METRICS:
+            data["encoder"] = self.encoder.name
+        if self.kept:
+            data["kept"] = SkillLibrary(self.source.domain, tuple(self.kept.values())).digest
+        return data
 
-    def _run_jobs(self, what: str, function: Any, work: Sequence[tuple[Any, ...]]) -> list[Any]:
-        results = []
-        self.callback.on_progress(what, 0, len(work))
-        for result in self.workers.run(function, work):
-            results.append(result)
-            self.callback.on_progress(what, len(results), len(work))
-        return in_order(results)
+    def _run(
+        self, what: str, function: Callable[..., dict[str, Any]], work: Sequence[tuple[Any, ...]]
+    ) -> list[dict[str, Any]]:
+        report = partial(self.callback.on_progress, what)
+        return run_in_order(self.workers, function, work, report)
 
 
-def _round(data: Any) -> Round:
-    return Round(
-        float(data["initial"]),
-        tuple(map(float, data["segments"])),
-        int(data["best"]),
-        bool(data["over"]),
-    )
+def require_plans(rollouts: Sequence[PlanRollout], source: TaskSource) -> None:
+    """Refuse tasks of which none has a plan; where some have one, the others are left out.
 
-
-def _failures(rollouts: Sequence[PlanRollout]) -> list[Stage]:
-    return [stage for rollout in rollouts if (stage := rollout.failure) is not None]
-
-
-def _starts(
-    name: str, rollouts: Sequence[PlanRollout]
-) -> tuple[list[InitiationRecord], list[InitiationRecord]]:
-    """Where an operator's skill began: first where it failed, then where it did not."""
-    parts: tuple[list[InitiationRecord], list[InitiationRecord]] = ([], [])
-    for rollout in rollouts:
-        for stage in rollout.stages:
-            if stage.operator == name and stage.state:
-                parts[stage.done].append(initiation_record(rollout, stage))
-    return parts
-
-
-def _digest(starts: Sequence[InitiationRecord]) -> str:
-    return sha256(json.dumps(sorted(starts)).encode()).hexdigest()
+    Raises:
+        UnsolvableError: None has a plan.
+    """
+    without = [rollout for rollout in rollouts if rollout.unplanned]
+    if len(without) == len(rollouts):
+        goal = source.goal or "its own goal"
+        raise UnsolvableError(
+            f"none of {len(rollouts)} tasks of {source.domain} has a plan for {goal}: "
+            f"{without[0].unplanned}; give other operators, or another goal"
+        )

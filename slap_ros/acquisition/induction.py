@@ -117,7 +117,7 @@ def induce_operators(
     clusters: list[_Cluster] = []
     for trace in demonstrations:
         for before, after in pairwise(_without_passages(stable_states(trace, hold_steps))):
-            change = _Change.of(before, after)
+            change = _ObservedEffect.of(before, after)
             if len(change.objects) > MAX_OBJECTS:
                 continue  # everything at once is no skill
             if not any(cluster.take(change) for cluster in clusters):
@@ -162,7 +162,7 @@ def _without_passages(states: Sequence[frozenset[GroundAtom]]) -> list[frozenset
 
 
 @dataclass(frozen=True)
-class _Change:
+class _ObservedEffect:
     """What changed from one stable state to the next."""
 
     objects: tuple[Object, ...]  # of the changes, in order
@@ -171,7 +171,7 @@ class _Change:
     before: frozenset[GroundAtom]  # what held of these objects, and of none
 
     @classmethod
-    def of(cls, before: frozenset[GroundAtom], after: frozenset[GroundAtom]) -> _Change:
+    def of(cls, before: frozenset[GroundAtom], after: frozenset[GroundAtom]) -> _ObservedEffect:
         added, deleted = after - before, before - after
         ordered = [*sorted(added, key=str), *sorted(deleted, key=str)]
         objects = tuple(dict.fromkeys(obj for atom in ordered for obj in atom.objects))
@@ -191,7 +191,7 @@ class _Change:
 class _Cluster:
     """Changes that are alike up to objects."""
 
-    def __init__(self, first: _Change) -> None:
+    def __init__(self, first: _ObservedEffect) -> None:
         self.kind = first.kind
         self.types: tuple[Type, ...] = tuple(obj.type for obj in first.objects)
         self.added = _numbered(first.added, first.objects)
@@ -200,7 +200,7 @@ class _Cluster:
         self.before = self.first_before
         self.seen = 1
 
-    def take(self, change: _Change) -> bool:
+    def take(self, change: _ObservedEffect) -> bool:
         """Join a change, if it is alike."""
         if change.kind != self.kind:
             return False

@@ -5,14 +5,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from slap_ros.acquisition.attempt_log import AttemptLog
 from slap_ros.acquisition.complaints import Complaint, ComplaintClass, serious
 from slap_ros.errors import MalformedAnswerError, ProposalRejectedError, SlapError
-from slap_ros.language.budget import Budget
+from slap_ros.language.budget import Budget, BudgetLimits
+from slap_ros.language.cassette import ReplayingClient, open_client, with_recorded
 from slap_ros.language.formats import Parsed
 from slap_ros.language.prompts import conversation, feedback
 from slap_ros.language.request import Client, Reply, Request, Schema
@@ -87,6 +88,43 @@ class Inquiry:
         self.budget = budget
         self.log = log
         self._answers = Counter[str]()  # by subject
+        self._scripted = False  # whether an answer was a script's
+
+    @classmethod
+    def opened(
+        cls,
+        settings: LanguageSettings,
+        cassette: str,
+        limits: BudgetLimits,
+        log: AttemptLog,
+    ) -> Inquiry:
+        """A conversation with whoever answers by the mode of the cassette.
+
+        Args:
+            settings: Which model, where, how; a replay without a model takes the recorded ones.
+            cassette: ``live``, ``off``, ``record:FILE`` or ``replay:FILE``.
+            limits: What may be spent.
+            log: Where everything is written down.
+
+        Raises:
+            InvalidParameterError: Another mode.
+            InvalidCassetteError: The cassette cannot be used.
+            LanguageUnavailableError: A server cannot be asked.
+        """
+        client = open_client(cassette, settings)
+        return cls(client, with_recorded(settings, client), Budget(limits), log)
+
+    @property
+    def answered_by(self) -> dict[str, Any]:
+        """Who answered, for records: a model now, a recording of one, or a script."""
+        client = self.client
+        return {
+            "source": client.source,
+            "replayed_cassette": client.cassette.digest
+            if isinstance(client, ReplayingClient)
+            else "",
+            "scripted": self._scripted,
+        }
 
     def ask(self, question: Question[D, T], rejected: Rejected | None = None) -> Answer[T]:
         """Ask until an answer passes.
@@ -129,6 +167,7 @@ class Inquiry:
         judged = _judge(question, reply)
         self.budget.book(reply)
         self._answers[question.subject] += 1
+        self._scripted |= reply.scripted
         self.log.answer(
             question.subject, request, reply, judged.cut, judged.complaints, self.budget
         )
@@ -154,6 +193,14 @@ class Inquiry:
         except SlapError as error:
             self.log.failure(subject, error, self.budget)
             raise
+
+
+def described(answered_by: Mapping[str, Any]) -> str:
+    """Who answered, in words, from what records say of it."""
+    source = answered_by.get("source", "an unknown source")
+    who = f"a script's ({source})" if answered_by.get("scripted") else f"a model's ({source})"
+    cassette = str(answered_by.get("replayed_cassette", ""))
+    return f"{who}, replayed from recording {cassette[:12]}…" if cassette else who
 
 
 def rejection(budget: Budget, complaints: Sequence[Complaint]) -> ProposalRejectedError:

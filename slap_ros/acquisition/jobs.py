@@ -5,14 +5,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from slap_ros.acquisition.initiation_states import InitiationRecord, InitiationStates
 from slap_ros.acquisition.reward import SkillReward
-from slap_ros.acquisition.rollouts import PlanRollout, Stage, StageEnd, initiation, roll_out
+from slap_ros.acquisition.rollouts import roll_out
 from slap_ros.acquisition.settings import AcquisitionSettings
 from slap_ros.acquisition.skill import LearnedSkill
 from slap_ros.acquisition.skill_env import Initiation
@@ -20,11 +21,48 @@ from slap_ros.acquisition.skill_library import load_skill
 from slap_ros.acquisition.skill_training import SkillTraining
 from slap_ros.acquisition.task_source import TaskSource
 from slap_ros.acquisition.validation import SkillTrials
+from slap_ros.acquisition.warm_start import WarmStart
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidStateError
-from slap_ros.learning.mlp_policy import MlpPolicy
+from slap_ros.learning.learner_interface import learner_interface
+from slap_ros.relational import State
 
-InitiationRecord = tuple[int, tuple[str, ...], tuple[float, ...]]  # task, objects, state
+
+@dataclass(frozen=True)
+class LearningJob:
+    """A round of training of one skill, as data that other processes can be sent.
+
+    Args:
+        source: Of tasks.
+        operator: Name of the skill's.
+        number: Of the round, from 0.
+        initiations: Of rollouts on training tasks, where episodes begin.
+        fresh: Of rollouts on tasks that training never sees, where checkpoints are judged from.
+        settings: All hyper-parameters.
+        folder: Where the skill is learned.
+        warm_start: What the skill's first round begins with.
+        attempt: How often the skill was learned from scratch before.
+    """
+
+    source: TaskSource
+    operator: str
+    number: int
+    initiations: InitiationStates
+    fresh: InitiationStates
+    settings: AcquisitionSettings
+    folder: Path
+    warm_start: WarmStart | None = None
+    attempt: int = 0
+
+    @property
+    def segment_steps(self) -> int:
+        """Environment steps between two judgements."""
+        return self.settings.segment_steps(horizon_of(self.source.make_domain()))
+
+    @property
+    def steps(self) -> int:
+        """Environment steps of the round at most."""
+        return self.settings.segments(horizon_of(self.source.make_domain())) * self.segment_steps
 
 
 def carry_out(source: TaskSource, index: int, skills: Mapping[str, str]) -> dict[str, Any]:
@@ -44,27 +82,8 @@ def carry_out(source: TaskSource, index: int, skills: Mapping[str, str]) -> dict
     return roll_out(domain, task, index, source.operators(), learned).as_json()
 
 
-def learn(
-    source: TaskSource,
-    operator: str,
-    number: int,
-    starts: Sequence[InitiationRecord],
-    fresh: Sequence[InitiationRecord],
-    settings: AcquisitionSettings,
-    folder: str,
-    beginning: MlpPolicy | None,
-) -> dict[str, Any]:
+def learn(job: LearningJob) -> dict[str, Any]:
     """Learn one skill for one round.
-
-    Args:
-        source: Of tasks.
-        operator: Name of the skill's.
-        number: Of the round.
-        starts: Where episodes begin.
-        fresh: Where checkpoints are judged from.
-        settings: All hyper-parameters.
-        folder: Where the skill is learned.
-        beginning: The policy of another skill that the first round begins with.
 
     Returns:
         The :class:`~slap_ros.acquisition.skill_training.Round` as JSON, with the number of start
@@ -74,19 +93,21 @@ def learn(
         InvalidParameterError: The folder is damaged.
         InvalidStateError: The world refuses all states.
     """
+    source, settings = job.source, job.settings
     domain = source.make_domain()
-    (lifted,) = (one for one in source.operators() if one.name == operator)
-    reward = SkillReward(lifted, source.rewards()[operator])
-    training = SkillTraining(
-        domain, reward, horizon_of(domain), settings, source.seed, Path(folder)
-    )
+    reward = _reward(source, job.operator, domain)
+    horizon, seed = horizon_of(domain), source.seed
+    training = SkillTraining(domain, reward, horizon, settings, seed, job.folder, job.attempt)
+    starts = job.initiations.with_rehearsal(settings.rehearsal)
     accepted, refused = _accepted(source, domain, starts)
-    judged, _ = _accepted(source, domain, fresh)
+    judged, _ = _accepted(source, domain, job.fresh.all[: settings.judged])
     if not accepted:
         raise InvalidStateError(
-            f"{domain.name} refuses all {len(starts)} states in which {operator} is to be learned"
+            f"{domain.name} refuses all {len(starts)} states in which {job.operator} is to be "
+            "learned"
         )
-    outcome = training.run(number, accepted, judged or accepted, beginning)
+    policy = job.warm_start.policy if job.warm_start is not None else None
+    outcome = training.run(job.number, accepted, judged or accepted, policy)
     return {**asdict(outcome), "refused": refused}
 
 
@@ -105,8 +126,7 @@ def vacuity(
         The :class:`~slap_ros.acquisition.validation.Vacuity` as JSON.
     """
     domain = source.make_domain()
-    (lifted,) = (one for one in source.operators() if one.name == operator)
-    reward = SkillReward(lifted, source.rewards()[operator])
+    reward = _reward(source, operator, domain)
     begun, _ = _accepted(source, domain, fresh[:most])
     trials = SkillTrials(domain, reward, begun, horizon_of(domain))
     return asdict(trials.vacuity(np.random.default_rng(source.seed)))
@@ -118,13 +138,13 @@ def horizon_of(domain: Domain) -> int:
     return domain.acquisition.horizon
 
 
-def initiation_record(rollout: PlanRollout, stage: Stage) -> InitiationRecord:
-    """Where a stage's skill began, as data."""
-    return rollout.task, stage.objects, stage.state
-
-
 def _skill(folder: str, domain: Domain) -> LearnedSkill:
     return load_skill(Path(folder), domain).in_domain(domain)
+
+
+def _reward(source: TaskSource, operator: str, domain: Domain) -> SkillReward:
+    (lifted,) = (one for one in source.operators() if one.name == operator)
+    return SkillReward(lifted, source.rewards()[operator], learner_interface(domain))
 
 
 def _accepted(
@@ -132,9 +152,10 @@ def _accepted(
 ) -> tuple[list[Initiation], int]:
     """The states that the world accepts, and how many it refuses."""
     accepted: list[Initiation] = []
-    for index, objects, state in records:
-        stage = Stage("", objects, state, StageEnd.DONE.value, 0)
-        begun = initiation(source.task(index), stage)
+    for index, names, data in records:
+        layout = source.task(index).initial_state.layout
+        objects = tuple(layout.object(name) for name in names)
+        begun = Initiation(State(layout, np.array(data)), objects)
         try:
             domain.make_world(begun.state)
         except InvalidStateError:

@@ -15,8 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slap_ros.acquisition.groundings import GroundedStates
-from slap_ros.core import Domain, LearnerInterface
+from slap_ros.core import Domain
 from slap_ros.errors import InvalidDomainError
+from slap_ros.geometry.rotations import inverse_each, rotate_each, x_axes
+from slap_ros.learning.learner_interface import learner_interface
 from slap_ros.relational import Column
 from slap_ros.relational.state import Array
 
@@ -24,7 +26,10 @@ SLOTS = 3  # for the objects of an operator, the robot itself not among them
 ROBOT_FEATURES = 16  # at most
 OBJECT_FEATURES = 16  # of each object, at most
 PAIRS = tuple(combinations(range(SLOTS), 2))
-SIZE = ROBOT_FEATURES + SLOTS * (1 + OBJECT_FEATURES) + len(PAIRS)
+RELATION_FEATURES = 10  # of each pair
+RELATIONS = ROBOT_FEATURES + SLOTS * (1 + OBJECT_FEATURES)  # where they begin
+SIZE = RELATIONS + len(PAIRS) * RELATION_FEATURES
+FINE = 0.2  # of the interface's length: below, a relative position is observed linearly
 
 
 class SkillObserver:
@@ -36,13 +41,7 @@ class SkillObserver:
         Raises:
             InvalidDomainError: The domain has no learner's interface.
         """
-        if domain.learning is None:
-            raise InvalidDomainError(
-                f"domain {domain.name} does not say what learners observe; give it "
-                "Learning.interface"
-            )
-        self._interface: LearnerInterface = domain.learning.interface
-        self._domain = domain
+        self._interface, self._domain = learner_interface(domain), domain
 
     def __call__(self, states: GroundedStates) -> NDArray[np.float32]:
         """What is observed in each state, shape (n, SIZE).
@@ -63,8 +62,9 @@ class SkillObserver:
             self._put(observed, at + 1, features, OBJECT_FEATURES)
         for number, (one, other) in enumerate(PAIRS):
             if other < len(slots):
-                between = self._separation(states, slots[one], slots[other])
-                observed[:, SIZE - len(PAIRS) + number] = between
+                at = RELATIONS + number * RELATION_FEATURES
+                relation = self._relation(states, slots[one], slots[other])
+                observed[:, at : at + relation.shape[-1]] = relation
         return observed.astype(np.float32)
 
     def _slots(self, states: GroundedStates) -> list[Column]:
@@ -87,6 +87,35 @@ class SkillObserver:
                 f"features of the robot or of an object; {most} are the most"
             )
         observed[:, at : at + features.shape[-1]] = features
+
+    def _relation(self, states: GroundedStates, one: Column, other: Column) -> Array:
+        """How far one object is from the other, in which direction, and turned how in its frame.
+
+        The direction is along the axes of the base, as actions are.
+
+        How it is turned is told by its own x axis, and by the products of its coordinates, which
+        are the same either way round, as many things may be.
+
+        Args:
+            states: Of some groundings.
+            one: For each of these, the one.
+            other: For each of these, the other.
+
+        Returns:
+            Shape (n, RELATION_FEATURES), or (n, 1) where the interface has no frames.
+        """
+        separation = self._separation(states, one, other)[:, None]
+        if self._interface.frames is None:
+            return separation
+        (origin, turn), (base, frame) = (
+            tuple(states.pick(part) for part in self._interface.frames(states.state, column))
+            for column in (one, other)
+        )
+        fine = np.arcsinh((origin - base) / (FINE * self._interface.length_m))
+        axis = rotate_each(inverse_each(frame), x_axes(turn))
+        x, y, z = np.moveaxis(axis, -1, 0)
+        either_way = np.stack([x * y, x * z, y * z], axis=-1)
+        return np.concatenate([separation, fine, axis, either_way], axis=-1)
 
     def _separation(self, states: GroundedStates, one: Column, other: Column) -> Array:
         """Between two slots, from 0 to 1 at infinity."""

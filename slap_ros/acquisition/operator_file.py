@@ -61,7 +61,7 @@ def _drafts(text: str, source: str) -> list[OperatorDraft]:
         return [_draft(operator) for operator in parse_domain(text, source).operators]
     if text.lstrip().startswith("{"):
         return list(_from_json(text, source))
-    drafts = list(_from_text(text))
+    drafts = list(_from_text(text, source))
     if not drafts:
         raise MalformedAnswerError(
             f"{source} has no operators: give a PDDL domain, the JSON of a proposal, or blocks of "
@@ -73,14 +73,14 @@ def _drafts(text: str, source: str) -> list[OperatorDraft]:
 def _from_json(text: str, source: str) -> Iterator[OperatorDraft]:
     try:
         entries = parse_json(text)["operators"]
-        texts = [json.dumps(entry) for entry in entries]
+        texts = [json.dumps(dict(entry)) for entry in entries]
     except (ValueError, KeyError, TypeError) as error:
         raise MalformedAnswerError(f"{source} is no proposal's JSON: {error!r}") from error
-    for entry in texts:
-        yield parse_operator(entry).draft
+    for number, entry in enumerate(texts, start=1):
+        yield _parse(entry, f"{source}, operator {number}")
 
 
-def _from_text(text: str) -> Iterator[OperatorDraft]:
+def _from_text(text: str, source: str) -> Iterator[OperatorDraft]:
     blocks: list[tuple[str, list[str]]] = []
     for line in text.splitlines():
         title = _TITLE.fullmatch(line.strip())
@@ -89,7 +89,7 @@ def _from_text(text: str) -> Iterator[OperatorDraft]:
         elif blocks:
             blocks[-1][1].append(line)
     for name, lines in blocks:
-        draft = parse_operator("\n".join(lines)).draft
+        draft = _parse("\n".join(lines), f"{source}, {name}")
         yield OperatorDraft(
             name,
             draft.parameters,
@@ -97,6 +97,13 @@ def _from_text(text: str) -> Iterator[OperatorDraft]:
             draft.delete_effects,
             draft.add_effects,
         )
+
+
+def _parse(text: str, where: str) -> OperatorDraft:
+    try:
+        return parse_operator(text).draft
+    except MalformedAnswerError as error:
+        raise MalformedAnswerError(f"{where}: {error}") from error
 
 
 def _draft(operator: LiftedOperator) -> OperatorDraft:

@@ -10,7 +10,7 @@ from functools import cached_property
 from itertools import pairwise
 
 from slap_ros.core import Domain, Task
-from slap_ros.relational import AtomSpace, GroundAtom, Layout, Metric, Predicate, Type
+from slap_ros.relational import AtomSpace, GroundAtom, Layout, Metric, Predicate, State, Type
 from slap_ros.relational.pddl import PddlDomain, PddlProblem
 
 
@@ -29,6 +29,7 @@ class AcquisitionProblem:
         goal: The atoms that shall hold in the end.
         shown: Abstract states that demonstrations went through, in order, for each demonstration;
             none where there are none.
+        start: The task's initial state; None for problems without a world.
     """
 
     name: str
@@ -40,6 +41,7 @@ class AcquisitionProblem:
     init: frozenset[GroundAtom]
     goal: frozenset[GroundAtom]
     shown: tuple[tuple[frozenset[GroundAtom], ...], ...] = ()
+    start: State | None = None
 
     @classmethod
     def of_pddl(cls, domain: PddlDomain, problem: PddlProblem) -> AcquisitionProblem:
@@ -83,6 +85,7 @@ class AcquisitionProblem:
             space.layout,
             frozenset(space.decode(space.abstract(task.initial_state))),
             frozenset(goal or task.goal),
+            start=task.initial_state,
         )
 
     @cached_property

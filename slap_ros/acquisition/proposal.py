@@ -134,6 +134,28 @@ def template_data(template: RewardTemplate) -> dict[str, Any]:
     }
 
 
+def read_proposal(data: Any, domain: Domain) -> Proposal:
+    """The proposal of :meth:`Proposal.to_data`, in a domain's words.
+
+    Raises:
+        LookupError, TypeError, ValueError, AttributeError: It is not of that form, or of another
+            domain.
+        InvalidDomainError: Its parts do not fit.
+    """
+    operators = {entry["name"]: read_operator(entry, domain) for entry in data["operators"]}
+    rewards = {
+        entry["operator"]: read_template(entry, operators[entry["operator"]], domain)
+        for entry in data["rewards"]
+    }
+    made = dict(data["provenance"])
+    provenance = ProposalProvenance(**{**made, "requests": tuple(made["requests"])})
+    plan = None if data["plan"] is None else tuple(map(str, data["plan"]))
+    remarks = tuple(map(str, data["remarks"]))
+    return Proposal(
+        str(data["problem"]), tuple(operators.values()), plan, provenance, rewards, remarks
+    )
+
+
 def read_operator(data: Any, domain: Domain) -> LiftedOperator:
     """The operator of :func:`operator_data`, in a domain's words.
 

@@ -13,6 +13,7 @@ import json
 from typing import Any
 
 import numpy as np
+import torch
 from gymnasium import spaces
 from stable_baselines3.common.buffers import ReplayBuffer
 from stable_baselines3.common.type_aliases import ReplayBufferSamples
@@ -90,7 +91,8 @@ class SkillReplayBuffer(ReplayBuffer):
         self.observations[rows, 0] = self._normalisation(mdp.observe(before, numbers))
         self.next_observations[rows, 0] = self._normalisation(mdp.observe(after, numbers))
         self.actions[rows, 0] = episodes.actions.reshape(len(numbers), -1)
-        self.rewards[rows, 0] = mdp.rewards(after, numbers)[0]
+        begun = np.repeat(episodes.states[:, 0], steps, axis=0)
+        self.rewards[rows, 0] = mdp.rewards(after, numbers, begun)[0]
         self.pos = self._whole = rows.stop
 
     def size(self) -> int:
@@ -114,7 +116,7 @@ class SkillReplayBuffer(ReplayBuffer):
             zeros,  # nothing is terminal
             self.rewards[rows],
         )
-        return ReplayBufferSamples(*(self.to_torch(part) for part in data))
+        return ReplayBufferSamples(*map(torch.from_numpy, data))  # copies of rows already
 
     @property
     def generator_state(self) -> str:

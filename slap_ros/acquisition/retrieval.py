@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which known skill a new one begins with: the nearest key of a library (LG-SAIL §4.3).
 
-The paper's key is a text embedding of ⟨PRE, EFF+, EFF-⟩. Ours is the metric signature: the metrics
-that these atoms rest on, with the direction in which each has to go. Names of operators, predicates
-and objects play no part, metrics do: opening a drawer and opening a cabinet move the same one.
+The paper's key is a text embedding of ⟨PRE, EFF+, EFF-⟩, which
+:class:`~slap_ros.acquisition.embedding_encoder.EmbeddingEncoder` makes. Ours is the metric
+signature: the metrics that these atoms rest on, with the direction in which each has to go. Names
+of operators, predicates and objects play no part, metrics do: opening a drawer and opening a
+cabinet move the same one.
 """
 
 from __future__ import annotations
@@ -18,6 +20,8 @@ from slap_ros.relational import LiftedAtom, LiftedOperator
 from slap_ros.relational.metrics import Condition
 
 PARTS = {"EFF+": 1.0, "EFF-": 0.5, "PRE": 0.25}  # what counts most is what a skill brings about
+
+METRICS = "metrics"
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,11 @@ class SkillSignature:
 class SkillEncoder(Protocol):
     """Gives operators their keys."""
 
+    @property
+    def name(self) -> str:
+        """What tells it from other encoders, for work folders and records."""
+        ...
+
     def encode(self, operator: LiftedOperator) -> SkillSignature:
         """The key of an operator."""
         ...
@@ -59,6 +68,8 @@ class SkillEncoder(Protocol):
 
 class MetricSignatureEncoder:
     """Keys from metrics alone."""
+
+    name = METRICS
 
     def encode(self, operator: LiftedOperator) -> SkillSignature:
         """See :class:`SkillEncoder`."""

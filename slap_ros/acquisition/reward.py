@@ -15,13 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slap_ros.acquisition.groundings import GroundedStates, N
+from slap_ros.core import LearnerInterface
 from slap_ros.errors import InvalidRewardError
 from slap_ros.relational import (
     Column,
     LiftedAtom,
     LiftedOperator,
+    Predicate,
     RewardTemplate,
     RewardTerm,
+    State,
     Variable,
 )
 from slap_ros.relational.predicates import Bools
@@ -81,18 +84,21 @@ class _Positions:
         return tuple(states.columns[i] for i in self.numbers)
 
 
-class SkillReward:
-    """The reward of an operator's skill, for many states of many groundings at once."""
+class OperatorEffects:
+    """Whether an operator's effects hold for good, in many states of many groundings at once.
 
-    def __init__(self, operator: LiftedOperator, template: RewardTemplate) -> None:
-        """Bind the template to the operator's parameters.
+    The hand that goes away moves a drawer somewhat, or what it lies against. So what is added must
+    be some way past its threshold, and the hand able to leave: both as the domain says.
+    """
 
-        Raises:
-            InvalidRewardError: They do not fit.
+    def __init__(self, operator: LiftedOperator, interface: LearnerInterface) -> None:
+        """Bind the effects to the operator's parameters.
+
+        Args:
+            operator: Whose effects.
+            interface: Of the domain.
         """
-        check_template(template, operator)
-        self.operator, self.template = operator, template
-        self._terms = [(t, _Positions.of(t.arguments, operator)) for t in template.terms]
+        self.operator, self._interface = operator, interface
         self._added = self._positions(operator.add_effects)
         self._deleted = self._positions(operator.delete_effects)
 
@@ -100,6 +106,53 @@ class SkillReward:
         """Atoms in alphabetic order, since sets have none."""
         ordered = sorted(atoms, key=str)
         return [(atom, _Positions.of(atom.variables, self.operator)) for atom in ordered]
+
+    def hold(self, states: GroundedStates) -> Bools:
+        """Whether all that is added holds and nothing that is deleted, for good, shape (n,)."""
+        success = np.ones(len(states.choice), dtype=bool)
+        for atom, about in self._added:
+            success &= self._holds(atom.predicate, states, about.columns(states))
+        for atom, about in self._deleted:
+            columns = about.columns(states)
+            success &= ~_own(states, atom.predicate.classifier(states.state, *columns))
+        done = np.flatnonzero(success)
+        if done.size:
+            ended = State(states.state.layout, states.state.data[done])
+            success[done] = self._interface.can_leave(ended)
+        return success
+
+    def _holds(
+        self, predicate: Predicate, states: GroundedStates, columns: tuple[Column, ...]
+    ) -> Bools:
+        tolerance = self._interface.success_tolerance(
+            predicate(*(column.objects[0] for column in columns))
+        )
+        if tolerance == 0.0 or predicate.margin is None:
+            return _own(states, predicate.classifier(states.state, *columns))
+        past: Bools = _own(states, predicate.margin(states.state, *columns)) >= tolerance
+        return past
+
+
+class SkillReward:
+    """The reward of an operator's skill, for many states of many groundings at once."""
+
+    def __init__(
+        self, operator: LiftedOperator, template: RewardTemplate, interface: LearnerInterface
+    ) -> None:
+        """Bind the template to the operator's parameters.
+
+        Args:
+            operator: Whose skill is to be learned.
+            template: The dense part of its reward.
+            interface: Of the domain.
+
+        Raises:
+            InvalidRewardError: They do not fit.
+        """
+        check_template(template, operator)
+        self.operator, self.template = operator, template
+        self._terms = [(t, _Positions.of(t.arguments, operator)) for t in template.terms]
+        self._effects = OperatorEffects(operator, interface)
 
     def __call__(self, states: GroundedStates) -> Array:
         """The reward in each state, in [0, max(1, Σ weights)], shape (n,)."""
@@ -114,13 +167,8 @@ class SkillReward:
         return total
 
     def success(self, states: GroundedStates) -> Bools:
-        """Whether all that the operator adds holds and nothing that it deletes, shape (n,)."""
-        success = np.ones(len(states.choice), dtype=bool)
-        for wanted, atoms in ((True, self._added), (False, self._deleted)):
-            for atom, about in atoms:
-                holds = atom.predicate.classifier(states.state, *about.columns(states))
-                success &= _own(states, holds) == wanted
-        return success
+        """As :meth:`OperatorEffects.hold`, shape (n,)."""
+        return self._effects.hold(states)
 
 
 def _own(states: GroundedStates, values: NDArray[N]) -> NDArray[N]:

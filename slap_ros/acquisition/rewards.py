@@ -6,13 +6,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import permutations
+from itertools import permutations, product
 
 from slap_ros.acquisition.complaints import Complaint, ComplaintClass, serious
 from slap_ros.acquisition.problem import AcquisitionProblem
 from slap_ros.errors import InvalidDomainError
 from slap_ros.language.formats import RewardDraft, TermDraft, shown
 from slap_ros.relational import (
+    Column,
     LiftedAtom,
     LiftedOperator,
     Metric,
@@ -22,6 +23,7 @@ from slap_ros.relational import (
 )
 
 DENSE_SUM = 0.8  # of composed weights: success itself, which is paid 1, stays the best
+FULL = 0.99  # of a normalised metric: there is nothing more to be had
 METRES = "m"
 
 Bound = tuple[Metric, tuple[Variable, ...]]
@@ -53,7 +55,9 @@ def compose_reward(operator: LiftedOperator, problem: AcquisitionProblem) -> Rew
     """A dense reward without a model: the metrics behind what the operator adds, equally weighed.
 
     Metrics between objects come before those of the hand, and last the hand's way to each object
-    that the operator changes and that was not in the hand before.
+    that the operator changes and that was not in the hand before. A metric that pays all it can
+    from the start, as whether something lies still, leads nowhere, and all else would be paid less.
+    So it is left out, unless the operator begins where it is another.
 
     Args:
         operator: Whose reward it is.
@@ -63,7 +67,7 @@ def compose_reward(operator: LiftedOperator, problem: AcquisitionProblem) -> Rew
         InvalidDomainError: No atom that it adds rests on a metric that grows towards it.
     """
     added = sorted(operator.add_effects, key=str)
-    behind = [bound for atom in added for bound in _behind(atom, rewarded=True)]
+    behind = _leading(added, operator, problem)
     chosen = [b for b in behind if not b[0].of_hand] + [b for b in behind if b[0].of_hand]
     chosen += _ways(operator, problem)
     terms = list(dict.fromkeys(chosen))
@@ -74,6 +78,46 @@ def compose_reward(operator: LiftedOperator, problem: AcquisitionProblem) -> Rew
         )
     weight = DENSE_SUM / len(terms)
     return RewardTemplate(operator.name, tuple(RewardTerm(m, a, weight) for m, a in terms))
+
+
+def _leading(
+    added: Sequence[LiftedAtom], operator: LiftedOperator, problem: AcquisitionProblem
+) -> list[Bound]:
+    """The metrics behind added atoms that have a way to go; all of them where none has.
+
+    Args:
+        added: By the operator.
+        operator: What it asks for and deletes may rest on the same metric.
+        problem: With the state that tasks start from.
+    """
+    before = operator.preconditions | operator.delete_effects
+    changed = {bound for atom in before for bound in _behind(atom)}
+    behind, leading = [], []
+    for atom in added:
+        for condition in atom.predicate.conditions:
+            if condition.rewarded:
+                bound = condition.metric, tuple(atom.variables[i] for i in condition.arguments)
+                behind.append(bound)
+                if bound in changed or not _is_full(condition.metric, problem):
+                    leading.append(bound)
+    return leading or behind
+
+
+def _is_full(metric: Metric, problem: AcquisitionProblem) -> bool:
+    """Whether a metric pays all it can at the start, whatever objects it is of.
+
+    Args:
+        metric: Of a condition.
+        problem: With the state that tasks start from, if there is one.
+    """
+    if problem.start is None:
+        return False
+    kinds = (problem.layout.of_type(kind) for kind in metric.types)
+    choices = [choice for choice in product(*kinds) if len(set(choice)) == len(choice)]
+    if not choices:
+        return False
+    columns = [Column(objects) for objects in zip(*choices, strict=True)]
+    return bool((metric.normalised(problem.start, *columns) >= FULL).all())
 
 
 def _behind(atom: LiftedAtom, rewarded: bool = False) -> list[Bound]:

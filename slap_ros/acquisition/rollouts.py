@@ -8,19 +8,22 @@ Eq. 4). Nothing is planned again, and the stages after a failed one are not run.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from enum import Enum
 from typing import Any
 
-import numpy as np
-
 from slap_ros.acquisition.skill import APPROACH_STEPS, LearnedSkill, approach_of
-from slap_ros.acquisition.skill_env import Initiation
 from slap_ros.core import Domain, Task, World
 from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.planning.astar import find_shortest_sequence
-from slap_ros.relational import AtomSpace, GroundOperator, LiftedOperator, State, ground_operators
+from slap_ros.relational import (
+    AtomSpace,
+    GroundOperator,
+    LiftedOperator,
+    Target,
+    ground_operators,
+)
 
 
 class StageEnd(Enum):
@@ -31,23 +34,6 @@ class StageEnd(Enum):
     NOT_APPROACHED = "the approach did not arrive"
     NO_EFFECT = "effect not reached"
     DISTURBED = "something else disturbed"
-
-
-@dataclass(frozen=True)
-class StageTarget:
-    """What a stage has to reach: masks of atoms."""
-
-    required: int
-    forbidden: int
-
-    @classmethod
-    def of(cls, operator: GroundOperator, abstract: int) -> StageTarget:
-        """What an operator leads to from an abstract state."""
-        return cls(operator.apply(abstract), operator.delete_effects)
-
-    def reached(self, abstract: int) -> bool:
-        """Whether all that is required holds, and nothing that is forbidden; more may."""
-        return not (self.required & ~abstract) and not (self.forbidden & abstract)
 
 
 @dataclass(frozen=True)
@@ -132,16 +118,9 @@ class PlanRollout:
         return cls(int(data["task"]), plan, stages, str(data["unplanned"]))
 
 
-def initiation(task: Task, stage: Stage) -> Initiation:
-    """Where a stage's skill began.
-
-    Args:
-        task: Of the rollout.
-        stage: One whose approach arrived.
-    """
-    layout = task.initial_state.layout
-    objects = tuple(layout.object(name) for name in stage.objects)
-    return Initiation(State(layout, np.array(stage.state)), objects)
+def failed_stages(rollouts: Iterable[PlanRollout]) -> list[Stage]:
+    """The stage that failed of each plan that did not get through, in order."""
+    return [stage for rollout in rollouts if (stage := rollout.failure) is not None]
 
 
 def plan_operators(
@@ -220,7 +199,7 @@ def _carry_out(
     """
     name, objects = operator.operator.name, operator.objects
     names = tuple(obj.name for obj in objects)
-    target = StageTarget.of(operator, space.abstract(world.state))
+    target = Target.after(operator, space.abstract(world.state))
     if not _approach(domain, world, operator):
         return Stage(name, names, (), StageEnd.NOT_APPROACHED.value, 0)
     began = tuple(map(float, world.state.data))
@@ -231,12 +210,12 @@ def _carry_out(
         action = policy(world.state)
         assert action is not None
         abstract = space.abstract(world.step(action))
-        if target.reached(abstract):
+        if target.reached(abstract) and skill.accepts(world.state, objects):
             return Stage(name, names, began, StageEnd.DONE.value, step)
         effects |= not (operator.add_effects & ~abstract or operator.delete_effects & abstract)
     end = StageEnd.DISTURBED if effects else StageEnd.NO_EFFECT
-    wrong = (target.required & ~abstract) | (target.forbidden & abstract)
-    return Stage(name, names, began, end.value, skill.horizon, tuple(map(str, space.decode(wrong))))
+    wrong = tuple(map(str, space.decode(target.difference(abstract))))
+    return Stage(name, names, began, end.value, skill.horizon, wrong)
 
 
 def _approach(domain: Domain, world: World, operator: GroundOperator) -> bool:

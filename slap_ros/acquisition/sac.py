@@ -9,13 +9,14 @@ so that one that is resumed there ends with the same weights.
 
 from __future__ import annotations
 
-import json
+from collections.abc import Iterator, Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from stable_baselines3.common.logger import Logger
 
 from slap_ros.acquisition.episodes import Episodes
@@ -34,6 +35,53 @@ ONE = np.ones(SIZE, dtype=np.float32)
 AS_OBSERVED = ObservationNormalisation(0.0 * ONE, ONE)  # clipped alone: any skill can begin another
 
 
+class ExploringSac(LeanSac):
+    """SAC whose noise is held: in the last environment longest, in each before it half as long.
+
+    Random actions of the beginning are held for 1, 2, 3 steps and so on. Noise that is correlated
+    in time reaches what white noise hardly does (Eberhard et al. 2023): fingers that are to grasp
+    must close for some steps on end. It is a function of seed and step, so that nothing of it
+    needs to be kept.
+    """
+
+    longest_hold = 1  # environment steps
+
+    def _sample_action(
+        self, learning_starts: int, action_noise: Any = None, n_envs: int = 1
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        del action_noise
+        if self.num_timesteps < learning_starts:
+            holds = [1 + env % self.longest_hold for env in range(n_envs)]
+            drawn = [rng.uniform(-1.0, 1.0, self._axes) for rng in self._draws(holds)]
+            actions = np.stack(drawn).astype(np.float32)
+        else:
+            holds = [max(1, self.longest_hold >> (n_envs - 1 - env)) for env in range(n_envs)]
+            noise = [rng.standard_normal(self._axes) for rng in self._draws(holds)]
+            actions = self._act_with(np.stack(noise).astype(np.float32))
+        return actions, actions
+
+    def _draws(self, holds: Sequence[int]) -> Iterator[np.random.Generator]:
+        """A generator for each environment, the same for the steps that it holds what it drew."""
+        assert self.seed is not None
+        step = self.num_timesteps // len(holds)
+        for env, hold in enumerate(holds):
+            yield np.random.default_rng((self.seed, env, step // hold))
+
+    @property
+    def _axes(self) -> int:
+        assert self.action_space.shape is not None
+        return self.action_space.shape[0]
+
+    def _act_with(self, noise: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The policy's actions in the present states, given noise of deviation 1, (n, axes)."""
+        with torch.no_grad():
+            mean, log_std = self.distribution(torch.as_tensor(self._last_obs))
+            actions: NDArray[np.float32] = torch.tanh(
+                mean + log_std.exp() * torch.from_numpy(noise)
+            ).numpy()
+        return actions
+
+
 class SkillLearner:
     """SAC on the episodes of one skill."""
 
@@ -48,7 +96,7 @@ class SkillLearner:
         torch.set_num_threads(1)  # tiny networks: more threads only wait for one another
         self.settings, self._env = settings, env
         actions = env.action_map.size
-        self._sac = LeanSac(
+        self._sac = ExploringSac(
             "MlpPolicy",
             StableBaselinesVecEnv(env, AS_OBSERVED),
             learning_rate=settings.learning_rate,
@@ -57,6 +105,7 @@ class SkillLearner:
             batch_size=settings.batch_size,
             tau=settings.tau,
             gamma=settings.discount,
+            ent_coef=f"auto_{settings.entropy_weight}",
             train_freq=1,
             gradient_steps=settings.environments // settings.steps_per_update,
             replay_buffer_class=SkillReplayBuffer,
@@ -69,6 +118,9 @@ class SkillLearner:
             seed=seed,
             device="cpu",
         )
+        self._sac.longest_hold = settings.longest_hold
+        if settings.critic_layer_norm:
+            self._sac.normalise_critics()
         self._sac.set_logger(Logger(None, []))
 
     @property
@@ -102,8 +154,8 @@ class SkillLearner:
         return episodes
 
     def policy(self) -> MlpPolicy:
-        """The policy as it is now, without torch, its most likely action squashed."""
-        weights = {k: v.detach().numpy().copy() for k, v in self._sac.actor.state_dict().items()}
+        """The actor's average as it is now, without torch, its most likely action squashed."""
+        weights = {name: value.numpy().copy() for name, value in self._sac.averaged.items()}
         hidden = [f"latent_pi.{2 * i}" for i in range(len(self.settings.hidden))]
         layers = tuple(
             (weights[f"{name}.weight"], weights[f"{name}.bias"]) for name in [*hidden, "mu"]
@@ -127,8 +179,9 @@ class SkillLearner:
                 "learn with the same hidden layers"
             )
         for name, (weight, bias) in zip(names, policy.layers, strict=True):
-            now[f"{name}.weight"].copy_(torch.from_numpy(weight))
-            now[f"{name}.bias"].copy_(torch.from_numpy(bias))
+            for tensors in (now, self._sac.averaged):
+                tensors[f"{name}.weight"].copy_(torch.from_numpy(weight))
+                tensors[f"{name}.bias"].copy_(torch.from_numpy(bias))
 
     # -- checkpoints ------------------------------------------------------------------------------
 
@@ -137,9 +190,11 @@ class SkillLearner:
         sac, draft = self._sac, path.with_suffix(".draft")
         assert sac.log_ent_coef is not None
         assert sac.ent_coef_optimizer is not None
+        whole = BytesIO()  # torch reports a full disk as a fault of its own
         torch.save(
             {
                 "policy": sac.policy.state_dict(),
+                "averaged": sac.averaged,
                 "actor_optimizer": sac.actor.optimizer.state_dict(),
                 "critic_optimizer": sac.critic.optimizer.state_dict(),
                 "entropy_weight": sac.log_ent_coef.detach(),
@@ -147,10 +202,10 @@ class SkillLearner:
                 "steps": sac.num_timesteps,
                 "torch_generator": torch.get_rng_state(),
                 "buffer_generator": self.buffer.generator_state,
-                "random_actions": json.dumps(sac.action_space.np_random.bit_generator.state),
             },
-            draft,
+            whole,
         )
+        draft.write_bytes(whole.getbuffer())
         draft.rename(path)
 
     def resume(self, path: Path, episodes: list[Episodes]) -> None:
@@ -167,6 +222,8 @@ class SkillLearner:
         assert sac.log_ent_coef is not None
         assert sac.ent_coef_optimizer is not None
         sac.policy.load_state_dict(saved["policy"])
+        for name, value in sac.averaged.items():
+            value.copy_(saved["averaged"][name])
         sac.actor.optimizer.load_state_dict(saved["actor_optimizer"])
         sac.critic.optimizer.load_state_dict(saved["critic_optimizer"])
         with torch.no_grad():
@@ -176,7 +233,6 @@ class SkillLearner:
         for some in episodes:
             self.buffer.add_episodes(some)
         self.buffer.generator_state = saved["buffer_generator"]
-        sac.action_space.np_random.bit_generator.state = json.loads(saved["random_actions"])
         torch.set_rng_state(saved["torch_generator"])
 
 
@@ -188,7 +244,7 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
     """
     try:
         saved = torch.load(BytesIO(read_bytes(path, MAX_CHECKPOINT_BYTES)), weights_only=True)
-        return {**saved, "steps": int(saved["steps"])}
+        return {**saved, "averaged": dict(saved["averaged"]), "steps": int(saved["steps"])}
     except Exception as error:  # torch says in a dozen ways that a file is damaged
         raise InvalidParameterError(
             f"{path}: damaged: {type(error).__name__}; remove its folder to learn this skill again"

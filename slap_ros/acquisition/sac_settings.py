@@ -20,13 +20,20 @@ class SacSettings:
     Args:
         environments: Episodes side by side.
         hidden: Units of each hidden layer, of actor and critics alike.
+        critic_layer_norm: Whether hidden layers of the critics are normalised. Without, the value
+            of what was never tried runs ahead of what is known, and success swings late.
         batch_size: Transitions of an update.
         steps_per_update: Environment steps for each update.
         learning_rate: Of actor, critics and the entropy's weight.
         discount: Of rewards, per environment step.
-        tau: How far target networks follow in each update.
+        tau: How far target networks, and the policy that is judged, follow in each update.
         entropy_per_action: Target entropy, for each action.
+        entropy_weight: What entropy is worth in the beginning. The library's 1 outweighs a reward
+            of at most 1 for the first 5,000 steps or so.
         random_steps: Environment steps with random actions, before the first update.
+        longest_hold: Environment steps for which the last environment holds its noise; each one
+            before it holds it half as long, one step at least. Random actions of the beginning
+            are held for 1, 2, 3 steps and so on, at most this.
         capacity: Transitions that are kept; the oldest episodes are forgotten first.
 
     Raises:
@@ -35,16 +42,24 @@ class SacSettings:
 
     environments: int = 8
     hidden: tuple[int, ...] = (64, 64)
+    critic_layer_norm: bool = True
     batch_size: int = 128
     steps_per_update: int = 2
     learning_rate: float = 1e-3
     discount: float = 0.98
     tau: float = 0.005
     entropy_per_action: float = -1.0
-    random_steps: int = 800
+    entropy_weight: float = 0.1
+    random_steps: int = 1600
+    longest_hold: int = 8
     capacity: int = 200_000
 
     def __post_init__(self) -> None:
+        if not (self.entropy_weight > 0.0 and self.longest_hold >= 1):
+            raise InvalidParameterError(
+                f"entropy_weight is {self.entropy_weight}, longest_hold {self.longest_hold}; "
+                "give a positive number, and 1 at least"
+            )
         if self.environments % self.steps_per_update:
             raise InvalidParameterError(
                 f"{self.environments} environments are stepped together, and after each step an "
@@ -61,12 +76,15 @@ SAC_PRESETS: Mapping[str, SacSettings] = {
     "maple": SacSettings(
         environments=3,
         hidden=(256, 256),
+        critic_layer_norm=False,
         batch_size=1024,
         steps_per_update=3,
         learning_rate=3e-5,
         discount=0.99,
         tau=1e-3,
+        entropy_weight=1.0,
         random_steps=30_000,
+        longest_hold=1,
         capacity=1_000_000,
     ),
 }

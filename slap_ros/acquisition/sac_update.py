@@ -4,14 +4,15 @@
 
 The losses, the networks, the optimisers and the order of random draws are the library's, so that
 the weights after an update are the same up to rounding, which a test shows. What is left out is
-what small networks spend their time on: gradients of the critics for the actor's loss, which are
-thrown away; objects for distributions; hooks of modules; a loop over the parameters of the target
-networks; and figures for a logger.
+what small networks spend their time on: a recorded graph of the critics; their weights' gradients
+for the actor's loss, which are thrown away; objects for distributions; hooks of modules; a loop
+over the parameters of the target networks; and figures for a logger.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import torch
@@ -19,42 +20,38 @@ from stable_baselines3 import SAC
 from stable_baselines3.sac.policies import LOG_STD_MAX, LOG_STD_MIN
 from torch.nn import functional
 
+from slap_ros.acquisition.twin_critics import NormalisedRectifier, TwinCritics, linear_layers
+
 LOG_SQRT_TAU = 0.5 * math.log(2.0 * math.pi)
 SQUASH_EPSILON = 1e-6  # against log 0, as the library has it
 
 
-Layers = list[tuple[torch.Tensor, torch.Tensor]]  # weights and bias of each
-
-
-def _layers(network: torch.nn.Module) -> Layers:
-    """The linear layers of a perceptron; between them is the rectifier."""
-    return [
-        (layer.weight, layer.bias)
-        for layer in network.modules()
-        if isinstance(layer, torch.nn.Linear)
-    ]
-
-
-def _forward(layers: Layers, inputs: torch.Tensor) -> torch.Tensor:
-    """What a perceptron makes of its inputs, without a module's hooks."""
-    (weight, bias), *others = layers
-    outputs = functional.linear(inputs, weight, bias)
-    for weight, bias in others:
-        outputs = functional.linear(outputs.relu(), weight, bias)
-    return outputs
-
-
 class LeanSac(SAC):
-    """SAC without batch normalisation and state-dependent exploration."""
+    """SAC without batch normalisation and state-dependent exploration.
+
+    Beside the actor there is its average over updates, which follows as target networks do. From
+    one update to the next the actor goes to and fro between good and bad; its average does not.
+    """
+
+    averaged: dict[str, torch.Tensor]  # the actor's average, by name
 
     def _setup_model(self) -> None:
         super()._setup_model()
         assert self.log_ent_coef is not None
         rate = self.lr_schedule(1.0)
         self.ent_coef_optimizer = torch.optim.Adam([self.log_ent_coef], lr=rate, fused=True)
-        self._online = [_layers(network) for network in self.critic.q_networks]
-        self._target = [_layers(network) for network in self.critic_target.q_networks]
-        self._hidden = _layers(self.actor.latent_pi)
+        self._online = TwinCritics(self.critic.q_networks)
+        self._target = TwinCritics(self.critic_target.q_networks)
+        make: Callable[..., torch.optim.Optimizer] = self.policy.optimizer_class
+        settings = self.policy.optimizer_kwargs
+        self.critic.optimizer = make(self._online.tensors, lr=rate, **settings)
+        self._actor_weights = list(self.actor.parameters())
+        self._hidden = [(layer.weight, layer.bias) for layer in linear_layers(self.actor.latent_pi)]
+        self.averaged = {k: v.detach().clone() for k, v in self.actor.state_dict().items()}
+
+    def normalise_critics(self) -> None:
+        """Normalise the hidden layers of the critics from now on."""
+        self._online.activation = self._target.activation = NormalisedRectifier()
 
     def train(self, gradient_steps: int, batch_size: int = 64) -> None:
         """Update the networks so many times, each with a batch of its own.
@@ -63,8 +60,8 @@ class LeanSac(SAC):
             gradient_steps: Updates.
             batch_size: Transitions of each.
         """
-        online: list[torch.Tensor] = list(self.critic.parameters())
-        target: list[torch.Tensor] = list(self.critic_target.parameters())
+        online = [*self._online.tensors, *self._actor_weights]
+        following = [*self._target.tensors, *self.averaged.values()]
         for _ in range(gradient_steps):
             batch = self.replay_buffer.sample(batch_size)  # type: ignore[union-attr]
             actions, log_prob = self._act(batch.observations)
@@ -72,52 +69,48 @@ class LeanSac(SAC):
             self._update_critic(batch, entropy_weight)
             self._update_actor(batch.observations, actions, log_prob, entropy_weight)
             with torch.no_grad():
-                torch._foreach_lerp_(target, online, self.tau)
+                torch._foreach_lerp_(following, online, self.tau)
         self._n_updates += gradient_steps
 
     def _act(self, observations: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Actions drawn from the policy, and the logarithm of their density, shape (n, 1)."""
-        hidden = _forward(self._hidden, observations).relu()
-        mean, log_std = self.actor.mu(hidden), self.actor.log_std(hidden)  # type: ignore[operator]
-        log_std = log_std.clamp(LOG_STD_MIN, LOG_STD_MAX)
+        mean, log_std = self.distribution(observations)
         noise = torch.randn_like(mean)
         actions = torch.tanh(mean + log_std.exp() * noise)
         gaussian = -0.5 * noise * noise - log_std - LOG_SQRT_TAU
         squash = torch.log(1.0 - actions * actions + SQUASH_EPSILON)
         return actions, (gaussian - squash).sum(dim=1, keepdim=True)
 
-    @staticmethod
-    def _least_value(
-        critics: list[Layers], observations: torch.Tensor, actions: torch.Tensor
-    ) -> torch.Tensor:
-        """The least of both critics' values, shape (n, 1)."""
-        inputs = torch.cat([observations, actions], dim=1)
-        one, other = (_forward(network, inputs) for network in critics)
-        return torch.minimum(one, other)
+    def distribution(self, observations: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Mean and logarithm of the deviation, before tanh, each of shape (n, axes)."""
+        hidden = observations
+        for weight, bias in self._hidden:
+            hidden = functional.linear(hidden, weight, bias).relu()
+        mean, log_std = self.actor.mu(hidden), self.actor.log_std(hidden)  # type: ignore[operator]
+        return mean, log_std.clamp(LOG_STD_MIN, LOG_STD_MAX)
 
     def _update_entropy_weight(self, log_prob: torch.Tensor) -> torch.Tensor:
         """Move the entropy's weight towards the target entropy; the weight before that."""
         assert self.log_ent_coef is not None
         assert self.ent_coef_optimizer is not None
         weight = self.log_ent_coef.detach().exp()
-        loss = -(self.log_ent_coef * (log_prob + float(self.target_entropy)).detach()).mean()
-        self.ent_coef_optimizer.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
+        # The gradient of -(log_ent_coef * (log_prob + target_entropy)).mean()
+        self.log_ent_coef.grad = -(log_prob.detach().mean() + float(self.target_entropy))[None]
         self.ent_coef_optimizer.step()
         return weight
 
+    @torch.no_grad()
     def _update_critic(self, batch: Any, entropy_weight: torch.Tensor) -> None:
-        with torch.no_grad():
-            actions, log_prob = self._act(batch.next_observations)
-            value = self._least_value(self._target, batch.next_observations, actions)
-            value -= entropy_weight * log_prob
-            wanted = batch.rewards + (1.0 - batch.dones) * self.gamma * value
-        inputs = torch.cat([batch.observations, batch.actions], dim=1)
-        one, other = (_forward(network, inputs) for network in self._online)
-        loss = 0.5 * (functional.mse_loss(one, wanted) + functional.mse_loss(other, wanted))
-        self.critic.optimizer.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
-        self.critic.optimizer.step()
+        actions, log_prob = self._act(batch.next_observations)
+        one, other = self._target(batch.next_observations, actions).values
+        value = torch.minimum(one, other)
+        value -= entropy_weight * log_prob
+        wanted = batch.rewards + (1.0 - batch.dones) * self.gamma * value
+        forward = self._online(batch.observations, batch.actions)
+        # Of the mean squared error of both, which is half of the sum of their losses.
+        gradient = (forward.values - wanted).mul_(2.0 / forward.values.numel())
+        gradients = self._online.weight_gradients(forward, gradient)
+        _descend(self.critic.optimizer, self._online.tensors, gradients)
 
     def _update_actor(
         self,
@@ -126,7 +119,7 @@ class LeanSac(SAC):
         log_prob: torch.Tensor,
         entropy_weight: torch.Tensor,
     ) -> None:
-        """Towards actions of more value and entropy.
+        """Towards actions of more value and entropy: less (weight · log_prob - min value).mean().
 
         Args:
             observations: Shape (n, size).
@@ -134,10 +127,31 @@ class LeanSac(SAC):
             log_prob: Logarithm of their density, with its gradient, shape (n, 1).
             entropy_weight: What entropy is worth.
         """
-        self.critic.requires_grad_(False)  # only its value's gradient by the actions is used
-        value = self._least_value(self._online, observations, actions)
-        loss = (entropy_weight * log_prob - value).mean()
-        self.critic.requires_grad_(True)
-        self.actor.optimizer.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
-        self.actor.optimizer.step()
+        n, axes = actions.shape
+        with torch.no_grad():
+            forward = self._online(observations, actions)
+            by_values = _share_in_minimum(forward.values).mul_(-1.0 / n)
+            by_actions = self._online.action_gradient(forward, by_values, axes)
+            by_log_prob = (entropy_weight / n).expand_as(log_prob)
+        gradients = torch.autograd.grad(
+            (actions, log_prob), self._actor_weights, (by_actions, by_log_prob)
+        )
+        _descend(self.actor.optimizer, self._actor_weights, gradients)
+
+
+def _share_in_minimum(values: torch.Tensor) -> torch.Tensor:
+    """The gradient of the smaller of two values by each of them; they share it where equal."""
+    one, other = values
+    first = (one < other).to(values.dtype).add_((one == other).to(values.dtype), alpha=0.5)
+    return torch.stack([first, 1.0 - first])
+
+
+def _descend(
+    optimizer: torch.optim.Optimizer,
+    weights: Sequence[torch.Tensor],
+    gradients: Sequence[torch.Tensor],
+) -> None:
+    """A step along gradients."""
+    for weight, gradient in zip(weights, gradients, strict=True):
+        weight.grad = gradient
+    optimizer.step()

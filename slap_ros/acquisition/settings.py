@@ -17,6 +17,8 @@ class AcquisitionSettings:
 
     Args:
         sac: How a skill is learned.
+        dense_share: What the weighted metrics are paid by. The paper's weights pay .8 or .9 for
+            being near and 1 for success: so small a margin is learned late, if at all.
         rollouts: Tasks that the plan is carried out in, new ones in each iteration.
         validation: Tasks that skills are judged on, which training never sees.
         judged: States at most, from these tasks, that a checkpoint is judged from.
@@ -31,11 +33,12 @@ class AcquisitionSettings:
     """
 
     sac: SacSettings = field(default_factory=SacSettings)
+    dense_share: float = 0.3
     rollouts: int = 40
     validation: int = 40
     judged: int = 40
     segment_episodes: int = 5
-    skill_steps: int = 16_000
+    skill_steps: int = 24_000
     total_steps: int = 150_000
     enough: float = 0.95
     progress: float = 0.95
@@ -47,6 +50,10 @@ class AcquisitionSettings:
         for name in ("rollouts", "validation", "judged", "segment_episodes", "patience"):
             if getattr(self, name) < 1:
                 raise InvalidParameterError(f"{name} is {getattr(self, name)}; give 1 at least")
+        if not 0.0 <= self.dense_share <= 1.0:
+            raise InvalidParameterError(
+                f"dense_share is {self.dense_share}; give a share from 0 to 1"
+            )
         if not 0.0 <= self.rehearsal < 1.0:
             raise InvalidParameterError(f"rehearsal is {self.rehearsal}; give a share below 1")
 

@@ -4,15 +4,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from slap_ros.acquisition.groundings import Grounding, Groundings
 from slap_ros.acquisition.observations import SkillObserver
+from slap_ros.acquisition.reward import OperatorEffects
 from slap_ros.core import Action, Approach, Domain, Policy
 from slap_ros.errors import InvalidDomainError
 from slap_ros.learning.action_map import ActionMap
+from slap_ros.learning.learner_interface import learner_interface
 from slap_ros.learning.mlp_policy import MlpPolicy
 from slap_ros.relational import LiftedOperator, Object, State
 
@@ -34,7 +37,7 @@ def approach_of(domain: Domain) -> Approach:
     return domain.acquisition.approach
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LearnedSkill:
     """The skill of an operator, for any objects of the operator's types.
 
@@ -80,9 +83,19 @@ class LearnedSkill:
         Returns:
             The approach and then the policy; None once the horizon is reached.
         """
-        return _SkillExecution(self, state, objects)
+        return _PolicyExecution(self, state, objects)
 
-    def act(self, objects: tuple[Object, ...]) -> Policy:
+    def accepts(self, state: State, objects: tuple[Object, ...]) -> bool:
+        """Whether what it does is done as surely as it was learned.
+
+        Args:
+            state: As things are.
+            objects: What it is applied to.
+        """
+        (part,) = Groundings([Grounding(state.layout, objects)]).split(state.data[None], NOBODY)
+        return bool(OperatorEffects(self.operator, learner_interface(self.domain)).hold(part)[0])
+
+    def act(self, objects: tuple[Object, ...]) -> Callable[[State], Action]:
         """The policy alone, from where the approach ends.
 
         Args:
@@ -105,7 +118,7 @@ class LearnedSkill:
         return policy
 
 
-class _SkillExecution:
+class _PolicyExecution:
     """A skill that is being executed."""
 
     def __init__(self, skill: LearnedSkill, state: State, objects: tuple[Object, ...]) -> None:

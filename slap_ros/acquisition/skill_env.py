@@ -19,6 +19,7 @@ from slap_ros.acquisition.episodes import Episodes
 from slap_ros.acquisition.groundings import Grounding, Groundings, Indices
 from slap_ros.acquisition.observations import SIZE, SkillObserver
 from slap_ros.acquisition.reward import SkillReward
+from slap_ros.acquisition.stage_targets import StageTargets
 from slap_ros.core import Domain, VectorWorld
 from slap_ros.learning.action_map import ActionMap
 from slap_ros.learning.shares import proportional_shares
@@ -49,24 +50,32 @@ class Initiation:
 class SkillMdp:
     """What is observed and paid for in states of an operator's skill."""
 
-    def __init__(self, domain: Domain, reward: SkillReward, groundings: Groundings) -> None:
+    def __init__(
+        self,
+        domain: Domain,
+        reward: SkillReward,
+        groundings: Groundings,
+        dense_share: float = 1.0,
+    ) -> None:
         """Bind a reward to a domain's features and a choice of groundings.
 
         Args:
             domain: Whose learner's interface is used.
             reward: Of the operator.
             groundings: Those that states are of.
+            dense_share: What the weighted metrics are paid by; success is paid 1.
 
         Raises:
             InvalidDomainError: The domain has no learner's interface.
         """
         self.domain, self.reward, self.groundings = domain, reward, groundings
-        self._observe = SkillObserver(domain)
+        self.dense_share = dense_share
+        self._observe, self._targets = SkillObserver(domain), StageTargets(domain, reward.operator)
         self.action_map = ActionMap(domain, gripper=True)
 
     def over(self, groundings: Groundings) -> SkillMdp:
         """The same for states of other groundings."""
-        return SkillMdp(self.domain, self.reward, groundings)
+        return SkillMdp(self.domain, self.reward, groundings, self.dense_share)
 
     def observe(self, rows: Array, numbers: Indices) -> NDArray[np.float32]:
         """What is observed in states.
@@ -83,20 +92,22 @@ class SkillMdp:
             observed[part.rows] = self._observe(part)
         return observed
 
-    def rewards(self, rows: Array, numbers: Indices) -> tuple[Array, Bools]:
+    def rewards(self, rows: Array, numbers: Indices, begun: Array) -> tuple[Array, Bools]:
         """What arriving in states is paid, and whether they are successes.
 
         Args:
             rows: Shape (n, width).
             numbers: Of the grounding of each, shape (n,).
+            begun: The states in which their episodes began, shape (n, width).
 
         Returns:
             Two arrays of shape (n,).
         """
         rewards, success = np.zeros(len(rows)), np.zeros(len(rows), dtype=bool)
         for part in self.groundings.split(rows, numbers):
-            success[part.rows] = self.reward.success(part)
-            dense = self.reward.dense(part)
+            first = begun[part.rows, : part.state.layout.size]
+            success[part.rows] = self._targets.reached(part, first, self.reward.success(part))
+            dense = self.dense_share * self.reward.dense(part)
             rewards[part.rows] = np.maximum(dense, success[part.rows].astype(np.float64))
         return rewards, success
 
@@ -148,7 +159,7 @@ class SkillVecEnv:
             self._rows[part] = self.mdp.groundings.rows(world.step(commands[part]).data)
         self._trace.append(self._rows.copy())
         self._actions.append(np.array(actions, dtype=np.float32))
-        rewards, success = self.mdp.rewards(self._rows, self._numbers)
+        rewards, success = self.mdp.rewards(self._rows, self._numbers, self._trace[0])
         self._success |= success
         final = self.mdp.observe(self._rows, self._numbers)
         last = len(self._actions) == self.horizon

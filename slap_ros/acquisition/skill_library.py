@@ -40,24 +40,33 @@ from slap_ros.core import Domain
 from slap_ros.errors import InvalidDomainError, InvalidLibraryError, InvalidRewardError
 from slap_ros.learning.action_map import ActionMap
 from slap_ros.learning.library_files import (
+    SKILL,
     load_policy,
     policy_tensors,
+    read_about,
+    read_members,
     read_object,
-    replace_folder,
+    record_of,
     save_policy,
+    write_library,
     write_object,
 )
 from slap_ros.learning.mlp_policy import ACTIVATIONS, MlpPolicy
 from slap_ros.relational import LiftedOperator, RewardTemplate
 
 FORMAT = 1
-LIBRARY, SKILL, POLICY = "library.json", "skill.json", "policy.safetensors"
+POLICY = "policy.safetensors"
 MAX_HORIZON = 10_000  # environment steps
 
 
 def operator_digest(operator: LiftedOperator) -> str:
     """Eight hexadecimal digits that tell lifted operators apart."""
     return sha256(json.dumps(operator_data(operator)).encode()).hexdigest()[:8]
+
+
+def skill_folder_name(operator: LiftedOperator) -> str:
+    """The name of the folder of an operator's skill: the operator's name and digest."""
+    return f"{operator.name}-{operator_digest(operator)}"
 
 
 @dataclass(frozen=True)
@@ -81,7 +90,7 @@ class AcquiredSkill:
     @property
     def folder_name(self) -> str:
         """The operator's name and digest."""
-        return f"{self.operator.name}-{operator_digest(self.operator)}"
+        return skill_folder_name(self.operator)
 
     def in_domain(self, domain: Domain) -> LearnedSkill:
         """The skill, to be executed."""
@@ -111,38 +120,17 @@ class SkillLibrary:
             return ""
         whole = sha256()
         for skill in self.skills:
-            whole.update(skill.folder_name.encode() + save(policy_tensors(skill.policy)))
+            policy = skill.policy
+            run_as = f"{skill.folder_name} {skill.horizon} {policy.activation} {policy.squashed}"
+            whole.update(run_as.encode() + save(policy_tensors(policy)))
         return whole.hexdigest()[:16]
-
-
-def acquired_domain(domain: Domain, library: SkillLibrary) -> Domain:
-    """The domain with a library's operators and skills in the place of its own.
-
-    Args:
-        domain: Whose predicates, worlds and approach are used.
-        library: Of that domain.
-
-    Returns:
-        A domain like any other; what is static in it is what was static before.
-    """
-    return replace(
-        domain,
-        operators=tuple(skill.operator for skill in library.skills),
-        skills={skill.operator.name: skill.in_domain(domain) for skill in library.skills},
-        static=domain.static_predicates,
-    )
 
 
 def save_skill_library(path: Path, library: SkillLibrary) -> None:
     """Write a library as a folder, in place of the one that may be there."""
-
-    def write(folder: Path) -> None:
-        for skill in library.skills:
-            save_skill(folder / skill.folder_name, skill)
-        about = {"format": FORMAT, "domain": library.domain, **library.record}
-        write_object(folder / LIBRARY, about)
-
-    replace_folder(path, write)
+    about = {"format": FORMAT, "domain": library.domain, **library.record}
+    skills = {skill.folder_name: skill for skill in library.skills}
+    write_library(path, about, skills, save_skill)
 
 
 def load_skill_library(path: Path, domain: Domain) -> SkillLibrary:
@@ -150,40 +138,25 @@ def load_skill_library(path: Path, domain: Domain) -> SkillLibrary:
 
     Raises:
         InvalidLibraryError: There is none, or it is damaged as a whole, newer than this version,
-            or another domain's.
+            another domain's, or one of shortcuts.
     """
     about = read_library_record(path)
     if about["domain"] != domain.name:
         raise InvalidLibraryError(
             f"{path}: skills of domain {about['domain']!r}, not of {domain.name!r}"
         )
-    skills, refused = [], []
-    for folder in sorted(entry for entry in path.iterdir() if entry.is_dir()):
-        try:
-            skills.append(load_skill(folder, domain))
-        except InvalidLibraryError as error:
-            refused.append(error)
-    record = {k: v for k, v in about.items() if k not in ("format", "domain")}
-    return SkillLibrary(domain.name, tuple(skills), record, tuple(refused))
+    skills, refused = read_members(path, lambda folder: load_skill(folder, domain))
+    return SkillLibrary(domain.name, skills, record_of(about), refused)
 
 
 def read_library_record(path: Path) -> dict[str, Any]:
     """What is said of a library, without its skills.
 
     Raises:
-        InvalidLibraryError: There is none, or it is damaged or newer than this version.
+        InvalidLibraryError: There is none, or it is damaged, newer than this version, or a library
+            of shortcuts.
     """
-    if not path.is_dir():
-        raise InvalidLibraryError(f"{path}: no such folder; `slap acquire DOMAIN` makes one")
-    about = read_object(path / LIBRARY)
-    if about.get("format") != FORMAT:
-        raise InvalidLibraryError(
-            f"{path}: format {about.get('format')!r}, this version of slap_ros reads {FORMAT}; "
-            "acquire the skills again or use the version of slap_ros that made them"
-        )
-    if not isinstance(about.get("domain"), str):
-        raise InvalidLibraryError(f"{path / LIBRARY}: damaged: it names no domain")
-    return about
+    return read_about(path, SKILL, FORMAT, "slap acquire DOMAIN", "acquire the skills again")
 
 
 # -- one skill ------------------------------------------------------------------------------------

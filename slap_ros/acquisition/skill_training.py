@@ -37,6 +37,7 @@ from slap_ros.learning.work_folder import DECODING_ERRORS
 if TYPE_CHECKING:
     from slap_ros.acquisition.sac import SkillLearner
 
+ROUNDS = "rounds.json"
 IN_A_ROW = 2  # good judgements after which a round is over
 
 
@@ -56,6 +57,12 @@ class Round:
     best: int = 0
     over: bool = False
 
+    @classmethod
+    def from_json(cls, data: dict[str, Any]) -> Round:
+        """The inverse of ``asdict``, once it has been through JSON."""
+        segments = tuple(map(float, data["segments"]))
+        return cls(float(data["initial"]), segments, int(data["best"]), bool(data["over"]))
+
     @property
     def success(self) -> float:
         """The success of the checkpoint that stays."""
@@ -73,6 +80,26 @@ class Round:
         return len(latest) == IN_A_ROW and min(latest) >= enough
 
 
+def rounds_in(folder: Path) -> list[Round]:
+    """How a skill's rounds went so far; none before the first judgement.
+
+    Args:
+        folder: Of its training.
+
+    Raises:
+        InvalidParameterError: What is there is damaged.
+    """
+    path = folder / ROUNDS
+    if not path.exists():
+        return []
+    try:
+        return [Round.from_json(one) for one in parse_json(read_text(path))]
+    except DECODING_ERRORS as error:
+        raise InvalidParameterError(
+            f"{path}: damaged: {error!r}; remove its folder to learn this skill again"
+        ) from error
+
+
 @dataclass
 class SkillTraining:
     """The training of one skill, round after round in the same folder.
@@ -84,6 +111,7 @@ class SkillTraining:
         settings: All hyper-parameters.
         seed: Of the whole curriculum.
         folder: Where everything is kept.
+        attempt: How often the skill was learned from scratch before.
     """
 
     domain: Domain
@@ -92,6 +120,7 @@ class SkillTraining:
     settings: AcquisitionSettings
     seed: int
     folder: Path
+    attempt: int = 0
     _rounds: list[Round] = field(default_factory=list, init=False)
 
     def run(
@@ -115,18 +144,20 @@ class SkillTraining:
         Raises:
             InvalidParameterError: The folder is damaged.
         """
-        self._rounds = self._read_rounds()
+        if not (self.folder / ROUNDS).exists():
+            shutil.rmtree(self.folder, ignore_errors=True)  # of a round that had hardly begun
+        self._rounds = rounds_in(self.folder)
         if number < len(self._rounds) and self._rounds[number].over:
             return self._rounds[number]
         done = sum(len(earlier.segments) for earlier in self._rounds[: number + 1])
         groundings = Groundings(list(dict.fromkeys(one.grounding for one in initiations)))
-        mdp = SkillMdp(self.domain, self.reward, groundings)
+        mdp = SkillMdp(self.domain, self.reward, groundings, self.settings.dense_share)
         in_round = 0 if number == len(self._rounds) else len(self._rounds[number].segments)
         learner = self._learner(mdp, initiations, number, in_round)
         trials = SkillTrials(self.domain, self.reward, fresh, self.horizon)
-        self._resume(learner, number, done, in_round, beginning)
+        self._resume(learner, number, done, beginning)
         if number == len(self._rounds):
-            self._begin_round(learner, trials)
+            self._begin_round(learner, trials, done)
         while not self._rounds[-1].over:
             self._segment(learner, trials, done)
             done += 1
@@ -144,8 +175,10 @@ class SkillTraining:
         return SkillLearner(env, self.settings.sac, seed)
 
     def _seed(self, number: int) -> int:
-        """Every skill and round draws from streams of its own."""
+        """Every skill, attempt and round draws from streams of its own."""
         text = f"{self.seed} {self.reward.operator.name} {number}"
+        if self.attempt:
+            text += f" {self.attempt}"
         return int.from_bytes(sha256(text.encode()).digest()[:4], "little")
 
     def _resume(
@@ -153,7 +186,6 @@ class SkillTraining:
         learner: SkillLearner,
         number: int,
         done: int,
-        in_round: int,
         beginning: MlpPolicy | None,
     ) -> None:
         """Go on from the last checkpoint; a round begins with the best one where it is better.
@@ -162,7 +194,6 @@ class SkillTraining:
             learner: To go on with.
             number: Of the round.
             done: Segments so far, of all rounds.
-            in_round: Of this round.
             beginning: What a first round begins with.
         """
         types = self.domain.types_by_name
@@ -170,13 +201,16 @@ class SkillTraining:
         if done:
             # Where none has succeeded yet, the last one has learned most.
             previous = self._rounds[number - 1]
-            worse = not in_round and previous.segments[-1] < previous.success
+            begins = number == len(self._rounds)
+            worse = begins and previous.segments[-1] < previous.success
             path = self.folder / "best.pt" if worse else self._checkpoint(done)
             learner.resume(path, earlier)
         elif beginning is not None:
             learner.begin_with(beginning)
 
-    def _begin_round(self, learner: SkillLearner, trials: SkillTrials) -> None:
+    def _begin_round(self, learner: SkillLearner, trials: SkillTrials, done: int) -> None:
+        if done:  # best.pt may be another one before the first segment counts
+            learner.save(self._checkpoint(done))
         self._rounds.append(Round(trials.success(learner.policy().mean)))
         self._keep_best(learner)
         self._write_rounds()
@@ -207,19 +241,6 @@ class SkillTraining:
     def _episodes(self, number: int) -> Path:
         return self.folder / "episodes" / f"{number:03}.safetensors"
 
-    def _read_rounds(self) -> list[Round]:
-        path = self.folder / "rounds.json"
-        if not path.exists():
-            shutil.rmtree(self.folder, ignore_errors=True)  # of a round that had hardly begun
-            return []
-        try:
-            data: list[dict[str, Any]] = parse_json(read_text(path))
-            return [Round(**{**one, "segments": tuple(one["segments"])}) for one in data]
-        except DECODING_ERRORS as error:
-            raise InvalidParameterError(
-                f"{path}: damaged: {error!r}; remove its folder to learn this skill again"
-            ) from error
-
     def _write_rounds(self) -> None:
         data = [asdict(one) for one in self._rounds]
-        write_whole(self.folder / "rounds.json", json.dumps(data))
+        write_whole(self.folder / ROUNDS, json.dumps(data))

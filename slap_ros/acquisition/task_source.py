@@ -85,6 +85,17 @@ class TaskSource:
         return {**vars(self), "proposal": json.loads(self.proposal)}
 
 
+def training_tasks(iteration: int, count: int) -> range:
+    """Indices of the tasks that an iteration carries out plans in: others in each."""
+    first = ROLLOUTS + iteration * count
+    return range(first, first + count)
+
+
+def fresh_tasks(count: int) -> range:
+    """Indices of the tasks that skills are judged on: always the same, and never trained on."""
+    return range(VALIDATION, VALIDATION + count)
+
+
 @lru_cache(maxsize=64)
 def _read(source: TaskSource) -> tuple[tuple[LiftedOperator, RewardTemplate], ...]:
     domain, pairs = source.make_domain(), []

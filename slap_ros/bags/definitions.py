@@ -27,6 +27,15 @@ from slap_ros.messages.interfaces import PACKAGE, definition, message_texts, typ
 IDL_SEPARATOR = "=" * 80 + "\n"
 MAX_DEFINITION_FIELDS = 5_000  # with those of nested types, constants included
 MAX_DEFINITION_CHARACTERS = 2**20
+# Fields and constants of messages that earlier bags do not have, by type. In them they would have
+# been empty, so that being without them means the same.
+ADDED = {
+    "slap_msgs/msg/PlanEdge": ("others_may_appear", "forbidden_atoms"),
+    "slap_msgs/msg/AcquisitionEvent": (
+        *("ROLLED_OUT", "JUDGED", "ACQUIRED", "operators", "iteration", "task", "progress"),
+        *("success", "segment_steps", "digest"),
+    ),
+}
 UNDEFINED = (TypesysError, SyntaxError, ValueError, KeyError, IndexError, RecursionError)
 UNREADABLE = (SerdeError, struct.error, ValueError, KeyError, IndexError, TypeError, OverflowError)
 
@@ -119,8 +128,9 @@ def check_version(channel: Channel) -> None:
     for name in _nested(channel.type_name):
         constants, fields = theirs.fielddefs.get(name, ([], []))
         wanted_constants, wanted_fields = ours.fielddefs[name]
-        missing = [entry[0] for entry in wanted_constants if entry not in constants]
-        missing += [entry[0] for entry in wanted_fields if entry not in fields]
+        missing = [e[0] for e in wanted_constants if e not in constants]
+        missing += [e[0] for e in wanted_fields if e not in fields]
+        missing = [entry for entry in missing if entry not in ADDED.get(name, ())]
         if missing:
             raise ForeignBagError(
                 _mismatch(channel, f"{', '.join(missing)} of {name} missing or different")

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from slap_ros.bags.definitions import ADDED
 from slap_ros.bags.reader import read_bag
 from slap_ros.errors import DamagedBagError
 from slap_ros.messages.interfaces import DOMAIN_INFO
@@ -34,7 +35,8 @@ def bag_digest(path: Path | str) -> str:
     """SHA-256 over what happened: the messages of each topic in order, topics by name.
 
     When messages were sent and received does not count, nor do software versions, diagnostics,
-    logs, transforms and markers, nor types that cannot be deserialised.
+    logs, transforms and markers, nor types that cannot be deserialised. A field that older bags do
+    not have counts where it is not empty, so that the same run has the digest that it always had.
 
     Returns:
         64 hexadecimal digits.
@@ -78,9 +80,10 @@ def _canonical(value: object) -> Iterator[bytes]:
     elif is_dataclass(value):
         type_name = str(getattr(value, "__msgtype__", ""))  # all classes of rosbags have it
         yield from _canonical(type_name)
-        excluded = EXCLUDED_FIELDS.get(type_name, ())
+        excluded, added = EXCLUDED_FIELDS.get(type_name, ()), ADDED.get(type_name, ())
         for field in fields(value):
-            if field.name not in excluded:
-                yield from _canonical(getattr(value, field.name))
+            part = getattr(value, field.name)
+            if field.name not in excluded and (field.name not in added or part):
+                yield from _canonical(part)
     else:
         raise TypeError(f"rosbags gave a message a {type(value).__name__}")

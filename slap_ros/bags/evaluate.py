@@ -11,7 +11,9 @@ from pathlib import Path
 from slap_ros.bags.reader import Bag, read_bag
 from slap_ros.bags.recording import RecordedEpisode, Recording, initial_state
 from slap_ros.core import Domain
-from slap_ros.evaluation.metrics import AtomNames, RunLog, RunMetrics
+from slap_ros.evaluation.atom_names import AtomNames
+from slap_ros.evaluation.metrics import RunMetrics
+from slap_ros.evaluation.run_log import RunLog
 from slap_ros.messages.decode import decode_state
 
 

@@ -5,15 +5,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import isfinite
 from typing import Any
 
+from slap_ros.acquisition.domain_choice import NO_SKILLS, DomainChoice, open_domain
 from slap_ros.bags.reader import Bag
 from slap_ros.core import Domain
-from slap_ros.errors import ForeignBagError
-from slap_ros.evaluation.metrics import AtomNames, atom_names
-from slap_ros.learning.domain_choice import DomainChoice, open_domain
+from slap_ros.errors import ForeignBagError, InvalidLibraryError, SkillsChangedError
+from slap_ros.evaluation.atom_names import AtomNames, atom_names
 from slap_ros.messages.decode import decode_state, stamp_ns
 from slap_ros.messages.interfaces import (
     ACQUISITION_EVENT,
@@ -112,6 +112,9 @@ class Recording:
     def domain(self) -> Domain | None:
         """The domain that was recorded; None where the bag breaks off before naming it.
 
+        Where the library of skills that was used is not at hand, the domain has none: what is
+        perceived, drawn and replayed needs none.
+
         Raises:
             UnknownDomainError: It is not known here.
             InvalidParameterError: Its preset, or its skills, are not known here.
@@ -120,7 +123,7 @@ class Recording:
         info = self.domain_info
         if info is None:
             return None
-        domain = open_domain(DomainChoice.announced(info))
+        domain = _open(DomainChoice.announced(info))
         recorded = {t.name: [str(name) for name in t.feature_names] for t in info.types}
         here = {t.name: [feature.name for feature in t.features] for t in domain.types}
         if recorded != here:
@@ -129,6 +132,14 @@ class Recording:
                 f"{here} here; read the bag with the version of slap_ros that wrote it"
             )
         return domain
+
+
+def _open(choice: DomainChoice) -> Domain:
+    """The domain, without skills where its library is not the one that ships here."""
+    try:
+        return open_domain(choice)
+    except (InvalidLibraryError, SkillsChangedError):
+        return open_domain(replace(choice, skills=NO_SKILLS, digest=""))
 
 
 def initial_state(episode: RecordedEpisode, domain: Domain) -> tuple[int, State] | None:

@@ -35,16 +35,16 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("plan")(exits(plan.plan))
+app.command("plan")(exits(flat_options(plan.plan)))
 app.command("propose")(exits(flat_options(propose.propose)))
-app.command("evaluate")(exits(evaluate.evaluate))
+app.command("evaluate")(exits(flat_options(evaluate.evaluate)))
 app.command("report")(exits(report.report))
 app.command("train")(exits(flat_options(train.train)))
 app.command("acquire")(exits(flat_options(acquire.acquire)))
 app.command("skills")(exits(skills.skills))
 app.add_typer(study.app, name="study")
 app.add_typer(bag.app, name="bag")
-app.command("check")(exits(check.check))
+app.command("check")(exits(flat_options(check.check)))
 app.command("domains")(exits(domains.domains))
 app.command("doctor")(exits(doctor_command.doctor))
 

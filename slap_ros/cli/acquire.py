@@ -4,22 +4,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
-from rich.progress import BarColumn, Progress, TaskID, TextColumn
 
+from slap_ros.acquisition.attempt_log import AttemptLog, Entry
 from slap_ros.acquisition.curriculum import Curriculum
-from slap_ros.acquisition.problem import AcquisitionProblem
-from slap_ros.acquisition.proposal import Proposal
-from slap_ros.acquisition.proposers import (
-    ComposedRewarder,
-    ManualProposer,
-    ManualRewarder,
-    propose,
+from slap_ros.acquisition.embedding_encoder import EmbeddingEncoder
+from slap_ros.acquisition.inquiry import described
+from slap_ros.acquisition.jobs import horizon_of
+from slap_ros.acquisition.proposal import Proposal, read_proposal
+from slap_ros.acquisition.proposal_request import (
+    MANUAL,
+    REWARDERS,
+    ProposalRequest,
+    require_known,
 )
+from slap_ros.acquisition.retrieval import MetricSignatureEncoder, SkillEncoder
 from slap_ros.acquisition.settings import ACQUISITION_SETTINGS, AcquisitionSettings
 from slap_ros.acquisition.skill_library import (
     AcquiredSkill,
@@ -28,21 +31,23 @@ from slap_ros.acquisition.skill_library import (
     read_library_record,
     save_skill_library,
 )
-from slap_ros.acquisition.skill_training import Round
 from slap_ros.acquisition.task_source import TaskSource
+from slap_ros.cli.acquisition_bars import AcquisitionBars
+from slap_ros.cli.acquisition_events import AcquisitionEvents
 from slap_ros.cli.command_line import command_line
 from slap_ros.cli.console import console, print_json, styled
-from slap_ros.cli.options import MAX_SEED, DomainName, Goal, Jobs, Json, Preset
+from slap_ros.cli.options import DomainName, Goal, Jobs, Json, Preset, Ray, TrainingSeed
+from slap_ros.cli.propose import show_entry
+from slap_ros.cli.proposer_options import ProposerOptions
 from slap_ros.cli.train import require_torch, training_workers
 from slap_ros.core import Domain
 from slap_ros.core.goals import task_with_goal
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import require_writable
+from slap_ros.language.settings import LOCAL_SCHEME, read_settings
 from slap_ros.learning.setting_changes import changed, parse_changes
-
-PROPOSERS = ("manual",)
-REWARDERS = ("manual", "composed")
+from slap_ros.learning.work_folder import WorkFolder
 
 
 @dataclass(frozen=True)
@@ -55,17 +60,30 @@ class AcquireOptions:
     ] = None
     preset: Preset = None
     goal: Goal = None
-    seed: Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Of everything.")] = 0
-    proposer: Annotated[
-        str, typer.Option(help="Of operators: manual, which are the domain's hand-written ones.")
-    ] = "manual"
+    seed: TrainingSeed = 0
     rewarder: Annotated[
         str,
-        typer.Option(help="Of rewards: manual (hand-written), or composed (from metrics)."),
-    ] = "manual"
+        typer.Option(
+            help="Of rewards: manual (hand-written), composed (from metrics), or language."
+        ),
+    ] = MANUAL
     begin: Annotated[
         list[Path] | None,
         typer.Option("--from", help="A skill library to begin with; may be repeated."),
+    ] = None
+    encoder: Annotated[
+        str | None,
+        typer.Option(
+            help="With --from: an embedding model at --base-url that says which skills are alike. "
+            "Default: the metrics behind their operators, without any model."
+        ),
+    ] = None
+    keep: Annotated[
+        Path | None,
+        typer.Option(
+            help="A skill library whose skills are there already: what it lacks is learned, and "
+            "what fails is learned further."
+        ),
     ] = None
     settings: Annotated[
         str, typer.Option(help=f"Networks and SAC: {', '.join(ACQUISITION_SETTINGS)}.")
@@ -83,14 +101,21 @@ class AcquireOptions:
         typer.Option(min=1, help="Environment steps that all skills together learn for."),
     ] = None
     jobs: Jobs = 2
-    ray: Annotated[
-        str | None, typer.Option(help="Address of a Ray cluster to run on instead, or local.")
-    ] = None
+    ray: Ray = None
     work: Annotated[
         Path | None,
         typer.Option(help="Folder for checkpoints and results; the same one again goes on."),
     ] = None
+    events: Annotated[
+        bool,
+        typer.Option("--events", help="Print what happens on stdout, each event a line of JSON."),
+    ] = False
     json: Json = False
+
+    def __post_init__(self) -> None:
+        require_known("--rewarder", self.rewarder, REWARDERS)
+        if self.encoder is not None and not self.begin:
+            raise InvalidParameterError("--encoder is for --from: without, nothing is retrieved")
 
     @property
     def library_folder(self) -> Path:
@@ -101,6 +126,22 @@ class AcquireOptions:
     def work_folder(self) -> Path:
         """Where checkpoints are, by default beside the library."""
         return self.work or self.library_folder.with_name(f"{self.library_folder.name}-training")
+
+    def skill_encoder(self, proposers: ProposerOptions) -> SkillEncoder:
+        """What says which skills are alike.
+
+        Raises:
+            InvalidParameterError: Language settings cannot be read, or name no server.
+            LanguageUnavailableError: There is no key, or no client.
+        """
+        if self.encoder is None:
+            return MetricSignatureEncoder()
+        settings = read_settings(proposers.language_settings, self.encoder, proposers.base_url)
+        if settings.base_url.startswith(LOCAL_SCHEME):
+            raise InvalidParameterError(
+                f"--encoder asks a server, and {settings.base_url} is none: give another --base-url"
+            )
+        return EmbeddingEncoder(settings, WorkFolder(self.work_folder))
 
     @property
     def acquisition_settings(self) -> AcquisitionSettings:
@@ -119,8 +160,7 @@ class AcquireOptions:
         chosen = changed(ACQUISITION_SETTINGS[self.settings], changes)
         return chosen if self.steps is None else replace(chosen, total_steps=self.steps)
 
-    @property
-    def command(self) -> str:
+    def command(self, proposers: ProposerOptions) -> str:
         """The command that acquires the same library again."""
         return command_line(
             "acquire",
@@ -128,74 +168,167 @@ class AcquireOptions:
             preset=self.preset,
             goal=self.goal,
             seed=self.seed,
-            proposer=self.proposer,
+            **proposers.given,
             rewarder=self.rewarder,
+            **{"from": [_shareable(folder) for folder in self.begin or ()]},
+            encoder=self.encoder,
+            keep=_shareable(self.keep) if self.keep else None,
             settings=self.settings,
             steps=self.steps,
             set=self.set,
         )
 
 
-def acquire(options: AcquireOptions) -> int:
+def _shareable(folder: Path) -> str:
+    """A folder as it was given, or its name alone: no path of this machine goes into a library."""
+    return folder.name if folder.is_absolute() else folder.as_posix()
+
+
+def acquire(options: AcquireOptions, proposers: ProposerOptions) -> int:
     """Acquire skills: carry out plans, train what fails from where it fails, and again.
 
     Interrupted, it goes on where it was when the same command is given again.
     """
-    domain = get_domain(options.domain, options.preset)
+    domain = _acquirable(options)
     options = replace(options, preset=domain.preset)
     settings = options.acquisition_settings
+    segment_steps = settings.segment_steps(horizon_of(domain))
+    _require_budget(settings, segment_steps)
+    encoder = options.skill_encoder(proposers)
+    known, there = _known(options.begin or ()), _library_to_keep(options.keep, domain)
     for folder in (options.library_folder, options.work_folder):
         require_writable(folder)
     require_torch()
     goal = options.goal if options.goal is not None else next(iter(domain.goals), "")
-    proposal = _proposal(domain, options, goal)
+    events = AcquisitionEvents(segment_steps if options.events else None)
+    proposed = _proposed(domain, options, proposers, goal, events)
+    proposal = proposed.proposal
+    events.proposed(proposal)
     source = TaskSource.of(domain, goal, options.seed, proposal.operators, proposal.rewards)
-    known = _known(options.begin or ())
-    with training_workers(options.jobs, options.ray) as workers, _AcquisitionBars() as bars:
-        curriculum = Curriculum(source, settings, options.work_folder, workers, bars, known)
+    kept = _kept(options.keep, there, proposal)
+    with training_workers(options.jobs, options.ray) as workers, AcquisitionBars(events) as bars:
+        curriculum = Curriculum(
+            source, settings, options.work_folder, workers, bars, known, encoder, kept
+        )
         library = curriculum.run()
     made_by = {
-        "command": options.command,
-        "proposer": options.proposer,
-        "rewarder": options.rewarder,
+        "command": options.command(proposers),
+        **proposed.as_record(),
         "began_with": [path.name for path in options.begin or ()],
+        **({"encoder": encoder.name} if options.encoder else {}),
+        **({"kept": options.keep.name} if options.keep else {}),
     }
     library = replace(library, record={**made_by, **library.record})
     save_skill_library(options.library_folder, library)
+    events.acquired(options.library_folder, library)
     _report(options, library)
     return 0
 
 
-def _proposal(domain: Domain, options: AcquireOptions, goal: str) -> Proposal:
-    """Operators and rewards, checked.
+@dataclass(frozen=True)
+class _Proposed:
+    """A proposal, and who answered where a model was to be asked."""
+
+    proposal: Proposal
+    answered_by: dict[str, Any]
+
+    def as_record(self) -> dict[str, Any]:
+        """What a library says of it."""
+        made = self.proposal.provenance
+        record = {
+            "proposer": made.proposer,
+            "rewarder": made.rewarder,
+            "provenance": asdict(made),
+            "remarks": list(self.proposal.remarks),
+        }
+        return {**record, "answered_by": self.answered_by} if self.answered_by else record
+
+
+def _proposed(
+    domain: Domain,
+    options: AcquireOptions,
+    proposers: ProposerOptions,
+    goal: str,
+    events: AcquisitionEvents,
+) -> _Proposed:
+    """Operators and rewards, checked; those of the work folder where it has some already.
+
+    A model would give others when it is asked again.
 
     Args:
         domain: In which skills are acquired.
         options: Of the command.
+        proposers: Who proposes.
         goal: A name, or atoms.
+        events: Are told of every answer.
 
     Raises:
-        InvalidParameterError: The domain says nothing of acquisition, or there is no such
-            proposer.
+        InvalidParameterError: The work folder has another training, or is damaged.
         ProposalRejectedError: The operators make no plan.
     """
+    work, command = WorkFolder(options.work_folder), options.command(proposers)
+
+    def propose() -> dict[str, Any]:
+        task = task_with_goal(domain, options.seed, 0, goal)
+        shown = proposers.demonstrations_in(domain)
+        request = ProposalRequest.of_task(domain, task, proposers.proposer, options.rewarder, shown)
+
+        def show(entry: Entry) -> None:
+            show_entry(entry)
+            events.attempted(entry)
+
+        path = options.work_folder / "attempts.jsonl" if request.asks_model else None
+        inquiry = proposers.inquiry(request, AttemptLog(path, show))
+        proposal = request.propose(inquiry)
+        return {
+            "command": command,
+            "proposal": proposal.to_data(),
+            "answered_by": inquiry.answered_by if inquiry is not None else {},
+        }
+
+    def read(data: Any) -> tuple[str, _Proposed]:
+        proposal = read_proposal(data["proposal"], domain)
+        return data["command"], _Proposed(proposal, dict(data["answered_by"]))
+
+    made_by, proposed = work.cached("proposal", propose, read)
+    if made_by != command:
+        raise InvalidParameterError(
+            f"{options.work_folder} has another training, of `{made_by}`; give another folder, or "
+            "remove this one"
+        )
+    return proposed
+
+
+def _acquirable(options: AcquireOptions) -> Domain:
+    """The domain in which skills are acquired.
+
+    Raises:
+        InvalidParameterError: It says nothing of acquisition.
+    """
+    domain = get_domain(options.domain, options.preset)
     if domain.acquisition is None:
         raise InvalidParameterError(
-            f"domain {domain.name} does not say what skills are acquired with; `slap domains` "
-            "lists those that do"
+            f"domain {domain.name} does not say what skills are acquired with; those that do have "
+            "goals in the table of `slap domains`"
         )
-    if options.proposer not in PROPOSERS:
-        known = ", ".join(PROPOSERS)
-        raise InvalidParameterError(f"--proposer {options.proposer!r}: there are {known}")
-    if options.rewarder not in REWARDERS:
-        known = ", ".join(REWARDERS)
-        raise InvalidParameterError(f"--rewarder {options.rewarder!r}: there are {known}")
-    task = task_with_goal(domain, options.seed, 0, goal)
-    problem = AcquisitionProblem.of_task(domain, task)
-    written = domain.acquisition
-    composed = options.rewarder == "composed"
-    rewarder = ComposedRewarder() if composed else ManualRewarder(written.rewards)
-    return propose(problem, ManualProposer(written.operators, "the domain's own"), rewarder)
+    return domain
+
+
+def _require_budget(settings: AcquisitionSettings, least: int) -> None:
+    """Refuse a budget in which no skill can be judged even once.
+
+    Args:
+        settings: With the budget.
+        least: Environment steps until a skill is judged first.
+
+    Raises:
+        InvalidParameterError: It says how many steps it takes.
+    """
+    if settings.total_steps < least:
+        raise InvalidParameterError(
+            f"{settings.total_steps} environment steps are too few to learn anything: a skill is "
+            f"judged after {least}; give more --steps"
+        )
 
 
 def _known(paths: list[Path] | tuple[()]) -> dict[str, AcquiredSkill]:
@@ -214,14 +347,49 @@ def _known(paths: list[Path] | tuple[()]) -> dict[str, AcquiredSkill]:
     return known
 
 
+def _library_to_keep(path: Path | None, domain: Domain) -> SkillLibrary:
+    """The library whose skills are there already; an empty one where none is given.
+
+    Raises:
+        InvalidLibraryError: It cannot be read, or is of another domain.
+    """
+    return SkillLibrary(domain.name) if path is None else load_skill_library(path, domain)
+
+
+def _kept(path: Path | None, library: SkillLibrary, proposal: Proposal) -> dict[str, AcquiredSkill]:
+    """The skills of a library that are for the operators proposed, by folder.
+
+    Args:
+        path: The library's folder; None for none.
+        library: Read from there.
+        proposal: Says what is to be acquired.
+    """
+    if path is None:
+        return {}
+    kept, reasons = {}, list(map(str, library.refused))
+    for skill in library.skills:
+        if skill.operator in proposal.operators:
+            kept[str(path / skill.folder_name)] = skill
+        else:
+            reasons.append(f"no operator that is proposed is that of {skill.folder_name}")
+    for reason in reasons:
+        console.print(styled("warning", "yellow", f" a skill is not kept: {reason}"))
+    return kept
+
+
 def _report(options: AcquireOptions, library: SkillLibrary) -> None:
     record = library.record
     if options.json:
         print_json({"library": str(options.library_folder), "digest": library.digest, **record})
     if not library.skills:
         console.print(f"nothing was learned: {record['ended']}")
-    for name, why in record["left"].items():
-        console.print(f"{name} was not learned well enough: {why}")
+    for name, found in record["left"].items():
+        console.print(f"{name} was not learned well enough: {why_left(found)}")
+    if record["left"]:
+        last = options.work_folder / f"iteration{len(record['progress']) - 1}" / "rollouts.json"
+        console.print(f"{last} has the states")
+    if record.get("answered_by"):
+        console.print(f"operators or rewards are {described(record['answered_by'])}")
     console.print(
         f"{len(library.skills)} skills in {options.library_folder}: {record['ended']}; "
         f"task progress {record['progress_on_fresh_tasks']:.2f} on tasks that training never saw, "
@@ -229,44 +397,15 @@ def _report(options: AcquireOptions, library: SkillLibrary) -> None:
     )
 
 
-class _AcquisitionBars:
-    """Progress on the terminal."""
+def why_left(found: dict[str, Any]) -> str:
+    """Why a skill was given up, in words: from how many states, and what its failures share.
 
-    def __init__(self) -> None:
-        self._bars = Progress(
-            TextColumn("{task.description}", markup=False),
-            BarColumn(),
-            TextColumn("{task.completed} of {task.total}"),
-            console=console,
-            transient=True,
-        )
-        self._tasks: dict[str, TaskID] = {}
-
-    def __enter__(self) -> _AcquisitionBars:
-        self._bars.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._bars.stop()
-
-    def on_progress(self, what: str, done: int, total: int) -> None:
-        """So many jobs of a kind are done."""
-        if what not in self._tasks:
-            self._tasks[what] = self._bars.add_task(what, total=total)
-        self._bars.update(self._tasks[what], completed=done)
-        if done == total:
-            self._bars.remove_task(self._tasks.pop(what))
-
-    def on_rollouts(self, iteration: int, progress: float, failures: dict[str, int]) -> None:
-        """How far plans got."""
-        failed = ", ".join(f"{name} {count} times" for name, count in failures.items())
-        console.print(
-            f"iteration {iteration}: task progress {progress:.2f}; failed: {failed or 'nothing'}"
-        )
-
-    def on_judged(self, iteration: int, skill: str, outcome: Round) -> None:
-        """What a round of training was worth."""
-        console.print(
-            f"iteration {iteration}, {skill}: success {outcome.initial:.2f} became "
-            f"{outcome.success:.2f} in {len(outcome.segments)} segments"
-        )
+    Args:
+        found: As the curriculum records it.
+    """
+    if "states" not in found:
+        return str(found["why"])
+    ends = ", ".join(f"{end} ({count} times)" for end, count in found["ends"].items())
+    atoms = ", ".join(f"{atom} ({count} times)" for atom, count in found["atoms"].items())
+    wrong = f"; most often not as it should be: {atoms}" if atoms else ""
+    return f"{found['why']} from {found['states']} states: {ends}{wrong}"

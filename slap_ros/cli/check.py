@@ -21,7 +21,9 @@ def check(
     domain: DomainName,
     preset: Preset = None,
     seed: Seed = 0,
-    tasks: Annotated[int, typer.Option(min=1, help="Tasks that are planned and executed.")] = 50,
+    tasks: Annotated[
+        int, typer.Option(min=1, max=10**6, help="Tasks that are planned and executed.")
+    ] = 50,
     states: Annotated[
         int, typer.Option(min=10, help="States that are reset to and stepped from again.")
     ] = 200,

@@ -9,13 +9,18 @@ from collections.abc import Mapping
 from typing import Any
 
 
+def option_of(name: str) -> str:
+    """The option that a parameter of a command is given by."""
+    return f"--{name.replace('_', '-')}"
+
+
 def command_line(*words: str, **options: Any) -> str:
     """A ``slap`` command.
 
     Args:
         words: Sub-commands and arguments.
-        options: By name. Those that say nothing (None, or a mapping) are left out; a list repeats
-            its option.
+        options: By name. Values that say nothing (None, False, or a mapping) are left out; True
+            gives an option without a value, and a list repeats its option.
 
     Returns:
         The command, to be pasted into a shell.
@@ -23,7 +28,9 @@ def command_line(*words: str, **options: Any) -> str:
     parts = ["slap", *words]
     for name, value in options.items():
         values = value if isinstance(value, list) else [value]
-        if not isinstance(value, Mapping) and value is not None:
-            flag = f"--{name.replace('_', '-')}"
-            parts += [part for one in values for part in (flag, str(one))]
+        for one in values:
+            if one is True:
+                parts.append(option_of(name))
+            elif not (one is None or one is False or isinstance(one, Mapping)):
+                parts += [option_of(name), str(one)]
     return shlex.join(parts)

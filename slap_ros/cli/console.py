@@ -33,7 +33,7 @@ from rich.segment import Segment
 from rich.text import Text
 
 from slap_ros.errors import ErrorCode, SlapError
-from slap_ros.signals import TerminatedError, exit_code, signals_raised
+from slap_ros.signals import TerminatedError, exit_code, forget_interrupt, signals_raised
 
 P = ParamSpec("P")
 FILE_WIDTH = 120  # columns, where stderr is no terminal: tables must not be cut there
@@ -116,6 +116,7 @@ def exits(command: Callable[P, int | None]) -> Callable[P, None]:
         except SlapError as error:
             _fail(error.code, " ".join(str(error).split()), error)
         except KeyboardInterrupt as error:
+            forget_interrupt()
             _say("terminated" if isinstance(error, TerminatedError) else "interrupted")
             raise typer.Exit(exit_code(error)) from None
         except BrokenPipeError as error:  # whoever read stdout has seen enough

@@ -10,11 +10,12 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
+from slap_ros.acquisition.domain_choice import DomainChoice, open_domain
 from slap_ros.acquisition.problem import metrics_of
 from slap_ros.cli.console import console, print_json
 from slap_ros.cli.options import Json, Preset
 from slap_ros.core import Domain
-from slap_ros.domains import domain_names, get_domain, preset_names
+from slap_ros.domains import domain_names, preset_names
 from slap_ros.errors import InvalidDomainError, InvalidParameterError, UnknownObjectError
 from slap_ros.relational import LiftedOperator, Metric, Predicate
 from slap_ros.relational.metrics import typed_arguments, variable_names
@@ -31,7 +32,7 @@ def domains(
 ) -> None:
     """List the domains that are installed; of one, its predicates, metrics, goals and operators."""
     if domain is not None:
-        one = get_domain(domain, preset)
+        one = open_domain(DomainChoice(domain, preset or ""))
         if json:
             print_json(_data(one))
         else:
@@ -59,7 +60,7 @@ def _available() -> Iterator[Domain]:
     """Every domain that can be made here; for the others, say why not."""
     for name in domain_names():
         try:
-            yield from [get_domain(name, preset) for preset in preset_names(name)]
+            yield from [open_domain(DomainChoice(name, preset)) for preset in preset_names(name)]
         except InvalidDomainError as error:
             console.print(str(error))
 

@@ -6,32 +6,35 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.table import Table
 
+from slap_ros.acquisition.domain_choice import SHIPPED
 from slap_ros.cli.command_line import command_line
 from slap_ros.cli.console import console, print_json, progress
-from slap_ros.cli.options import DomainName, Goal, Jobs, Json, Planner, Preset, Skills
+from slap_ros.cli.options import DomainName, Goal, Jobs, Json, Planner, Preset
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose, sampling
-from slap_ros.errors import ErrorCode
+from slap_ros.cli.skill_choice import Skills, open_chosen
+from slap_ros.core import Domain
+from slap_ros.errors import ErrorCode, InvalidParameterError
 from slap_ros.evaluation.approaches import Approach, approaches, shooting
 from slap_ros.evaluation.evaluation_file import require_replaceable, write_evaluation
 from slap_ros.evaluation.experiment import Experiment, Trial, run_all
 from slap_ros.evaluation.summary import Spread, Summary
 from slap_ros.files import require_writable
-from slap_ros.learning.domain_choice import SHIPPED, DomainChoice, open_domain
 from slap_ros.planning.planner import make_planner
+from slap_ros.shortcuts.library import Library
 from slap_ros.shortcuts.shipped import shipped_library
-from slap_ros.studies.results import describe_library
+from slap_ros.studies.results import describe_library, describe_skills
 from slap_ros.versions import versions
 
 
 def evaluate(
     domain: DomainName,
-    tasks: Annotated[int, typer.Option(min=1, help="Tasks per seed.")] = 10,
-    seeds: Annotated[int, typer.Option(min=1, help="How many seeds.")] = 5,
+    tasks: Annotated[int, typer.Option(min=1, max=10**6, help="Tasks per seed.")] = 10,
+    seeds: Annotated[int, typer.Option(min=1, max=10**6, help="How many seeds.")] = 5,
     first_seed: Annotated[
         int,
         typer.Option(
@@ -64,7 +67,7 @@ def evaluate(
     With a shortcut library: pure planning, SLAP as the paper evaluates it (one sample) and SLAP
     with --samples, on the same tasks. Spreads are mean ± sample standard deviation over all tasks.
     """
-    chosen = open_domain(DomainChoice(domain, preset or "", skills))
+    chosen = open_chosen(domain, preset, skills)
     settings = {
         "preset": chosen.preset,
         "tasks": tasks,
@@ -73,24 +76,46 @@ def evaluate(
         "samples": samples,
         "planner": planner,
     }
-    settings |= {name: given for name, given in (("goal", goal), ("skills", skills)) if given}
+    besides = {"goal": goal, "skills": skills, "shooting": with_shooting}
+    settings |= {name: value for name, value in besides.items() if value}
     command = command_line("evaluate", domain, shortcuts=shortcuts, **settings)
     if output is not None:
         require_writable(output)
         require_replaceable(output, command)
     library = choose(shortcuts, chosen, planner)
+    compared = _compared(library, chosen, samples, with_shooting)
     experiment = Experiment(chosen, tasks, seeds, first_seed, planner, goal=goal, skills=skills)
     make_planner(planner, chosen, experiment.task(first_seed, 0).initial_state)
-    compared = list(approaches(library, sampling(samples)))
-    if with_shooting and library is not None:
-        compared.insert(1, shooting(library, chosen, sampling(samples)))
     results = _run(experiment, compared, jobs)
-    summaries = [summary for summary, _ in results]
     if output is not None:
-        folder = Path(shortcuts) if shortcuts else shipped_library(domain)
-        described = describe_library(folder.name, library) if folder and library else None
-        origin = {"command": command, "domain": domain, **settings, "library": described}
-        write_evaluation(output, origin, results)
+        origin = {"command": command, "domain": domain, **settings}
+        write_evaluation(output, origin | _libraries(chosen, shortcuts, library), results)
+    return _show(experiment, [summary for summary, _ in results], json)
+
+
+def _compared(
+    library: Library | None, domain: Domain, samples: int, with_shooting: bool
+) -> list[Approach]:
+    compared = list(approaches(library, sampling(samples)))
+    if with_shooting:
+        if library is None:
+            raise InvalidParameterError(
+                "--shooting searches where shortcuts of a library would be used: give --shortcuts"
+            )
+        compared.insert(1, shooting(library, domain, sampling(samples)))
+    return compared
+
+
+def _libraries(domain: Domain, shortcuts: str | None, library: Library | None) -> dict[str, Any]:
+    """The libraries that an evaluation was made with, of skills and of shortcuts."""
+    folder = Path(shortcuts) if shortcuts else shipped_library(domain.name)
+    described = describe_library(folder.name, library) if folder and library else None
+    skills = describe_skills(domain)
+    return ({"skills": skills} if skills else {}) | {"library": described}
+
+
+def _show(experiment: Experiment, summaries: Sequence[Summary], json: bool) -> int:
+    """Print what came out; the command's exit code."""
     if json:
         rows = [summary.as_row() for summary in summaries]
         made = {"approaches": rows, "versions": versions()}

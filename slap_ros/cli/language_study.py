@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,14 +17,15 @@ from slap_ros.cli.options import Preset
 from slap_ros.core import Domain, task_with_goal
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidCassetteError, InvalidParameterError
-from slap_ros.language.cassette import ReplayingClient, open_client, with_recorded
+from slap_ros.language.cassette import ReplayingClient, open_client, read_cassette, with_recorded
 from slap_ros.language.settings import read_settings
 from slap_ros.studies import planning_ablation, reward_ablation
-from slap_ros.studies.comparison import StudyProgress
+from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.model_attempts import LanguageModel, ModelsOnly
 from slap_ros.studies.results import StudyReport
 
 Data = dict[str, Any]
+MakeReport = Callable[[JobRunner], StudyReport]
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,22 @@ class ModelOptions:
             )
         return LanguageModel(ModelsOnly(client), with_recorded(settings, client))
 
+    def dated(self, report: StudyReport) -> StudyReport:
+        """A report with the day of the answers, and the digest of their recording if there is one.
+
+        Args:
+            report: Once everything was answered.
+        """
+        mode, _, path = self.cassette.partition(":")
+        day = datetime.now(UTC).date().isoformat()
+        if mode == "live":
+            return replace(report, circumstances={"answered_on": day})
+        recording = read_cassette(Path(path))
+        day = recording.recorded[: len(day)]
+        return replace(
+            report, circumstances={"answered_on": day, "recording_sha256": recording.digest}
+        )
+
     def problem(self, domain: Domain, index: int) -> AcquisitionProblem:
         """A task of the domain."""
         return AcquisitionProblem.of_task(
@@ -92,14 +110,18 @@ class ModelOptions:
         }
 
 
+def answered_by(models: Mapping[str, LanguageModel]) -> dict[str, str]:
+    """What answers for each model, and for one in this process the library that runs it."""
+    return {name: model.client.source for name, model in models.items()}
+
+
 def planning(
     domain: str,
     variants: str,
     plans: int,
     attempts: int,
     options: ModelOptions,
-    bars: StudyProgress,
-) -> tuple[StudyReport, Data]:
+) -> tuple[Data, MakeReport]:
     """Who plans with a model's operators; see :mod:`slap_ros.studies.planning_ablation`.
 
     Args:
@@ -108,10 +130,9 @@ def planning(
         plans: Tasks.
         attempts: For one plan at most.
         options: Whom to ask.
-        bars: Show progress.
 
     Returns:
-        The report, and the settings that made it.
+        The settings that the report names, and what makes it.
 
     Raises:
         InvalidParameterError: There is no such variant, or a model is named twice.
@@ -125,14 +146,21 @@ def planning(
     models = options.models()
     opened = get_domain(domain, options.preset)
     problems = [options.problem(opened, index) for index in range(plans)]
-    report = planning_ablation.study(models, problems, chosen, attempts, bars)
-    settings = {"variants": variants, "plans": plans, "attempts": attempts, "model": [*models]}
-    return report, settings | options.as_settings()
+    settings = {
+        "variants": variants,
+        "plans": plans,
+        "attempts": attempts,
+        "model": [*models],
+        "answered_by": answered_by(models),
+    }
+    return settings | options.as_settings(), lambda runner: options.dated(
+        planning_ablation.study(models, problems, chosen, attempts, runner)
+    )
 
 
 def rewards(
-    domain: str, metrics: str, trials: int, options: ModelOptions, bars: StudyProgress
-) -> tuple[StudyReport, Data]:
+    domain: str, metrics: str, trials: int, options: ModelOptions
+) -> tuple[Data, MakeReport]:
     """What rewards are worth; see :mod:`slap_ros.studies.reward_ablation`.
 
     Args:
@@ -140,10 +168,9 @@ def rewards(
         metrics: What is shown of them, separated by commas.
         trials: Of each.
         options: Whom to ask.
-        bars: Show progress.
 
     Returns:
-        The report, and the settings that made it.
+        The settings that the report names, and what makes it.
 
     Raises:
         InvalidParameterError: There is no such choice of what is shown, or more than one model.
@@ -160,5 +187,13 @@ def rewards(
     opened = get_domain(domain, options.preset)
     written = opened.acquisition.operators if opened.acquisition else opened.operators
     ((name, model),) = models.items()
-    report = reward_ablation.study(model, options.problem(opened, 0), written, shown, trials, bars)
-    return report, {"metrics": metrics, "trials": trials, "model": [name], **options.as_settings()}
+    problem = options.problem(opened, 0)
+    settings = {
+        "metrics": metrics,
+        "trials": trials,
+        "model": [name],
+        "answered_by": answered_by(models),
+    }
+    return settings | options.as_settings(), lambda runner: options.dated(
+        reward_ablation.study(model, problem, written, shown, trials, runner)
+    )

@@ -13,6 +13,7 @@ from typing import Annotated, Any, TypeVar, get_type_hints
 
 import typer
 
+from slap_ros.cli.command_line import option_of
 from slap_ros.errors import InvalidParameterError
 
 R = TypeVar("R")
@@ -43,12 +44,9 @@ Goal = Annotated[
         "'(and (On block2 target) (GripperEmpty robot))'."
     ),
 ]
-Skills = Annotated[
-    str,
-    typer.Option(
-        help="Whose: none, or demonstrator (scripts that show how tasks are solved). Default: the "
-        "domain's own."
-    ),
+TrainingSeed = Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Of everything.")]
+Ray = Annotated[
+    str | None, typer.Option(help="Address of a Ray cluster to run on instead, or local.")
 ]
 Jobs = Annotated[int, typer.Option(min=1, help="Processes; the results are the same.")]
 
@@ -80,7 +78,7 @@ def flat_options(command: Callable[..., R]) -> Callable[..., R]:
 
     @wraps(command)
     def run(**given: Any) -> R:
-        _require_finite(given)
+        _require_usable(given)
         for name, kind in groups.items():
             given[name] = kind(**{field.name: given.pop(field.name) for field in fields(kind)})
         return command(**given)
@@ -92,15 +90,21 @@ def flat_options(command: Callable[..., R]) -> Callable[..., R]:
     return run
 
 
-def _require_finite(given: Mapping[str, Any]) -> None:
-    """Refuse numbers that no range of an option keeps out: NaN is neither too small nor too large.
+def _require_usable(given: Mapping[str, Any]) -> None:
+    """Refuse numbers that no range of an option keeps out.
+
+    NaN is neither too small nor too large, and what counts something often has no upper end.
 
     Raises:
         InvalidParameterError: Names the option.
     """
     for name, value in given.items():
         if isinstance(value, float) and not math.isfinite(value):
-            raise InvalidParameterError(f"--{name.replace('_', '-')} is {value}; give a number")
+            raise InvalidParameterError(f"{option_of(name)} is {value}; give a number")
+        if isinstance(value, int) and value > MAX_SEED:
+            raise InvalidParameterError(
+                f"{option_of(name)} is a number of {len(str(value))} digits; {MAX_SEED} at most"
+            )
 
 
 def _parameters_of(kind: Any) -> list[Parameter]:

@@ -10,15 +10,16 @@ from typing import Annotated
 
 import typer
 
+from slap_ros.acquisition.domain_choice import SHIPPED
 from slap_ros.cli.console import console, print_json
-from slap_ros.cli.options import Goal, Index, Json, Planner, Preset, Seed, Skills
+from slap_ros.cli.options import Goal, Index, Json, Planner, Preset, Seed
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose, sampling
+from slap_ros.cli.skill_choice import Skills, open_chosen
 from slap_ros.core import Domain, Task, task_with_goal
 from slap_ros.drawing import draw_abstract_graph
 from slap_ros.errors import InvalidParameterError, PlanningLimitError, StorageFullError
 from slap_ros.evaluation.approaches import approaches
 from slap_ros.files import read_text, require_writable, write_whole
-from slap_ros.learning.domain_choice import SHIPPED, DomainChoice, open_domain
 from slap_ros.planning.abstract_graph import AbstractGraph, build_abstract_graph
 from slap_ros.planning.ff import MAX_EXPANSIONS, MAX_TESTS, find_operator_sequence
 from slap_ros.planning.plan import PlanningResult
@@ -70,7 +71,7 @@ def plan(
         return
     if output is not None:
         require_writable(output)
-    chosen = open_domain(DomainChoice(domain, preset or "", skills))
+    chosen = open_chosen(domain, preset, skills)
     task = task_with_goal(chosen, seed, index, goal)
     if not chosen.operators and chosen.acquisition and chosen.acquisition.operators:
         _plan_by_hand(chosen, chosen.acquisition.operators, task, output, json)
@@ -140,10 +141,13 @@ def _show(result: PlanningResult, json: bool) -> None:
                 "edges_rolled_out": result.edges_rolled_out,
                 "versions": versions(),
             }
+            | ({"fails": result.fails} if result.fails else {})
         )
         return
     for option, steps in edges:
         console.print(f"{steps:5d}  {option}")
+    if result.fails:
+        console.print(f"this plan fails in the model, near the goal: {result.fails}")
     console.print(
         f"{result.plan.predicted_steps:5d}  steps predicted; {result.graph_nodes} abstract states, "
         f"{result.graph_edges} edges, {result.edges_rolled_out} rolled out",

@@ -18,7 +18,7 @@ from slap_ros.report import check_output, read_report, render, write_page
 def report(
     bags: Annotated[
         list[Path],
-        typer.Argument(metavar="BAG...", help="Bags' folders, or single .mcap or .db3 files."),
+        typer.Argument(metavar="BAG", help="Bags' folders, or single .mcap or .db3 files."),
     ],
     output: Annotated[Path, typer.Option(help="The .html to write.")],
 ) -> int:

@@ -4,11 +4,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from slap_ros.acquisition.inquiry import described
 from slap_ros.acquisition.proposal import operator_data, template_data
 from slap_ros.acquisition.skill_library import (
     AcquiredSkill,
@@ -35,8 +37,12 @@ def skills(
         _show(skill)
     for reason in read.refused:
         console.print(styled("warning", "yellow", f" a skill is left out: {reason}"))
+    if isinstance(answered_by := about.get("answered_by"), dict):
+        console.print(f"operators or rewards are {described(answered_by)}")
     progress = about.get("progress_on_fresh_tasks")
     reached = "" if progress is None else f", task progress {progress:.2f} on fresh tasks"
+    made_by = " and ".join(str(about[who]) for who in ("proposer", "rewarder") if who in about)
+    console.print(f"proposer and rewarder: {made_by or 'not known'}")
     console.print(f"{len(read.skills)} skills of {read.domain}, digest {read.digest}{reached}")
 
 
@@ -71,9 +77,21 @@ def _show(skill: AcquiredSkill) -> None:
     if "success" not in record:
         return
     blind = record.get("vacuity") or {}
-    began = record.get("began_with") or {}
     console.print(
         f"  success {record['success']:.2f} from fresh states, of constant and random actions "
         f"{blind.get('success', float('nan')):.2f}; {record['steps']} environment steps; began "
-        f"with {began.get('skill', 'random weights')}"
+        f"with {beginning(record.get('began_with') or {})}"
     )
+
+
+def beginning(found: Mapping[str, Any]) -> str:
+    """What a skill began with, in words.
+
+    Args:
+        found: As the curriculum records it: the known skill, how similar it is, and what it was
+            worth before anything was learned.
+    """
+    if "skill" not in found:
+        return "random weights"
+    worth = f", success {found['success']:.2f} at once" if "success" in found else ""
+    return f"{found['skill']} (similarity {found['similarity']:.2f}{worth})"

@@ -4,71 +4,78 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import shutil
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
-from rich.progress import TaskID
 
-from slap_ros.cli import language_study
-from slap_ros.cli.command_line import command_line
-from slap_ros.cli.console import console, exits, progress
-from slap_ros.cli.language_study import ModelOptions
-from slap_ros.cli.options import MAX_SEED, DomainName, Jobs, Preset, flat_options
+from slap_ros.acquisition.domain_choice import DomainChoice
+from slap_ros.cli import acquisition_study
+from slap_ros.cli.console import console, exits
+from slap_ros.cli.options import DomainName, Jobs, Preset, flat_options
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose, sampling
+from slap_ros.cli.study_report import (
+    FRESH_SEED,
+    RESULTS,
+    FreshSeed,
+    Output,
+    make_report,
+    provenance,
+    require_report,
+)
+from slap_ros.cli.train import require_torch
 from slap_ros.core import Domain
 from slap_ros.domains import get_domain, preset_names
 from slap_ros.errors import InvalidParameterError
-from slap_ros.evaluation.approaches import approaches
+from slap_ros.evaluation.approaches import Approach, approaches
 from slap_ros.evaluation.experiment import Experiment
-from slap_ros.files import read_text, require_writable, write_whole
-from slap_ros.learning.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
+from slap_ros.files import read_text, write_whole
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.shortcuts.settings import ExplorationSettings, training_settings
 from slap_ros.shortcuts.shipped import shipped_libraries, shipped_library
 from slap_ros.studies import (
-    demonstrations,
+    ablation,
     dynamics,
     generalisation,
-    induction,
     perception,
     planning_time,
     pruning,
     readme,
     table1,
-    vacuity,
 )
 from slap_ros.studies import goals as sampled
 from slap_ros.studies.comparison import Comparison
-from slap_ros.studies.figures import require_matplotlib
-from slap_ros.studies.planning_ablation import SEARCH, VARIANTS
-from slap_ros.studies.results import Data, Provenance, StudyReport, describe_library, write
-from slap_ros.studies.study_log import JobLog
+from slap_ros.studies.job_runner import JobRunner
+from slap_ros.studies.results import Data, StudyReport, describe_library
 from slap_ros.studies.trainings import TrainingFolder
-from slap_ros.studies.trial_log import TrialLog
-from slap_ros.studies.variations import NUMBERS, offered, parse_variation
+from slap_ros.studies.variations import offered, offered_number, parse_variation
 
-RESULTS = Path("docs/results")
-FRESH_SEED = 500  # development looks at no task seed from here on
+TABLES_IN = ("README.md", "docs/presets.md", "docs/reproducing.md", "docs/skills.md")
+PAGES = [Path(page) for page in TABLES_IN]  # with tables made of results
 
 app = typer.Typer(
-    help="Make a figure of the paper again: data, a picture and a page.",
+    help="Make a figure of the papers again: data, a picture and a page. Stopped while it solves "
+    "tasks, learns or asks a model, a study goes on where it was with the same command.",
     no_args_is_help=True,
 )
 
 Tasks = Annotated[int, typer.Option(min=1, help="Tasks per seed.")]
-Seeds = Annotated[int, typer.Option(min=1, help="How many seeds, from 0 on.")]
-FreshSeed = Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Of the tasks.")]
-Output = Annotated[Path, typer.Option(help="Folder for NAME_DOMAIN.json, .svg and .md.")]
+Seeds = Annotated[int, typer.Option(min=1, help="How many task seeds.")]
+FirstSeed = Annotated[int, typer.Option(min=0, help="The first of them.")]
 Vary = Annotated[
     list[str] | None,
     typer.Option(help="setting=value,value,...: vary this instead of the usual; may be repeated."),
 ]
 Work = Annotated[
     list[Path],
-    typer.Option(help="Work folder of a `slap train`; may be repeated, one folder per seed."),
+    typer.Option(
+        metavar="FOLDER",
+        help="Work folder of a `slap train`; may be repeated, one folder per seed.",
+    ),
 ]
 
 
@@ -78,17 +85,14 @@ class TaskOptions:
 
     tasks: Tasks = 4
     seeds: Seeds = 5
+    first_seed: FirstSeed = FRESH_SEED
     preset: Preset = None
     jobs: Jobs = 1
     output: Output = RESULTS
 
     def __post_init__(self) -> None:
-        """Check that there is where to write, before hours are spent.
-
-        Raises:
-            OSError: It is no place for files.
-        """
-        require_writable(self.output)
+        """Refuse what cannot be, before hours are spent: see :func:`require_report`."""
+        require_report(self.output)
 
 
 @dataclass(frozen=True)
@@ -108,15 +112,12 @@ class GoalOptions(ComparisonOptions):
 
 @app.command("dynamics")
 @exits
-def dynamics_(domain: DomainName, work: Work, output: Output = RESULTS) -> None:
-    """SLAP Fig. 4: success and length while shortcuts are learned, from trainings' work folders."""
-    require_matplotlib()
-    require_writable(output)
-    get_domain(domain)
+@flat_options
+def dynamics_(domain: DomainName, work: Work, *, options: ComparisonOptions) -> None:
+    """SLAP Fig. 4: learning curves, and plans with what was learned so far, from work folders."""
     folders = [TrainingFolder(folder) for folder in work]
-    report = dynamics.study(domain, folders)
-    command = command_line("study", "dynamics", domain, work=work)
-    _write(output, report, Provenance(domain, command, _trainings(folders)))
+    compared = _Compared.of(domain, options, _trainings(folders), needs_library=False)
+    compared.make("dynamics", lambda it: dynamics.study(folders, it), work=work)
 
 
 @app.command("generalisation")
@@ -124,14 +125,9 @@ def dynamics_(domain: DomainName, work: Work, output: Output = RESULTS) -> None:
 @flat_options
 def generalisation_(domain: DomainName, vary: Vary = None, *, options: ComparisonOptions) -> None:
     """SLAP Fig. 5: pure planning and SLAP as obstacles, distractors, mass or friction vary."""
-    comparison, settings = _compare(domain, options)
-    chosen = [parse_variation(text) for text in vary or ()] or offered(comparison.domain)
-    with _StudyBars() as bars:
-        report = generalisation.study(_ends(comparison), chosen, bars)
-    command = command_line(
-        "study", "generalisation", domain, vary=vary, **_given(options, settings)
-    )
-    _write(options.output, report, Provenance(domain, command, settings))
+    compared = _Compared.of(domain, options)
+    chosen = [parse_variation(text) for text in vary or ()] or offered(compared.domain)
+    compared.ends().make("generalisation", lambda it: generalisation.study(it, chosen), vary=vary)
 
 
 @app.command("goals")
@@ -144,11 +140,8 @@ def goals_(
     options: GoalOptions,
 ) -> None:
     """SLAP Fig. 9: pure planning and SLAP for goals that the library was not trained for."""
-    comparison, settings = _compare(domain, options)
-    with _StudyBars() as bars:
-        report = sampled.study(_ends(comparison), goals, bars)
-    command = command_line("study", "goals", domain, goals=goals, **_given(options, settings))
-    _write(options.output, report, Provenance(domain, command, {"goals": goals, **settings}))
+    compared = _Compared.of(domain, options, {"goals": goals}).ends()
+    compared.make("goals", lambda it: sampled.study(it, goals))
 
 
 @app.command("pruning")
@@ -158,35 +151,31 @@ def pruning_(
     domain: DomainName,
     work: Annotated[
         list[Path] | None,
-        typer.Option(help="Work folder of a `slap train` that has explored; may be repeated."),
+        typer.Option(
+            metavar="FOLDER",
+            help="Work folder of a `slap train` that has explored; may be repeated.",
+        ),
     ] = None,
     settings: Annotated[
         str, typer.Option(help="ours, or paper: how to explore, without --work.")
     ] = "ours",
     *,
-    options: TaskOptions,
+    options: ComparisonOptions,
 ) -> None:
-    """SLAP Table 2: how many candidates random rollouts leave over."""
-    require_matplotlib()
-    chosen = get_domain(domain, options.preset)
-    if work:
-        folders = [TrainingFolder(folder) for folder in work]
-        explored, how = pruning.explored_in(folders, domain)
-        origin = Provenance(
-            domain, command_line("study", "pruning", domain, work=work), _trainings(folders)
-        )
-    else:
-        how = training_settings(settings, chosen).exploration
-        explored = _explore(chosen, options, how)
-        sampled_from = {
-            "preset": chosen.preset,
-            "tasks": options.tasks,
-            "seeds": options.seeds,
-            "settings": settings,
-        }
-        command = command_line("study", "pruning", domain, **sampled_from)
-        origin = Provenance(domain, command, sampled_from)
-    _write(options.output, pruning.study(domain, explored, how), origin)
+    """SLAP Table 2: how many candidates random rollouts leave over, and what plans are without."""
+    folders = [TrainingFolder(folder) for folder in work or ()]
+    sampled_from = _trainings(folders) if folders else {"settings": settings}
+    compared = _Compared.of(domain, options, sampled_from, needs_library=False)
+
+    def make(comparison: Comparison) -> StudyReport:
+        if folders:
+            explored, how = pruning.explored_in(folders, domain)
+        else:
+            how = training_settings(settings, compared.domain).exploration
+            explored = _explore(comparison, how)
+        return pruning.study(explored, how, comparison)
+
+    compared.make("pruning", make, work=work)
 
 
 @app.command("perception")
@@ -199,12 +188,8 @@ def perception_(
     options: ComparisonOptions,
 ) -> None:
     """SLAP D.3, D.4: success, length and replans while perception errs in several ways."""
-    comparison, settings = _compare(domain, options)
-    with _StudyBars() as bars:
-        report = perception.study(_ends(comparison), max_replans, bars)
-    settings = {"max_replans": max_replans, **settings}
-    command = command_line("study", "perception", domain, **_given(options, settings))
-    _write(options.output, report, Provenance(domain, command, settings))
+    compared = _Compared.of(domain, options, {"max_replans": max_replans}).ends()
+    compared.make("perception", lambda it: perception.study(it, max_replans))
 
 
 @app.command("planning_time")
@@ -220,163 +205,13 @@ def planning_time_(
     options: ComparisonOptions,
 ) -> None:
     """SLAP Table 4: seconds of planning, edges rolled out, size of the graph."""
-    comparison, settings = _compare(domain, options)
-    chosen = parse_variation(vary) if vary else offered(comparison.domain, NUMBERS)[0]
-    with _StudyBars() as bars:
-        report = planning_time.study(comparison, chosen, bars)
-    command = command_line("study", "planning_time", domain, vary=vary, **_given(options, settings))
-    _write(options.output, report, Provenance(domain, command, settings))
+    compared = _Compared.of(domain, options)
+    chosen = parse_variation(vary) if vary else offered_number(compared.domain)
+    compared.make("planning_time", lambda it: planning_time.study(it, chosen), vary=vary)
 
 
-@app.command("demonstrations")
-@exits
-def demonstrations_(
-    domain: DomainName,
-    goal: Annotated[
-        list[str] | None,
-        typer.Option(help="A goal's name; may be repeated. Default: all of the domain's."),
-    ] = None,
-    tasks: Annotated[int, typer.Option(min=1, help="Of the first goal.")] = 100,
-    others: Annotated[int, typer.Option(min=1, help="Tasks of every other goal.")] = 50,
-    seed: FreshSeed = FRESH_SEED,
-    preset: Preset = None,
-    jobs: Jobs = 1,
-    output: Output = RESULTS,
-) -> None:
-    """Whether tasks can be solved: success of the domain's demonstrator, by goal.
-
-    Whoever stops it goes on with the same command.
-    """
-    choice = _demonstrator(domain, preset, output)
-    names = goal or list(open_domain(choice).goals) or [""]
-    counts = {name: others if i else tasks for i, name in enumerate(names)}
-    settings = {"preset": choice.preset, "tasks": tasks, "others": others, "seed": seed}
-    command = command_line("study", "demonstrations", domain, goal=goal, **settings)
-    log = JobLog(output / f".demonstrations_{domain}.jsonl", command)
-    with _StudyBars() as bars:
-        report = demonstrations.study(choice, counts, seed, log, jobs, bars)
-    _write(output, report, Provenance(domain, command, settings))
-    log.remove()
-
-
-@app.command("vacuity")
-@exits
-def vacuity_(
-    domain: DomainName,
-    starts: Annotated[int, typer.Option(min=1, help="Of each operator.")] = 200,
-    seed: FreshSeed = FRESH_SEED,
-    preset: Preset = None,
-    jobs: Jobs = 1,
-    output: Output = RESULTS,
-) -> None:
-    """Whether there is anything to learn: policies that see nothing, from where skills begin.
-
-    Whoever stops it goes on with the same command.
-    """
-    choice = _demonstrator(domain, preset, output)
-    settings = {"preset": choice.preset, "starts": starts, "seed": seed}
-    command = command_line("study", "vacuity", domain, **settings)
-    log = JobLog(output / f".vacuity_{domain}.jsonl", command)
-    with _StudyBars() as bars:
-        report = vacuity.study(choice, starts, seed, log, jobs, bars)
-    _write(output, report, Provenance(domain, command, settings))
-    log.remove()
-
-
-@app.command("induction")
-@exits
-def induction_(
-    domain: DomainName,
-    demonstrations: Annotated[
-        list[int] | None, typer.Option(help="How many; may be repeated. Default: 1, 3 and 10.")
-    ] = None,
-    tasks: Annotated[int, typer.Option(min=1, help="To plan for, of each goal.")] = 20,
-    seed: FreshSeed = FRESH_SEED,
-    preset: Preset = None,
-    output: Output = RESULTS,
-) -> None:
-    """Operators from so many demonstrations: whether A* finds plans as short for every goal."""
-    choice = _demonstrator(domain, preset, output)
-    counts = demonstrations or [1, 3, 10]
-    settings = {"preset": choice.preset, "tasks": tasks, "seed": seed}
-    command = command_line("study", "induction", domain, demonstrations=counts, **settings)
-    with _StudyBars() as bars:
-        report = induction.study(choice, counts, tasks, seed, bars)
-    settings["demonstrations"] = counts
-    _write(output, report, Provenance(domain, command, settings))
-
-
-def _demonstrator(domain: str, preset: str | None, output: Path) -> DomainChoice:
-    """The domain with its demonstrator for skills, once it is known that there is one."""
-    require_matplotlib()
-    require_writable(output)
-    choice = DomainChoice(domain, preset or "", DEMONSTRATOR)
-    return replace(choice, preset=open_domain(choice).preset)
-
-
-@app.command("planning_ablation")
-@exits
-@flat_options
-def planning_ablation_(
-    domain: DomainName,
-    variants: Annotated[
-        str, typer.Option(help="language+search, language, one_shot; separated by commas.")
-    ] = ",".join(VARIANTS),
-    plans: Annotated[int, typer.Option(min=1, help="Tasks to plan for.")] = 25,
-    attempts: Annotated[int, typer.Option(min=1, help="At operators, for one plan.")] = 10,
-    output: Output = RESULTS,
-    *,
-    options: ModelOptions,
-) -> None:
-    """LG-SAIL Table 2: operators of a language model, planned with by A* or by the model."""
-    require_matplotlib()
-    require_writable(output)
-    with _StudyBars() as bars:
-        report, settings = language_study.planning(domain, variants, plans, attempts, options, bars)
-    command = command_line("study", "planning_ablation", domain, **settings)
-    _write(output, report, Provenance(domain, command, settings))
-
-
-@app.command("models")
-@exits
-@flat_options
-def models_(
-    domain: DomainName,
-    plans: Annotated[int, typer.Option(min=1, help="Tasks to plan for.")] = 100,
-    attempts: Annotated[int, typer.Option(min=1, help="At operators, for one plan.")] = 10,
-    output: Output = RESULTS,
-    *,
-    options: ModelOptions,
-) -> None:
-    """LG-SAIL Tables 5 and 6: operators of several language models, planned with by A*."""
-    require_matplotlib()
-    require_writable(output)
-    with _StudyBars() as bars:
-        report, settings = language_study.planning(domain, SEARCH, plans, attempts, options, bars)
-    command = command_line("study", "models", domain, **settings)
-    _write(output, replace(report, study="models"), Provenance(domain, command, settings))
-
-
-@app.command("reward_ablation")
-@exits
-@flat_options
-def reward_ablation_(
-    domain: DomainName,
-    metrics: Annotated[
-        str, typer.Option(help="full, headers: what the model sees of them; by commas.")
-    ] = "full,headers",
-    trials: Annotated[int, typer.Option(min=1, help="Of each.")] = 25,
-    output: Output = RESULTS,
-    *,
-    options: ModelOptions,
-) -> None:
-    """LG-SAIL Table 3, Fig. 7: rewards of a language model, and what is wrong with them."""
-    require_matplotlib()
-    require_writable(output)
-    with _StudyBars() as bars:
-        report, settings = language_study.rewards(domain, metrics, trials, options, bars)
-    command = command_line("study", "reward_ablation", domain, **settings)
-    _write(output, report, Provenance(domain, command, settings))
+for name, command in acquisition_study.COMMANDS.items():
+    app.command(name)(command)
 
 
 @app.command("table1")
@@ -387,12 +222,13 @@ def table1_(
         list[Path] | None,
         typer.Option(
             "--library",
+            metavar="FOLDER",
             help="A library's folder, one per training seed; may be repeated. Default: what ships.",
         ),
     ] = None,
     tasks: Tasks = 10,
     seeds: Seeds = 5,
-    first_seed: Annotated[int, typer.Option(min=0, help="The first task seed.")] = FRESH_SEED,
+    first_seed: FirstSeed = FRESH_SEED,
     presets: Annotated[
         list[str] | None, typer.Option("--preset", help="May be repeated. Default: all.")
     ] = None,
@@ -400,12 +236,8 @@ def table1_(
     jobs: Jobs = 1,
     output: Output = RESULTS,
 ) -> None:
-    """SLAP Table 1: success and plan length on fresh tasks, over several trained libraries.
-
-    Whoever stops it goes on with the same command.
-    """
-    require_matplotlib()
-    require_writable(output)
+    """SLAP Table 1: success and plan length on fresh tasks, over several trained libraries."""
+    require_report(output)
     chosen = [get_domain(domain, preset) for preset in presets or preset_names(domain)]
     folders = libraries or shipped_libraries(domain)
     trained = [
@@ -414,27 +246,76 @@ def table1_(
         if (loaded := choose(str(folder), chosen[0], "lazy")) is not None
     ]
     settings = {"tasks": tasks, "seeds": seeds, "first_seed": first_seed, "samples": samples}
-    given = {"library": list(map(str, libraries or ())), "preset": list(presets or ())}
-    command = command_line("study", "table1", domain, **given, **settings)
-    log = TrialLog(output / f".table1_{domain}.jsonl", command)
-    experiments = [Experiment(one, tasks, seeds, first_seed) for one in chosen]
-    with _StudyBars() as bars:
-        report = table1.study(experiments, trained, sampling(samples), jobs, log, bars)
+    given = {"library": libraries, "preset": presets, **settings}
     described = [describe_library(one.name, one.library) for one in trained]
-    _write(output, report, Provenance(domain, command, {**settings, "libraries": described}))
-    log.remove()
+    origin = provenance("table1", domain, {**settings, "libraries": described}, **given)
+    experiments = [Experiment(one, tasks, seeds, first_seed) for one in chosen]
+    make_report(
+        "table1",
+        origin,
+        output,
+        jobs,
+        lambda runner: table1.study(experiments, trained, sampling(samples), runner),
+    )
+
+
+@app.command("ablation")
+@exits
+def ablation_(
+    domain: DomainName,
+    term: Annotated[
+        list[str] | None,
+        typer.Option(help="What to leave out; may be repeated. Default: each, and all of them."),
+    ] = None,
+    trainings: Annotated[int, typer.Option(min=1, help="Of each, with seeds from 0 on.")] = 3,
+    steps: Annotated[
+        int | None,
+        typer.Option(min=1, help="Environment steps of a training. Default: the domain's."),
+    ] = None,
+    tasks: Annotated[int, typer.Option(min=1, help="To plan for with what was learned.")] = 20,
+    seed: FreshSeed = FRESH_SEED,
+    samples: Samples = SAMPLES,
+    preset: Preset = None,
+    jobs: Jobs = 1,
+    output: Output = RESULTS,
+) -> None:
+    """What is made by hand for a domain: learn without each term, and with a plain interface."""
+    require_report(output)
+    require_torch()
+    preset = get_domain(domain, preset).preset
+    setup = ablation.AblationSetup(domain, preset, steps, tasks, seed, sampling(samples))
+    settings = {
+        "preset": preset,
+        "trainings": trainings,
+        "steps": steps,
+        "tasks": tasks,
+        "seed": seed,
+        "samples": samples,
+    }
+    origin = provenance("ablation", domain, settings, term=term)
+    # Checkpoints of another command would be of other trainings.
+    folder = output / f".ablation_{domain}-{sha256(origin.command.encode()).hexdigest()[:8]}"
+    make_report(
+        "ablation",
+        origin,
+        output,
+        jobs,
+        lambda run: ablation.study(setup, term or setup.terms(), trainings, run, folder),
+    )
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 @app.command("readme")
 @exits
 def readme_(
     pages: Annotated[
-        list[Path] | None, typer.Argument(help="Markdown pages. Default: README.md.")
+        list[Path] | None,
+        typer.Argument(metavar="PAGE", help="Markdown pages. Default: all with tables."),
     ] = None,
     results: Annotated[Path, typer.Option(help="Folder of the studies' data.")] = RESULTS,
 ) -> None:
     """Write the tables of pages again from the data of studies."""
-    for page in pages or [Path("README.md")]:
+    for page in pages or PAGES:
         text = read_text(page)
         written = readme.with_tables(text, results)
         if written != text:
@@ -447,84 +328,94 @@ def _library_name(folder: Path) -> str:
     return "/".join(folder.resolve().parts[-2:])
 
 
-def _compare(domain: str, options: ComparisonOptions) -> tuple[Comparison, Data]:
-    """What to compare, and the settings that a report names."""
-    require_matplotlib()
-    chosen = get_domain(domain, options.preset)
-    library = choose(options.shortcuts, chosen, "lazy")
-    folder = Path(options.shortcuts) if options.shortcuts else shipped_library(domain)
-    if library is None or folder is None:
-        raise InvalidParameterError(
-            f"there is nothing to compare with pure planning in {domain}: give a shortcut library "
-            "with --shortcuts"
-        )
-    compared = approaches(library, sampling(options.samples))
-    settings = {
-        "preset": chosen.preset,
-        "tasks": options.tasks,
-        "seeds": options.seeds,
-        "samples": options.samples,
-        "library": describe_library(folder.name, library),
-    }
-    comparison = Comparison(chosen, compared, options.tasks, options.seeds, options.jobs)
-    return comparison, settings
+@dataclass(frozen=True)
+class _Compared:
+    """Pure planning and SLAP, and for which tasks."""
 
+    domain: Domain
+    approaches: tuple[Approach, ...]
+    settings: Data  # that a report names
+    options: ComparisonOptions
 
-def _ends(comparison: Comparison) -> Comparison:
-    """The same for pure planning and SLAP alone, without the approaches between them."""
-    return replace(comparison, approaches=(comparison.approaches[0], comparison.approaches[-1]))
+    @classmethod
+    def of(
+        cls,
+        domain: str,
+        options: ComparisonOptions,
+        settings: Data | None = None,
+        needs_library: bool = True,
+    ) -> _Compared:
+        """What the command line asks for.
 
+        Args:
+            domain: Its name.
+            options: The command's.
+            settings: The study's own that a report names.
+            needs_library: Whether there is nothing to study without shortcuts.
 
-def _given(options: ComparisonOptions, settings: Data) -> Data:
-    """The options that make a report again, with the library as it was given."""
-    return {"shortcuts": options.shortcuts, **settings}
+        Raises:
+            InvalidParameterError: There are none, and they are needed.
+        """
+        chosen = get_domain(domain, options.preset)
+        library = choose(options.shortcuts, chosen, "lazy")
+        folder = Path(options.shortcuts) if options.shortcuts else shipped_library(domain)
+        if library is None and needs_library:
+            raise InvalidParameterError(
+                f"there is nothing to compare with pure planning in {domain}: give a shortcut "
+                "library with --shortcuts"
+            )
+        named = {
+            **(settings or {}),
+            "preset": chosen.preset,
+            "tasks": options.tasks,
+            "seeds": options.seeds,
+            "first_seed": options.first_seed,
+            "samples": options.samples,
+        }
+        if library is not None and folder is not None:
+            named["library"] = describe_library(folder.name, library)
+        return cls(chosen, approaches(library, sampling(options.samples)), named, options)
+
+    def ends(self) -> _Compared:
+        """The same for pure planning and SLAP alone, without the approaches between them."""
+        return replace(self, approaches=(self.approaches[0], self.approaches[-1]))
+
+    def make(self, study: str, make: Callable[[Comparison], StudyReport], **given: Any) -> None:
+        """Make and write the report of a study.
+
+        Args:
+            study: As in ``slap study``.
+            make: Makes the report.
+            given: What its command has besides.
+        """
+        options = self.options
+        given["shortcuts"] = options.shortcuts
+        origin = provenance(study, self.domain.name, self.settings, **given)
+
+        def compare(runner: JobRunner) -> StudyReport:
+            return make(
+                Comparison(
+                    domain=self.domain,
+                    approaches=self.approaches,
+                    tasks=options.tasks,
+                    seeds=options.seeds,
+                    first_seed=options.first_seed,
+                    runner=runner,
+                )
+            )
+
+        make_report(study, origin, options.output, options.jobs, compare)
 
 
 def _explore(
-    domain: Domain, options: TaskOptions, how: ExplorationSettings
+    comparison: Comparison, how: ExplorationSettings
 ) -> tuple[pruning.PrunedCandidates, ...]:
-    trainings = [
-        TaskDistribution(domain.name, domain.preset, seed) for seed in range(options.seeds)
-    ]
-    with _StudyBars() as bars:
-        return pruning.explore(trainings, options.tasks, how, options.jobs, bars)
+    """Explore as many tasks as are planned for, each seed's as a training with that seed does."""
+    choice = DomainChoice.of(comparison.domain)
+    trainings = [TaskDistribution(choice, seed) for seed in range(comparison.seeds)]
+    return pruning.explore(trainings, comparison.tasks, how, comparison.runner)
 
 
 def _trainings(folders: Sequence[TrainingFolder]) -> Data:
     """Whose work folders they are."""
     return {"trainings": [folder.distribution() for folder in folders]}
-
-
-def _write(output: Path, report: StudyReport, origin: Provenance) -> None:
-    paths = write(output, report, origin)
-    console.print(f"{report.title}: {', '.join(map(str, paths))}")
-
-
-class _StudyBars:
-    """Progress on the terminal, one bar per kind of jobs."""
-
-    def __init__(self) -> None:
-        self._bars = progress()
-        self._bar: TaskID | None = None
-
-    def __enter__(self) -> _StudyBars:
-        self._bars.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._bars.stop()
-
-    def begin(self, what: str, total: int) -> None:
-        """So many jobs of a kind follow."""
-        if self._bar is not None:
-            self._bars.remove_task(self._bar)
-        self._bar = self._bars.add_task(what, total=total)
-
-    def advance(self) -> None:
-        """One of them has ended."""
-        if self._bar is not None:
-            self._bars.advance(self._bar)
-
-    def report_failure(self, complaint: str) -> None:
-        """A task was not solved, and why."""
-        console.print(complaint)

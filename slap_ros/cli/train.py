@@ -8,30 +8,33 @@ import shlex
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
+from math import isnan
+from os.path import relpath
 from pathlib import Path
-from threading import Event, Thread
 from time import monotonic
 from typing import Annotated, Any
 
 import typer
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, TaskID, TimeRemainingColumn
 
+from slap_ros.acquisition.domain_choice import SHIPPED, WORDS, DomainChoice
 from slap_ros.cli.console import console, print_json
-from slap_ros.cli.options import MAX_SEED, DomainName, Json, Preset
+from slap_ros.cli.learning_bars import LearningBars
+from slap_ros.cli.options import DomainName, Json, Preset, Ray, TrainingSeed
+from slap_ros.cli.skill_choice import Skills, open_chosen
 from slap_ros.core import Domain
-from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
-from slap_ros.files import parse_json, read_text, require_writable
+from slap_ros.files import require_writable
 from slap_ros.learning.setting_changes import changed, parse_changes
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.workers import Workers, local_workers, ray_workers
 from slap_ros.planning.planner import require_skills
 from slap_ros.shortcuts.library import save_library
+from slap_ros.shortcuts.progress import latest
 from slap_ros.shortcuts.settings import TrainingSettings, training_settings
 from slap_ros.shortcuts.training import CandidateGroup, Training
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
-
-REFRESH_S = 1.0
+from slap_ros.studies.results import describe_skills
 
 
 @dataclass(frozen=True)
@@ -43,7 +46,8 @@ class TrainOptions:
         Path | None, typer.Option(help="The library's folder. Default: runs/models/DOMAIN.")
     ] = None
     preset: Preset = None
-    seed: Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Of everything.")] = 0
+    skills: Skills = SHIPPED
+    seed: TrainingSeed = 0
     settings: Annotated[
         str, typer.Option(help="ours, paper (the paper's hyper-parameters), or the domain's own.")
     ] = "ours"
@@ -62,9 +66,7 @@ class TrainOptions:
         ),
     ] = None
     jobs: Annotated[int, typer.Option(min=1, help="Processes.")] = 2
-    ray: Annotated[
-        str | None, typer.Option(help="Address of a Ray cluster to run on instead, or local.")
-    ] = None
+    ray: Ray = None
     work: Annotated[
         Path | None,
         typer.Option(help="Folder for checkpoints and logs; the same one again goes on."),
@@ -98,10 +100,16 @@ class TrainOptions:
     @property
     def command(self) -> str:
         """The command that trains the same library again."""
-        command = f"slap train {self.domain} --preset {self.preset} --seed {self.seed}"
+        command = f"slap train {self.domain} --preset {self.preset}{self.skills_given}"
         steps = "" if self.steps is None else f" --steps {self.steps}"
         changes = "".join(f" --set {shlex.quote(text)}" for text in self.set or ())
-        return f"{command} --settings {self.settings}{steps}{changes}"
+        return f"{command} --seed {self.seed} --settings {self.settings}{steps}{changes}"
+
+    @property
+    def skills_given(self) -> str:
+        """The option ``--skills`` as a part of commands; never an absolute path."""
+        name = self.skills if self.skills in WORDS else relpath(self.skills)
+        return f" --skills {shlex.quote(name)}" if self.skills else ""
 
 
 def train(options: TrainOptions) -> int:
@@ -110,7 +118,7 @@ def train(options: TrainOptions) -> int:
     Interrupted, it goes on where it was when the same command is given again. Progress for
     TensorBoard is in the work folder.
     """
-    domain = get_domain(options.domain, options.preset)
+    domain = open_chosen(options.domain, options.preset, options.skills)
     require_skills(domain)
     options = replace(options, preset=domain.preset)
     settings = options.training_settings(domain)
@@ -118,17 +126,20 @@ def train(options: TrainOptions) -> int:
         require_writable(folder)
     require_torch()
     began, folder = monotonic(), options.library_folder
-    distribution = TaskDistribution(domain.name, domain.preset, options.seed)
+    distribution = TaskDistribution(DomainChoice.of(domain, options.skills), options.seed)
     with training_workers(options.jobs, options.ray) as workers, _TrainingBars() as bars:
         library = Training(distribution, settings, options.work_folder, workers, bars).run()
-    library = replace(library, record={"command": options.command, **library.record})
+    made_by: dict[str, Any] = {"command": options.command}
+    if acquired := describe_skills(domain):
+        made_by["skills"] = acquired
+    library = replace(library, record={**made_by, **library.record})
     save_library(folder, library)
     seconds = monotonic() - began
     if options.json:
         print_json({"library": str(folder), **library.record, "seconds": seconds})
     console.print(
         f"{len(library.shortcuts)} shortcuts in {folder}, {seconds:.0f} s; see what they are worth "
-        f"with `slap evaluate {options.domain} --shortcuts {folder}`",
+        f"with `slap evaluate {options.domain}{options.skills_given} --shortcuts {folder}`",
     )
     return 0
 
@@ -152,37 +163,16 @@ def require_torch() -> None:
         ) from error
 
 
-class _TrainingBars:
-    """Progress on the terminal. What is learned elsewhere is followed by its progress file."""
+class _TrainingBars(LearningBars):
+    """How far a training is, and what came of its steps."""
 
     def __init__(self) -> None:
-        self._bars = Progress(
-            TextColumn("{task.description}", markup=False),
-            BarColumn(),
-            TextColumn("{task.fields[detail]}", markup=False),
-            TimeRemainingColumn(),
-            console=console,
-            transient=True,
-        )
-        self._counting: dict[str, TaskID] = {}
-        self._following: tuple[Event, Thread] | None = None
-
-    def __enter__(self) -> _TrainingBars:
-        self._bars.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._unfollow()
-        self._bars.stop()
+        super().__init__(BarColumn(), TimeRemainingColumn())
 
     def on_progress(self, what: str, done: int, total: int) -> None:
-        """So many jobs of a kind are done."""
-        self._unfollow()
-        if done == 0 or what not in self._counting:
-            self._counting[what] = self._bars.add_task(what, total=total, detail="")
-        self._bars.update(self._counting[what], completed=done, detail=f"{done} of {total}")
-        if done == total:
-            self._bars.remove_task(self._counting.pop(what))
+        """So many jobs of a kind are done; what was learned before them is."""
+        self.unfollow()
+        super().on_progress(what, done, total)
 
     def on_left_out(self, use: str, index: int, reason: str) -> None:
         """A task has no plan."""
@@ -200,42 +190,22 @@ class _TrainingBars:
 
     def on_learning(self, name: str, folder: Path, total_steps: int) -> None:
         """Follow a training."""
-        self._unfollow()
-        bar = self._bars.add_task(f"learning {name}", total=total_steps, detail="")
-        stop = Event()
-        arguments = (ShortcutWorkFolder(folder), bar, stop)
-        thread = Thread(target=self._follow, args=arguments, daemon=True)
-        self._following = stop, thread
-        thread.start()
+        self.unfollow()
+        bar = self.bars.add_task(f"learning {name}", total=total_steps, detail="")
+        work = ShortcutWorkFolder(folder)
+        self.follow(lambda: self._update(bar, work), [bar])
 
-    def _follow(self, folder: ShortcutWorkFolder, bar: TaskID, stop: Event) -> None:
-        while not stop.wait(REFRESH_S):
-            stages = _latest(folder.progress)
-            if stages:
-                last = stages[max(stages)]
-                length = "-" if last["length"] is None else f"{last['length']:.1f}"
-                detail = f"success {last['success']:.0%}, length {length}"
-                steps = sum(stage["steps"] for stage in stages.values())
-                self._bars.update(bar, completed=steps, detail=detail)
-        self._bars.remove_task(bar)
-
-    def _unfollow(self) -> None:
-        if self._following is not None:
-            stop, thread = self._following
-            stop.set()
-            thread.join()
-            self._following = None
+    def _update(self, bar: TaskID, folder: ShortcutWorkFolder) -> None:
+        stages = latest(folder)
+        if stages:
+            last = stages[max(stages)]
+            length = "-" if isnan(last.length) else f"{last.length:.1f}"
+            detail = f"success {last.success:.0%}, length {length}"
+            steps = sum(stage.steps for stage in stages.values())
+            self.bars.update(bar, completed=steps, detail=detail)
 
     def on_validated(self, name: str, before: float, after: float, kept: bool) -> None:
         """What it is worth."""
         console.print(
             f"{name}: plans of {before:.1f} steps become {after:.1f}{'' if kept else '; not kept'}",
         )
-
-
-def _latest(path: Path) -> dict[int, dict[str, Any]]:
-    """The last line of each stage in a progress file; an unfinished line is left out."""
-    if not path.exists():
-        return {}
-    lines = read_text(path).split("\n")[:-1]
-    return {line["stage"]: line for line in map(parse_json, lines)}

@@ -91,10 +91,10 @@ class _LastLink(NamedTuple):
     def joints(self, q7: float) -> Joints | None:
         """The configuration for the wrist that a joint 7 makes, with the joint 7 that it wants."""
         c7, s7 = math.cos(q7), math.sin(q7)
-        wx, wy, wz = (
-            p - _WRIST * (c7 * a - s7 * b)
-            for p, a, b in zip(self.origin, self.x, self.y, strict=True)
-        )
+        (px, py, pz), (ax, ay, az), (bx, by, bz) = self.origin, self.x, self.y
+        wx = px - _WRIST * (c7 * ax - s7 * bx)
+        wy = py - _WRIST * (c7 * ay - s7 * by)
+        wz = pz - _WRIST * (c7 * az - s7 * bz)
         plane = _in_plane(math.hypot(wx, wy), wz - _SHOULDER)
         if plane is None:
             return None

@@ -29,8 +29,13 @@ class Side(Enum):
     FRAME = "frame"  # of a jointed body
     MOVING = "moving"  # part of a jointed body
 
+    # Members are compared by identity. Enum's own hash, of the name, is slow where thousands are
+    # looked up in a second.
+    __hash__ = object.__hash__
 
-HAND = frozenset({Side.PALM, Side.LEFT_FINGER, Side.RIGHT_FINGER})
+
+FINGERS = frozenset({Side.LEFT_FINGER, Side.RIGHT_FINGER})
+HAND = FINGERS | {Side.PALM}
 
 
 class Surface(NamedTuple):
@@ -50,11 +55,6 @@ class ContactPoint(NamedTuple):
     distance: float  # m; below 0, how deep they are in one another
     force_n: float  # along the normal, in the last substep
 
-    def turned(self) -> ContactPoint:
-        """The same with the other one first."""
-        x, y, z = self.normal
-        return self._replace(first=self.second, second=self.first, normal=(-x, -y, -z))
-
 
 def grasped(points: Iterable[ContactPoint], hand: Pose) -> int | None:
     """The free body that both fingers press on from opposite sides; the one gripped hardest.
@@ -63,21 +63,20 @@ def grasped(points: Iterable[ContactPoint], hand: Pose) -> int | None:
         points: What touches what.
         hand: The fingers move along its y.
     """
-    across = rotate(hand.quaternion, (0.0, 1.0, 0.0))
+    x, y, z = rotate(hand.quaternion, (0.0, 1.0, 0.0))
     pressing: dict[int, dict[Side, float]] = {}
-    for point in points:
-        if point.first.side is Side.FREE:
-            point = point.turned()
-        finger, body = point.first, point.second
-        if body.side is not Side.FREE or finger.side not in (Side.LEFT_FINGER, Side.RIGHT_FINGER):
+    for first, second, _, (u, v, w), _, force_n in points:
+        finger, body, sign = first, second, 1.0  # the normal is the body's, towards the finger
+        if first.side is Side.FREE:
+            finger, body, sign = second, first, -1.0
+        if body.side is not Side.FREE or finger.side not in FINGERS:
             continue
-        outwards = 1.0 if finger.side is Side.LEFT_FINGER else -1.0
-        along = outwards * sum(n * a for n, a in zip(point.normal, across, strict=True))
+        if finger.side is Side.RIGHT_FINGER:  # outwards is the other way
+            sign = -sign
+        along = sign * (u * x + v * y + w * z)
         if along > 0.0:
-            forces = pressing.setdefault(
-                body.number, {Side.LEFT_FINGER: 0.0, Side.RIGHT_FINGER: 0.0}
-            )
-            forces[finger.side] += along * point.force_n
+            forces = pressing.setdefault(body.number, dict.fromkeys(FINGERS, 0.0))
+            forces[finger.side] += along * force_n
     grips = {body: min(forces.values()) for body, forces in pressing.items()}
     held = max(grips, key=lambda body: grips[body], default=None)
     return held if held is not None and grips[held] >= PRESSING_N else None
@@ -91,10 +90,10 @@ def groups(points: Iterable[ContactPoint], surfaces: Sequence[Surface]) -> list[
         surfaces: The bodies asked about, the hand as its palm; each is in one group.
     """
     group = {surface: {surface} for surface in surfaces}
-    for point in points:
-        if point.distance > TOUCHING_M:
+    for one, other, _, _, distance, _ in points:
+        if distance > TOUCHING_M:
             continue
-        first, second = _whole(point.first), _whole(point.second)
+        first, second = _whole(one), _whole(other)
         if first not in group or second not in group or group[first] is group[second]:
             continue
         joined = group[first] | group[second]

@@ -117,20 +117,15 @@ class ContactDynamics:
 
         What it misses is found out by looking at palm and fingers one by one.
         """
+        moving = _all(now)
+        if not all(motion.still for motion in moving):
+            return False
         margin = TOUCH + OVERSHOOT_S * max(map(abs, now.hand.velocity))
         space = space_of_way(now.hand.pose, pull, margin)
-        if space is None:
+        if space is None or meet((space,), self._fixed):
             return False
-        for box in self._fixed:
-            if space.meets(box):
-                return False
-        bounds: list[Bounds | None] = []
-        for i, motion in enumerate(_all(now)):
-            box = self._bounds(i, motion)
-            if not motion.still or space.meets(box):
-                return False
-            bounds.append(box)
-        return not self._unsupported(now, bounds)
+        bounds = [self._bounds(i, motion) for i, motion in enumerate(moving)]
+        return not meet((space,), bounds) and not self._unsupported(now, bounds)
 
     def _involved(self, now: ContactSnapshot, sweep: Mover) -> Involved:
         bounds: list[Bounds] = []
@@ -192,8 +187,7 @@ class ContactDynamics:
             return involved
         moving, after = _all(now), self._results(outcome)
         ways = [
-            self._bounds(i, moving[i]).hull(self._new_bounds(i, motion))
-            for i, motion in after.items()
+            self._bounds(i, moving[i]).hull(self._bounds(i, motion)) for i, motion in after.items()
         ]
         hand = _hulls(self._hand_bounds(now.hand), self._hand_bounds(outcome.hand))
         met = involved.hand or meet(ways, hand)

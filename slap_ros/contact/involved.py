@@ -80,14 +80,12 @@ def rigid_bounds(body: Compound, pose: Pose) -> Bounds:
 
 def part_bounds(body: Compound, pose: Pose) -> list[Bounds]:
     """The bounds of each part of a rigid body: of a wall with a hole, not the hole."""
-    boxes = (part.bounding_box for part in body.parts)
-    return [bounds_of(OrientedBox(pose.compose(box.pose), box.half)) for box in boxes]
+    return [bounds_of(part.bounding_box.at(pose)) for part in body.parts]
 
 
 def frame_bounds(body: JointedBody, pose: Pose) -> Bounds:
     """The bounds of the frame of a jointed body that stands there."""
-    boxes = (part.bounding_box for part in body.frame)
-    return hull_of(OrientedBox(pose.compose(box.pose), box.half) for box in boxes)
+    return hull_of(part.bounding_box.at(pose) for part in body.frame)
 
 
 def moving_bounds(body: JointedBody, pose: Pose, opening: float) -> Bounds:
@@ -98,8 +96,7 @@ def moving_bounds(body: JointedBody, pose: Pose, opening: float) -> Bounds:
         pose: Where it stands.
         opening: Of its joint, m or rad.
     """
-    frame, half = body.moving_box
-    return bounds_of(OrientedBox(body.moving_pose(pose, opening).compose(frame), half))
+    return bounds_of(body.moving_box.at(body.moving_pose(pose, opening)))
 
 
 # Both fingers in one box, at finger position 0: how far they reach in the hand's frame.
@@ -112,15 +109,16 @@ _FINGERS_ROOT = STEM.pose.position[2] - STEM.half_extents_m[2]
 def hand_bounds(hand: HandState) -> tuple[Bounds, Bounds]:
     """The bounds of the palm, and of both fingers together."""
     left, right = hand.fingers
-    middle = Pose((0.0, 0.5 * (left - right), 0.5 * (_FINGERS_TIP + _FINGERS_ROOT)))
+    middle = (0.0, 0.5 * (left - right), 0.5 * (_FINGERS_TIP + _FINGERS_ROOT))
     half = (
         _FINGERS_WIDE,
         _FINGERS_ASIDE + 0.5 * (left + right),
         0.5 * (_FINGERS_TIP - _FINGERS_ROOT),
     )
+    pose, turn = hand.pose, hand.pose.quaternion  # both boxes are turned as the hand is
     return (
-        bounds_of(OrientedBox(hand.pose.compose(PALM.pose), PALM.half_extents_m)),
-        bounds_of(OrientedBox(hand.pose.compose(middle), half)),
+        bounds_of(OrientedBox(Pose(pose.apply(PALM.pose.position), turn), PALM.half_extents_m)),
+        bounds_of(OrientedBox(Pose(pose.apply(middle), turn), half)),
     )
 
 

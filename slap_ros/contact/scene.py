@@ -19,12 +19,14 @@ from slap_ros.geometry.pose import (
     Vector,
     conjugate,
     from_rotation_vector,
+    from_yaw,
     rotate,
 )
 from slap_ros.physics.scene import GREY, WOOD, Colour, RigidBody
 
 FRICTION = 1.0  # 1, of bodies; that of a pair of bodies is the product of both
 TABLE_FRICTION = 0.9  # 1
+TURNS = tuple(from_yaw(math.radians(turn)) for turn in (0.0, 22.5, 45.0, 67.5))  # deg
 INSCRIBED = math.sqrt(0.5)  # half the edge of the square inside a circle of radius 1
 
 
@@ -46,6 +48,11 @@ class BoxPart:
     def bounding_box(self) -> OrientedBox:
         """The smallest box around it."""
         return OrientedBox(self.pose, self.half_extents_m)
+
+    @property
+    def bounding_boxes(self) -> tuple[OrientedBox, ...]:
+        """Boxes around it; what is outside of one of them does not touch it."""
+        return (self.bounding_box,)
 
     @property
     def inner_box(self) -> OrientedBox:
@@ -86,6 +93,16 @@ class CylinderPart:
         return OrientedBox(self.pose, (self.radius_m, self.radius_m, 0.5 * self.length_m))
 
     @property
+    def bounding_boxes(self) -> tuple[OrientedBox, ...]:
+        """Boxes around it; what is outside of one of them does not touch it.
+
+        Each is turned about the axis: a single one's corners are 1.4 radii away from it, what is
+        inside all of them is 1.02 at most.
+        """
+        pose, half = self.bounding_box
+        return tuple(OrientedBox(pose.compose(Pose(quaternion=turn)), half) for turn in TURNS)
+
+    @property
     def inner_box(self) -> OrientedBox:
         """A box inside it."""
         half = INSCRIBED * self.radius_m
@@ -124,8 +141,7 @@ class Compound(RigidBody):
 
     def at(self, pose: Pose) -> OrientedBox:
         """The box around it at a pose."""
-        frame, half = self.bounding_box
-        return OrientedBox(pose.compose(frame), half)
+        return self.bounding_box.at(pose)
 
     def cores(self, pose: Pose) -> tuple[OrientedBox, ...]:
         """Boxes inside it at a pose."""
@@ -404,8 +420,7 @@ def bounding_box(parts: Sequence[Part]) -> OrientedBox:
 
 
 def _inner_boxes(parts: Sequence[Part], pose: Pose) -> tuple[OrientedBox, ...]:
-    inner = (part.inner_box for part in parts)
-    return tuple(OrientedBox(pose.compose(frame), half) for frame, half in inner)
+    return tuple(part.inner_box.at(pose) for part in parts)
 
 
 def _cross(a: Vector, b: Vector) -> Vector:

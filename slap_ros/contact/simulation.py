@@ -49,9 +49,8 @@ FASTEST = 2.0  # m/s, of any point of a jointed body, about: jammed, it would be
 MOTOR_SUBSTEPS = SUBSTEPS
 FINGERS = (LEFT, RIGHT)
 BASE = -1  # PyBullet's number of a body's first link
-
-# Columns of a contact point that PyBullet reports.
-BODIES, LINKS, POSITION, NORMAL, DISTANCE, FORCE = slice(1, 3), slice(3, 5), 6, 7, 8, 9
+AWAKE = pybullet.ACTIVATION_STATE_DISABLE_SLEEPING | pybullet.ACTIVATION_STATE_WAKE_UP
+ASLEEP = pybullet.ACTIVATION_STATE_ENABLE_SLEEPING | pybullet.ACTIVATION_STATE_SLEEP
 
 
 @dataclass(frozen=True)
@@ -72,7 +71,8 @@ def _parking(index: int) -> Vector:
 class ContactSimulation:
     """A PyBullet client with the hand and the bodies of a scene.
 
-    It remembers nothing that matters between calls but where the fixed bodies stand.
+    It remembers nothing that matters between calls but where the fixed bodies stand, and which
+    of the others sleep.
     """
 
     def __init__(self, scene: ContactScene) -> None:
@@ -97,6 +97,7 @@ class ContactSimulation:
         self._fixed = [self._add_fixed(i, body) for i, body in enumerate(scene.fixed)]
         self._free = [self._add_free(i, body) for i, body in enumerate(scene.free)]
         self._jointed = [self._add_jointed(i, body) for i, body in enumerate(scene.jointed)]
+        self._awake = set(range(len(self._free) + len(self._jointed)))  # by number, as involved
 
     def close(self) -> None:
         """Give the client back."""
@@ -119,7 +120,7 @@ class ContactSimulation:
             pull: Where the hand is pulled.
             involved: What is computed; all else is as if it were not there.
         """
-        self._prime(now)
+        self._prime_and_wake(now, set(involved.bodies))
         free = [i for i in involved.bodies if i < len(self._free)]
         jointed = [i - len(self._free) for i in involved.bodies[len(free) :]]
         if involved.hand:
@@ -139,6 +140,24 @@ class ContactSimulation:
             {i: self._opening(i) for i in jointed},
             tuple(self._contact_points()),
         )
+
+    def _prime_and_wake(self, now: ContactSnapshot, bodies: set[int]) -> None:
+        """Prime, and have only these awake then: what is left out costs less while it sleeps.
+
+        All that was awake or will be goes through the prime awake, since the bounds of a sleeping
+        body stay where they were, and others would still meet them there.
+        """
+        self._set_activation(bodies - self._awake, AWAKE)
+        self._prime(now)
+        self._set_activation(self._awake - bodies, ASLEEP)
+        self._awake = bodies
+
+    def _set_activation(self, bodies: set[int], state: int) -> None:
+        moving = (*self._free, *self._jointed)
+        for i in bodies:
+            pybullet.changeDynamics(
+                moving[i], BASE, activationState=state, physicsClientId=self.client
+            )
 
     def _prime(self, now: ContactSnapshot) -> None:
         """Forget: park everything apart for a moment, oriented as it will be.
@@ -205,18 +224,19 @@ class ContactSimulation:
             )
 
     def _hand_state(self, before: HandState) -> HandState:
-        pose = pybullet.getBasePositionAndOrientation(self._hand, self.client)
-        velocity, angular_velocity = pybullet.getBaseVelocity(self._hand, self.client)
-        fingers = [
-            _stopped(position, velocity, FINGER_OPEN)
-            for position, velocity, *_ in pybullet.getJointStates(self._hand, FINGERS, self.client)
-        ]
-        return before._replace(
-            pose=Pose(*pose),
-            velocity=velocity,
-            angular_velocity=angular_velocity,
-            fingers=(fingers[0][0], fingers[1][0]),
-            finger_velocities=(fingers[0][1], fingers[1][1]),
+        pose, velocity, angular_velocity = self._motion(self._hand)
+        left, right = pybullet.getJointStates(self._hand, FINGERS, self.client)
+        left_at, left_velocity = _stopped(left[0], left[1], FINGER_OPEN)
+        right_at, right_velocity = _stopped(right[0], right[1], FINGER_OPEN)
+        return HandState(
+            pose,
+            velocity,
+            angular_velocity,
+            before.target,
+            before.target_yaw,
+            (left_at, right_at),
+            (left_velocity, right_velocity),
+            before.closing,
         )
 
     def _add_hand(self) -> int:
@@ -274,14 +294,14 @@ class ContactSimulation:
 
     def _contact_points(self) -> Iterable[ContactPoint]:
         for point in pybullet.getContactPoints(physicsClientId=self.client):
-            (first, second), (link, other) = point[BODIES], point[LINKS]
+            _, first, second, link, other, _, position, normal, distance, force, *_ = point
             yield ContactPoint(
                 self._sides[first, link],
                 self._sides[second, other],
-                point[POSITION],
-                point[NORMAL],
-                point[DISTANCE],
-                point[FORCE] * SUBSTEPS,  # PyBullet spreads an impulse over the period
+                position,
+                normal,
+                distance,
+                force * SUBSTEPS,  # PyBullet spreads an impulse over the period
             )
 
     def _add_fixed(self, index: int, body: Compound) -> int | None:

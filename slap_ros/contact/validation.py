@@ -160,10 +160,7 @@ def _require_held(scene: ContactScene, snapshot: ContactSnapshot) -> None:
     if snapshot.held is None:
         return
     body, motion = scene.free[snapshot.held], snapshot.bodies[snapshot.held]
-    parts = [
-        OrientedBox(motion.pose.compose(part.bounding_box.pose), part.bounding_box.half)
-        for part in body.parts
-    ]
+    parts = [part.bounding_box.at(motion.pose) for part in body.parts]
     for pad in (box for box in snapshot.hand.boxes() if box.half == PAD.half_extents_m):
         if not _share_space([pad.grown(GRASP_GAP)], parts):
             raise InvalidStateError(f"{body.name} is held, but not between the fingers")

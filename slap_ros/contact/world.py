@@ -10,7 +10,6 @@ for bit (``docs/contact.md`` says how, and what it costs).
 from __future__ import annotations
 
 import weakref
-from types import TracebackType
 
 from slap_ros.contact.arm import Joints, arm_joints, in_time, share_in_time
 from slap_ros.contact.contacts import ContactPoint
@@ -69,12 +68,7 @@ class ContactWorld:
     def __enter__(self) -> ContactWorld:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

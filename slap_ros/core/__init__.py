@@ -9,7 +9,7 @@ from slap_ros.core.domain import Domain, Execution, Goal
 from slap_ros.core.domain_factory import DomainFactory, presets
 from slap_ros.core.goals import task_with_goal
 from slap_ros.core.learner_interface import LearnerInterface, Learning, SettingValue
-from slap_ros.core.skill import Policy, Skill
+from slap_ros.core.skill import DemandingSkill, Policy, Skill
 from slap_ros.core.task import Task
 from slap_ros.core.world import MakeVectorWorld, SyncVectorWorld, VectorWorld, World
 
@@ -20,6 +20,7 @@ __all__ = [
     "Animate",
     "PictureSize",
     "Approach",
+    "DemandingSkill",
     "Display",
     "Domain",
     "DomainFactory",

@@ -75,6 +75,10 @@ class Domain:
     execution: Execution
     operators: tuple[LiftedOperator, ...] = ()
     skills: Mapping[str, Skill] = field(default_factory=dict)  # by operator name
+    # Operators without a skill: no plan has them, but a message says where a plan would need one.
+    unskilled: tuple[LiftedOperator, ...] = ()
+    # Whether nothing else changes than what operators say; else other atoms may appear.
+    exact: bool = True
     # What rewards can be made of, beside the metrics that predicates rest on.
     metrics: tuple[Metric, ...] = ()
     # Predicates that nothing changes; None: those that no operator changes.
@@ -118,7 +122,7 @@ class Domain:
                     f"domain {self.name}, operator {operator.name}: no skill; add one to the "
                     "domain's skills"
                 )
-        for operator in self.acquisition.operators if self.acquisition else ():
+        for operator in (*self.unskilled, *self._written):
             self._check_operator(operator)
         self._check_static_predicates()
         self._check_learned_actions()
@@ -131,8 +135,7 @@ class Domain:
                     "static; name them, frozenset() for none"
                 )
             return
-        written = self.acquisition.operators if self.acquisition else ()
-        never_changed = static_predicates(self.predicates, (*self.operators, *written))
+        never_changed = static_predicates(self.predicates, (*self.operators, *self._written))
         if changed := sorted(p.name for p in self.static - never_changed):
             raise InvalidDomainError(
                 f"domain {self.name}: {', '.join(changed)} cannot be static: an operator changes "
@@ -159,6 +162,11 @@ class Domain:
         for variable in operator.parameters:
             if variable.type not in self.types:
                 raise InvalidDomainError(f"{where}: unknown type {variable.type.name!r}")
+
+    @property
+    def _written(self) -> tuple[LiftedOperator, ...]:
+        """The operators written by hand."""
+        return self.acquisition.operators if self.acquisition else ()
 
     @property
     def learned_actions(self) -> ActionSpace:

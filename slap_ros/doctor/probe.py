@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 ANSWER_LIMIT_S = 5.0  # for the first answer
-LIFE_LIMIT_S = 12  # after which a probe ends, come what may
+LIFE_LIMIT_S = 45  # after which a probe ends, come what may
 ROUND_TRIPS = 50
 PATIENCE_S = 0.1  # for any later one
 PERIOD_S = 0.02  # between questions until the first answer

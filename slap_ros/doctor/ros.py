@@ -15,7 +15,7 @@ from slap_ros.doctor.processes import PROBE, run_python
 
 DISTRO = "jazzy"
 CYCLONE = "rmw_cyclonedds_cpp"
-IMPORT_LIMIT_S = 15.0
+IMPORT_LIMIT_S = 40.0
 
 
 @dataclass(frozen=True)

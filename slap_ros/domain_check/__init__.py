@@ -41,7 +41,7 @@ def check_domain(
     solver, planner = domain, "lazy"
     if not domain.operators:  # then a demonstrator shows whether tasks can be solved
         solver, planner = acquisition.with_demonstrator(domain) or domain, "astar"
-    solved = tasks.Solved.of(solver, CHECK_SEED + seed, task_count, planner)
+    solved = tasks.SolvedTasks.of(solver, CHECK_SEED + seed, task_count, planner)
     yield solved.check()
     start = domain.task(CHECK_SEED + seed).initial_state
     experience = gather(domain, start, solved.episodes, state_count, rng)

@@ -8,18 +8,18 @@ from collections.abc import Iterator
 
 from slap_ros.core import Domain
 from slap_ros.doctor.check import Check
-from slap_ros.domain_check.tasks import Solved
+from slap_ros.domain_check.tasks import SolvedTasks
 from slap_ros.errors import SlapError
 from slap_ros.evaluation.approaches import PURE_PLANNING
 from slap_ros.planning.model import Model, Rollout
 from slap_ros.planning.options import Option
 from slap_ros.planning.plan import Plan
-from slap_ros.relational import State
+from slap_ros.relational import State, Target
 
 PLANS = 10  # tasks whose plans are rolled out again
 
 
-def lower_bounds(domain: Domain, solved: Solved) -> Check:
+def lower_bounds(domain: Domain, solved: SolvedTasks) -> Check:
     """Whether no option is done in fewer steps than its skill says that it takes at least."""
     seen = 0
     for option, state, rollout in _rollouts(domain, solved):
@@ -38,13 +38,13 @@ def lower_bounds(domain: Domain, solved: Solved) -> Check:
     return Check("lower bounds", "ok", f"never above the {seen} roll-outs of plans")
 
 
-def deterministic(domain: Domain, solved: Solved) -> Check:
+def deterministic(domain: Domain, solved: SolvedTasks) -> Check:
     """Whether an option, rolled out again in another world, takes the same way."""
     seen = 0
     for option, state, rollout in _rollouts(domain, solved):
         seen += 1
         again = Model.of(domain, state)
-        second = again.roll_out(option, state, again.space.abstract(rollout.final))
+        second = again.roll_out(option, state, Target.exactly(again.space.abstract(rollout.final)))
         if second.steps != rollout.steps or second.final.key != rollout.final.key:
             return Check(
                 "skills",
@@ -57,7 +57,7 @@ def deterministic(domain: Domain, solved: Solved) -> Check:
     return Check("skills", "ok", f"{seen} roll-outs repeated, to the bit")
 
 
-def _rollouts(domain: Domain, solved: Solved) -> Iterator[tuple[Option, State, Rollout]]:
+def _rollouts(domain: Domain, solved: SolvedTasks) -> Iterator[tuple[Option, State, Rollout]]:
     """Each edge of the plans of some tasks, from the state in which it began."""
     for index in range(min(PLANS, solved.count)):
         if index in solved.failures:

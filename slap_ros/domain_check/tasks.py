@@ -52,7 +52,7 @@ def different(domain: Domain, seed: int, count: int) -> Check:
 
 
 @dataclass(frozen=True)
-class Solved:
+class SolvedTasks:
     """What came of planning and executing tasks without shortcuts.
 
     Args:
@@ -70,7 +70,7 @@ class Solved:
     planner: str = "lazy"
 
     @classmethod
-    def of(cls, domain: Domain, seed: int, count: int, planner: str = "lazy") -> Solved:
+    def of(cls, domain: Domain, seed: int, count: int, planner: str = "lazy") -> SolvedTasks:
         """Plan and execute the first tasks of a seed.
 
         Args:

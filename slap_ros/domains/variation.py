@@ -27,19 +27,29 @@ class TaskSettings:
     Attributes:
         limits: The lowest and highest number of a field, both allowed, where it has such. All
             numbers are finite anyway.
+        choices: The words that a field may be, where it is a word.
     """
 
     limits: ClassVar[Mapping[str, Limits]] = {}
+    choices: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 
     def __post_init__(self: DataclassInstance) -> None:
-        """Check every number.
+        """Check every number and every word.
 
         Raises:
-            InvalidParameterError: One is not finite or beyond its limits.
+            InvalidParameterError: A number is not finite or beyond its limits, or a word is none
+                of its choices.
         """
         limits: Mapping[str, Limits] = getattr(self, "limits", {})
+        choices: Mapping[str, tuple[str, ...]] = getattr(self, "choices", {})
         for field in fields(self):
             value = getattr(self, field.name)
+            words = choices.get(field.name, ())
+            if words and value not in words:
+                raise InvalidParameterError(
+                    f"setting {field.name!r} is {_shortened(str(value))}; it must be "
+                    f"{' or '.join(words)}"
+                )
             low, high = limits.get(field.name, (-math.inf, math.inf))
             for number in _numbers(value):
                 # An integer beyond what floats hold is compared as it is; NaN fails.
@@ -74,7 +84,7 @@ def parse_preset(text: str) -> tuple[str, dict[str, str]]:
 
 
 def varied(settings: Settings, changes: Mapping[str, str]) -> Settings:
-    """Settings with some changed. A range is ``low..high``, or one number for both.
+    """Settings with some changed. A range is ``low..high``, or one number for both; or a word.
 
     Raises:
         InvalidParameterError: There is no such setting, or it cannot have that value.
@@ -105,6 +115,8 @@ def _read(name: str, text: str, now: object) -> object:
     """The text as a value like the present one."""
     is_range = isinstance(now, tuple) and len(now) == 2
     kind = type(now[0] if isinstance(now, tuple) else now)
+    if kind is str:
+        return text
     if kind not in (int, float):
         raise InvalidParameterError(f"setting {name!r} cannot be given on the command line")
     pieces = text.split("..") if is_range else [text]

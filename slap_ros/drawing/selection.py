@@ -96,12 +96,13 @@ def _path(
     number = {mask: i for i, mask in enumerate(atoms)}
     path, source = [], 0
     for edge in plan.edges if plan is not None else ():
-        if edge.target not in number:
-            number[edge.target] = len(atoms)
-            atoms.append(edge.target)
+        expected = edge.target.required
+        if expected not in number:
+            number[expected] = len(atoms)
+            atoms.append(expected)
             depths.append(depths[source] + 1)
-        path.append((source, number[edge.target], edge))
-        source = number[edge.target]
+        path.append((source, number[expected], edge))
+        source = number[expected]
     return path
 
 

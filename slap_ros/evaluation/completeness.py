@@ -1,12 +1,14 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a log of a run lacks: states, plans and events that others presuppose."""
+"""What the log of a run lacks: states, plans and events that others presuppose."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 
+from slap_ros.evaluation.executed_options import ExecutedOption
+from slap_ros.evaluation.recorded_run import RecordedRun
 from slap_ros.messages.events import PlanEventKind as Kind
 from slap_ros.messages.protocols import PlanEventMessage
 
@@ -18,6 +20,45 @@ FOLLOWERS: Mapping[int, Collection[Kind]] = {
     Kind.EDGE_REACHED: (Kind.EDGE_STARTED, Kind.SOLVED, Kind.FAILED),
     Kind.DIVERGED: (Kind.PLANNING_STARTED, Kind.FAILED),
 }
+
+
+def is_complete(run: RecordedRun, executed: Iterable[ExecutedOption]) -> bool:
+    """Whether a run has ended and all that its events refer to is here as well.
+
+    Args:
+        run: What was recorded of it.
+        executed: All options that were executed in its episode.
+    """
+    end = run.events.end
+    if end is None:
+        return False
+    # The newest plan tells shortcuts from operators.
+    planned = not run.announced or run.announced[-1] is not None
+    reached = sum(option.reached for option in executed)
+    return (
+        (end.step == run.first_step or end.step in run.episode.steps)
+        and end.step in run.episode.atoms
+        and reached >= run.events.count(Kind.EDGE_REACHED)
+        and planned
+    )
+
+
+def gaps_of(run: RecordedRun, executed: Iterable[ExecutedOption]) -> Iterator[str]:
+    """What is missing of a run, in words; nothing for that reason alone that it has not ended.
+
+    Args:
+        run: What was recorded of it.
+        executed: All options that were executed in its episode.
+    """
+    if states := missing_states(run.first_step, run.last_step, run.episode.steps):
+        yield states
+    yield from missing_events(run.events.messages)
+    if lost := len(run.announced) - len(run.plans):
+        yield f"{lost} of {len(run.announced)} plans are missing"
+    steps = range(run.first_step, run.last_step + 1)
+    reached = sum(option.reached for option in executed if option.start.step in steps)
+    if (lost := run.events.count(Kind.EDGE_REACHED) - reached) > 0:
+        yield f"skill events of {lost} executed options are missing"
 
 
 def missing_states(first: int, last: int, recorded: Collection[int]) -> str | None:

@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
+from slap_ros.acquisition.domain_choice import SHIPPED, DomainChoice, open_domain
 from slap_ros.core import Domain, Task, task_with_goal
 from slap_ros.errors import ErrorCode
 from slap_ros.evaluation.approaches import PURE_PLANNING, Approach
-from slap_ros.learning.domain_choice import SHIPPED, DomainChoice, open_domain
 from slap_ros.learning.workers import local_workers
 from slap_ros.planning.execution import EpisodeResult, ExecutedEdge, Executor
 from slap_ros.relational import GroundAtom
@@ -29,7 +30,7 @@ class Experiment:
         left_out: Seeds and indices of tasks that are not solved.
         goal: By name or as atoms, as :func:`~slap_ros.core.task_with_goal` takes it; None for the
             goal that comes with each task.
-        skills: Whose they are, as :class:`~slap_ros.learning.domain_choice.DomainChoice` has it.
+        skills: Whose they are, as :class:`~slap_ros.acquisition.domain_choice.DomainChoice` has it.
     """
 
     domain: Domain
@@ -165,6 +166,14 @@ class Trial:
             tuple(episode.edges),
         )
 
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Trial:
+        """The trial that :func:`dataclasses.asdict` made such data of."""
+        edges = tuple(
+            ExecutedEdge(**edge | {"objects": tuple(edge["objects"])}) for edge in data["edges"]
+        )
+        return cls(**{**data, "edges": edges})
+
 
 def run_all(experiment: Experiment, approach: Approach, jobs: int) -> Iterator[Trial]:
     """Solve every task of an experiment.
@@ -180,19 +189,43 @@ def run_all(experiment: Experiment, approach: Approach, jobs: int) -> Iterator[T
     Yields:
         The figures of each task, as it ends.
     """
-    choice = DomainChoice.of(experiment.domain, experiment.skills)
-    work = [
-        (choice, experiment.goal, experiment.planner, approach, seed, index)
-        for seed, index in experiment
-    ]
+    work = [task_job(experiment, approach, seed, index) for seed, index in experiment]
     with local_workers(jobs) as workers:
-        for _, trial in workers.run(_try, work):
+        for _, trial in workers.run(try_task, work):
             yield trial
 
 
-def _try(
+TaskJob = tuple[DomainChoice, str | None, str, Approach, int, int]
+
+
+def task_job(experiment: Experiment, approach: Approach, seed: int, index: int) -> TaskJob:
+    """The arguments of :func:`try_task` for a task of an experiment.
+
+    Args:
+        experiment: Whose task.
+        approach: How to plan.
+        seed: Of the task.
+        index: Of the task.
+    """
+    choice = DomainChoice.of(experiment.domain, experiment.skills)
+    return choice, experiment.goal, experiment.planner, approach, seed, index
+
+
+def try_task(
     choice: DomainChoice, goal: str | None, planner: str, approach: Approach, seed: int, index: int
 ) -> Trial:
-    """One task; its domain is made where this runs."""
+    """Solve one task, in whichever process this runs.
+
+    Args:
+        choice: Of the domain, which is made here.
+        goal: By name or as atoms; None for the goal that comes with the task.
+        planner: By name.
+        approach: How to plan.
+        seed: Of the task.
+        index: Of the task.
+
+    Returns:
+        The figures of the task.
+    """
     experiment = Experiment(open_domain(choice), 1, 1, planner=planner, goal=goal)
     return Trial.of(seed, index, experiment.run(seed, index, approach))

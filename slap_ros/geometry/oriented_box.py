@@ -20,6 +20,10 @@ class OrientedBox(NamedTuple):
     pose: Pose
     half: Vector
 
+    def at(self, frame: Pose) -> OrientedBox:
+        """The box seen from outside, where the frame that it is given in is at a pose."""
+        return OrientedBox(frame.compose(self.pose), self.half)
+
     def shrunk(self, depth: float) -> OrientedBox:
         """The box less a layer of ``depth`` m; what is thinner than that is left as a sheet."""
         x, y, z = self.half

@@ -11,15 +11,17 @@ from __future__ import annotations
 import importlib
 import json
 import logging
+import math
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from email.utils import parsedate_to_datetime
+from functools import partial
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeVar
 
 from slap_ros.errors import LanguageRefusedError, LanguageUnavailableError
 from slap_ros.files import parse_json
@@ -27,6 +29,8 @@ from slap_ros.language.request import OutputDegree, Reply, Request, replace_unpr
 from slap_ros.language.settings import KEY_VARIABLE, OPENAI_URL, LanguageSettings
 
 logger = logging.getLogger(__name__)
+
+Answer = TypeVar("Answer")
 
 MAX_BODY_BYTES = 16_000_000
 MAX_SERVER_WORDS = 300  # characters of a server's error message that are passed on
@@ -125,7 +129,8 @@ class OpenAIClient:
         degree: OutputDegree | None = self._degree
         refusals: list[str] = []
         while degree is not None:
-            outcome = self._ask(request, degree, deadline)
+            body = self._body(request, degree)
+            outcome = self._ask(self._client.chat.completions, body, _read_envelope, deadline)
             if isinstance(outcome, _Failure):
                 refusals.append(f"{degree}: {outcome.words}")
                 degree = degree.next
@@ -136,6 +141,31 @@ class OpenAIClient:
             f"{self.source} does not accept the request, however it is asked: {refusals[-1]}"
         )
 
+    def embed(self, texts: Sequence[str], seconds_left: float) -> list[list[float]]:
+        """The vectors of texts, by the server's ``/embeddings``.
+
+        Args:
+            texts: One or more.
+            seconds_left: The wait ends then.
+
+        Returns:
+            As many vectors as texts, in their order, all of the same size.
+
+        Raises:
+            LanguageUnavailableError: No answer could be had.
+            LanguageRefusedError: The server does not accept the request: key, model, address.
+        """
+        deadline = time.monotonic() + min(seconds_left, self._settings.answer_seconds)
+        body = {"model": self._settings.model, "input": [*texts], "encoding_format": "float"}
+        read = partial(_read_embeddings, count=len(texts))
+        outcome = self._ask(self._client.embeddings, body, read, deadline)
+        if isinstance(outcome, _Failure):
+            raise LanguageRefusedError(
+                f"{self.source} makes no embeddings (model {self._settings.model!r}): "
+                f"{outcome.words}"
+            )
+        return outcome
+
     def _remember(self, degree: OutputDegree, refusals: list[str]) -> None:
         if degree != self._degree:
             logger.warning(
@@ -145,19 +175,30 @@ class OpenAIClient:
             self._degree = degree
 
     def _ask(
-        self, request: Request, degree: OutputDegree, deadline: float
-    ) -> dict[str, Any] | _Failure:
-        """The server's answer; a failure only where it does not accept the request as such."""
+        self,
+        endpoint: Any,
+        body: dict[str, Any],
+        read: Callable[[bytes], Answer | _Failure],
+        deadline: float,
+    ) -> Answer | _Failure:
+        """The server's answer; a failure only where it does not accept the request as such.
+
+        Args:
+            endpoint: Of the ``openai`` package's client.
+            body: What is sent there.
+            read: Makes of the bytes that come back what is returned.
+            deadline: On the clock of :func:`time.monotonic`, s.
+        """
         failures = 0
         while True:
-            outcome = self._try(request, degree, deadline - time.monotonic())
+            outcome = self._try(endpoint, body, read, deadline - time.monotonic())
             if not isinstance(outcome, _Failure) or outcome.status in BAD_REQUEST:
                 return outcome
             failures += 1
             if not outcome.passing:
                 at_fault = REFUSED.get(outcome.status or 0, "the request")
                 raise LanguageRefusedError(
-                    f"{self.source} refused {at_fault} (model {request.model!r}): {outcome.words}"
+                    f"{self.source} refused {at_fault} (model {body['model']!r}): {outcome.words}"
                 )
             self._wait(outcome, failures, deadline)
 
@@ -175,12 +216,17 @@ class OpenAIClient:
         self._sleep(pause)
 
     def _try(
-        self, request: Request, degree: OutputDegree, seconds: float
-    ) -> dict[str, Any] | _Failure:
+        self,
+        endpoint: Any,
+        body: dict[str, Any],
+        read: Callable[[bytes], Answer | _Failure],
+        seconds: float,
+    ) -> Answer | _Failure:
+        """The same, once; see :meth:`_ask`, which gives it so many seconds."""
         if seconds <= 0:
             return _Failure("the time for an answer is over")
         try:
-            body = self._receive(self._body(request, degree), seconds)
+            received = self._receive(endpoint, body, seconds)
         except self._openai.APIStatusError as error:
             return _Failure(
                 f"HTTP {error.status_code}: {self._clean(_server_words(error.body))}",
@@ -189,14 +235,14 @@ class OpenAIClient:
             )
         except self._lost as error:
             return _Failure(self._clean(f"{type(error).__name__}: {error}"))
-        return _read_envelope(body)
+        return read(received)
 
-    def _receive(self, fields: dict[str, Any], seconds: float) -> bytes:
+    def _receive(self, endpoint: Any, fields: dict[str, Any], seconds: float) -> bytes:
         """The answer's bytes; as they come, since a time limit for each says nothing about all."""
         deadline = time.monotonic() + seconds
         parts, size = [], 0
-        completions = self._client.chat.completions.with_streaming_response
-        with _quiet(), completions.create(**fields, timeout=seconds) as response:
+        streaming = endpoint.with_streaming_response
+        with _quiet(), streaming.create(**fields, timeout=seconds) as response:
             for part in response.iter_bytes():
                 size += len(part)
                 if size > MAX_BODY_BYTES:
@@ -299,6 +345,21 @@ def _read_envelope(body: bytes) -> dict[str, Any] | _Failure:
     except (ValueError, TypeError, KeyError, IndexError):
         return _Failure(f"an answer of {len(body)} bytes that is no chat completion")
     return dict(envelope)
+
+
+def _read_embeddings(body: bytes, count: int) -> list[list[float]] | _Failure:
+    """The vectors in a server's answer, in the order in which texts were sent."""
+    try:
+        data = sorted(parse_json(body)["data"], key=lambda one: int(one["index"]))
+        vectors = [[float(number) for number in one["embedding"]] for one in data]
+        sizes = {len(vector) for vector in vectors}
+        if len(vectors) != count or len(sizes) != 1 or 0 in sizes:
+            raise ValueError("other vectors than were asked for")
+        if not all(math.isfinite(number) for vector in vectors for number in vector):
+            raise ValueError("not all numbers")
+    except (ValueError, TypeError, KeyError, OverflowError):
+        return _Failure(f"an answer of {len(body)} bytes that is no {count} embeddings")
+    return vectors
 
 
 def _text(content: Any) -> str:

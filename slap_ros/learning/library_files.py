@@ -13,7 +13,7 @@ import shutil
 from collections.abc import Callable, Mapping
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from safetensors import SafetensorError
@@ -22,6 +22,12 @@ from safetensors.numpy import load, save
 from slap_ros.errors import InvalidLibraryError
 from slap_ros.files import parse_json, read_bytes, read_text
 from slap_ros.learning.mlp_policy import MlpPolicy, ObservationNormalisation, Weights
+
+ABOUT = "library.json"
+SKILL, SHORTCUT = "skill.json", "shortcut.json"  # what is known of a member, by its kind
+KINDS = {SKILL: "skills", SHORTCUT: "shortcuts"}
+
+Member = TypeVar("Member")
 
 
 def replace_folder(path: Path, write: Callable[[Path], None]) -> None:
@@ -49,6 +55,29 @@ def replace_folder(path: Path, write: Callable[[Path], None]) -> None:
             old.rename(path)
         for left in (draft, old):
             shutil.rmtree(left, ignore_errors=True)
+
+
+def write_library(
+    path: Path,
+    about: Mapping[str, Any],
+    members: Mapping[str, Member],
+    save_member: Callable[[Path, Member], None],
+) -> None:
+    """Write a library as a folder, in place of the one that may be there.
+
+    Args:
+        path: Of the folder.
+        about: What it says of itself: format, domain, how it was made.
+        members: By the names of their folders.
+        save_member: Writes one into its folder.
+    """
+
+    def write(folder: Path) -> None:
+        for name, member in members.items():
+            save_member(folder / name, member)
+        write_object(folder / ABOUT, about)
+
+    replace_folder(path, write)
 
 
 def policy_tensors(policy: MlpPolicy) -> dict[str, Weights]:
@@ -123,6 +152,68 @@ def _check(path: Path, policy: MlpPolicy) -> None:
         raise InvalidLibraryError(f"{path}: the shapes of its tensors do not fit together")
     if not all(np.isfinite(tensor).all() for tensor in policy_tensors(policy).values()):
         raise InvalidLibraryError(f"{path}: not all numbers in it are finite")
+
+
+def read_about(path: Path, member: str, version: int, maker: str, remedy: str) -> dict[str, Any]:
+    """What a library says of itself, in its :data:`ABOUT`.
+
+    Args:
+        path: Of its folder.
+        member: :data:`SKILL` or :data:`SHORTCUT`: what it is to be a library of.
+        version: Of the format that is read.
+        maker: The command that makes such a library.
+        remedy: What to do about one of another format, in words.
+
+    Returns:
+        Format, domain and how it was made.
+
+    Raises:
+        InvalidLibraryError: There is none, or it is damaged, of the other kind, or of another
+            format.
+    """
+    if not path.is_dir():
+        raise InvalidLibraryError(f"{path}: no such folder; `{maker}` makes one")
+    about = read_object(path / ABOUT)
+    found = {kind for kind in KINDS if any(path.glob(f"*/{kind}"))}
+    if found and member not in found:
+        raise InvalidLibraryError(
+            f"{path}: a library of {KINDS[found.pop()]}, not of {KINDS[member]}; `{maker}` makes "
+            "one of these"
+        )
+    if about.get("format") != version:
+        raise InvalidLibraryError(
+            f"{path}: format {about.get('format')!r}, this version of slap_ros reads {version}; "
+            f"{remedy} or use the version of slap_ros that made it"
+        )
+    if not isinstance(about.get("domain"), str):
+        raise InvalidLibraryError(f"{path / ABOUT}: damaged: it names no domain")
+    return about
+
+
+def record_of(about: Mapping[str, Any]) -> dict[str, Any]:
+    """How a library was made, without its format and domain."""
+    return {key: value for key, value in about.items() if key not in ("format", "domain")}
+
+
+def read_members(
+    path: Path, load: Callable[[Path], Member]
+) -> tuple[tuple[Member, ...], tuple[InvalidLibraryError, ...]]:
+    """What is in the folders of a library, in order of their names.
+
+    Args:
+        path: Of the library.
+        load: Reads a folder; what it refuses with an ``InvalidLibraryError`` is left out.
+
+    Returns:
+        What could be read, and why the rest could not.
+    """
+    members, refused = [], []
+    for folder in sorted(entry for entry in path.iterdir() if entry.is_dir()):
+        try:
+            members.append(load(folder))
+        except InvalidLibraryError as error:
+            refused.append(error)
+    return tuple(members), tuple(refused)
 
 
 def read_object(path: Path) -> dict[str, Any]:

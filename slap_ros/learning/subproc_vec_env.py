@@ -25,7 +25,7 @@ from slap_ros.learning.action_map import ActionMap
 from slap_ros.learning.vec_env import VecEnv, VecEnvStep
 from slap_ros.learning.workers import exit_with_parent
 from slap_ros.relational.state import Array
-from slap_ros.signals import interrupts_held_back
+from slap_ros.signals import signals_held_back
 
 PATIENCE_S = 5.0  # for a process to end by itself
 CLOSED = (EOFError, ConnectionError)  # raised by a pipe whose other end is closed
@@ -114,10 +114,10 @@ def make_vec_env(specs: Sequence[VecEnvSpec], processes: int) -> Iterator[VecEnv
         for share in shares:
             mine, theirs = context.Pipe()
             process = context.Process(target=_step_until_closed, args=(theirs, share, os.getpid()))
-            with interrupts_held_back():
+            with signals_held_back():
                 process.start()
+                stack.callback(_end, process, mine)
             theirs.close()  # or nobody would notice its end
-            stack.callback(_end, process, mine)
             links.append(mine)
         yield SubprocVecEnv(links, shares)
 

@@ -5,19 +5,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from slap_ros.core import Domain
-from slap_ros.domains import get_domain
+from slap_ros.learning.domain_spec import DomainSpec
 
 TRAINING_SEED = 1_000_000  # added to the seed: training never sees the tasks of evaluation
 
 
 @dataclass(frozen=True)
 class TaskDistribution:
-    """The tasks of a domain, a preset and a seed."""
+    """The tasks of a domain and a seed."""
 
-    domain: str
-    preset: str
+    domain: DomainSpec
     seed: int
 
     @property
@@ -26,5 +26,9 @@ class TaskDistribution:
         return TRAINING_SEED + self.seed
 
     def make_domain(self) -> Domain:
-        """The domain with its preset."""
-        return get_domain(self.domain, self.preset)
+        """The domain, in this process."""
+        return self.domain.make()
+
+    def as_json(self) -> dict[str, Any]:
+        """A JSON object: what tells the domain from others, and the seed."""
+        return {**self.domain.identity, "seed": self.seed}

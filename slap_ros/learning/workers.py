@@ -5,16 +5,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import get_context
+from queue import SimpleQueue
 from threading import Thread
 from time import sleep
 from typing import Any, Protocol, TypeVar
 
 from slap_ros.errors import InvalidParameterError
-from slap_ros.signals import interrupts_held_back
+from slap_ros.signals import signals_held_back
 
 Result = TypeVar("Result")
 PARENT_POLL_S = 1.0
@@ -66,9 +67,17 @@ class LocalWorkers:
         self, function: Callable[..., Result], jobs: Sequence[tuple[Any, ...]]
     ) -> Iterator[tuple[int, Result]]:
         """See :class:`Workers`."""
-        with interrupts_held_back():  # the first one starts the processes
-            numbers = {self._pool.submit(function, *job): i for i, job in enumerate(jobs)}
-        for future in as_completed(numbers):
+        numbers: dict[Future[Result], int] = {}
+        ended: SimpleQueue[Future[Result]] = SimpleQueue()
+        with signals_held_back():  # the first job starts the processes
+            for i, job in enumerate(jobs):
+                future = self._pool.submit(function, *job)
+                numbers[future] = i
+                future.add_done_callback(ended.put)
+        for _ in numbers:
+            # Not as_completed: a signal while it takes the locks of its futures leaves them taken,
+            # and the pool waits for them for good.
+            future = ended.get()
             yield numbers[future], future.result()
 
 
@@ -142,6 +151,26 @@ def ray_workers(address: str) -> Iterator[RayWorkers]:
         ray.shutdown()
 
 
-def in_order(results: Iterable[tuple[int, Result]]) -> list[Result]:
-    """Results by the number of their jobs."""
-    return [result for _, result in sorted(results, key=lambda numbered: numbered[0])]
+def run_in_order(
+    workers: Workers,
+    function: Callable[..., Result],
+    jobs: Sequence[tuple[Any, ...]],
+    on_progress: Callable[[int, int], None],
+) -> list[Result]:
+    """Run a function once per job, wherever and in whichever order they end.
+
+    Args:
+        workers: Where jobs run.
+        function: What to run; importable by its name, for other processes.
+        jobs: Its arguments.
+        on_progress: Called with the number of jobs done and of all: before the first, after each.
+
+    Returns:
+        The results in the order of the jobs.
+    """
+    results: dict[int, Result] = {}
+    on_progress(0, len(jobs))
+    for number, result in workers.run(function, jobs):
+        results[number] = result
+        on_progress(len(results), len(jobs))
+    return [results[number] for number in sorted(results)]

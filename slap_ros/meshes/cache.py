@@ -15,7 +15,7 @@ def cache_folder() -> Path:
 
 
 def store(file: Path, content: bytes) -> None:
-    """Write a file, in one go: two processes may both do so."""
+    """Write a whole file or none: two processes may both do so."""
     file.parent.mkdir(parents=True, exist_ok=True)
     part = file.with_name(f".{file.name}.{os.getpid()}")
     part.write_bytes(content)

@@ -16,9 +16,10 @@ from slap_ros.messages.protocols import (
     GroundAtomMessage,
     Header,
     ObjectStateMessage,
+    PlanEdgeMessage,
     StateMessage,
 )
-from slap_ros.relational import AtomSpace, GroundAtom, Layout, Object, State, Type
+from slap_ros.relational import AtomSpace, GroundAtom, Layout, Object, State, Target, Type
 
 NANOSECONDS = 1_000_000_000  # in a second
 
@@ -97,6 +98,20 @@ def decode_atoms(msgs: Iterable[GroundAtomMessage], space: AtomSpace) -> int:
         MismatchedAtomError: Number or types of the objects do not fit.
     """
     return space.mask(space.atom(msg.predicate, msg.objects) for msg in msgs)
+
+
+def decode_target(msg: PlanEdgeMessage, space: AtomSpace) -> Target:
+    """Where an edge of a plan shall end.
+
+    Raises:
+        UnknownPredicateError: The domain has no such predicate.
+        UnknownObjectError: The task has no such object.
+        MismatchedAtomError: Number or types of the objects do not fit.
+    """
+    expected = decode_atoms(msg.expected_atoms, space)
+    if not msg.others_may_appear:
+        return Target.exactly(expected)
+    return Target(expected, decode_atoms(msg.forbidden_atoms, space))
 
 
 def decode_goal(msgs: Iterable[GroundAtomMessage], space: AtomSpace) -> frozenset[GroundAtom]:

@@ -29,7 +29,7 @@ class SkillEventKind(IntEnum):
 
 
 class AcquisitionEventKind(IntEnum):
-    """What happens to a proposal: ``slap_msgs/AcquisitionEvent.kind``."""
+    """What happens to a proposal and to its skills: ``slap_msgs/AcquisitionEvent.kind``."""
 
     STARTED = 0
     ANSWERED = 1
@@ -37,3 +37,6 @@ class AcquisitionEventKind(IntEnum):
     FINISHED = 3
     FAILED = 4
     CANCELED = 5
+    ROLLED_OUT = 6
+    JUDGED = 7
+    ACQUIRED = 8

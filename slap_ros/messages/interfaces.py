@@ -21,6 +21,7 @@ COMMAND = "slap_msgs/msg/RobotCommand"
 PLAN = "slap_msgs/msg/Plan"
 PLAN_EVENT = "slap_msgs/msg/PlanEvent"
 SKILL_EVENT = "slap_msgs/msg/SkillEvent"
+SKILL_LIBRARY = "slap_msgs/msg/SkillLibrary"
 ACQUISITION_EVENT = "slap_msgs/msg/AcquisitionEvent"
 MARKERS = "visualization_msgs/msg/MarkerArray"
 BODIES = "bodies"  # the namespace of markers that show what is there

@@ -129,6 +129,8 @@ class PlanEdgeMessage(Protocol):
     name: str
     objects: Sequence[str]
     expected_atoms: Sequence[GroundAtomMessage]
+    others_may_appear: bool
+    forbidden_atoms: Sequence[GroundAtomMessage]
     predicted_steps: int
 
 
@@ -184,6 +186,18 @@ class AcquisitionEventMessage(Protocol):
     tokens: int
     seconds: float
     error_msg: str
+
+
+class LearningEventMessage(AcquisitionEventMessage, Protocol):
+    """Fields that events of skills have besides; bags of proposals alone may lack them."""
+
+    operators: Sequence[str]
+    iteration: int
+    task: int
+    progress: float
+    success: Sequence[float]
+    segment_steps: int
+    digest: str
 
 
 class PointMessage(Protocol):

@@ -41,6 +41,7 @@ OFFERED = {
     "slap/plan_events": EPISODE,
     "slap/skill_events": EPISODE,
     "slap/acquisition_events": EPISODE,
+    "slap/skills": LATCHED,
     "slap/markers": EPISODE,
     "joint_states": EPISODE,
     "diagnostics": VOLATILE,

@@ -8,6 +8,7 @@ a straight piece is that of its slowest joint at full speed throughout.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -69,20 +70,29 @@ def retime(
     return np.concatenate(motions)
 
 
-def retime_fixed_steps(path: Path, steps: int = PAPER_STEPS) -> Joints:
-    """Joint positions at each control step, the same number for every straight piece.
+def retime_fixed_steps(path: Path, steps: int = PAPER_STEPS, *, per_radian: bool = False) -> Joints:
+    """Joint positions at each control step, a multiple of a number for every straight piece.
 
     The timing of the preset ``paper``: the joint limits a step are ignored.
 
     Args:
         path: rad, shape (k, 7).
         steps: Control steps a piece.
+        per_radian: As often for a piece as the joint that turns most begins a radian. Otherwise
+            once, however long it is.
 
     Returns:
-        rad, shape (steps * (k - 1), 7); the start is left out.
+        rad, shape (n, 7), n a multiple of ``steps``; the start is left out.
     """
-    motions = [_evenly(piece, steps) for piece in _straight_pieces(path)]
+    motions = [
+        _evenly(piece, steps * (_radians_begun(piece) if per_radian else 1))
+        for piece in _straight_pieces(path)
+    ]
     return np.concatenate([np.empty((0, path.shape[1])), *motions])
+
+
+def _radians_begun(piece: Path) -> int:
+    return math.ceil(float(np.abs(piece[1] - piece[0]).max()))
 
 
 def _straight_pieces(path: Path) -> list[Path]:

@@ -99,12 +99,11 @@ class Mesh(RigidBody):
 
     def at(self, pose: Pose) -> OrientedBox:
         """A box around it at a pose: the space that the arm takes it to fill."""
-        frame, half = self.shape.bounds
-        return OrientedBox(pose.compose(frame), half)
+        return self.shape.bounds.at(pose)
 
     def cores(self, pose: Pose) -> tuple[OrientedBox, ...]:
         """Boxes inside it at a pose."""
-        return tuple(OrientedBox(pose.compose(core.pose), core.half) for core in self.shape.cores)
+        return tuple(core.at(pose) for core in self.shape.cores)
 
     def extent(self, axis: Vector) -> float:
         """How far it reaches from its origin along an axis of length 1, m."""

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import weakref
 from dataclasses import replace
-from types import TracebackType
 
 from slap_ros.core import Action, ActionSpace, GripperAxis
 from slap_ros.errors import InvalidStateError
@@ -86,12 +85,7 @@ class PandaWorld:
     def __enter__(self) -> PandaWorld:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

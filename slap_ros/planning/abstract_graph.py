@@ -94,6 +94,56 @@ def build_abstract_graph(
     return _build_pruned(start, goal, operators, extra_depth, max_nodes)
 
 
+def build_unrolled_graph(
+    start: int,
+    goal: int,
+    operators: Sequence[tuple[GroundOperator, Option]],
+    length: int,
+    max_nodes: int = MANY_NODES,
+) -> AbstractGraph:
+    """Every sequence of at most so many ground operators, those that come back included.
+
+    An abstract state is a node for each number of operators after which it is reached. So all edges
+    are forward edges, and a path may lead through an abstract state twice, in two low-level states.
+
+    Args:
+        start: The abstract state to start from.
+        goal: Mask of atoms that must hold; goal states are not expanded.
+        operators: Ground operators, each with the option that carries it out.
+        length: Operators of the longest sequence.
+        max_nodes: Nodes after which to give up.
+
+    Returns:
+        The graph, with a goal node at least.
+
+    Raises:
+        UnsolvableError: The goal holds after no such sequence.
+        PlanningLimitError: More than ``max_nodes`` nodes.
+    """
+    graph = AbstractGraph(goal, [start], [0])
+    layer = {start: 0}
+    for depth in range(1, length + 1):
+        following: dict[int, int] = {}
+        for abstract, source in layer.items():
+            if abstract & goal == goal:
+                continue
+            for operator, option in operators:
+                successor = operator.apply(abstract)
+                if not operator.applicable(abstract) or successor == abstract:
+                    continue
+                if successor not in following:
+                    following[successor] = len(graph.nodes)
+                    graph.nodes.append(successor)
+                    graph.depth.append(depth)
+                graph.edges.append(Edge(source, following[successor], option))
+        if len(graph.nodes) > max_nodes:
+            raise PlanningLimitError(
+                f"more than {max_nodes} abstract states in sequences of {length} operators"
+            )
+        layer = following
+    return _require_goal(graph)
+
+
 def _build_pruned(
     start: int,
     goal: int,

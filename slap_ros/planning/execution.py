@@ -167,6 +167,7 @@ class Executor:
             execution = OptionExecution(
                 edge.option,
                 edge.target,
+                self.space,
                 self.domain.action_space,
                 self._percept.state,
                 self.hold_steps,

@@ -15,10 +15,9 @@ from dataclasses import dataclass, field
 from slap_ros.errors import ErrorCode
 from slap_ros.planning.model import Rollout
 from slap_ros.planning.options import Option, OptionKind
-from slap_ros.relational import AtomSpace, GroundOperator
+from slap_ros.relational import GroundOperator, Target
 
 SHOWN = 2  # failures in a message
-ATOMS_SHOWN = 3  # of each kind, in a failure
 
 
 @dataclass(frozen=True)
@@ -26,7 +25,7 @@ class FailedRollout:
     """An option that did not end in its target when it was rolled out."""
 
     option: Option
-    target: int
+    target: Target
     rollout: Rollout
 
     @property
@@ -38,26 +37,12 @@ class FailedRollout:
     def difference(self) -> int:
         """The atoms that came out differently, a mask; none where the skill did not begin."""
         began = self.rollout.result.code is not ErrorCode.SKILL_NOT_APPLICABLE
-        return self.rollout.abstract ^ self.target if began else 0
+        return self.target.difference(self.rollout.abstract) if began else 0
 
-    def in_words(self, space: AtomSpace) -> str:
-        """How it failed: the atoms that differ, or the words of the skill."""
-        if self.rollout.result.code not in (
-            ErrorCode.SKILL_STOPPED_SHORT,
-            ErrorCode.SKILL_STEP_LIMIT,
-        ):
-            reason = self.rollout.result.reason.removeprefix(f"{self.option}: ")
-            return f"{self.option}: {reason}"
-        parts = [
-            f"{list_atoms(space, mask)} {word}"
-            for mask, word in (
-                (self.target & self.difference, "missing"),
-                (self.rollout.abstract & self.difference, "too many"),
-            )
-            if mask
-        ]
-        after = f"{self.option} ended after {self.rollout.steps} steps"
-        return f"{after} with {' and '.join(parts)}" if parts else f"{after}, but not at rest"
+    def __str__(self) -> str:
+        """How it failed, in the words of its execution or of its skill."""
+        reason = self.rollout.result.reason
+        return reason if reason.startswith(str(self.option)) else f"{self.option}: {reason}"
 
 
 @dataclass
@@ -67,25 +52,25 @@ class Failures:
     tried: int = 0  # roll-outs, also those that did not fail
     failed: list[FailedRollout] = field(default_factory=list)
 
-    def add(self, option: Option, target: int, rollout: Rollout) -> None:
+    def add(self, option: Option, target: Target, rollout: Rollout) -> None:
         """Take the first attempt of an option from a state.
 
         Args:
             option: What was tried.
-            target: The abstract state to reach, a mask.
+            target: Where it should have ended.
             rollout: What it came to.
         """
         self.tried += 1
         if not rollout.reached:
             self.failed.append(FailedRollout(option, target, rollout))
 
-    def in_words(self, space: AtomSpace) -> str:
+    def in_words(self) -> str:
         """A sentence about the most telling failures; empty if nothing was tried."""
         if not self.tried:
             return ""
         given = [one for one in self.failed if one.option.kind is OptionKind.OPERATOR]
         shown = _most_telling(given or self.failed)
-        what = "; ".join(one.in_words(space) for one in shown)
+        what = "; ".join(str(one) for one in shown)
         more = len(self.failed) - len(shown)
         others = f"; and {more} more" if more > 0 else ""
         return f"{len(self.failed)} of {self.tried} options failed in the model: {what}{others}"
@@ -120,10 +105,3 @@ def unreachable_atoms(start: int, goal: int, operators: Iterable[GroundOperator]
         for one in applicable:
             reached |= one.add_effects
     return goal & ~reached
-
-
-def list_atoms(space: AtomSpace, mask: int) -> str:
-    """The atoms of a mask, the first few of them by name."""
-    names = sorted(map(str, space.decode(mask)))
-    rest = len(names) - ATOMS_SHOWN
-    return ", ".join(names[:ATOMS_SHOWN]) + (f" and {rest} more" if rest > 0 else "")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from slap_ros.core import ActionSpace, Domain, World
 from slap_ros.errors import ErrorCode, SkillNotApplicableError
 from slap_ros.planning.options import Option, OptionExecution, OptionResult
-from slap_ros.relational import AtomSpace, State
+from slap_ros.relational import AtomSpace, State, Target
 
 REACHED = OptionResult(ErrorCode.NONE)
 
@@ -19,7 +19,7 @@ class Rollout:
     """The outcome of an option in the model.
 
     Args:
-        reached: Whether it ended in its target abstract state.
+        reached: Whether it ended in its target.
         steps: Environment steps taken.
         final: The state in which it ended.
         abstract: Its abstract state, a mask.
@@ -52,20 +52,20 @@ class Model:
         self.executed = 0  # roll-outs made so far; those from the cache do not count
         self._world = world
         self._actions = actions
-        self._cache: dict[tuple[Option, int, bytes], Rollout] = {}
+        self._cache: dict[tuple[Option, Target, bytes], Rollout] = {}
 
     @classmethod
     def of(cls, domain: Domain, initial: State) -> Model:
         """A model for the tasks over these objects."""
         return cls(domain.make_world(initial), domain.atom_space(initial), domain.action_space)
 
-    def roll_out(self, option: Option, state: State, target: int) -> Rollout:
+    def roll_out(self, option: Option, state: State, target: Target) -> Rollout:
         """Execute an option until it reaches its target or ends otherwise.
 
         Args:
             option: What is executed.
             state: Where it starts.
-            target: The abstract state to reach, a mask.
+            target: Where it shall end.
 
         Returns:
             The outcome; not reached in no steps where the skill cannot start in the state.
@@ -76,10 +76,10 @@ class Model:
             self._cache[key] = self._simulate(option, state, target)
         return self._cache[key]
 
-    def _simulate(self, option: Option, state: State, target: int) -> Rollout:
+    def _simulate(self, option: Option, state: State, target: Target) -> Rollout:
         self._world.reset(state)
         try:
-            execution = OptionExecution(option, target, self._actions, state)
+            execution = OptionExecution(option, target, self.space, self._actions, state)
         except SkillNotApplicableError as error:
             result = OptionResult(error.code, str(error))
             return Rollout(False, 0, state, self.space.abstract(state), result)

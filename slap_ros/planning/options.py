@@ -10,9 +10,9 @@ from enum import Enum
 
 import numpy as np
 
-from slap_ros.core import Action, ActionSpace, Domain, Policy, Skill
+from slap_ros.core import Action, ActionSpace, DemandingSkill, Domain, Policy, Skill
 from slap_ros.errors import ErrorCode, InvalidCommandError, UnknownSkillError
-from slap_ros.relational import Object, State
+from slap_ros.relational import AtomSpace, Object, State, Target
 
 
 class OptionKind(Enum):
@@ -48,6 +48,8 @@ class Option:
         next_attempt: Gives the same option with the next rollout, which fails where there is
             none; None for a skill that has one rollout alone.
         given_up: Whether it is not tried any more in this task: its skill failed too often.
+        deletes: Where other atoms may appear, those that must not hold at its end, a mask; None
+            where exactly the expected atoms must hold.
     """
 
     kind: OptionKind
@@ -57,6 +59,17 @@ class Option:
     attempt: int = 0
     next_attempt: Callable[[], Option | None] = field(default=_none, compare=False, repr=False)
     given_up: Callable[[], bool] = field(default=_never, compare=False, repr=False)
+    deletes: int | None = field(default=None, compare=False, repr=False)
+
+    def target(self, expected: int) -> Target:
+        """Where it ends.
+
+        Args:
+            expected: The atoms that are expected then, a mask.
+        """
+        if self.deletes is None:
+            return Target.exactly(expected)
+        return Target(expected, self.deletes & ~expected)
 
     def __str__(self) -> str:
         return f"{self.skill.name}({', '.join(obj.name for obj in self.objects)})"
@@ -89,7 +102,12 @@ def given_option(domain: Domain, name: str, objects: Sequence[Object]) -> Option
             f"{name} takes ({', '.join(map(str, wanted))}), got "
             f"({', '.join(f'{obj}: {obj.type}' for obj in objects)})"
         )
-    return Option(OptionKind.OPERATOR, domain.skills[name], tuple(objects))
+    skill, about = domain.skills[name], tuple(objects)
+    if isinstance(skill, DemandingSkill):
+        return Option(
+            OptionKind.OPERATOR, skill, about, accepts=lambda state: skill.accepts(state, about)
+        )
+    return Option(OptionKind.OPERATOR, skill, about)
 
 
 @dataclass(frozen=True)
@@ -144,7 +162,8 @@ class OptionExecution:
 
     Args:
         option: What is executed.
-        target: The abstract state in which it ends, a mask.
+        target: Where it ends.
+        space: The task's atoms, for messages.
         actions: What the robot can do; any other action of the policy ends the option.
         state: Where it starts; then the newest state, of the same objects: what is not detected any
             more stays where it was, and what was not detected at the start is left out.
@@ -157,13 +176,15 @@ class OptionExecution:
     """
 
     option: Option
-    target: int
+    target: Target
+    space: AtomSpace
     actions: ActionSpace
     state: State
     hold_steps: int = 0
     steps: int = 0
     _policy: Policy = field(init=False, repr=False)
     _held_steps: int = field(default=0, init=False)  # at its end
+    _start: int | None = field(default=None, init=False)  # the abstract state in which it begins
 
     def __post_init__(self) -> None:
         self._policy = self.option.skill.start(self.state, self.option.objects)
@@ -183,30 +204,37 @@ class OptionExecution:
             An action within ``actions``, or the result.
         """
         self.state = state = state.over(self.state.layout, self.state)
+        if self._start is None:
+            self._start = abstract
         if unseen := [obj.name for obj in self.option.objects if obj.name in missing]:
             return OptionResult(
                 ErrorCode.NO_DETECTION,
                 f"{self.option}: not seen for too long: {', '.join(unseen)}",
             )
-        if abstract == self.target and self.steps > 0 and self.option.accepts(state):
+        if self.target.reached(abstract) and self.steps > 0 and self.option.accepts(state):
             return OptionResult(ErrorCode.NONE)
         if self.steps >= self.option.skill.step_limit:
-            return OptionResult(
-                ErrorCode.SKILL_STEP_LIMIT,
-                f"{self.option} did not end within {self.option.skill.step_limit} steps",
-            )
+            return self._missed(ErrorCode.SKILL_STEP_LIMIT, self._start, abstract)
         action = self._next(state)
         if action is None:
-            return OptionResult(
-                ErrorCode.SKILL_STOPPED_SHORT,
-                f"{self.option} ended in another abstract state than expected",
-            )
+            return self._missed(ErrorCode.SKILL_STOPPED_SHORT, self._start, abstract)
         try:
             self.actions.check(action)
         except InvalidCommandError as error:
             return OptionResult(error.code, f"{self.option}: {error}")
         self.steps += 1
         return action
+
+    def _missed(self, code: ErrorCode, start: int, abstract: int) -> OptionResult:
+        """The result of an option that has ended elsewhere.
+
+        Args:
+            code: How it ended.
+            start: The abstract state in which it began.
+            abstract: That in which it ended.
+        """
+        why = self.target.why_missed(start, abstract, self.space)
+        return OptionResult(code, f"{self.option} ended after {self.steps} steps{why}")
 
     def _next(self, state: State) -> Action | None:
         """The policy's next action; at its end, none after ``hold_steps`` steps of holding."""

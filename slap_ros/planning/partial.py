@@ -50,7 +50,7 @@ class PartialPlanner:
         known = self.atoms_of(state)
         result = planner.plan(state, self.space.project(goal, known))
         edges = (
-            replace(edge, target=known.project(edge.target, self.space))
+            replace(edge, target=edge.target.projected(known, self.space))
             for edge in result.plan.edges
         )
         return replace(result, plan=Plan(tuple(edges)))

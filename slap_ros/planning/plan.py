@@ -7,14 +7,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from slap_ros.planning.options import Option
+from slap_ros.relational import Target
 
 
 @dataclass(frozen=True)
 class PlanEdge:
-    """One edge: an option and the abstract state in which it shall end."""
+    """One edge: an option and where it shall end."""
 
     option: Option
-    target: int  # abstract state
+    target: Target
     predicted_steps: int  # environment steps in the planner's model
 
     def __str__(self) -> str:
@@ -42,9 +43,12 @@ class PlanningResult:
         graph_nodes: Abstract states in the graph.
         graph_edges: Options in the graph.
         edges_rolled_out: Options simulated in the model.
+        fails: Why no plan can be executed in the model, where this one fails there as well; empty
+            where it reaches the goal.
     """
 
     plan: Plan
     graph_nodes: int
     graph_edges: int
     edges_rolled_out: int
+    fails: str = ""

@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from slap_ros.core import Domain
@@ -15,15 +16,25 @@ from slap_ros.errors import (
     PlanningLimitError,
     UnsolvableError,
 )
-from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
+from slap_ros.planning.abstract_graph import (
+    AbstractGraph,
+    Edge,
+    build_abstract_graph,
+    build_unrolled_graph,
+)
 from slap_ros.planning.astar import find_shortest_sequence
-from slap_ros.planning.failures import Failures, list_atoms, unreachable_atoms
+from slap_ros.planning.failures import Failures, unreachable_atoms
 from slap_ros.planning.ff import find_operator_sequence
 from slap_ros.planning.model import Model
 from slap_ros.planning.options import Option, given_option
 from slap_ros.planning.plan import Plan, PlanEdge, PlanningResult
-from slap_ros.planning.search import search_exhaustively, search_lazily
-from slap_ros.relational import AtomSpace, GroundOperator, State
+from slap_ros.planning.search import (
+    FailedPath,
+    failed_paths,
+    search_exhaustively,
+    search_lazily,
+)
+from slap_ros.relational import AtomSpace, GroundOperator, State, ground_operators, list_atoms
 
 Search = Callable[[AbstractGraph, State, Model], Plan]
 
@@ -53,8 +64,8 @@ def require_skills(domain: Domain) -> None:
     if not domain.operators:
         by_hand = domain.acquisition is not None and domain.acquisition.operators
         advice = (
-            "`slap plan` plans with its hand-written operators, and "
-            "`slap run --policy demonstrator` lets its demonstrator act"
+            "`slap acquire` acquires them, for --skills; `slap plan` plans with its hand-written "
+            "operators, and `slap run --skills demonstrator` lets its demonstrator act"
             if by_hand
             else "give it operators and skills"
         )
@@ -70,18 +81,29 @@ def ground_options(domain: Domain, space: AtomSpace) -> GroundedOptions:
         NoSkillsError: The domain has no operators.
     """
     require_skills(domain)
-    return tuple(
-        (ground, given_option(domain, ground.operator.name, ground.objects))
-        for ground in domain.ground(space)
-    )
+    return tuple((ground, _option(domain, ground)) for ground in domain.ground(space))
+
+
+def _option(domain: Domain, ground: GroundOperator) -> Option:
+    option = given_option(domain, ground.operator.name, ground.objects)
+    return option if domain.exact else replace(option, deletes=ground.delete_effects)
 
 
 @dataclass(frozen=True)
 class Problem:
-    """A domain over one set of objects: what planners share."""
+    """A domain over one set of objects: what planners share.
+
+    Args:
+        model: Rolls options out.
+        operators: To plan with.
+        unskilled: Operators that lack a skill, for messages.
+        exact: Whether nothing else changes than what operators say, as with given skills.
+    """
 
     model: Model
     operators: GroundedOptions
+    unskilled: tuple[GroundOperator, ...] = ()
+    exact: bool = True
 
     @classmethod
     def of(cls, domain: Domain, initial: State) -> Problem:
@@ -90,17 +112,23 @@ class Problem:
         Raises:
             NoSkillsError: The domain has no operators.
         """
-        options = ground_options(domain, domain.atom_space(initial))
-        return cls(Model.of(domain, initial), options)
+        space = domain.atom_space(initial)
+        unskilled = ground_operators(domain.unskilled, space)
+        options = ground_options(domain, space)
+        return cls(Model.of(domain, initial), options, unskilled, domain.exact)
 
     def why_not(self, start: int, goal: int) -> str:
         """Why operators alone do not lead from an abstract state to a goal, both masks."""
         grounds = [ground for ground, _ in self.operators]
-        return why_unreachable(self.model.space, start, goal, grounds)
+        return why_unreachable(self.model.space, start, goal, grounds, self.unskilled)
 
 
 def why_unreachable(
-    space: AtomSpace, start: int, goal: int, operators: Sequence[GroundOperator]
+    space: AtomSpace,
+    start: int,
+    goal: int,
+    operators: Sequence[GroundOperator],
+    unskilled: Sequence[GroundOperator] = (),
 ) -> str:
     """Why operators alone do not lead from an abstract state to a goal.
 
@@ -109,7 +137,14 @@ def why_unreachable(
         start: A mask.
         goal: A mask.
         operators: Over that space.
+        unskilled: Others over it that lack a skill.
     """
+    with suppress(UnsolvableError, PlanningLimitError):
+        every = (*operators, *unskilled)
+        sequence = [every[i] for i in find_shortest_sequence(start, goal, every)]
+        lacking = [str(one) for one in sequence if one in unskilled]
+        if lacking:
+            return f"the plan {', '.join(map(str, sequence))} lacks a skill for {lacking[0]}"
     never = unreachable_atoms(start, goal, operators)
     if never:
         return f"no operator leads to {list_atoms(space, never)}"
@@ -136,10 +171,17 @@ class GraphPlanner:
     :mod:`slap_ros.planning.search`. A plan that shortcuts make possible in a shallower graph is
     taken, though a deeper one might have a shorter plan.
 
+    Where acquired skills fail on every path, the plan may take a detour, back to an abstract state
+    in which it was before: a skill that fails from one low-level state of it may well succeed from
+    another. Where every detour fails too, the plan is the one that leaves the goal nearest where it
+    fails: a skill may well succeed from where it has left the robot, so that to act and to plan
+    again is better than to give up.
+
     Args:
         problem: The model, and the ground operators with their options.
         search: Lazy or exhaustive.
-        max_extra_depth: Layers, one per operator, by which the graph may be deepened.
+        max_extra_depth: Layers, one per operator, by which the graph may be deepened, and operators
+            of a detour.
         shortcuts: Where shortcut edges come from.
     """
 
@@ -158,12 +200,68 @@ class GraphPlanner:
                 graph.edges.extend(self.shortcuts.edges(graph))
             try:
                 plan = self.search(graph, state, model)
-            except UnsolvableError:
-                if extra_depth == self.max_extra_depth:
+            except UnsolvableError as error:
+                if extra_depth < self.max_extra_depth:
+                    continue
+                if self.problem.exact:
                     raise
-                continue
+                detour = self._detour(state, graph)
+                rolled_out = model.executed - before
+                if detour is None:
+                    return self._despite_failures(state, goal, graph, rolled_out, error)
+                return PlanningResult(detour, len(graph.nodes), len(graph.edges), rolled_out)
             return PlanningResult(plan, len(graph.nodes), len(graph.edges), model.executed - before)
         raise InvalidParameterError(f"max_extra_depth must not be negative: {self}")
+
+    def _despite_failures(
+        self, state: State, goal: int, graph: AbstractGraph, rolled_out: int, why: UnsolvableError
+    ) -> PlanningResult:
+        """The plan that leaves the goal nearest where it fails, counted in operators.
+
+        Args:
+            state: Where to start.
+            goal: Mask of atoms that must hold.
+            graph: In which no path can be executed.
+            rolled_out: Options simulated to find that out.
+            why: What the search said.
+
+        Raises:
+            UnsolvableError: From wherever a path fails, no operators lead to the goal any more.
+        """
+        symbolic = SymbolicPlanner(self.problem.model.space, self.problem.operators)
+        to_go: dict[int, int] = {}
+        nearest: list[tuple[int, int, int, FailedPath]] = []
+        for number, path in enumerate(failed_paths(graph, state, self.problem.model)):
+            with suppress(UnsolvableError, PlanningLimitError):
+                if path.abstract not in to_go:
+                    to_go[path.abstract] = len(symbolic.edges(path.abstract, goal))
+                key = to_go[path.abstract], path.plan.predicted_steps, number
+                nearest.append((*key, path))
+        if not nearest:
+            raise why
+        *_, best = min(nearest)
+        rest = symbolic.edges(graph.nodes[best.node], goal)
+        plan = Plan((*best.plan.edges, *rest))
+        return PlanningResult(plan, len(graph.nodes), len(graph.edges), rolled_out, str(why))
+
+    def _detour(self, state: State, graph: AbstractGraph) -> Plan | None:
+        """A plan that comes back to an abstract state, without shortcuts; None if there is none.
+
+        Args:
+            state: Where to start.
+            graph: In which no path can be executed.
+        """
+        shortest = min(graph.depth[node] for node in graph.goal_nodes)
+        with suppress(UnsolvableError, PlanningLimitError):
+            unrolled = build_unrolled_graph(
+                graph.nodes[0],
+                graph.goal,
+                self.problem.operators,
+                shortest + self.max_extra_depth,
+            )
+            # Whatever the search: it tries the fewest of so many sequences.
+            return search_lazily(unrolled, state, self.problem.model)
+        return None
 
     def _graph(self, start: int, goal: int, extra_depth: int) -> AbstractGraph:
         """The top level; an error says which atoms of the goal cannot be had."""
@@ -198,7 +296,7 @@ class FFPlanner:
             try:
                 sequence = find_operator_sequence(start, goal, grounds, forbidden)
             except UnsolvableError as error:
-                why = failures.in_words(model.space) or self.problem.why_not(start, goal)
+                why = failures.in_words() or self.problem.why_not(start, goal)
                 raise UnsolvableError(f"{error}: {why}") from error
             edges, failed = self._refine(state, start, sequence, failures)
             if failed is None:
@@ -211,7 +309,7 @@ class FFPlanner:
             forbidden.add(failed)
         raise PlanningLimitError(
             f"none of {self.max_attempts} abstract plans could be executed; raise max_attempts: "
-            f"{failures.in_words(model.space)}"
+            f"{failures.in_words()}"
         )
 
     def _refine(
@@ -221,18 +319,23 @@ class FFPlanner:
         edges: list[PlanEdge] = []
         for number in sequence:
             ground, option = self.problem.operators[number]
-            target = ground.apply(abstract)
+            expected = ground.apply(abstract)
+            target = option.target(expected)
             rollout = self.problem.model.roll_out(option, state, target)
             failures.add(option, target, rollout)
             if not rollout.reached:
                 return edges, (abstract, number)
             edges.append(PlanEdge(option, target, rollout.steps))
-            state, abstract = rollout.final, target
+            state, abstract = rollout.final, expected
         return edges, None
 
 
 def plan_symbolically(
-    space: AtomSpace, start: int, goal: int, operators: Sequence[GroundOperator]
+    space: AtomSpace,
+    start: int,
+    goal: int,
+    operators: Sequence[GroundOperator],
+    unskilled: Sequence[GroundOperator] = (),
 ) -> list[int]:
     """A shortest sequence of operators, by A*; see :mod:`slap_ros.planning.astar`.
 
@@ -241,6 +344,7 @@ def plan_symbolically(
         start: The abstract state to start from, a mask.
         goal: Mask of atoms that must hold.
         operators: Over that space.
+        unskilled: Others over it that lack a skill, for messages.
 
     Returns:
         Indices into ``operators``.
@@ -252,7 +356,7 @@ def plan_symbolically(
     try:
         return find_shortest_sequence(start, goal, operators)
     except UnsolvableError as error:
-        why = why_unreachable(space, start, goal, operators)
+        why = why_unreachable(space, start, goal, operators, unskilled)
         raise UnsolvableError(f"{error}: {why}") from error
 
 
@@ -266,21 +370,31 @@ class SymbolicPlanner:
     Args:
         space: The task's atoms.
         options: The operators over its objects.
+        unskilled: Operators that lack a skill, for messages.
     """
 
     space: AtomSpace
     options: GroundedOptions
+    unskilled: tuple[GroundOperator, ...] = ()
 
     def plan(self, state: State, goal: int) -> PlanningResult:
         """See :class:`Planner`; the steps that are predicted are the least that skills take."""
-        start = self.space.abstract(state)
-        grounds = [ground for ground, _ in self.options]
-        edges, abstract = [], start
-        for number in plan_symbolically(self.space, start, goal, grounds):
+        edges = self.edges(self.space.abstract(state), goal)
+        return PlanningResult(Plan(tuple(edges)), len(edges) + 1, len(edges), 0)
+
+    def edges(self, abstract: int, goal: int) -> list[PlanEdge]:
+        """The plan from an abstract state to a goal, both masks.
+
+        Raises:
+            UnsolvableError: There is none.
+            PlanningLimitError: None was found within the limit of abstract states.
+        """
+        grounds, edges = [ground for ground, _ in self.options], []
+        for number in plan_symbolically(self.space, abstract, goal, grounds, self.unskilled):
             ground, option = self.options[number]
             abstract = ground.apply(abstract)
-            edges.append(PlanEdge(option, abstract, option.skill.least_steps))
-        return PlanningResult(Plan(tuple(edges)), len(edges) + 1, len(edges), 0)
+            edges.append(PlanEdge(option, option.target(abstract), option.skill.least_steps))
+        return edges
 
 
 def _lazy(problem: Problem, shortcuts: ShortcutSource | None) -> Planner:
@@ -300,7 +414,7 @@ def _ff(problem: Problem, shortcuts: ShortcutSource | None) -> Planner:
 def _astar(problem: Problem, shortcuts: ShortcutSource | None) -> Planner:
     if shortcuts is not None:
         raise InvalidParameterError("the planner astar plans without shortcuts; use lazy")
-    return SymbolicPlanner(problem.model.space, problem.operators)
+    return SymbolicPlanner(problem.model.space, problem.operators, problem.unskilled)
 
 
 PLANNERS: Mapping[str, Callable[[Problem, ShortcutSource | None], Planner]] = {

@@ -34,6 +34,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import count
 
@@ -41,7 +42,7 @@ from slap_ros.errors import UnsolvableError
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge
 from slap_ros.planning.failures import Failures
 from slap_ros.planning.model import Model, Rollout
-from slap_ros.planning.options import Option
+from slap_ros.planning.options import Option, OptionKind
 from slap_ros.planning.plan import Plan, PlanEdge
 from slap_ros.relational import State
 
@@ -53,7 +54,8 @@ class Vertex:
     """A node reached in a low-level state.
 
     Args:
-        node: Index of the abstract state.
+        node: Index of the abstract state, whose atoms hold; where options are not exact, so may
+            others.
         state: The low-level state.
         cost: Environment steps from the start.
         parent: The vertex before it; None at the start.
@@ -125,9 +127,10 @@ def _attempts(
     """All rollouts of an edge's option that reach its target, the shortest first."""
     option: Option | None = edge.option
     while option is not None:
-        rollout = model.roll_out(option, state, graph.nodes[edge.target])
+        target = option.target(graph.nodes[edge.target])
+        rollout = model.roll_out(option, state, target)
         if option.attempt == edge.option.attempt:
-            failures.add(option, graph.nodes[edge.target], rollout)
+            failures.add(option, target, rollout)
         if not rollout.reached:
             return
         yield replace(edge, option=option), rollout
@@ -162,7 +165,7 @@ def search_exhaustively(graph: AbstractGraph, state: State, model: Model) -> Pla
         for edge, steps, successor in bottom.successors[vertex.key]:
             reached = Vertex(successor.node, successor.state, cost + steps, vertex, edge)
             heapq.heappush(queue, (reached.cost, next(tie), reached))
-    raise _infeasible(graph, model, bottom.failures)
+    raise _infeasible(graph, bottom.failures)
 
 
 @dataclass(order=True)
@@ -248,6 +251,42 @@ def search_lazily(graph: AbstractGraph, state: State, model: Model) -> Plan:
     return _LazySearch(graph, state, model).run()
 
 
+@dataclass(frozen=True)
+class FailedPath:
+    """A path whose last edge fails in the model.
+
+    Args:
+        plan: Its edges, with the steps that they take, the last one's until it fails.
+        node: Index of the node that the last edge should have led to.
+        abstract: The abstract state in which it ends instead.
+    """
+
+    plan: Plan
+    node: int
+    abstract: int
+
+
+def failed_paths(graph: AbstractGraph, state: State, model: Model) -> list[FailedPath]:
+    """Where given and acquired skills have failed in a search that found no plan.
+
+    Args:
+        graph: The top level.
+        state: The low-level state to start from, in the graph's first node.
+        model: That has rolled everything out already.
+
+    Returns:
+        Paths whose last edge moved the robot, in the order in which they failed.
+    """
+    search = _LazySearch(graph, state, model)
+    with suppress(UnsolvableError):
+        search.run()
+    return [
+        FailedPath(_plan(graph, ended), edge.target, model.space.abstract(ended.state))
+        for ended in search.failed
+        if (edge := ended.edge) is not None
+    ]
+
+
 class _LazySearch:
     """One run of :func:`search_lazily`."""
 
@@ -259,6 +298,7 @@ class _LazySearch:
         start = Vertex(0, state, 0)
         self._cheapest = {start.key: 0}
         self._failures = Failures()
+        self.failed: list[Vertex] = []  # where operators that failed have left the robot
         self._frontier.push(start)
 
     def run(self) -> Plan:
@@ -271,7 +311,7 @@ class _LazySearch:
                 return _plan(self._graph, vertex)
             elif vertex.cost == self._cheapest[vertex.key]:
                 self._expand(vertex)
-        raise _infeasible(self._graph, self._model, self._failures)
+        raise _infeasible(self._graph, self._failures)
 
     def _expand(self, vertex: Vertex) -> None:
         """Queue the edges out of a vertex, each with its bound."""
@@ -284,7 +324,7 @@ class _LazySearch:
         """Roll an edge out, and queue where it leads and its next attempt."""
         if edge.option.given_up():
             return
-        target = self._graph.nodes[edge.target]
+        target = edge.option.target(self._graph.nodes[edge.target])
         rollout = self._model.roll_out(edge.option, vertex.state, target)
         if edge.option.attempt == 0:
             self._failures.add(edge.option, target, rollout)
@@ -297,7 +337,11 @@ class _LazySearch:
             following = edge.option.next_attempt()
             if following is not None:  # it takes longer, but the next option may take less
                 self._frontier.push(vertex, replace(edge, option=following), rollout.steps)
-        elif edge.option.given_up():
+            return
+        if rollout.steps and edge.option.kind is OptionKind.OPERATOR:
+            cost = vertex.cost + rollout.steps
+            self.failed.append(Vertex(edge.target, rollout.final, cost, vertex, edge))
+        if edge.option.given_up():
             self._frontier.drop_given_up()
 
 
@@ -318,7 +362,11 @@ def _steps_to_go(forward: list[list[Edge]], goals: Sequence[int]) -> list[int | 
 
 def _plan(graph: AbstractGraph, goal: Vertex) -> Plan:
     edges = [
-        PlanEdge(edge.option, graph.nodes[edge.target], vertex.cost - parent.cost)
+        PlanEdge(
+            edge.option,
+            edge.option.target(graph.nodes[edge.target]),
+            vertex.cost - parent.cost,
+        )
         for vertex, parent, edge in _path(goal)
     ]
     return Plan(tuple(reversed(edges)))
@@ -330,7 +378,7 @@ def _path(vertex: Vertex) -> Iterator[tuple[Vertex, Vertex, Edge]]:
         vertex = vertex.parent
 
 
-def _infeasible(graph: AbstractGraph, model: Model, failures: Failures) -> UnsolvableError:
+def _infeasible(graph: AbstractGraph, failures: Failures) -> UnsolvableError:
     what = f"no path through the {len(graph.nodes)} abstract states can be executed from here"
-    why = failures.in_words(model.space)
+    why = failures.in_words()
     return UnsolvableError(f"{what}: {why}" if why else what)

@@ -3,7 +3,7 @@
 """The relational layer: typed objects, states, predicates, atoms as bits, operators, PDDL."""
 
 from slap_ros.relational.atom_space import AtomSpace
-from slap_ros.relational.grounding import ground_operators
+from slap_ros.relational.grounding import ground_operator, ground_operators
 from slap_ros.relational.metrics import Condition, Metric, NormalisedForm
 from slap_ros.relational.objects import Column, Feature, Object, Type
 from slap_ros.relational.operators import (
@@ -16,6 +16,7 @@ from slap_ros.relational.operators import (
 from slap_ros.relational.predicates import GroundAtom, Predicate
 from slap_ros.relational.rewards import RewardTemplate, RewardTerm
 from slap_ros.relational.state import Layout, State
+from slap_ros.relational.target import Target, list_atoms
 
 __all__ = [
     "AtomSpace",
@@ -34,8 +35,11 @@ __all__ = [
     "RewardTemplate",
     "RewardTerm",
     "State",
+    "Target",
     "Type",
     "Variable",
+    "ground_operator",
     "ground_operators",
+    "list_atoms",
     "static_predicates",
 ]

@@ -46,19 +46,29 @@ def ground_operators(
                     "parameters or objects"
                 )
             if len(binding) == len(operator.parameters):
-                found.append(_ground(operator, binding, space))
+                objects = tuple(binding[variable] for variable in operator.parameters)
+                found.append(ground_operator(operator, objects, space))
     return tuple(found)
 
 
-def _ground(
-    operator: LiftedOperator, binding: dict[Variable, Object], space: AtomSpace
+def ground_operator(
+    operator: LiftedOperator, objects: tuple[Object, ...], space: AtomSpace
 ) -> GroundOperator:
+    """One application of an operator.
+
+    Args:
+        operator: To be applied.
+        objects: For its parameters, in order.
+        space: The atoms over the objects.
+    """
+    binding = dict(zip(operator.parameters, objects, strict=True))
+
     def mask(atoms: Iterable[LiftedAtom]) -> int:
         return space.mask(atom.ground(binding) for atom in atoms)
 
     return GroundOperator(
         operator,
-        tuple(binding[variable] for variable in operator.parameters),
+        objects,
         mask(operator.preconditions),
         mask(operator.add_effects),
         mask(operator.delete_effects),

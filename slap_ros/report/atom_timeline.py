@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from slap_ros.bags.recording import RecordedEpisode
-from slap_ros.evaluation.metrics import RunTrace
+from slap_ros.evaluation.run_trace import RunTrace
 from slap_ros.report.chain import texts
 from slap_ros.report.timeline import call
 

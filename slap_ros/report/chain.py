@@ -7,7 +7,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from slap_ros.bags.recording import RecordedEpisode
-from slap_ros.evaluation.metrics import AtomNames, RunTrace, atom_names
+from slap_ros.evaluation.atom_names import AtomNames, atom_names
+from slap_ros.evaluation.run_trace import RunTrace
 from slap_ros.messages.events import PlanEventKind
 from slap_ros.messages.protocols import PlanMessage
 from slap_ros.planning.options import OptionKind
@@ -64,6 +65,8 @@ def _chain(plan: PlanMessage, trace: RunTrace, episode: RecordedEpisode) -> Plan
     for number, edge in enumerate(plan.edges):
         after = atom_names(edge.expected_atoms)
         known = after if before is None else before
+        if getattr(edge, "others_may_appear", False):  # not in bags of version 0.1.0
+            after |= known - atom_names(edge.forbidden_atoms)
         touched |= after ^ known
         edges.append(
             ChainEdge(

@@ -13,8 +13,11 @@ from slap_ros.bags.evaluate import BagContents, BagEvaluation, evaluate, read_ru
 from slap_ros.bags.recording import RecordedEpisode, Recording
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidDomainError
-from slap_ros.evaluation.metrics import RunMetrics, RunTrace, describe
+from slap_ros.evaluation.atom_names import describe
+from slap_ros.evaluation.metrics import RunMetrics
+from slap_ros.evaluation.run_trace import RunTrace
 from slap_ros.messages.protocols import KeyValueMessage
+from slap_ros.report.acquisitions import RecordedAcquisition, recorded_acquisitions
 from slap_ros.report.atom_timeline import AtomTimeline, atom_timeline
 from slap_ros.report.chain import PlanChain, chains
 from slap_ros.report.proposals import RecordedProposal, recorded_proposals
@@ -71,6 +74,7 @@ class BagReport:
     runs: tuple[RunReport, ...]
     evaluation: BagEvaluation
     proposals: tuple[RecordedProposal, ...]
+    acquisitions: tuple[RecordedAcquisition, ...]
     unchecked: str  # why no atoms were compared with recomputed ones; empty where they were
 
 
@@ -96,8 +100,15 @@ def read_report(path: Path | str) -> BagReport:
         unchecked = "the recording does not name its domain"
     name = Path(path).resolve().name
     runs = tuple(_report(name, reading, trace, domain) for trace in reading.log.traces())
-    proposals = recorded_proposals(reading.recording.acquisition)
-    return BagReport(name, runs, evaluate(reading, domain), proposals, unchecked)
+    events = reading.recording.acquisition
+    return BagReport(
+        name,
+        runs,
+        evaluate(reading, domain),
+        recorded_proposals(events),
+        recorded_acquisitions(events),
+        unchecked,
+    )
 
 
 def _report(name: str, reading: BagContents, trace: RunTrace, domain: Domain | None) -> RunReport:

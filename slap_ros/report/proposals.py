@@ -9,12 +9,14 @@ from dataclasses import dataclass
 
 from slap_ros.messages.events import AcquisitionEventKind
 from slap_ros.messages.protocols import AcquisitionEventMessage
+from slap_ros.report.acquisitions import LEARNING, SKILLS
 
 ENDS = {
     AcquisitionEventKind.FINISHED: "accepted",
     AcquisitionEventKind.FAILED: "failed",
     AcquisitionEventKind.CANCELED: "canceled",
 }
+OF_SKILLS = LEARNING | {AcquisitionEventKind.ACQUIRED}
 KINDS = {int(kind): kind for kind in AcquisitionEventKind}
 IN_PLAN = "all operators together"
 
@@ -69,6 +71,8 @@ def recorded_proposals(
             if open_ is not None:
                 found.append(RecordedProposal("not ended", "", (), tuple(open_)))
             open_ = []
+        elif kind in OF_SKILLS or (event.subject == SKILLS and open_ is None):
+            continue  # the proposal was accepted before
         elif kind in ENDS:
             reason, plan = event.error_msg, tuple(event.plan)
             found.append(RecordedProposal(ENDS[kind], reason, plan, tuple(open_ or ())))

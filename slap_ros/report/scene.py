@@ -12,7 +12,7 @@ from math import nan
 from slap_ros.bags.recording import RecordedEpisode, Recording
 from slap_ros.core import Domain, VisibleBody
 from slap_ros.drawing.projection import drawable, is_near
-from slap_ros.evaluation.metrics import RunTrace
+from slap_ros.evaluation.run_trace import RunTrace
 from slap_ros.geometry.pose import Vector
 from slap_ros.messages.decode import decode_state, stamp_ns
 from slap_ros.messages.interfaces import BODIES

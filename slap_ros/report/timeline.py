@@ -7,7 +7,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from slap_ros.evaluation.metrics import SHORTCUT, OptionMetrics, RunTrace
+from slap_ros.evaluation.metrics import SHORTCUT, OptionMetrics
+from slap_ros.evaluation.run_trace import RunTrace
 from slap_ros.messages.events import PlanEventKind
 from slap_ros.messages.protocols import PlanEdgeMessage, PlanEventMessage
 

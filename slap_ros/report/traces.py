@@ -9,7 +9,7 @@ from math import isfinite
 
 from slap_ros.bags.recording import RecordedEpisode, Recording
 from slap_ros.core import Domain
-from slap_ros.evaluation.metrics import RunTrace
+from slap_ros.evaluation.run_trace import RunTrace
 
 USUAL = frozenset({"robot"})  # types of what acts, where a domain names none
 HELD = "grasp_"  # how a body lies in the hand: nothing that moves by itself

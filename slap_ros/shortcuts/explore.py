@@ -22,11 +22,11 @@ from numpy.typing import NDArray
 
 from slap_ros.core import Domain
 from slap_ros.learning.action_map import ActionMap
+from slap_ros.learning.learner_interface import learner_interface
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
 from slap_ros.planning.planner import GraphPlanner, Problem
 from slap_ros.planning.search import Vertex
 from slap_ros.relational import State
-from slap_ros.shortcuts.observation_encoder import learner_interface
 from slap_ros.shortcuts.settings import ExplorationSettings
 from slap_ros.shortcuts.signature import Change, Signature, context_of
 from slap_ros.shortcuts.stored_keys import restored, stored
@@ -161,11 +161,10 @@ class Explorer:
         """Collect states, roll out from them, value what was reached."""
         vertices, operator_steps = self._collect()
         to_go = steps_to_goal(self.graph, operator_steps)
-        index = {node: j for j, node in enumerate(self.graph.nodes)}
         joined = {(edge.source, edge.target) for edge in self.graph.edges}
         candidates = []
         for vertex in vertices:
-            for j, lengths in self._roll_out(vertex, index).items():
+            for j, lengths in self._roll_out(vertex).items():
                 if len(lengths) < self._settings.hits:
                     continue
                 candidates += [
@@ -258,15 +257,23 @@ class Explorer:
 
     def _follow(self, vertex: Vertex, edge: Edge) -> Vertex | None:
         """Where an edge leads to from a vertex; None where it cannot be executed."""
-        target = self.graph.nodes[edge.target]
+        target = edge.option.target(self.graph.nodes[edge.target])
         rollout = self._problem.model.roll_out(edge.option, vertex.state, target)
         self._steps += rollout.steps
         if not rollout.reached:
             return None
         return Vertex(edge.target, rollout.final, vertex.cost + rollout.steps, vertex, edge)
 
-    def _roll_out(self, vertex: Vertex, index: Mapping[int, int]) -> dict[int, list[int]]:
-        """Random rollouts, for all targets at once: steps to each node reached, by node."""
+    def _roll_out(self, vertex: Vertex) -> dict[int, list[int]]:
+        """Random rollouts, for all targets at once: steps to each node reached, by node.
+
+        Where more atoms hold in the vertex than in its node, they have to stay.
+        """
+        abstract, node = self.space.abstract(vertex.state), self.graph.nodes[vertex.node]
+        index = {
+            Change.between(node, target).apply(abstract): j
+            for j, target in enumerate(self.graph.nodes)
+        }
         reached: dict[int, list[int]] = {}
         for _ in range(0, self._settings.rollouts, len(self._grips)):
             for first in self._roll_out_batch(vertex.state, index):

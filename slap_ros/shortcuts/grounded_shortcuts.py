@@ -7,11 +7,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from slap_ros.core import Domain
+from slap_ros.learning.learner_interface import learner_interface
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge
 from slap_ros.planning.options import Option, OptionKind
-from slap_ros.relational import State
+from slap_ros.relational import State, Target
 from slap_ros.shortcuts.ground_shortcut import GroundShortcut
-from slap_ros.shortcuts.observation_encoder import ObservationEncoder, learner_interface
+from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.shortcut import DEFAULT, Sampling, Shortcut
 from slap_ros.shortcuts.shortcut_rollouts import ShortcutRollout, ShortcutRollouts
 from slap_ros.shortcuts.signature import Change, concerned
@@ -57,19 +58,19 @@ class GroundedShortcuts:
                     found.append(Edge(i, j, self._option(shortcut, change)))
         return found
 
-    def option(self, name: str, source: int, target: int, attempt: int = 0) -> Option | None:
-        """A shortcut from one abstract state to another.
+    def option(self, name: str, source: int, target: Target, attempt: int = 0) -> Option | None:
+        """A shortcut from an abstract state to a target.
 
         Args:
             name: Of the shortcut.
             source: Abstract state in which it begins, a mask.
-            target: Abstract state in which it shall end, a mask.
+            target: Where it shall end.
             attempt: Which of its successful rollouts to follow, the shortest first.
 
         Returns:
             The option; None where there is no such shortcut, or it does not match the change.
         """
-        change = Change.between(source, target)
+        change = Change(target.required & ~source, target.forbidden & source)
         for shortcut in self.shortcuts:
             if shortcut.name == name and shortcut.signature.matches(change, self._space):
                 return self._option(shortcut, change, attempt)
@@ -94,4 +95,5 @@ class GroundedShortcuts:
             attempt=attempt,
             next_attempt=lambda: self._option(shortcut, change, attempt + 1),
             given_up=lambda: self._rollouts.given_up(shortcut),
+            deletes=None if self._domain.exact else change.delete,
         )

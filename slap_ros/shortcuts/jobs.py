@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from time import process_time
 from typing import TYPE_CHECKING, Any
@@ -18,7 +19,7 @@ from slap_ros.planning.planner import GraphPlanner, Problem
 from slap_ros.shortcuts.explore import Explorer, OperatorPath
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
 from slap_ros.shortcuts.library import load_shortcut, save_shortcut
-from slap_ros.shortcuts.progress import ProgressRecorder
+from slap_ros.shortcuts.progress import Progress, ProgressRecorder, latest
 from slap_ros.shortcuts.settings import ExplorationSettings, TrainingSettings
 from slap_ros.shortcuts.shortcut import Sampling, Shortcut
 from slap_ros.shortcuts.shortcut_env_spec import ShortcutEnvSpec
@@ -128,18 +129,9 @@ def plan_length(
     return result.plan.predicted_steps
 
 
-def learn(
-    distribution: TaskDistribution,
-    signature: Signature,
-    starts: tuple[StartRecord, ...],
-    settings: TrainingSettings,
-    folder: str,
-    processes: int,
-) -> Shortcut:
-    """Train a shortcut, stage after stage.
-
-    Begun before, it continues from the last checkpoint; finished before, it is read. The number
-    of processes makes no difference to what is learned.
+@dataclass(frozen=True)
+class LearningAttempt:
+    """One attempt to learn a shortcut, as data that other processes can be sent.
 
     Args:
         distribution: Whose tasks the starts are from.
@@ -147,6 +139,77 @@ def learn(
         starts: Initial states of episodes.
         settings: All hyper-parameters.
         folder: Where the shortcut, checkpoints and progress are kept.
+        number: Counted from 0; each has other initial weights and noise.
+    """
+
+    distribution: TaskDistribution
+    signature: Signature
+    starts: tuple[StartRecord, ...]
+    settings: TrainingSettings
+    folder: str
+    number: int = 0
+
+    @property
+    def work(self) -> ShortcutWorkFolder:
+        """Its folder, which is made where there is none."""
+        return ShortcutWorkFolder(Path(self.folder))
+
+    @property
+    def seed(self) -> int:
+        """Of weights and noise; the first attempt has that of the training."""
+        seed = self.distribution.seed
+        if not self.number:
+            return seed
+        return int(np.random.SeedSequence([seed, self.number]).generate_state(1)[0])
+
+    def recorder(self) -> ProgressRecorder:
+        """Writes down how it goes."""
+        return ProgressRecorder(self.work, self.signature, self.settings.total_steps)
+
+    def parts(self, stage: int) -> list[ShortcutEnvSpec]:
+        """The parts of a stage's environments, each with a seed of its own."""
+        ppo = self.settings.stages[stage]
+        again = (self.number,) if self.number else ()
+        return [
+            ShortcutEnvSpec(
+                self.distribution.domain,
+                self.signature,
+                self.starts,
+                ppo.environments // ppo.parts,
+                self.settings.horizon,
+                self.settings.rewards_in(stage),
+                (self.distribution.seed, len(self.starts), stage, part, *again),
+            )
+            for part in range(ppo.parts)
+        ]
+
+
+def learn_first_stage(attempt: LearningAttempt, processes: int) -> Progress:
+    """Train a shortcut in the first stage alone; :func:`learn` continues from there.
+
+    Args:
+        attempt: What is learned.
+        processes: How many may step environments.
+
+    Returns:
+        The last figures of the stage.
+
+    Raises:
+        ChildProcessError: A process that stepped environments has ended.
+        InvalidParameterError: A checkpoint or the progress is damaged.
+    """
+    _learn_stages(attempt, 1, attempt.recorder(), processes)
+    return latest(attempt.work)[0]
+
+
+def learn(attempt: LearningAttempt, processes: int) -> Shortcut:
+    """Train a shortcut, stage after stage.
+
+    Begun before, it continues from the last checkpoint; finished before, it is read. The number
+    of processes makes no difference to what is learned.
+
+    Args:
+        attempt: What is learned.
         processes: How many may step environments.
 
     Returns:
@@ -155,41 +218,32 @@ def learn(
     Raises:
         ChildProcessError: A process that stepped environments has ended.
         InvalidLibraryError: What was finished before is damaged.
-        InvalidParameterError: A checkpoint is damaged.
+        InvalidParameterError: A checkpoint or the progress is damaged.
     """
-    work = ShortcutWorkFolder(Path(folder))
+    work = attempt.work
     if work.finished.exists():
         return load_shortcut(work.shortcut)
-    specs = [
-        _parts(distribution, signature, starts, settings, stage)
-        for stage in range(len(settings.stages))
-    ]
-    recorder = ProgressRecorder(work)
-    learner = _learn_stages(specs, settings, distribution.seed, work, recorder, processes)
-    shortcut = Shortcut(signature, learner.policy(), learner.shortest, recorder.record())
+    recorder = attempt.recorder()
+    learner = _learn_stages(attempt, len(attempt.settings.stages), recorder, processes)
+    shortcut = Shortcut(attempt.signature, learner.policy(), learner.shortest, recorder.record())
     save_shortcut(work.shortcut, shortcut)
     work.finished.touch()
     return shortcut
 
 
 def _learn_stages(
-    specs: Sequence[Sequence[ShortcutEnvSpec]],
-    settings: TrainingSettings,
-    seed: int,
-    work: ShortcutWorkFolder,
-    recorder: ProgressRecorder,
-    processes: int,
+    attempt: LearningAttempt, stages: int, recorder: ProgressRecorder, processes: int
 ) -> Learner:
     """Each stage begins with the weights of the one before it."""
     from slap_ros.shortcuts.ppo import Learner, normalisation_of  # torch, here alone
 
-    first = specs[0][0]
-    rng = np.random.default_rng([seed, len(first.starts)])
-    normalisation = normalisation_of(first.make(), rng, WARM_UP)
+    work = attempt.work
+    rng = np.random.default_rng([attempt.seed, len(attempt.starts)])
+    normalisation = normalisation_of(attempt.parts(0)[0].make(), rng, WARM_UP)
     learner: Learner | None = None
-    for stage, ppo in enumerate(settings.stages):
-        with make_vec_env(specs[stage], processes) as env:
-            earlier, learner = learner, Learner(env, normalisation, ppo, seed)
+    for stage, ppo in enumerate(attempt.settings.stages[:stages]):
+        with make_vec_env(attempt.parts(stage), processes) as env:
+            earlier, learner = learner, Learner(env, normalisation, ppo, attempt.seed)
             if earlier is not None:
                 learner.initialise_from(earlier)
             if work.checkpoint(stage).exists():
@@ -198,27 +252,3 @@ def _learn_stages(
             learner.save(work.checkpoint(stage))
     assert learner is not None  # there is one stage at least
     return learner
-
-
-def _parts(
-    distribution: TaskDistribution,
-    signature: Signature,
-    starts: tuple[StartRecord, ...],
-    settings: TrainingSettings,
-    stage: int,
-) -> list[ShortcutEnvSpec]:
-    """The parts of a stage's environments, each with a seed of its own."""
-    ppo = settings.stages[stage]
-    return [
-        ShortcutEnvSpec(
-            distribution.domain,
-            distribution.preset,
-            signature,
-            starts,
-            ppo.environments // ppo.parts,
-            settings.horizon,
-            settings.rewards_in(stage),
-            (distribution.seed, len(starts), stage, part),
-        )
-        for part in range(ppo.parts)
-    ]

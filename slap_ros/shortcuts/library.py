@@ -28,11 +28,15 @@ from safetensors.numpy import save
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidLibraryError
 from slap_ros.learning.library_files import (
+    SHORTCUT,
     load_policy,
     policy_tensors,
+    read_about,
+    read_members,
     read_object,
-    replace_folder,
+    record_of,
     save_policy,
+    write_library,
     write_object,
 )
 from slap_ros.learning.mlp_policy import MlpPolicy
@@ -42,7 +46,7 @@ from slap_ros.shortcuts.signature import Signature
 
 FORMAT = 1
 MAX_SHORTEST = 1_000_000  # environment steps; attempts are a multiple of them long
-LIBRARY, SHORTCUT, POLICY = "library.json", "shortcut.json", "policy.safetensors"
+POLICY = "policy.safetensors"
 
 Record = Mapping[str, Any]
 
@@ -75,18 +79,10 @@ class Library:
 
 
 def save_library(path: Path, library: Library) -> None:
-    """Write a library as a folder, in place of the one that may be there.
-
-    It is written beside and then moved, so that there always is a whole one.
-    """
-
-    def write(folder: Path) -> None:
-        for shortcut in library.shortcuts:
-            save_shortcut(folder / shortcut.name, shortcut)
-        about = {"format": FORMAT, "domain": library.domain, **library.record}
-        write_object(folder / LIBRARY, about)
-
-    replace_folder(path, write)
+    """Write a library as a folder, in place of the one that may be there."""
+    about = {"format": FORMAT, "domain": library.domain, **library.record}
+    shortcuts = {shortcut.name: shortcut for shortcut in library.shortcuts}
+    write_library(path, about, shortcuts, save_shortcut)
 
 
 def load_library(path: Path, domain: Domain) -> Library:
@@ -94,32 +90,21 @@ def load_library(path: Path, domain: Domain) -> Library:
 
     Raises:
         InvalidLibraryError: There is none, or it is damaged as a whole, newer than this version,
-            or another domain's.
+            another domain's, or one of skills.
     """
-    if not path.is_dir():
+    about = read_about(path, SHORTCUT, FORMAT, f"slap train {domain.name}", "train again")
+    if about["domain"] != domain.name:
         raise InvalidLibraryError(
-            f"{path}: no such folder; `slap train {domain.name}` makes a shortcut library"
+            f"{path}: a library of domain {about['domain']!r}, not of {domain.name!r}"
         )
-    about = read_object(path / LIBRARY)
-    if about.get("format") != FORMAT:
-        raise InvalidLibraryError(
-            f"{path}: format {about.get('format')!r}, this version of slap_ros reads {FORMAT}; "
-            "train again or use the version of slap_ros that made it"
-        )
-    if about.get("domain") != domain.name:
-        raise InvalidLibraryError(
-            f"{path}: a library of domain {about.get('domain')!r}, not of {domain.name!r}"
-        )
-    shortcuts, refused = [], []
-    for folder in sorted(entry for entry in path.iterdir() if entry.is_dir()):
-        try:
-            shortcut = load_shortcut(folder)
-            _require_fit(shortcut, folder, domain)
-            shortcuts.append(shortcut)
-        except InvalidLibraryError as error:
-            refused.append(error)
-    record = {k: v for k, v in about.items() if k not in ("format", "domain")}
-    return Library(domain.name, tuple(shortcuts), record, tuple(refused))
+
+    def load(folder: Path) -> Shortcut:
+        shortcut = load_shortcut(folder)
+        _require_fit(shortcut, folder, domain)
+        return shortcut
+
+    shortcuts, refused = read_members(path, load)
+    return Library(domain.name, shortcuts, record_of(about), refused)
 
 
 def _require_fit(shortcut: Shortcut, folder: Path, domain: Domain) -> None:

@@ -17,9 +17,9 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.core import Domain, LearnerInterface
-from slap_ros.errors import InvalidDomainError
+from slap_ros.core import Domain
 from slap_ros.learning.action_map import ActionMap
+from slap_ros.learning.learner_interface import learner_interface
 from slap_ros.relational import AtomSpace, Column, GroundAtom, Object, State
 from slap_ros.relational.predicates import Bools, Predicate
 from slap_ros.relational.state import Array
@@ -31,20 +31,6 @@ PENDING_OBJECT_WEIGHT = 3.0  # an object whose turn has not come
 PROXIMITY_WEIGHT = 3.0  # the hand at the last object, which is in place but still moves
 JOINT_LIMIT_WEIGHT = 3.0  # an axis at its limit: a policy that drives it there is stuck
 ACHIEVED = 1e-9  # deficit below which an atom counts as achieved
-
-
-def learner_interface(domain: Domain) -> LearnerInterface:
-    """What the domain offers to learners.
-
-    Raises:
-        InvalidDomainError: Nothing: ``Domain.learning`` is None.
-    """
-    if domain.learning is None:
-        raise InvalidDomainError(
-            f"domain {domain.name} has no learner's interface, so that nothing can be learned in "
-            "it; see Domain.learning"
-        )
-    return domain.learning.interface
 
 
 def uses_gripper(domain: Domain, signature: Signature) -> bool:

@@ -5,16 +5,26 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import nan
 from pathlib import Path
 from time import monotonic
-from typing import Protocol
+from typing import Any, Protocol
 
-from slap_ros.shortcuts.stored_keys import stored
+from slap_ros.errors import InvalidParameterError
+from slap_ros.files import parse_json, read_text
+from slap_ros.learning.library_files import replace_folder
+from slap_ros.learning.mlp_policy import MlpPolicy
+from slap_ros.learning.work_folder import DECODING_ERRORS
+from slap_ros.shortcuts.library import save_shortcut
+from slap_ros.shortcuts.shortcut import Shortcut
+from slap_ros.shortcuts.signature import Signature
+from slap_ros.shortcuts.stored_keys import restored, stored
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 
 CHECKPOINT_S = 30.0  # between checkpoints
+SNAPSHOTS = 12  # of a shortcut while it is learned, about
 
 
 @dataclass(frozen=True)
@@ -39,24 +49,70 @@ class Progress:
     shortest: int
 
 
-class Checkpointed(Protocol):
+NOTHING_YET = Progress(steps=0, episodes=0, success=0.0, length=nan, failure=0.0, shortest=0)
+
+
+def latest(folder: ShortcutWorkFolder) -> dict[int, Progress]:
+    """The last figures of each stage that were written; a line that is not whole is left out.
+
+    Raises:
+        InvalidParameterError: The file is damaged.
+    """
+    if not folder.progress.exists():
+        return {}
+    try:
+        lines = [parse_json(line) for line in read_text(folder.progress).split("\n")[:-1]]
+        return {int(line["stage"]): _restored(line) for line in lines}
+    except DECODING_ERRORS as error:
+        raise InvalidParameterError(
+            f"{folder.progress}: damaged: {error!r}; remove the folder to learn the shortcut again"
+        ) from error
+
+
+def _restored(line: Mapping[str, Any]) -> Progress:
+    """The figures in a line of a progress file; no length is NaN again."""
+    figures: dict[str, Any] = restored(Progress, {key: line[key] for key in stored(NOTHING_YET)})
+    length = figures.pop("length")
+    return Progress(**figures, length=nan if length is None else length)
+
+
+class SavableLearner(Protocol):
     """A learner whose state can be saved."""
 
     def save(self, path: Path) -> None:
         """Write a checkpoint."""
         ...
 
+    def policy(self) -> MlpPolicy:
+        """The policy as it is now."""
+        ...
+
+    @property
+    def shortest(self) -> int:
+        """Environment steps of the shortest success; the horizon where there is none."""
+        ...
+
 
 class ProgressRecorder:
-    """Appends figures to the progress file, and saves checkpoints now and then."""
+    """Appends figures to the progress file, and saves checkpoints and snapshots now and then."""
 
-    def __init__(self, folder: ShortcutWorkFolder) -> None:
+    def __init__(self, folder: ShortcutWorkFolder, signature: Signature, total_steps: int) -> None:
+        """Go on from what is in a folder.
+
+        Args:
+            folder: Where to write.
+            signature: Of the shortcut that is learned.
+            total_steps: Environment steps of all stages.
+        """
         self._folder = folder
+        self._signature = signature
+        self._interval = max(1, total_steps // SNAPSHOTS)
+        self._snapshots = -1  # the number of whole intervals before the last snapshot
         self._began = self._saved = monotonic()
         self._cpu_s = _cpu_s()
-        self._latest: dict[int, Progress] = {}
+        self._latest = latest(folder)
 
-    def of(self, stage: int, learner: Checkpointed) -> Callable[[Progress], bool]:
+    def of(self, stage: int, learner: SavableLearner) -> Callable[[Progress], bool]:
         """What is called after each rollout of a stage; it answers yes: learning continues."""
 
         def report(progress: Progress) -> bool:
@@ -66,17 +122,30 @@ class ProgressRecorder:
             if monotonic() - self._saved > CHECKPOINT_S:
                 learner.save(self._folder.checkpoint(stage))
                 self._saved = monotonic()
+            self._take_snapshot(learner)
             return True
 
         return report
 
+    def _take_snapshot(self, learner: SavableLearner) -> None:
+        """Keep the policy, the first time in each interval of environment steps."""
+        steps = self._steps
+        if steps // self._interval != self._snapshots:
+            self._snapshots = steps // self._interval
+            taken = Shortcut(self._signature, learner.policy(), learner.shortest)
+            folder = self._folder.snapshot(steps)
+            replace_folder(folder.parent, lambda draft: save_shortcut(draft / folder.name, taken))
+
+    @property
+    def _steps(self) -> int:
+        """Environment steps of all stages so far."""
+        return sum(progress.steps for progress in self._latest.values())
+
     def record(self) -> dict[str, str | int | float]:
         """Figures by name; success and length are those of the last episodes, with noise."""
-        if not self._latest:  # all stages were over before
-            return {}
         last = self._latest[max(self._latest)]
         return {
-            "environment_steps": sum(progress.steps for progress in self._latest.values()),
+            "environment_steps": self._steps,
             "episodes": sum(progress.episodes for progress in self._latest.values()),
             "success": last.success,
             "length": last.length if last.length == last.length else -1.0,

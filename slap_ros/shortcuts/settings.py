@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Every hyper-parameter of shortcut learning by name; ours, and the paper's (SLAP Table 8)."""
+"""Every hyper-parameter of shortcut learning by name; ours, and the paper's (SLAP, appendix)."""
 
 from __future__ import annotations
 
@@ -52,6 +52,7 @@ class ExplorationSettings:
         return cls(**restored(cls, data))
 
 
+ENOUGH_SUCCESS = 0.5  # share of the last episodes of the first stage: no further attempt
 LEARN = PpoSettings(total_steps=250_000)
 POLISH = PpoSettings(
     rollout_steps=128,
@@ -81,6 +82,8 @@ class TrainingSettings:
             save on validation tasks, to be kept.
         validation: Validation tasks.
         sampling: How shortcuts are tried out when planning.
+        attempts: How often the first stage is learned at most, each time with other random
+            numbers, until ``ENOUGH_SUCCESS`` is reached. The most successful attempt is polished.
     """
 
     exploration: ExplorationSettings = field(default_factory=ExplorationSettings)
@@ -94,6 +97,7 @@ class TrainingSettings:
     least_saving: float = 0.05
     validation: int = 8
     sampling: Sampling = DEFAULT
+    attempts: int = 1
 
     @property
     def stages(self) -> tuple[PpoSettings, ...]:
@@ -129,8 +133,14 @@ class TrainingSettings:
         )
 
     def as_json(self) -> dict[str, Any]:
-        """A JSON object, under the keys of :mod:`slap_ros.shortcuts.stored_keys`."""
-        return stored(self)
+        """A JSON object, under the keys of :mod:`slap_ros.shortcuts.stored_keys`.
+
+        A single attempt is left out, as work folders have it from when there was no other way.
+        """
+        data = stored(self)
+        if self.attempts == 1:
+            del data["attempts"]
+        return data
 
 
 OURS = TrainingSettings()

@@ -4,50 +4,29 @@
 
 from __future__ import annotations
 
-import os
-import sys
-from collections.abc import Iterator
 from pathlib import Path
 
-import slap_ros
 from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError
 from slap_ros.files import parse_json, read_text
+from slap_ros.learning.learner_interface import learner_interface
+from slap_ros.learning.library_files import ABOUT
+from slap_ros.learning.shipped_models import shipped_folder, shipped_with_siblings
 from slap_ros.planning.planner import WITH_SHORTCUTS
-from slap_ros.shortcuts.library import LIBRARY, Library, load_library
-from slap_ros.shortcuts.observation_encoder import learner_interface
+from slap_ros.shortcuts.library import Library, load_library
 
 NONE = "none"  # the choice of no library
-SHARE = Path("share") / "slap_ros"  # under an installation's prefix
 
 
 def shipped_library(domain: str) -> Path | None:
     """The folder of a domain's shipped library, if there is one."""
-    folders = (root / "models" / domain for root in _roots())
-    return next((folder for folder in folders if folder.is_dir()), None)
+    return shipped_folder(domain)
 
 
 def shipped_libraries(domain: str) -> list[Path]:
-    """The folders of all of a domain's shipped libraries: the one in use, and its siblings.
-
-    They were trained alike with other seeds, and show how much a training depends on its seed.
-    """
-    folders = [shipped_library(domain)]
-    for root in _roots():
-        siblings = sorted((root / "models" / "seeds" / domain).glob("[0-9]*"))
-        if siblings:
-            folders += siblings
-            break
-    return [folder for folder in folders if folder is not None]
-
-
-def _roots() -> Iterator[Path]:
-    """Where models may be: beside the package in a checkout, else installed."""
-    yield Path(slap_ros.__file__).resolve().parent.parent
-    overlays = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
-    for prefix in [*filter(None, overlays), sys.prefix]:
-        yield Path(prefix) / SHARE
+    """The folders of all of a domain's shipped libraries: the one in use, and its siblings."""
+    return shipped_with_siblings(domain)
 
 
 def chosen_library(choice: str | None, domain: Domain, planner: str = "lazy") -> Library | None:
@@ -103,9 +82,9 @@ def require_usable(choice: str, planner: str = "lazy") -> None:
 def _domain_of(path: Path) -> str:
     """The name of the domain that a library says it is for."""
     try:
-        return str(parse_json(read_text(path / LIBRARY))["domain"])
+        return str(parse_json(read_text(path / ABOUT))["domain"])
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InvalidLibraryError(
-            f"{path}: no shortcut library: {LIBRARY}: {error!r}; give a folder that `slap train` "
+            f"{path}: no shortcut library: {ABOUT}: {error!r}; give a folder that `slap train` "
             f"made, or {NONE}"
         ) from error

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slap_ros.domains import get_domain
 from slap_ros.learning.action_map import ActionMap
+from slap_ros.learning.domain_spec import DomainSpec
 from slap_ros.shortcuts.observation_encoder import make_action_map
 from slap_ros.shortcuts.rewards import Rewards
 from slap_ros.shortcuts.shortcut_vec_env import ShortcutVecEnv
@@ -22,8 +22,7 @@ class ShortcutEnvSpec:
     """What a :class:`ShortcutVecEnv` is made from, as data that other processes can be sent.
 
     Args:
-        domain: Its name.
-        preset: Of the domain.
+        domain: Whose worlds they are.
         signature: Of the shortcut.
         starts: From which episodes draw.
         num_envs: How many environments.
@@ -32,8 +31,7 @@ class ShortcutEnvSpec:
         seed: Of the generator that draws the starts.
     """
 
-    domain: str
-    preset: str
+    domain: DomainSpec
     signature: Signature
     starts: tuple[StartRecord, ...]
     num_envs: int
@@ -44,11 +42,11 @@ class ShortcutEnvSpec:
     @property
     def action_map(self) -> ActionMap:
         """From the policy's actions to the robot's."""
-        return make_action_map(get_domain(self.domain, self.preset), self.signature)
+        return make_action_map(self.domain.make(), self.signature)
 
     def make(self) -> ShortcutVecEnv:
         """The environments themselves, in this process."""
-        domain, rng = get_domain(self.domain, self.preset), np.random.default_rng(self.seed)
+        domain, rng = self.domain.make(), np.random.default_rng(self.seed)
         starts = restore_starts(domain, self.starts)
         return ShortcutVecEnv(
             domain, self.signature, starts, self.num_envs, self.horizon, self.rewards, rng

@@ -16,11 +16,11 @@ import numpy as np
 
 from slap_ros.core import Domain
 from slap_ros.errors import SlapError
+from slap_ros.learning.learner_interface import learner_interface
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
 from slap_ros.planning.planner import Problem
 from slap_ros.relational import AtomSpace, State
 from slap_ros.shortcuts.explore import OperatorPath, steps_to_goal
-from slap_ros.shortcuts.observation_encoder import learner_interface
 from slap_ros.shortcuts.signature import Change, Signature
 from slap_ros.shortcuts.signature_matcher import SignatureMatcher
 
@@ -161,7 +161,8 @@ def _execute(
     problem: Problem, graph: AbstractGraph, path: Sequence[Edge], state: State
 ) -> State | None:
     for edge in path:
-        rollout = problem.model.roll_out(edge.option, state, graph.nodes[edge.target])
+        target = edge.option.target(graph.nodes[edge.target])
+        rollout = problem.model.roll_out(edge.option, state, target)
         if not rollout.reached:
             return None
         state = rollout.final

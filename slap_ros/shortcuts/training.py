@@ -10,25 +10,29 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from statistics import fmean
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 from slap_ros.errors import InvalidParameterError, UnsolvableError
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.work_folder import WorkFolder
-from slap_ros.learning.workers import Workers, in_order
+from slap_ros.learning.workers import Workers, run_in_order
 from slap_ros.shortcuts import jobs
 from slap_ros.shortcuts.explore import ExplorationResult, OperatorPath, ShortcutCandidate
 from slap_ros.shortcuts.library import Library
-from slap_ros.shortcuts.settings import TrainingSettings
+from slap_ros.shortcuts.progress import Progress
+from slap_ros.shortcuts.settings import ENOUGH_SUCCESS, TrainingSettings
 from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.signature import Pattern, Signature
 from slap_ros.shortcuts.starts import StartRecord
+from slap_ros.shortcuts.work_folder import attempt_folder
 from slap_ros.versions import versions
 
+Result = TypeVar("Result")
 UNRECORDED = "why was not recorded"  # in work folders of version 0.1.0
 
 
@@ -122,7 +126,8 @@ class CandidateGroup:
 ProblemKey = tuple[frozenset[Pattern], frozenset[str]]  # equal for equal learning problems
 
 
-def _problem_key(signature: Signature) -> ProblemKey:
+def problem_key(signature: Signature) -> ProblemKey:
+    """What is the same for signatures that a single policy is learned for."""
     return signature.patterns, signature.context
 
 
@@ -154,7 +159,7 @@ def _best_by_key(
     """Of one task's candidates that are the same up to objects, the one that saves most."""
     best: dict[tuple[ProblemKey, OperatorPath], ShortcutCandidate] = {}
     for candidate in result.candidates:
-        key = (_problem_key(candidate.signature), candidate.operator_path)
+        key = (problem_key(candidate.signature), candidate.operator_path)
         if key not in best or candidate.expected_saving > best[key].expected_saving:
             best[key] = candidate
     return best
@@ -202,13 +207,13 @@ class Training:
             group = self._most_promising(ranked, kept)
             if group is None:
                 break
-            key = _problem_key(group.signature)
-            ranked = [other for other in ranked if _problem_key(other.signature) != key]
+            key = problem_key(group.signature)
+            ranked = [other for other in ranked if problem_key(other.signature) != key]
             before, length = length, self._try(group, operator_steps, length)
             if length < before:
                 kept.append(group)
         record = self._record(explored, baseline, length)
-        return Library(self.distribution.domain, tuple(self._shortcuts), record)
+        return Library(self.distribution.domain.name, tuple(self._shortcuts), record)
 
     def _most_promising(
         self, groups: Sequence[CandidateGroup], kept: Sequence[CandidateGroup]
@@ -255,7 +260,7 @@ class Training:
 
     def _require_same_settings(self) -> None:
         """Refuse a folder with another training."""
-        own = {"place": vars(self.distribution), **self.settings.as_json()}
+        own = {"place": self.distribution.as_json(), **self.settings.as_json()}
         own = json.loads(json.dumps(own))
         if self._work.cached("settings", lambda: own, lambda theirs: theirs) != own:
             raise InvalidParameterError(
@@ -292,10 +297,11 @@ class Training:
         for i, reason in reasons.items():
             self.callback.on_left_out(use, first + i, reason)
         if len(reasons) == len(found):
+            domain = self.distribution.domain
             raise UnsolvableError(
                 f"none of {len(found)} tasks for {use} has a plan, so there is nothing to shorten. "
-                f"The first: {reasons[0]}. `slap plan {self.distribution.domain} --preset "
-                f"{self.distribution.preset} --seed {self.distribution.task_seed} --index {first}` "
+                f"The first: {reasons[0]}. `slap plan {domain.name} --preset "
+                f"{domain.preset} --seed {self.distribution.task_seed} --index {first}` "
                 "plans for it"
             )
 
@@ -322,12 +328,46 @@ class Training:
         )
 
     def _learn(self, signature: Signature, starts: tuple[StartRecord, ...]) -> Shortcut:
-        folder = self.folder / signature.name
-        self.callback.on_learning(signature.name, folder, self.settings.total_steps)
-        processes = self.workers.processes
-        work = [(self.distribution, signature, starts, self.settings, str(folder), processes)]
-        ((_, shortcut),) = self.workers.run(jobs.learn, work)
-        return shortcut
+        """Learn a shortcut in the most successful of as many attempts as it takes."""
+        if self.settings.attempts == 1:
+            return self._run_attempt(jobs.learn, self._attempt(signature, starts, 0))
+        first_stages: list[Progress] = []
+        while len(first_stages) < self.settings.attempts:
+            attempt = self._attempt(signature, starts, len(first_stages))
+            first_stages.append(self._run_attempt(jobs.learn_first_stage, attempt))
+            if first_stages[-1].success >= ENOUGH_SUCCESS:
+                break
+        success = [stage.success for stage in first_stages]
+        best = success.index(max(success))
+        shortcut = self._run_attempt(jobs.learn, self._attempt(signature, starts, best))
+        in_vain = sum(stage.steps for i, stage in enumerate(first_stages) if i != best)
+        steps = int(shortcut.record["environment_steps"]) + in_vain
+        record = {**shortcut.record, "environment_steps": steps, "attempts": len(success)}
+        return replace(shortcut, record=record)
+
+    def _attempt(
+        self, signature: Signature, starts: tuple[StartRecord, ...], number: int
+    ) -> jobs.LearningAttempt:
+        """An attempt to learn a shortcut.
+
+        Args:
+            signature: Of the shortcut.
+            starts: Initial states of episodes.
+            number: Counted from 0.
+        """
+        folder = attempt_folder(self.folder, signature.name, number)
+        return jobs.LearningAttempt(
+            self.distribution, signature, starts, self.settings, str(folder), number
+        )
+
+    def _run_attempt(
+        self, learn: Callable[[jobs.LearningAttempt, int], Result], attempt: jobs.LearningAttempt
+    ) -> Result:
+        """The result of a job that learns in an attempt."""
+        name, steps = attempt.signature.name, self.settings.total_steps
+        self.callback.on_learning(name, Path(attempt.folder), steps)
+        ((_, result),) = self.workers.run(learn, [(attempt, self.workers.processes)])
+        return result
 
     def _plan_length(self, shortcuts: tuple[Shortcut, ...]) -> float:
         """Mean on validation tasks, environment steps; infinite where one was not solved."""
@@ -346,19 +386,15 @@ class Training:
 
     def _run(self, what: str, function: Any, work: Sequence[tuple[Any, ...]]) -> list[Any]:
         """The results of a step's jobs, in their order."""
-        results = []
-        self.callback.on_progress(what, 0, len(work))
-        for result in self.workers.run(function, work):
-            results.append(result)
-            self.callback.on_progress(what, len(results), len(work))
-        return in_order(results)
+        report = partial(self.callback.on_progress, what)
+        return run_in_order(self.workers, function, work, report)
 
     def _record(
         self, explored: Sequence[ExplorationResult], baseline: float, length: float
     ) -> dict[str, Any]:
         steps = [int(shortcut.record.get("environment_steps", 0)) for shortcut in self._shortcuts]
         return {
-            "preset": self.distribution.preset,
+            "preset": self.distribution.domain.preset,
             "seed": self.distribution.seed,
             "validation": {"pure_planning": baseline, "slap": length},
             "environment_steps": {

@@ -10,8 +10,10 @@
       Clear_On-e41568a9/         a shortcut being learned
         starts.json
         progress.jsonl, tensorboard/, checkpoint0.pt
+        snapshots/100352/Clear_On-e41568a9/  the shortcut after so many environment steps
         finished                 exists once the shortcut is learned
         Clear_On-e41568a9/       the shortcut, as in a library
+      attempt2/Clear_On-e41568a9/  the same of a second attempt; see TrainingSettings.attempts
 """
 
 from __future__ import annotations
@@ -21,6 +23,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+
+def attempt_folder(folder: Path, name: str, attempt: int) -> Path:
+    """Where a shortcut is learned.
+
+    Args:
+        folder: The work folder of the training.
+        name: Of the shortcut.
+        attempt: Counted from 0.
+    """
+    return folder / f"attempt{attempt + 1}" / name if attempt else folder / name
 
 
 @dataclass(frozen=True)
@@ -40,6 +53,15 @@ class ShortcutWorkFolder:
     def checkpoint(self, stage: int) -> Path:
         """The file with the state of PPO in a stage, which is counted from 0."""
         return self.path / f"checkpoint{stage}.pt"
+
+    def snapshot(self, steps: int) -> Path:
+        """The shortcut as it was after so many environment steps, as in a library."""
+        return self.path / "snapshots" / str(steps) / self.path.name
+
+    @property
+    def snapshots(self) -> list[int]:
+        """The environment steps after which there is one."""
+        return sorted(int(folder.name) for folder in self.path.glob("snapshots/[0-9]*"))
 
     @property
     def finished(self) -> Path:

@@ -4,55 +4,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Protocol, TypeVar
 
+from slap_ros.acquisition.domain_choice import DomainChoice, open_domain
 from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.evaluation.approaches import Approach
-from slap_ros.evaluation.experiment import Experiment, Trial, run_all
+from slap_ros.evaluation.experiment import Experiment, Trial, solve
 from slap_ros.evaluation.summary import Spread, Summary
-from slap_ros.learning.workers import local_workers
 from slap_ros.planning.planner import Planner
 from slap_ros.relational import State
+from slap_ros.studies.job_runner import JobRunner
 
-Result = TypeVar("Result")
 
+class TaskOutcome(Protocol):
+    """What came of a task."""
 
-class StudyProgress(Protocol):
-    """Is called as the jobs of a study begin and end, to show its progress."""
-
-    def begin(self, what: str, total: int) -> None:
-        """So many jobs of a kind follow."""
+    @property
+    def success(self) -> bool:
+        """Whether it was solved."""
         ...
 
-    def advance(self) -> None:
-        """One of them has ended."""
+    @property
+    def reason(self) -> str:
+        """Why it was not solved; empty where it was."""
         ...
 
-    def report_failure(self, complaint: str) -> None:
-        """A task was not solved, and why."""
-        ...
+
+Result = TypeVar("Result", bound=TaskOutcome)
 
 
 @dataclass(frozen=True)
 class PlanningSetup:
     """What a process needs to make domain and planner again."""
 
-    domain: str
-    preset: str
+    choice: DomainChoice
     planner: str
     approach: Approach
 
     def make_domain(self) -> Domain:
-        """The domain under its preset.
+        """Open the domain that is meant.
 
         Raises:
             UnknownDomainError: It is not registered.
             InvalidParameterError: It has no such preset or setting.
         """
-        return get_domain(self.domain, self.preset)
+        return open_domain(self.choice)
 
     def make_planner(self, domain: Domain, state: State) -> Planner:
         """A planner for tasks with the objects of a state.
@@ -83,8 +82,9 @@ class Comparison:
         domain: Whose tasks.
         approaches: Ways to plan, pure planning first.
         tasks: Number of tasks per seed.
-        seeds: Number of seeds, from 0 on.
-        jobs: Number of processes.
+        seeds: Number of seeds.
+        first_seed: The first of them.
+        runner: Does what takes long.
         planner: Name of the planner: lazy, exhaustive or ff.
     """
 
@@ -92,7 +92,8 @@ class Comparison:
     approaches: tuple[Approach, ...]
     tasks: int
     seeds: int
-    jobs: int = 1
+    first_seed: int
+    runner: JobRunner
     planner: str = "lazy"
 
     def under(self, preset: str) -> Comparison:
@@ -106,56 +107,80 @@ class Comparison:
     @property
     def experiment(self) -> Experiment:
         """The tasks to be solved, and how."""
-        return Experiment(self.domain, self.tasks, self.seeds, planner=self.planner)
+        return Experiment(
+            self.domain, self.tasks, self.seeds, self.first_seed, planner=self.planner
+        )
 
-    def measure(self, progress: StudyProgress) -> tuple[ApproachResult, ...]:
+    def measure(self) -> tuple[ApproachResult, ...]:
         """Solve every task with every approach; one that is not solved counts as failed."""
-        experiment = self.experiment
-        measured: list[ApproachResult] = []
-        progress.begin(self.domain.preset, len(experiment) * len(self.approaches))
-        for approach in self.approaches:
-            trials = []
-            for trial in run_all(experiment, approach, self.jobs):
-                trials.append(trial)
-                progress.advance()
-                if not trial.success:
-                    progress.report_failure(
-                        complaint(approach, trial.seed, trial.index, trial.reason)
-                    )
-            trials.sort(key=lambda trial: (trial.seed, trial.index))
-            yardstick = measured[0].trials if measured else trials
-            summary = Summary.of(experiment, approach.name, trials, yardstick)
-            measured.append(ApproachResult(summary, tuple(trials)))
-        return tuple(measured)
+        jobs = named_tasks(self.experiment)
+        found = self.attempt(self.domain.preset, solve_task, Trial.from_json, jobs)
+        yardstick = found[self.approaches[0].name]
+        return tuple(
+            ApproachResult(Summary.of(self.experiment, name, trials, yardstick), trials)
+            for name, trials in found.items()
+        )
 
-    def map_jobs(
-        self, function: Callable[..., Result], approach: Approach, jobs: Sequence[tuple[Any, ...]]
-    ) -> Iterator[tuple[int, Result]]:
-        """Run jobs in processes; every approach has processes of its own, as in :func:`run_all`.
+    def attempt(
+        self,
+        what: str,
+        function: Callable[..., Result],
+        decode: Callable[[Any], Result],
+        jobs: Mapping[str, tuple[Any, ...]],
+    ) -> dict[str, tuple[Result, ...]]:
+        """Do something with tasks, by every approach, each in processes of its own.
 
         Args:
+            what: Is done; nothing else that the study does is called so.
             function: Does a job; called with a :class:`PlanningSetup`, then the job's arguments.
-            approach: How its planner plans.
-            jobs: Arguments of each job.
+            decode: Makes a result of its JSON.
+            jobs: Arguments of each job, by what it is called.
 
-        Yields:
-            Number and result of each job, in the order in which they end.
+        Returns:
+            Results in the order of ``jobs``, by the approach's name.
         """
-        setup = PlanningSetup(self.domain.name, self.domain.preset, self.planner, approach)
-        with local_workers(self.jobs) as workers:
-            yield from workers.run(function, [(setup, *job) for job in jobs])
+        choice = DomainChoice.of(self.domain)
+        batches = {
+            approach.name: {
+                f"{what}, {approach.name}: {name}": (
+                    PlanningSetup(choice, self.planner, approach),
+                    *job,
+                )
+                for name, job in jobs.items()
+            }
+            for approach in self.approaches
+        }
+        found = self.runner.run(what, function, decode, *batches.values(), failure=not_solved)
+        return {
+            approach: tuple(found[name] for name in batch) for approach, batch in batches.items()
+        }
 
 
-def complaint(approach: Approach, seed: int, index: int, reason: str) -> str:
-    """A line about a task that was not solved.
+def named_tasks(tasks: Iterable[tuple[int, int]]) -> dict[str, tuple[int, int]]:
+    """Seed and index of tasks, by what they are called on the terminal and in logs."""
+    return {f"seed {seed}, task {index}": (seed, index) for seed, index in tasks}
+
+
+def not_solved(attempted: TaskOutcome) -> str | None:
+    """What there is to say of a task that was not solved."""
+    return None if attempted.success else f"not solved: {attempted.reason}"
+
+
+def solve_task(setup: PlanningSetup, seed: int, index: int) -> Trial:
+    """Plan for a task and execute the plan.
 
     Args:
-        approach: Which did not solve it.
+        setup: Makes domain and planner, in the process where this runs.
         seed: Of the task.
         index: Number of the task among its seed's.
-        reason: Why not.
+
+    Returns:
+        What came of it.
     """
-    return f"{approach.name}: seed {seed}, task {index} not solved: {reason}"
+    domain = setup.make_domain()
+    return Trial.of(
+        seed, index, solve(domain, domain.task(seed, index), setup.approach, setup.planner)
+    )
 
 
 def spread_of(values: Sequence[float]) -> Spread | None:

@@ -9,15 +9,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
+from slap_ros.acquisition.domain_choice import DomainChoice, open_domain
 from slap_ros.drawing.palette import MUTED
 from slap_ros.evaluation.statistics import Interval, wilson_interval
 from slap_ros.evaluation.summary import Spread
 from slap_ros.learning.demonstrator import demonstrate
-from slap_ros.learning.domain_choice import DomainChoice, open_domain
-from slap_ros.studies.comparison import StudyProgress, format_spread, spread_of
+from slap_ros.studies.comparison import format_spread, not_solved, spread_of
 from slap_ros.studies.figures import LINES
+from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.results import MarkdownTable, StudyReport
-from slap_ros.studies.study_log import JobLog
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -134,9 +134,7 @@ def study(
     choice: DomainChoice,
     counts: Mapping[str, int],
     seed: int,
-    log: JobLog,
-    processes: int,
-    progress: StudyProgress,
+    runner: JobRunner,
 ) -> StudyReport:
     """Let the demonstrator solve tasks.
 
@@ -144,9 +142,7 @@ def study(
         choice: The domain, with its demonstrator for skills.
         counts: Tasks of each goal, by name; an empty name for the goal that comes with each task.
         seed: Of the tasks.
-        log: Keeps what is done.
-        processes: Tasks at a time.
-        progress: Is called as tasks end.
+        runner: Solves tasks.
 
     Returns:
         The report.
@@ -158,15 +154,18 @@ def study(
     open_domain(choice)
     goals = []
     for goal, count in counts.items():
-        jobs = {f"{goal} {index}": (choice, goal, seed, index) for index in range(count)}
-        results = log.run(goal or choice.name, demonstrate_task, jobs, processes, progress)
-        tasks = tuple(DemonstratedTask(**result) for result in results.values())
-        for task in tasks:
-            if not task.success:
-                progress.report_failure(
-                    f"{goal}: seed {seed}, task {task.index} not solved: {task.reason}"
-                )
-        goals.append(GoalDemonstrations(goal, tasks))
+        jobs = {
+            f"{goal}: seed {seed}, task {index}": (choice, goal, seed, index)
+            for index in range(count)
+        }
+        tasks = runner.run(
+            goal or choice.name,
+            demonstrate_task,
+            lambda data: DemonstratedTask(**data),
+            jobs,
+            failure=not_solved,
+        )
+        goals.append(GoalDemonstrations(goal, tuple(tasks.values())))
     return StudyReport(
         study="demonstrations",
         source="",
@@ -190,7 +189,7 @@ def study(
     )
 
 
-def demonstrate_task(choice: DomainChoice, goal: str, seed: int, index: int) -> dict[str, Any]:
+def demonstrate_task(choice: DomainChoice, goal: str, seed: int, index: int) -> DemonstratedTask:
     """Solve one task.
 
     Args:
@@ -200,20 +199,18 @@ def demonstrate_task(choice: DomainChoice, goal: str, seed: int, index: int) -> 
         index: Of the task.
 
     Returns:
-        A :class:`DemonstratedTask`, as JSON has it.
+        What came of it.
     """
     domain = open_domain(choice)
     episode = demonstrate(domain, domain.task(seed, index, goal or None)).episode
-    return asdict(
-        DemonstratedTask(
-            index,
-            episode.success,
-            episode.plan_length,
-            episode.replans,
-            dict(Counter(edge.option for edge in episode.edges)),
-            dict(Counter(edge.option for edge in episode.edges if not edge.reached)),
-            episode.error.reason,
-        )
+    return DemonstratedTask(
+        index,
+        episode.success,
+        episode.plan_length,
+        episode.replans,
+        dict(Counter(edge.option for edge in episode.edges)),
+        dict(Counter(edge.option for edge in episode.edges if not edge.reached)),
+        episode.error.reason,
     )
 
 

@@ -8,10 +8,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
+from slap_ros.drawing.palette import PLAN
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.summary import Spread
-from slap_ros.studies.comparison import format_spread, spread_of
+from slap_ros.shortcuts.shortcut import Shortcut
+from slap_ros.studies.comparison import Comparison, format_spread, spread_of
 from slap_ros.studies.figures import LINES
+from slap_ros.studies.library_plans import LibraryPlans, plan_with
 from slap_ros.studies.results import MarkdownTable, StudyReport
 from slap_ros.studies.trainings import LearningCurve, TrainingFolder
 
@@ -28,6 +31,12 @@ from the starts of training, so they are not what planning with the shortcut com
 training follow one another along the axis, dotted lines part them. Several trainings (seeds) of
 the same shortcut are averaged where they have numbers for the same step count; mean ± sample
 standard deviation."""
+PLANNED = """
+
+Plan length is that of plans that are executed on the same {tasks} tasks of evaluation, with the
+shortcuts of the library that is named below as they were after so many environment steps of
+learning each; mean ± sample standard deviation, and relative to pure planning. A shortcut counts as
+used if it is in one of these plans at least and reaches its target there."""
 
 
 @dataclass(frozen=True)
@@ -83,29 +92,109 @@ class LearningDynamics:
             ]
 
 
-def study(domain: str, folders: Sequence[TrainingFolder]) -> StudyReport:
-    """The curves in the work folders of trainings.
+@dataclass(frozen=True)
+class PlansAfterSteps:
+    """Plans with shortcuts as they were after so many environment steps of learning each."""
+
+    steps: int
+    plans: LibraryPlans
+
+    def as_json(self) -> dict[str, Any]:
+        """Steps, the summary and every trial, for the report's JSON."""
+        return {"steps": self.steps, "used": list(self.plans.used), **self.plans.as_json()}
+
+    def as_row(self) -> list[str]:
+        """Row of a table."""
+        there, *rest = self.plans.as_cells()
+        return [f"{self.steps:,}", there, str(len(self.plans.used)), *rest]
+
+
+def study(folders: Sequence[TrainingFolder], comparison: Comparison) -> StudyReport:
+    """The curves in the work folders of trainings, and plans in the course of them.
+
+    Args:
+        folders: Of one domain.
+        comparison: Pure planning, and for plans SLAP with a library that one of the trainings made.
+
+    Returns:
+        The report.
 
     Raises:
-        InvalidParameterError: A folder has none, damaged ones, or those of another domain.
+        InvalidParameterError: A folder has no curves, damaged ones, or those of another domain; or
+            no training has made a shortcut of the library.
+        InvalidLibraryError: A snapshot is damaged.
     """
+    domain = comparison.domain.name
     for folder in folders:
         folder.require_domain(domain)
     curves = [curve for folder in folders for curve in folder.curves()]
     names = dict.fromkeys(curve.shortcut for curve in curves)
     learned = [_together([c for c in curves if c.shortcut == name]) for name in names]
+    planned = plan_while_learned(folders, comparison) if len(comparison.approaches) > 1 else []
+    measured = MEASURED
+    if planned:
+        columns = ("environment steps", "shortcuts", "used", "plan length [steps]", "relative")
+        table = MarkdownTable(columns, [one.as_row() for one in planned])
+        measured += PLANNED.format(tasks=len(comparison.experiment))
+        measured += f"\n\n{table.as_markdown()}"
     return StudyReport(
         study="dynamics",
         source="SLAP Fig. 4",
         title=f"Learning dynamics: {domain}",
-        measured=MEASURED,
+        measured=measured,
         table=MarkdownTable(
             ["shortcut", "environment steps", "success [%]", "length [steps]"],
             [row for one in learned for row in one.as_rows()],
         ),
-        found={"shortcuts": [one.as_json() for one in learned]},
-        draw=lambda figure: draw(figure, learned),
-        size=(6.4, 4.2 + 0.2 * len(learned)),
+        found={
+            "shortcuts": [one.as_json() for one in learned],
+            **({"plans": [one.as_json() for one in planned]} if planned else {}),
+        },
+        draw=lambda figure: draw(figure, learned, planned),
+        size=(6.4, (7.4 if planned else 4.2) + 0.2 * len(learned)),
+    )
+
+
+def plan_while_learned(
+    folders: Sequence[TrainingFolder], comparison: Comparison
+) -> list[PlansAfterSteps]:
+    """Plan with the shortcuts of a library as they were while they were learned.
+
+    Args:
+        folders: Of trainings, one of which has made the library.
+        comparison: Pure planning, and SLAP with the library; the tasks.
+
+    Returns:
+        Plans without any shortcut, and then whenever one of them was kept.
+
+    Raises:
+        InvalidParameterError: No training has made a shortcut of the library.
+        InvalidLibraryError: A snapshot is damaged.
+    """
+    courses = [_course(folders, shortcut) for shortcut in comparison.approaches[-1].shortcuts]
+    found: list[PlansAfterSteps] = []
+    for steps in sorted({0, *(steps for course in courses for steps, _ in course)}):
+        ready = [[one for began, one in course if began <= steps] for course in courses]
+        shortcuts = tuple(versions[-1] for versions in ready if versions)
+        trials = plan_with(comparison, shortcuts, f"{steps} steps of learning")
+        names = tuple(one.name for one in shortcuts)
+        baseline = found[0].plans.trials if found else trials
+        found.append(PlansAfterSteps(steps, LibraryPlans(names, trials, baseline)))
+    return found
+
+
+def _course(
+    folders: Sequence[TrainingFolder], shortcut: Shortcut
+) -> tuple[tuple[int, Shortcut], ...]:
+    for folder in folders:
+        course = folder.while_learned(shortcut)
+        if course is not None and len(course) > 1:
+            return course
+    raise InvalidParameterError(
+        f"{', '.join(str(folder.path) for folder in folders)}: no training that came to "
+        f"{shortcut.name} as the library has it, with snapshots of it on the way: train the "
+        "library again with this version and the command in its library.json, or give "
+        "--shortcuts none for the curves alone"
     )
 
 
@@ -126,9 +215,17 @@ def _together(curves: Sequence[LearningCurve]) -> LearningDynamics:
     return LearningDynamics(curves[0].shortcut, len(curves), tuple(moments), curves[0].stages)
 
 
-def draw(figure: Figure, learned: Sequence[LearningDynamics]) -> None:
-    """Draw success above, length below, one line per shortcut."""
-    above, below = figure.subplots(2, 1, sharex=True)
+def draw(
+    figure: Figure, learned: Sequence[LearningDynamics], planned: Sequence[PlansAfterSteps] = ()
+) -> None:
+    """Draw success above, length below, one line per shortcut; below them plans.
+
+    Args:
+        figure: To draw into.
+        learned: A line each.
+        planned: In order of their steps; may be none.
+    """
+    above, below, *rest = figure.subplots(4 if planned else 2, 1, sharex=True)
     for number, one in enumerate(learned):
         colour, dashes = LINES[number % len(LINES)], ("-", "--")[number // len(LINES) % 2]
         pen = {"color": colour, "linestyle": dashes}
@@ -146,8 +243,22 @@ def draw(figure: Figure, learned: Sequence[LearningDynamics]) -> None:
     below.set_ylim(bottom=0)
     below.set_xlim(left=0)
     below.set_ylabel("length of successful\nepisodes [steps]")
-    below.set_xlabel("environment steps [thousands]")
+    if planned:
+        _plot_plans(rest[0], rest[1], planned)
+    (above, below, *rest)[-1].set_xlabel("environment steps [thousands]")
     figure.legend(loc="outside upper center")  # one below the other: names are long
+
+
+def _plot_plans(length: Axes, used: Axes, planned: Sequence[PlansAfterSteps]) -> None:
+    """Plan length, and how many shortcuts plans have."""
+    steps = [one.steps / THOUSAND for one in planned]
+    pen = {"color": PLAN, "marker": "o", "markersize": 3}
+    _plot(length, steps, [one.plans.length for one in planned], pen)
+    length.set_ylim(bottom=0)
+    length.set_ylabel("plan length\n[steps]")
+    used.plot(steps, [len(one.plans.used) for one in planned], drawstyle="steps-post", color=PLAN)
+    used.set_yticks(range(1 + max(len(one.plans.shortcuts) for one in planned)))
+    used.set_ylabel("shortcuts used")
 
 
 def _plot(

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from slap_ros.studies.comparison import ApproachResult, Comparison, StudyProgress, format_spread
+from slap_ros.studies.comparison import ApproachResult, Comparison, format_spread
 from slap_ros.studies.figures import dodged, label, legend_above, plot_spreads, plot_values
 from slap_ros.studies.results import MarkdownTable, StudyReport
 from slap_ros.studies.variations import Variation
@@ -62,15 +62,12 @@ class StudyCondition:
             ]
 
 
-def study(
-    comparison: Comparison, variations: Sequence[Variation], progress: StudyProgress
-) -> StudyReport:
+def study(comparison: Comparison, variations: Sequence[Variation]) -> StudyReport:
     """Measure under every value of every setting.
 
     Args:
         comparison: Approaches, and the tasks that they solve.
         variations: Settings and their values.
-        progress: Is called as tasks end.
 
     Returns:
         The report.
@@ -85,7 +82,7 @@ def study(
         for value in one.values
     ]
     conditions = [
-        StudyCondition(setting, value, under.domain.preset, under.measure(progress))
+        StudyCondition(setting, value, under.domain.preset, under.measure())
         for setting, value, under in planned
     ]
     return StudyReport(

@@ -19,19 +19,16 @@ import numpy as np
 from slap_ros.core import Domain, Task
 from slap_ros.drawing.palette import MUTED
 from slap_ros.errors import PlanningLimitError, UnsolvableError
-from slap_ros.evaluation.approaches import Approach
 from slap_ros.evaluation.experiment import Trial, solve
 from slap_ros.evaluation.summary import Summary
-from slap_ros.learning.workers import in_order
 from slap_ros.planning.abstract_graph import build_abstract_graph
 from slap_ros.planning.planner import Problem
 from slap_ros.relational import AtomSpace, GroundAtom
 from slap_ros.studies.comparison import (
     Comparison,
     PlanningSetup,
-    StudyProgress,
-    complaint,
     format_spread,
+    named_tasks,
 )
 from slap_ros.studies.figures import APPROACH_STYLES, label
 from slap_ros.studies.results import MarkdownTable, StudyReport
@@ -115,13 +112,12 @@ class GoalTrials:
         return (pure.plan_length, slap.plan_length) if pure.success and slap.success else None
 
 
-def study(comparison: Comparison, count: int, progress: StudyProgress) -> StudyReport:
+def study(comparison: Comparison, count: int) -> StudyReport:
     """Sample goals for each task and solve them all with every approach.
 
     Args:
         comparison: Approaches, and the tasks whose goals are replaced.
         count: Goals per task, fewer where a task has fewer.
-        progress: Is called as goals are solved.
 
     Returns:
         The report.
@@ -129,24 +125,21 @@ def study(comparison: Comparison, count: int, progress: StudyProgress) -> StudyR
     Raises:
         UnsolvableError: No task has any goal that operators can reach.
     """
-    jobs = [
-        (seed, index, goal)
-        for seed, index in comparison.experiment
-        for goal in _goals(comparison.domain, seed, index, count, progress)
-    ]
+    jobs = {
+        f"{name}, {' and '.join(_words(goal))}": (*task, goal)
+        for name, task in named_tasks(comparison.experiment).items()
+        for goal in _goals(comparison, *task, count)
+    }
     if not jobs:
         raise UnsolvableError("operators can reach no goal in any of the tasks")
-    progress.begin("goals", len(jobs) * len(comparison.approaches))
-    trials = [
-        _solve_all(comparison, approach, jobs, progress) for approach in comparison.approaches
-    ]
+    found = comparison.attempt("goals", solve_for, Trial.from_json, jobs)
+    trials = list(found.values())
     outcomes = [
         GoalTrials(goal, own)
-        for (*_, goal), own in zip(jobs, zip(*trials, strict=True), strict=True)
+        for (*_, goal), own in zip(jobs.values(), zip(*trials, strict=True), strict=True)
     ]
     summaries = [
-        Summary.of(comparison.experiment, approach.name, own, trials[0])
-        for approach, own in zip(comparison.approaches, trials, strict=True)
+        Summary.of(comparison.experiment, name, own, trials[0]) for name, own in found.items()
     ]
     return _report(comparison, outcomes, summaries)
 
@@ -170,15 +163,16 @@ def _report(
     )
 
 
-def _goals(
-    domain: Domain, seed: int, index: int, count: int, progress: StudyProgress
-) -> list[NamedGoal]:
+def _goals(comparison: Comparison, seed: int, index: int, count: int) -> list[NamedGoal]:
     """Goals for one task; none where its graph cannot be built."""
+    domain = comparison.domain
     rng = np.random.default_rng([seed, index, GOALS])
     try:
         sampled = sample_goals(domain, domain.task(seed, index), count, rng)
     except (UnsolvableError, PlanningLimitError) as error:
-        progress.report_failure(f"seed {seed}, task {index} has no goals: {error}")
+        comparison.runner.progress.report_failure(
+            f"seed {seed}, task {index} has no goals: {error}"
+        )
         return []
     return [
         tuple((atom.predicate.name, tuple(obj.name for obj in atom.objects)) for atom in goal)
@@ -186,25 +180,18 @@ def _goals(
     ]
 
 
-def _solve_all(
-    comparison: Comparison,
-    approach: Approach,
-    jobs: Sequence[tuple[int, int, NamedGoal]],
-    progress: StudyProgress,
-) -> list[Trial]:
-    """A trial a job."""
-    ended = []
-    for number, trial in comparison.map_jobs(_solve, approach, jobs):
-        ended.append((number, trial))
-        progress.advance()
-        if not trial.success:
-            reason = f"{' and '.join(_words(jobs[number][2]))}: {trial.reason}"
-            progress.report_failure(complaint(approach, trial.seed, trial.index, reason))
-    return in_order(ended)
+def solve_for(setup: PlanningSetup, seed: int, index: int, goal: NamedGoal) -> Trial:
+    """Solve one task for another goal.
 
+    Args:
+        setup: Makes domain and planner, in the process where this runs.
+        seed: Of the task.
+        index: Number of the task among its seed's.
+        goal: Instead of the task's own.
 
-def _solve(setup: PlanningSetup, seed: int, index: int, goal: NamedGoal) -> Trial:
-    """One task with another goal; the domain is made where this runs."""
+    Returns:
+        What came of it.
+    """
     chosen = setup.make_domain()
     task = chosen.task(seed, index)
     space = chosen.atom_space(task.initial_state)

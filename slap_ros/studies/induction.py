@@ -8,21 +8,21 @@ that the domain has a name for, in as few operators as those that people wrote.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import permutations
 from typing import TYPE_CHECKING, Any
 
+from slap_ros.acquisition.domain_choice import DomainChoice, open_domain
 from slap_ros.acquisition.induction import InducedOperator, hold_steps_of, induce_operators
 from slap_ros.core import Domain, Task
 from slap_ros.drawing.palette import MUTED
 from slap_ros.errors import InvalidParameterError, PlanningLimitError, UnsolvableError
-from slap_ros.learning.demonstrator import AtomTrace, record_traces
-from slap_ros.learning.domain_choice import DomainChoice, open_domain
+from slap_ros.learning.demonstrator import record_traces
 from slap_ros.planning.astar import find_shortest_sequence
 from slap_ros.relational import LiftedAtom, LiftedOperator, Variable, ground_operators
-from slap_ros.studies.comparison import StudyProgress
 from slap_ros.studies.figures import LINES
+from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.results import MarkdownTable, StudyReport
 
 if TYPE_CHECKING:
@@ -81,6 +81,16 @@ class Induction:
     too_many: dict[str, tuple[str, ...]]
     goals: tuple[GoalPlans, ...]
 
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Induction:
+        """The induction that :func:`dataclasses.asdict` made such data of."""
+        goals = tuple(
+            GoalPlans(one["goal"], tuple(one["lengths"]), tuple(one["shortest"]))
+            for one in data["goals"]
+        )
+        too_many = {name: tuple(atoms) for name, atoms in data["too_many"].items()}
+        return cls(data["demonstrations"], tuple(data["operators"]), too_many, goals)
+
     @property
     def complete(self) -> bool:
         """Whether every task of every goal has a plan as short as with hand-written operators."""
@@ -122,7 +132,7 @@ def _cell(goal: GoalPlans) -> str:
 
 
 def study(
-    choice: DomainChoice, counts: Sequence[int], tasks: int, seed: int, progress: StudyProgress
+    choice: DomainChoice, counts: Sequence[int], tasks: int, seed: int, runner: JobRunner
 ) -> StudyReport:
     """Induce operators from so many demonstrations, and plan with them.
 
@@ -131,7 +141,7 @@ def study(
         counts: Of demonstrations; the first of as many as the greatest count says.
         tasks: To plan for, of each goal.
         seed: Of these tasks.
-        progress: Is called as goals are planned for.
+        runner: Does it for a count at a time.
 
     Returns:
         The report.
@@ -144,49 +154,54 @@ def study(
         raise InvalidParameterError(
             f"counts of demonstrations are at least 1, not {', '.join(map(str, counts)) or 'none'}"
         )
+    jobs = {f"{count} demonstrations": (choice, count, tasks, seed) for count in sorted(counts)}
+    title = f"{choice.name}: demonstrations and plans"
+    found = runner.run(title, induce, Induction.from_json, jobs)
+    return _report(choice, tuple(found.values()), tasks)
+
+
+def induce(choice: DomainChoice, count: int, tasks: int, seed: int) -> Induction:
+    """Operators from some demonstrations, and what they are worth.
+
+    Args:
+        choice: The domain, with its demonstrator for skills.
+        count: Of demonstrations.
+        tasks: To plan for, of each goal.
+        seed: Of these tasks.
+
+    Returns:
+        What came of it.
+
+    Raises:
+        UnsolvableError: The demonstrator fails too often.
+    """
     domain = open_domain(choice)
-    training = next(iter(domain.goals), None)
-    progress.begin(f"{choice.name}: demonstrations and plans", 1 + len(counts))
-    traces = record_traces(domain, max(counts), training)
-    progress.advance()
+    traces = record_traces(domain, count, _training_goal(domain))
+    induced = induce_operators(traces, hold_steps_of(domain.execution.control_period_s))
+    operators = tuple(one.operator for one in induced)
     posed = {
         goal: [domain.task(seed, index, goal or None) for index in range(tasks)]
         for goal in domain.goals or ("",)
     }
-    shortest = {goal: tuple(_lengths(domain.operators, domain, own)) for goal, own in posed.items()}
-    found = []
-    for count in sorted(set(counts)):
-        found.append(_induced(domain, traces[:count], posed, shortest))
-        progress.advance()
-    return _report(choice, found, tasks, training)
-
-
-def _induced(
-    domain: Domain,
-    traces: Sequence[AtomTrace],
-    posed: dict[str, list[Task]],
-    shortest: dict[str, tuple[int | None, ...]],
-) -> Induction:
-    """Operators from some demonstrations, and what they are worth.
-
-    Args:
-        domain: For its atoms.
-        traces: The demonstrations.
-        posed: Tasks, by goal.
-        shortest: Lengths of plans with hand-written operators, by goal.
-    """
-    induced = induce_operators(traces, hold_steps_of(domain.execution.control_period_s))
-    operators = tuple(one.operator for one in induced)
     goals = tuple(
-        GoalPlans(goal, tuple(_lengths(operators, domain, tasks)), shortest[goal])
-        for goal, tasks in posed.items()
+        GoalPlans(
+            goal,
+            tuple(_lengths(operators, domain, own)),
+            tuple(_lengths(domain.operators, domain, own)),
+        )
+        for goal, own in posed.items()
     )
     too_many = {
         operator.name: tuple(sorted(map(str, rest)))
         for operator in operators
         if (rest := _too_many(operator, domain.operators))
     }
-    return Induction(len(traces), tuple(map(_operator_data, induced)), too_many, goals)
+    return Induction(count, tuple(map(_operator_data, induced)), too_many, goals)
+
+
+def _training_goal(domain: Domain) -> str | None:
+    """The goal of which there are demonstrations; None for the goals that come with tasks."""
+    return next(iter(domain.goals), None)
 
 
 def _too_many(operator: LiftedOperator, by_hand: Sequence[LiftedOperator]) -> frozenset[LiftedAtom]:
@@ -238,17 +253,16 @@ def _operator_data(induced: InducedOperator) -> dict[str, Any]:
     }
 
 
-def _report(
-    choice: DomainChoice, found: Sequence[Induction], tasks: int, training: str | None
-) -> StudyReport:
-    hold_steps = hold_steps_of(open_domain(choice).execution.control_period_s)
+def _report(choice: DomainChoice, found: Sequence[Induction], tasks: int) -> StudyReport:
+    domain = open_domain(choice)
+    hold_steps = hold_steps_of(domain.execution.control_period_s)
     goals = [goal.goal or "(the task's own)" for goal in found[0].goals]
     return StudyReport(
         study="induction",
         source="",
         title=f"Operators from demonstrations: {choice.name}",
         measured=MEASURED.format(
-            training=training or "the tasks' own", tasks=tasks, hold_steps=hold_steps
+            training=_training_goal(domain) or "the tasks' own", tasks=tasks, hold_steps=hold_steps
         ),
         table=MarkdownTable(
             ["demonstrations", "operators", *goals, "preconditions too many"],

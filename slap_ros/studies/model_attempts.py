@@ -3,14 +3,15 @@
 """Attempts of a language model at operators, plans and rewards, each without a second chance.
 
 What studies count: an attempt at operators is a decomposition and an operator for each of its
-actions, asked for once. It succeeds where all pass their checks and chain to the goal.
+actions, asked for once. It succeeds where all pass their checks and chain to the goal. It ends with
+the first answer that does not pass: what would follow costs, and changes nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from slap_ros.acquisition.attempt_log import AttemptLog
 from slap_ros.acquisition.complaints import Complaint, serious
@@ -32,6 +33,7 @@ from slap_ros.relational import LiftedOperator
 D = TypeVar("D")
 T = TypeVar("T")
 
+VERIFICATION = "verification"  # of all operators together
 SEED = "seed"  # a field of sampling: servers that know it answer differently to each
 
 
@@ -105,6 +107,21 @@ class Attempt:
         """Whether nothing is wrong."""
         return not self.errors
 
+    @property
+    def verdict(self) -> str:
+        """``passed``, or which answers did not, with the classes of what is wrong with each."""
+        wrong = (
+            f"{subject.partition(' ')[0]}: {', '.join(kinds)}"
+            for subject, kinds in self.errors.items()
+        )
+        return "; ".join(wrong) or "passed"
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Attempt:
+        """The attempt that :func:`dataclasses.asdict` made such data of."""
+        errors = {subject: tuple(kinds) for subject, kinds in data["errors"].items()}
+        return cls(errors, data["tokens"], data["seconds"])
+
 
 class _Asker:
     """Asks once for each thing, and collects what is wrong."""
@@ -132,7 +149,7 @@ class _Asker:
 def attempt_operators(
     inquiry: Inquiry, problem: AcquisitionProblem
 ) -> tuple[Attempt, tuple[LiftedOperator, ...]]:
-    """Ask once for a decomposition and each of its operators.
+    """Ask once for a decomposition and each of its operators, until an answer does not pass.
 
     Args:
         inquiry: The conversation.
@@ -143,14 +160,18 @@ def attempt_operators(
     """
     asker = _Asker(inquiry)
     actions = asker.ask(about_decomposition(problem)) or ()
-    answers = [asker.ask(about_operator(one, actions, problem)) for one in actions]
-    operators = tuple(answer for answer in answers if answer is not None)
+    operators: list[LiftedOperator] = []
+    for action in actions:
+        operator = asker.ask(about_operator(action, actions, problem))
+        if operator is None:
+            break
+        operators.append(operator)
     if asker.attempt().passed:
         verification = verify(operators, problem)
         if verification.plan is None:
-            asker.blame("operators", verification.complaints)
+            asker.blame(VERIFICATION, verification.complaints)
     attempt = asker.attempt()
-    return attempt, operators if attempt.passed else ()
+    return attempt, tuple(operators) if attempt.passed else ()
 
 
 def attempt_plan(

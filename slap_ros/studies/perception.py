@@ -23,9 +23,8 @@ from slap_ros.planning.partial import PartialPlanner
 from slap_ros.studies.comparison import (
     Comparison,
     PlanningSetup,
-    StudyProgress,
-    complaint,
     format_spread,
+    named_tasks,
     spread_of,
 )
 from slap_ros.studies.figures import dodged, label, legend_above, plot_spreads, plot_values
@@ -143,13 +142,12 @@ class NoiseLevel:
         ]
 
 
-def study(comparison: Comparison, max_replans: int, progress: StudyProgress) -> StudyReport:
+def study(comparison: Comparison, max_replans: int) -> StudyReport:
     """Measure at every level of every kind of noise.
 
     Args:
         comparison: Approaches, and the tasks that they solve.
         max_replans: Plans that a task may take after the first.
-        progress: Is called as tasks end.
 
     Returns:
         The report.
@@ -158,9 +156,7 @@ def study(comparison: Comparison, max_replans: int, progress: StudyProgress) -> 
     planned += [
         (kind.name, value, quality) for kind in NOISE_KINDS for value, quality in kind.levels
     ]
-    levels = [
-        level for one in planned for level in _measure(comparison, *one, max_replans, progress)
-    ]
+    levels = [level for one in planned for level in _measure(comparison, *one, max_replans)]
     return StudyReport(
         study="perception",
         source="SLAP D.3 and D.4",
@@ -177,26 +173,17 @@ def study(comparison: Comparison, max_replans: int, progress: StudyProgress) -> 
 
 
 def _measure(
-    comparison: Comparison,
-    kind: str,
-    value: str,
-    quality: Quality,
-    max_replans: int,
-    progress: StudyProgress,
+    comparison: Comparison, kind: str, value: str, quality: Quality, max_replans: int
 ) -> Iterator[NoiseLevel]:
-    """One approach after the other."""
-    tasks = list(comparison.experiment)
-    progress.begin(" ".join(f"{kind} {value}".split()), len(tasks) * len(comparison.approaches))
-    for approach in comparison.approaches:
-        trials = []
-        jobs = [(quality, max_replans, seed, index) for seed, index in tasks]
-        for _, one in comparison.map_jobs(solve_perceived, approach, jobs):
-            trials.append(one)
-            progress.advance()
-            if not one.success:
-                progress.report_failure(complaint(approach, one.seed, one.index, one.reason))
-        trials.sort(key=lambda one: (one.seed, one.index))
-        yield NoiseLevel(kind, value, quality, approach.name, tuple(trials))
+    """A level, an approach each."""
+    jobs = {
+        name: (quality, max_replans, *task)
+        for name, task in named_tasks(comparison.experiment).items()
+    }
+    what = " ".join(f"{kind} {value}".split())
+    found = comparison.attempt(what, solve_perceived, lambda data: NoisyTrial(**data), jobs)
+    for approach, trials in found.items():
+        yield NoiseLevel(kind, value, quality, approach, trials)
 
 
 def solve_perceived(

@@ -11,15 +11,17 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from time import process_time
+from typing import TYPE_CHECKING, Any
 
 from slap_ros.acquisition.problem import AcquisitionProblem
 from slap_ros.evaluation.statistics import wilson_interval
 from slap_ros.language.budget import BudgetLimits
-from slap_ros.studies.comparison import StudyProgress
 from slap_ros.studies.figures import LINES
+from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.model_attempts import Attempt, LanguageModel, attempt_operators, attempt_plan
+from slap_ros.studies.reproducing import PLANS
 from slap_ros.studies.results import MarkdownTable, StudyReport
 
 if TYPE_CHECKING:
@@ -33,15 +35,23 @@ PAPER = {
     ALONE: (0.593, 0.781, 1.00, 2.16),
     ONE_SHOT: (0.520, 0.692, 0.36, None),
 }
+COSTS = ("tokens", "seconds", "processor_seconds")  # of an attempt
 MEASURED = """\
 Each plan is a task of its own. An attempt asks the model once for the actions of the task and once
-for the operator of each; *operators* is the share of attempts in which all pass their checks and
-A* finds a plan with them. *Planning* is the share of plans that reach the goal, of those attempted
-with such operators: A* by construction, or the model asked once. *Overall* is the share of tasks
-with a plan within {attempts} attempts, or in the only attempt of one_shot. *Attempts* is their mean
-number for each plan that was found. No answer is asked for again with what was wrong with it, so
-that attempts are alike. The attempt's number is the seed of the model's sampling. Shares have
-Wilson's 95 % interval. In brackets: the paper's, of its own model and tasks."""
+for the operator of each, and ends with the first answer that does not pass its checks; *operators*
+is the share of attempts in which all pass and A* finds a plan with them. *Planning* is the share of
+plans that reach the goal, of those attempted with such operators: A* by construction, or the model
+asked once. *Overall* is the share of tasks with a plan within {attempts} attempts, or in the only
+attempt of one_shot. *Attempts* is their mean number for each plan that was found. No answer is
+asked for again with what was wrong with it, so that attempts are alike. The attempt's number is the
+seed of the model's sampling. *Seconds* are those that an attempt waited for answers, however busy
+the machine, and those that the processor worked for it in this process: next to none where a server
+answers. Shares have Wilson's 95 % interval. In brackets, and as lines in the picture: the paper's,
+of its own model and tasks."""
+FEW = """
+
+**Plans: {plans}; wanted: {wanted}.** The interval of *overall* says how little so few
+tell. The same command with `--plans {wanted}` makes all of them."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +64,7 @@ class PlanTrial:
         attempts: At operators, in order.
         plans: At plans with those that passed; none of A*'s.
         found: Whether there is a plan in the end.
+        cpu_seconds: That this process worked for it, a model in it included.
     """
 
     model: str
@@ -61,10 +72,35 @@ class PlanTrial:
     attempts: tuple[Attempt, ...]
     plans: tuple[Attempt, ...]
     found: bool
+    cpu_seconds: float
+
+    @property
+    def every(self) -> tuple[Attempt, ...]:
+        """Attempts at operators and at plans."""
+        return self.attempts + self.plans
+
+    def as_json(self) -> dict[str, Any]:
+        """As the report has it: how each attempt ended, and what all of them cost."""
+        return {
+            "found": self.found,
+            "attempts": [attempt.verdict for attempt in self.attempts],
+            "plans": [plan.verdict for plan in self.plans],
+            "tokens": sum(one.tokens for one in self.every),
+            "seconds": round(sum(one.seconds for one in self.every), 1),
+            "cpu_seconds": self.cpu_seconds,
+        }
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> PlanTrial:
+        """The trial that :func:`dataclasses.asdict` made such data of."""
+        attempts, plans = (
+            tuple(map(Attempt.from_json, data[name])) for name in ("attempts", "plans")
+        )
+        return cls(**{**data, "attempts": attempts, "plans": plans})
 
 
 @dataclass(frozen=True)
-class Tally:
+class PlanTrials:
     """What trials of a model and variant come to."""
 
     trials: tuple[PlanTrial, ...]
@@ -98,8 +134,32 @@ class Tally:
     @property
     def errors(self) -> Counter[str]:
         """How often each class of error occurred."""
-        every = [a for t in self.trials for a in (*t.attempts, *t.plans)]
-        return Counter(kind for one in every for kinds in one.errors.values() for kind in kinds)
+        errors = [one.errors for trial in self.trials for one in trial.every]
+        return Counter(kind for one in errors for kinds in one.values() for kind in kinds)
+
+    @property
+    def cost(self) -> tuple[float, float, float]:
+        """Of an attempt, in the mean: tokens, seconds of waiting, seconds of the processor."""
+        every = [one for trial in self.trials for one in trial.every]
+        sums = (
+            sum(one.tokens for one in every),
+            sum(one.seconds for one in every),
+            sum(trial.cpu_seconds for trial in self.trials),
+        )
+        tokens, waited, worked = (total / self.operators[1] for total in sums)
+        return tokens, waited, worked
+
+    def as_json(self) -> dict[str, Any]:
+        """The figures, and every trial."""
+        return {
+            "operators": self.operators,
+            "planning": self.planning,
+            "overall": self.overall,
+            "attempts": self.attempts,
+            "errors": dict(sorted(self.errors.items())),
+            "cost": dict(zip(COSTS, self.cost, strict=True)),
+            "trials": [trial.as_json() for trial in self.trials],
+        }
 
 
 def expected_attempts(operators: float, planning: float) -> float:
@@ -117,7 +177,7 @@ def study(
     problems: Sequence[AcquisitionProblem],
     variants: Sequence[str],
     most_attempts: int,
-    progress: StudyProgress,
+    runner: JobRunner,
 ) -> StudyReport:
     """Ask each model for a plan of each task, in each variant.
 
@@ -126,7 +186,7 @@ def study(
         problems: A task per plan.
         variants: Of :data:`VARIANTS`.
         most_attempts: For one plan.
-        progress: Is called as tasks end.
+        runner: Keeps what was asked already, and is in this process: models cannot be sent.
 
     Returns:
         The report.
@@ -135,17 +195,17 @@ def study(
         InvalidCassetteError: A script answers, and no model.
         SlapError: No model can be asked.
     """
-    progress.begin("plans", len(models) * len(variants) * len(problems))
-    trials: list[PlanTrial] = []
+    jobs = {}
     for asked, model in models.items():
         for variant in variants:
             for number, problem in enumerate(problems):
                 attempts = 1 if variant == ONE_SHOT else most_attempts
                 seeds = range(number * most_attempts, number * most_attempts + attempts)
-                trials.append(_try(asked, model, variant, problem, seeds))
-                progress.advance()
+                name = f"{asked}, {variant}: plan {number}"
+                jobs[name] = (asked, model, variant, problem, seeds)
+    trials = runner.run("plans", _try, PlanTrial.from_json, jobs).values()
     tallies = {
-        (asked, variant): Tally(
+        (asked, variant): PlanTrials(
             tuple(t for t in trials if (t.model, t.variant) == (asked, variant))
         )
         for asked in models
@@ -155,20 +215,11 @@ def study(
         study="planning_ablation",
         source="LG-SAIL Tables 2, 5 and 6",
         title=f"Operators and plans of language models: {problems[0].name}",
-        measured=MEASURED.format(attempts=most_attempts),
+        measured=MEASURED.format(attempts=most_attempts) + _few(len(problems)),
         table=_table(tallies),
         found={
             "tallies": [
-                {
-                    "model": asked,
-                    "variant": variant,
-                    "operators": tally.operators,
-                    "planning": tally.planning,
-                    "overall": tally.overall,
-                    "attempts": tally.attempts,
-                    "errors": dict(sorted(tally.errors.items())),
-                    "trials": [asdict(trial) for trial in tally.trials],
-                }
+                {"model": asked, "variant": variant} | tally.as_json()
                 for (asked, variant), tally in tallies.items()
             ]
         },
@@ -180,8 +231,10 @@ def study(
 def _try(
     name: str, model: LanguageModel, variant: str, problem: AcquisitionProblem, seeds: range
 ) -> PlanTrial:
+    began = process_time()
     attempts: list[Attempt] = []
     plans: list[Attempt] = []
+    found = False
     for seed in seeds:
         attempt, operators = attempt_operators(model.inquiry(seed, BudgetLimits()), problem)
         attempts.append(attempt)
@@ -190,20 +243,37 @@ def _try(
             plans.append(attempt_plan(model.inquiry(seed, BudgetLimits()), operators, problem))
             found = plans[-1].passed
         if found:
-            return PlanTrial(name, variant, tuple(attempts), tuple(plans), True)
-    return PlanTrial(name, variant, tuple(attempts), tuple(plans), False)
+            break
+    worked = round(process_time() - began, 2)
+    return PlanTrial(name, variant, tuple(attempts), tuple(plans), found, worked)
 
 
-def _table(tallies: Mapping[tuple[str, str], Tally]) -> MarkdownTable:
+def _few(plans: int) -> str:
+    """What the page has to say of the number of plans."""
+    return FEW.format(plans=plans, wanted=PLANS) if plans < PLANS else ""
+
+
+def _table(tallies: Mapping[tuple[str, str], PlanTrials]) -> MarkdownTable:
     return MarkdownTable(
-        ("model", "variant", "operators", "planning", "overall", "attempts", "most frequent error"),
+        (
+            "model",
+            "variant",
+            "operators",
+            "planning",
+            "overall",
+            "attempts",
+            "tokens of an attempt",
+            "seconds of an attempt",
+            "most frequent errors",
+        ),
         [_row(name, variant, tally) for (name, variant), tally in tallies.items()],
     )
 
 
-def _row(name: str, variant: str, tally: Tally) -> list[str]:
+def _row(name: str, variant: str, tally: PlanTrials) -> list[str]:
     operators, planning, overall, attempts = PAPER[variant]
     own = "-" if tally.attempts is None else f"{tally.attempts:.2f}"
+    tokens, waited, worked = tally.cost
     return [
         name,
         variant,
@@ -211,7 +281,9 @@ def _row(name: str, variant: str, tally: Tally) -> list[str]:
         _share(tally.planning, planning),
         _share(tally.overall, overall),
         own if attempts is None else f"{own} ({attempts:.2f})",
-        ", ".join(f"{kind} {count}" for kind, count in tally.errors.most_common(2)) or "-",
+        f"{tokens:.0f}",
+        f"{waited:.1f} waited, {worked:.1f} of the processor",
+        ", ".join(f"{kind} {count}" for kind, count in tally.errors.most_common(3)) or "-",
     ]
 
 
@@ -223,19 +295,26 @@ def _share(counts: tuple[int, int], paper: float) -> str:
     return f"{good / every:.0%} [{within.low:.0%}, {within.high:.0%}] ({paper:.0%})"
 
 
-def draw(figure: Figure, tallies: Mapping[tuple[str, str], Tally]) -> None:
-    """Bars of the three shares, for each model and variant."""
+def draw(figure: Figure, tallies: Mapping[tuple[str, str], PlanTrials]) -> None:
+    """Bars of the three shares with their intervals, and the paper's as lines."""
     axes = figure.subplots()
-    shares = ("operators", "planning", "overall")
-    for number, name in enumerate(shares):
-        counts = [getattr(tally, name) for tally in tallies.values()]
-        places = [place + (number - 1) * 0.25 for place in range(len(counts))]
-        heights = [good / every if every else 0.0 for good, every in counts]
-        axes.bar(places, heights, width=0.23, color=LINES[number], label=name)
+    for number, name in enumerate(("operators", "planning", "overall")):
+        for group, ((_, variant), tally) in enumerate(tallies.items()):
+            place = group + (number - 1) * 0.25
+            paper = PAPER[variant][:3][number]
+            axes.hlines(paper, place - 0.11, place + 0.11, color="0.3")
+            good, every = getattr(tally, name)
+            if every:
+                share, within = good / every, wilson_interval(good, every)
+                apart = [[max(share - within.low, 0.0)], [max(within.high - share, 0.0)]]
+                axes.bar(place, share, 0.23, color=LINES[number], yerr=apart, capsize=3)
+        axes.bar(0, 0, color=LINES[number], label=name)
     axes.set_xticks(
         range(len(tallies)), [f"{variant}\n{name}" for name, variant in tallies], fontsize=8
     )
-    axes.set_ylim(0.0, 1.05)
+    axes.set_ylim(0.0, 1.25)  # the legend is above the bars
+    axes.set_yticks([0.0, 0.25, 0.5, 0.75, 1.0])
     axes.set_ylabel("share")
-    axes.legend(ncols=3, loc="lower right")
+    axes.plot([], color="0.3", label="the paper's")
+    axes.legend(ncols=4, loc="upper center")
     axes.grid(visible=False, axis="x")

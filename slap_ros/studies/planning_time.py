@@ -18,9 +18,8 @@ from slap_ros.evaluation.summary import Spread
 from slap_ros.studies.comparison import (
     Comparison,
     PlanningSetup,
-    StudyProgress,
-    complaint,
     format_spread,
+    named_tasks,
     spread_of,
 )
 from slap_ros.studies.figures import dodged, label, legend_above, plot_spreads
@@ -96,13 +95,12 @@ class PlanningCost:
 QUANTITIES = ("edges_rolled_out", "graph_nodes", "graph_edges", "predicted_steps")
 
 
-def study(comparison: Comparison, variation: Variation, progress: StudyProgress) -> StudyReport:
+def study(comparison: Comparison, variation: Variation) -> StudyReport:
     """Plan under every value of a setting.
 
     Args:
         comparison: Approaches, and the tasks that they plan for.
         variation: The setting and its values.
-        progress: Is called as tasks end.
 
     Returns:
         The report.
@@ -114,7 +112,7 @@ def study(comparison: Comparison, variation: Variation, progress: StudyProgress)
     planned = [
         (value, comparison.under(variation.preset(base, value))) for value in variation.values
     ]
-    costs = [cost for value, under in planned for cost in _measure(value, under, progress)]
+    costs = [cost for value, under in planned for cost in _measure(value, under)]
     return StudyReport(
         study="planning_time",
         source="SLAP Table 4",
@@ -127,19 +125,14 @@ def study(comparison: Comparison, variation: Variation, progress: StudyProgress)
     )
 
 
-def _measure(value: str, comparison: Comparison, progress: StudyProgress) -> Iterator[PlanningCost]:
-    """One approach after the other."""
-    tasks = list(comparison.experiment)
-    progress.begin(comparison.domain.preset, len(tasks) * len(comparison.approaches))
-    for approach in comparison.approaches:
-        planned = []
-        for _, one in comparison.map_jobs(plan_once, approach, tasks):
-            planned.append(one)
-            progress.advance()
-            if not one.success:
-                progress.report_failure(complaint(approach, one.seed, one.index, one.reason))
-        planned.sort(key=lambda one: (one.seed, one.index))
-        yield PlanningCost(value, approach.name, tuple(planned))
+def _measure(value: str, comparison: Comparison) -> Iterator[PlanningCost]:
+    """What planning takes under a value, an approach each."""
+    jobs = named_tasks(comparison.experiment)
+    found = comparison.attempt(
+        comparison.domain.preset, plan_once, lambda data: PlanningTrial(**data), jobs
+    )
+    for approach, planned in found.items():
+        yield PlanningCost(value, approach, planned)
 
 
 def plan_once(setup: PlanningSetup, seed: int, index: int) -> PlanningTrial:

@@ -4,24 +4,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from slap_ros.drawing.palette import MUTED, PLAN
-from slap_ros.errors import InvalidParameterError, PlanningLimitError, UnsolvableError
+from slap_ros.errors import InvalidParameterError, UnsolvableError
+from slap_ros.evaluation.experiment import Trial
 from slap_ros.evaluation.summary import Spread
 from slap_ros.learning.task_distribution import TaskDistribution
-from slap_ros.learning.workers import in_order, local_workers
 from slap_ros.shortcuts import jobs as training_jobs
 from slap_ros.shortcuts.explore import ExplorationResult
 from slap_ros.shortcuts.settings import ExplorationSettings
-from slap_ros.studies.comparison import StudyProgress, format_spread
+from slap_ros.shortcuts.shortcut import Shortcut
+from slap_ros.shortcuts.training import problem_key
+from slap_ros.studies.comparison import Comparison, format_spread
 from slap_ros.studies.figures import legend_above
+from slap_ros.studies.job_runner import JobRunner
+from slap_ros.studies.library_plans import LibraryPlans, plan_with
 from slap_ros.studies.results import MarkdownTable, StudyReport
 from slap_ros.studies.trainings import TrainingFolder
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 MEASURED = """\
@@ -35,8 +40,13 @@ learn. Tasks are those of training. Spread is the sample standard deviation over
 {settings} {overall}
 
 In the paper, K/N of 5 to 25 % gives plans of 167 to 202 steps, 30 % and more 333 to 349: whatever
-is pruned too eagerly is missing from the plans. Those are the paper's figures for plan length;
-here pairs are counted."""
+is pruned too eagerly is missing from the plans."""
+PLANNED = """
+
+Plan length is that of plans that are executed, with the library that is named below but without
+its shortcuts all of whose candidates have fewer than K hits, on the same {tasks} tasks of
+evaluation; mean ± sample standard deviation, and relative to pure planning. Nothing is trained
+again, so what a training would have learned instead of a pruned shortcut is not in it."""
 
 
 @dataclass(frozen=True)
@@ -78,8 +88,7 @@ def explore(
     trainings: Sequence[TaskDistribution],
     tasks: int,
     settings: ExplorationSettings,
-    jobs: int,
-    progress: StudyProgress,
+    runner: JobRunner,
 ) -> tuple[PrunedCandidates, ...]:
     """Explore the first tasks of trainings, as these do.
 
@@ -87,8 +96,7 @@ def explore(
         trainings: The tasks that each draws; all of one domain.
         tasks: Number of tasks per training.
         settings: How to explore.
-        jobs: Number of processes.
-        progress: Is called as tasks end.
+        runner: Explores.
 
     Returns:
         What is left of each task's candidates; tasks that could not be explored are left out.
@@ -96,32 +104,31 @@ def explore(
     Raises:
         UnsolvableError: No task can be planned for, so none can be explored.
     """
-    work = [(training, index, settings) for training in trainings for index in range(tasks)]
-    ended = []
-    progress.begin(f"exploring {trainings[0].domain}", len(work))
-    with local_workers(jobs) as workers:
-        for number, outcome in workers.run(_explore, work):
-            ended.append((number, outcome))
-            progress.advance()
-            if isinstance(outcome, str):
-                training, index, _ = work[number]
-                where = f"seed {training.seed}, task {index}"
-                progress.report_failure(f"{where} not explored: {outcome}")
-    explored = [outcome for outcome in in_order(ended) if isinstance(outcome, PrunedCandidates)]
-    if not explored:
-        raise UnsolvableError(f"none of the {len(work)} tasks could be explored")
-    return tuple(explored)
+    jobs = {
+        f"seed {training.seed}, task {index}": (training, index, settings)
+        for training in trainings
+        for index in range(tasks)
+    }
+    found = runner.run(
+        f"exploring {trainings[0].domain.name}",
+        training_jobs.try_to_explore,
+        _decode,
+        jobs,
+        failure=lambda one: f"not explored: {one}" if isinstance(one, str) else None,
+    )
+    pruned = [
+        PrunedCandidates(jobs[name][0].seed, jobs[name][1], explored)
+        for name, explored in found.items()
+        if not isinstance(explored, str)
+    ]
+    if not pruned:
+        raise UnsolvableError(f"none of the {len(jobs)} tasks could be explored")
+    return tuple(pruned)
 
 
-def _explore(
-    distribution: TaskDistribution, index: int, settings: ExplorationSettings
-) -> PrunedCandidates | str:
-    """Explore one task, or say why it cannot be."""
-    try:
-        data = training_jobs.explore(distribution, index, settings)
-    except (UnsolvableError, PlanningLimitError) as error:
-        return str(error)
-    return PrunedCandidates(distribution.seed, index, ExplorationResult.from_json(data))
+def _decode(data: Any) -> ExplorationResult | str:
+    """What exploring came to, or why it could not be done."""
+    return data if isinstance(data, str) else ExplorationResult.from_json(data)
 
 
 def explored_in(
@@ -150,16 +157,26 @@ def explored_in(
 
 
 def study(
-    domain: str, pruned: Sequence[PrunedCandidates], settings: ExplorationSettings
+    pruned: Sequence[PrunedCandidates], settings: ExplorationSettings, comparison: Comparison
 ) -> StudyReport:
     """The report on what is left, by the number of rollouts that must succeed.
 
     Args:
-        domain: Name of the domain.
         pruned: One per task.
         settings: How all of them were explored.
+        comparison: Pure planning, and for plan length SLAP with a library.
+
+    Returns:
+        The report.
     """
     thresholds = _thresholds(settings)
+    explored = [one.explored for one in pruned]
+    several = len(comparison.approaches) > 1
+    plans = plan_without_pruned(comparison, explored, thresholds) if several else {}
+    measured = MEASURED.format(settings=_said(settings), overall=_overall(pruned, settings))
+    if plans:
+        measured += PLANNED.format(tasks=len(comparison.experiment))
+        measured += f"\n\n{_by_threshold(pruned, settings, plans).as_markdown()}"
     signatures = {
         (candidate.signature.patterns, candidate.signature.context)
         for one in pruned
@@ -168,17 +185,18 @@ def study(
     return StudyReport(
         study="pruning",
         source="SLAP §4.2 and Table 2",
-        title=f"Pruning: {domain}",
-        measured=MEASURED.format(settings=_said(settings), overall=_overall(pruned, settings)),
+        title=f"Pruning: {comparison.domain.name}",
+        measured=measured,
         table=_table(pruned, settings, len(signatures)),
         found={
             "exploration": settings.as_json(),
-            "thresholds": [_at(hits, pruned, settings) for hits in thresholds],
+            "thresholds": [_at(hits, pruned, settings, plans.get(hits)) for hits in thresholds],
             "different_up_to_objects": len(signatures),
+            **({"plans": _different(plans.values())} if plans else {}),
             "tasks": [one.as_json() for one in pruned],
         },
-        draw=lambda figure: draw(figure, pruned, settings),
-        size=(5.6, 3.4),
+        draw=lambda figure: draw(figure, pruned, settings, plans),
+        size=(5.6, 5.4 if plans else 3.4),
     )
 
 
@@ -207,16 +225,92 @@ def _thresholds(settings: ExplorationSettings) -> list[int]:
     return thresholds
 
 
+def most_hits(shortcut: Shortcut, explored: Sequence[ExplorationResult]) -> int:
+    """Rollouts that reached a candidate which the shortcut was, or could be, learned for.
+
+    Args:
+        shortcut: Of a library.
+        explored: The tasks in which candidates were looked for.
+
+    Returns:
+        The most in any task; 0 where there was no such candidate.
+    """
+    key = problem_key(shortcut.signature)
+    candidates = (candidate for one in explored for candidate in one.candidates)
+    same = (one.hits for one in candidates if problem_key(one.signature) == key)
+    return max(same, default=0)
+
+
+def plan_without_pruned(
+    comparison: Comparison, explored: Sequence[ExplorationResult], thresholds: Sequence[int]
+) -> Mapping[int, LibraryPlans]:
+    """Plan with the shortcuts that each threshold leaves over, as if there never were others.
+
+    Args:
+        comparison: Pure planning, and SLAP with the whole library; the tasks.
+        explored: The tasks in which candidates were looked for.
+        thresholds: Hits that a candidate must have.
+
+    Returns:
+        The plans by threshold.
+    """
+    library = comparison.approaches[-1].shortcuts
+    hits = {shortcut.name: most_hits(shortcut, explored) for shortcut in library}
+    solved: dict[tuple[str, ...], tuple[Trial, ...]] = {}
+
+    def plans_with(threshold: int) -> LibraryPlans:
+        kept = tuple(one for one in library if hits[one.name] >= threshold)
+        names = tuple(one.name for one in kept)
+        if names not in solved:
+            solved[names] = plan_with(comparison, kept, f"{len(names)} shortcuts")
+        return LibraryPlans(names, solved[names], solved[()])
+
+    solved[()] = plan_with(comparison, (), "0 shortcuts")
+    return {threshold: plans_with(threshold) for threshold in thresholds}
+
+
 def _at(
-    hits: int, pruned: Sequence[PrunedCandidates], settings: ExplorationSettings
+    hits: int,
+    pruned: Sequence[PrunedCandidates],
+    settings: ExplorationSettings,
+    plans: LibraryPlans | None,
 ) -> dict[str, Any]:
-    """What is left at one threshold."""
+    """What is left at one threshold.
+
+    Args:
+        hits: The threshold.
+        pruned: One per task.
+        settings: How all of them were explored.
+        plans: With the shortcuts that are left, if any were made.
+    """
     return {
         "k": hits,
         "k_over_n": hits / settings.rollouts,
         "remaining": sum(one.remaining(hits) for one in pruned),
         "remaining_percent": asdict(Spread.of([one.percent(hits) for one in pruned])),
+        **(plans.summary() if plans else {}),
     }
+
+
+def _different(plans: Iterable[LibraryPlans]) -> list[dict[str, Any]]:
+    """Those with different shortcuts, for the report's JSON."""
+    by_shortcuts = {one.shortcuts: one.as_json() for one in plans}
+    return list(by_shortcuts.values())
+
+
+def _by_threshold(
+    pruned: Sequence[PrunedCandidates],
+    settings: ExplorationSettings,
+    plans: Mapping[int, LibraryPlans],
+) -> MarkdownTable:
+    """A row per threshold."""
+    rows = []
+    for hits, own in plans.items():
+        percent = format_spread(Spread.of([one.percent(hits) for one in pruned]), 1)
+        rows.append([str(hits), f"{100 * hits / settings.rollouts:.3g}", percent, *own.as_cells()])
+    return MarkdownTable(
+        ["K", "K/N [%]", "remaining [%]", "shortcuts", "plan length [steps]", "relative"], rows
+    )
 
 
 def _table(
@@ -245,19 +339,25 @@ def _table(
     )
 
 
-def draw(figure: Figure, pruned: Sequence[PrunedCandidates], settings: ExplorationSettings) -> None:
-    """Draw what remains against K/N: one thin line per task, the mean with its spread.
+def draw(
+    figure: Figure,
+    pruned: Sequence[PrunedCandidates],
+    settings: ExplorationSettings,
+    plans: Mapping[int, LibraryPlans],
+) -> None:
+    """Draw what remains against K/N, a thin line per task and the mean; below it plan length.
 
     Args:
         figure: To draw into.
         pruned: One per task.
         settings: How all of them were explored.
+        plans: By threshold; may be none.
     """
-    axes = figure.subplots()
+    above, *below = figure.subplots(2 if plans else 1, 1, squeeze=False, sharex=True)[:, 0]
     thresholds = _thresholds(settings)
     places = [100.0 * hits / settings.rollouts for hits in thresholds]
     for number, one in enumerate(pruned):
-        axes.plot(
+        above.plot(
             places,
             [one.percent(hits) for hits in thresholds],
             color=MUTED,
@@ -266,20 +366,32 @@ def draw(figure: Figure, pruned: Sequence[PrunedCandidates], settings: Explorati
             label="a task" if number == 0 else None,
         )
     spreads = [Spread.of([one.percent(hits) for one in pruned]) for hits in thresholds]
+    _plot(above, places, spreads, "mean ± standard deviation")
+    above.set_ylabel("candidates that remain [%]")
+    for axes in below:
+        _plot(axes, places, [plans[hits].length for hits in thresholds], None)
+        axes.set_ylabel("plan length [steps]")
+    bottom = (above, *below)[-1]
+    bottom.set_xscale("log")
+    bottom.set_xticks(places, [f"{place:.2g}" for place in places])
+    bottom.minorticks_off()
+    bottom.set_xlabel("rollouts that must succeed, K/N [%]")
+    legend_above(figure, above)
+
+
+def _plot(
+    axes: Axes, places: Sequence[float], spreads: Sequence[Spread | None], name: str | None
+) -> None:
+    """Means with their deviations, joined by a line; from 0 on."""
+    known = [(place, one) for place, one in zip(places, spreads, strict=True) if one is not None]
     axes.errorbar(
-        places,
-        [spread.mean for spread in spreads],
-        [spread.sd for spread in spreads],
+        [place for place, _ in known],
+        [spread.mean for _, spread in known],
+        [spread.sd for _, spread in known],
         color=PLAN,
         marker="o",
         markersize=5,
         capsize=2.5,
-        label="mean ± standard deviation",
+        label=name,
     )
-    axes.set_xscale("log")
-    axes.set_xticks(places, [f"{place:.3g}" for place in places])
-    axes.minorticks_off()
     axes.set_ylim(bottom=0)
-    axes.set_xlabel("rollouts that must succeed, K/N [%]")
-    axes.set_ylabel("candidates that remain [%]")
-    legend_above(figure, axes)

@@ -15,9 +15,12 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from slap_ros.acquisition.skill_library import read_library_record
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, read_text
+from slap_ros.learning.shipped_models import shipped_with_siblings
 from slap_ros.studies.figures import label
+from slap_ros.studies.reproducing import NOT_MEASURED, other_table, paper_table
 from slap_ros.studies.results import MarkdownTable
 
 PLACE = re.compile(r"(<!-- (\w+): slap study readme -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -26,6 +29,13 @@ DOMAINS = {
     "obstacle_tower": "Obstacle Tower",
     "cluttered_drawer": "Cluttered Drawer",
     "cleanup_table": "Cleanup Table",
+}
+# SLAP Table 1, steps. There, a shortcut is rolled out once.
+THE_PAPERS = {
+    "obstacle2d": {"pure_planning": "25.9 ± 1.7", "slap_1_sample": "17.6 ± 1.5"},
+    "obstacle_tower": {"pure_planning": "245.8 ± 10.4", "slap_1_sample": "79.2 ± 3.2"},
+    "cluttered_drawer": {"pure_planning": "352.1 ± 49.5", "slap_1_sample": "165.8 ± 43.6"},
+    "cleanup_table": {"pure_planning": "431.8 ± 33.1", "slap_1_sample": "115.2 ± 12.3"},
 }
 
 
@@ -53,6 +63,8 @@ def with_tables(text: str, results: Path) -> str:
 def main_table(results: Path) -> MarkdownTable:
     """Every row of ``slap study table1``, of all domains for which there is one.
 
+    Seconds of planning are left to the studies' own pages: they depend on what else a machine did.
+
     Raises:
         InvalidParameterError: There is none at all.
     """
@@ -72,10 +84,115 @@ def main_table(results: Path) -> MarkdownTable:
             "plan length [steps]",
             "± over libraries",
             "relative",
-            "planning [s]",
+            "the paper's [steps]",
         ),
         rows,
     )
+
+
+def preset_table(results: Path) -> MarkdownTable:
+    """How plans with all samples compare with pure planning under the preset ``paper``."""
+    return MarkdownTable(
+        ("", "relative length, all samples", "libraries", "tasks"),
+        [[name, *_under_paper(results / f"table1_{key}.json")] for key, name in DOMAINS.items()],
+    )
+
+
+def _under_paper(path: Path) -> list[str]:
+    rows = parse_json(read_text(path))["found"]["rows"] if path.exists() else []
+    for row in rows:
+        if (row["preset"], row["approach"]) == ("paper", "slap"):
+            length = _with_interval(row["relative_length"], None)
+            return [length, f"{len(row['libraries'])}", f"{row['tasks']}"]
+    return [NOT_MEASURED, "", ""]
+
+
+def skill_table(results: Path) -> MarkdownTable:
+    """Task progress of ``slap study acquisition``, with hand-written operators and rewards.
+
+    Raises:
+        InvalidLibraryError: A library that ships cannot be read.
+    """
+    columns = (
+        "skills of",
+        "libraries",
+        "task progress, by goal",
+        "LG-SAIL's",
+        "environment steps of a training",
+    )
+    data = [parse_json(read_text(path)) for path in sorted(results.glob("acquisition_*.json"))]
+    return MarkdownTable(columns, [_of_skills(one) for one in data])
+
+
+def _of_skills(data: Mapping[str, Any]) -> list[str]:
+    goals = [one for one in data["found"]["goals"] if one.get("rewarder", "manual") == "manual"]
+    libraries = {one["library"] for goal in goals for one in goal["libraries"]}
+    preset = "" if data["preset"] == "fair" else f" --preset {data['preset']}"
+    trainings = _trainings(data["domain"])
+    steps = sorted(one["steps"] for one in trainings)
+    return [
+        f"`slap acquire {data['domain']}{preset}{_changes(trainings[0])}`",
+        f"{len(libraries)}",
+        _by_goal({one["goal"]: one["progress"]["mean"] for one in goals}),
+        _by_goal({one["goal"]: one["paper"] for one in goals if one["paper"] is not None}),
+        " to ".join(f"{each:,}" for each in dict.fromkeys((steps[0], steps[-1]))),
+    ]
+
+
+def replanning_table(results: Path) -> MarkdownTable:
+    """Every row of ``slap study replanning``, of all domains for which there is one."""
+    data = [parse_json(read_text(path)) for path in sorted(results.glob("replanning_*.json"))]
+    return MarkdownTable(
+        (
+            "domain",
+            "goal",
+            "trained with",
+            "tasks",
+            "success",
+            "planned again",
+            "replans per task",
+            "failures",
+        ),
+        [[_page_of(one), *cells] for one in data for cells in map(_of_replanning, _goals(one))],
+    )
+
+
+def _goals(data: Mapping[str, Any]) -> list[dict[str, Any]]:
+    return list(data["found"]["goals"])
+
+
+def _page_of(data: Mapping[str, Any]) -> str:
+    return f"[{data['domain']}](results/{data['study']}_{data['domain']}.md)"
+
+
+def _of_replanning(row: Mapping[str, Any]) -> list[str]:
+    within = row["success_interval"]
+    seeds = ", ".join(f"{library['seed']}" for library in row["libraries"])
+    return [
+        f"`{row['goal']}`" if row["goal"] else "the task's own",
+        f"seed{'s' if len(row['libraries']) > 1 else ''} {seeds}",
+        f"{row['tasks']}",
+        f"{row['success_rate']:.0%} [{within['low']:.0%}, {within['high']:.0%}]",
+        f"{row['replanned']}",
+        f"{row['replans']['mean']:.2f}",
+        ", ".join(f"`{name}` {count}" for name, count in row["failures"].items()) or "none",
+    ]
+
+
+def _by_goal(progress: Mapping[str, float]) -> str:
+    return ", ".join(f"`{goal}` {share:.2f}" for goal, share in progress.items())
+
+
+def _changes(training: Mapping[str, Any]) -> str:
+    """Settings that a training's command changes, as its last options."""
+    _, option, changes = str(training["command"]).partition(" --set ")
+    return option + changes
+
+
+def _trainings(domain: str) -> list[dict[str, Any]]:
+    """Records of the libraries of skills that ship, with hand-written rewards."""
+    records = map(read_library_record, shipped_with_siblings("skills", domain))
+    return [one for one in records if one["rewarder"] == "manual"]
 
 
 def _rows(domain: str, results: Path) -> Iterator[list[str]]:
@@ -90,6 +207,7 @@ def _rows(domain: str, results: Path) -> Iterator[list[str]]:
             name if name != shown_domain else "",
             preset if preset != shown_preset else "",
             *_figures(row),
+            THE_PAPERS[domain].get(row["approach"], "") if row["preset"] == "paper" else "",
         ]
         shown_domain, shown_preset = name, preset
 
@@ -101,15 +219,11 @@ def _figures(row: Mapping[str, Any]) -> Iterator[str]:
     within = row["success_interval"]
     yield f"{row['success_rate']:.0%} [{within['low']:.0%}, {within['high']:.0%}]"
     yield f"{row['at_step_limit']}"
-    yield _spread(row["plan_length"], 1)
+    length = row["plan_length"]
+    yield "-" if length is None else f"{length['mean']:.1f} ± {length['sd']:.1f}"
     over = row["plan_length_over_libraries"]
     yield "" if over is None else f"{over['sd']:.1f}"
     yield "1" if pure else _with_interval(row["relative_length"], row["relative_interval"])
-    yield _spread(row["planning_seconds"], 2)
-
-
-def _spread(spread: Mapping[str, float] | None, digits: int) -> str:
-    return "-" if spread is None else f"{spread['mean']:.{digits}f} ± {spread['sd']:.{digits}f}"
 
 
 def _with_interval(value: float | None, interval: Mapping[str, float] | None) -> str:
@@ -119,4 +233,11 @@ def _with_interval(value: float | None, interval: Mapping[str, float] | None) ->
     return f"{value:.2f}{within}"
 
 
-TABLES: Mapping[str, Callable[[Path], MarkdownTable]] = {"table1": main_table}
+TABLES: Mapping[str, Callable[[Path], MarkdownTable]] = {
+    "table1": main_table,
+    "presets": preset_table,
+    "skills": skill_table,
+    "replanning": replanning_table,
+    "papers": paper_table,
+    "others": other_table,
+}

@@ -5,11 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from slap_ros.files import pretty_json, write_whole
+from slap_ros.acquisition.domain_choice import DIGEST_KEY, SKILLS_KEY
+from slap_ros.core import Domain
+from slap_ros.errors import InvalidParameterError
+from slap_ros.files import parse_json, pretty_json, read_text, write_whole
 from slap_ros.shortcuts.library import Library
 from slap_ros.studies.figures import Size, picture
 from slap_ros.versions import versions
@@ -46,6 +49,7 @@ class StudyReport:
         found: The numbers in full, as JSON has them.
         draw: Draws the picture.
         size: Of the picture.
+        circumstances: What no command decides, as the day on which a model answered; by name.
     """
 
     study: str
@@ -56,6 +60,7 @@ class StudyReport:
     found: Data
     draw: Callable[[Figure], None]
     size: Size
+    circumstances: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -82,6 +87,33 @@ class Provenance:
         }
 
 
+def require_replaceable(folder: Path, study: str, origin: Provenance) -> None:
+    """Check that a report may be written: there is none yet, or that of the same command.
+
+    Args:
+        folder: Where to.
+        study: As in ``slap study``.
+        origin: From what the report will be made.
+
+    Raises:
+        InvalidParameterError: There is data of another command, or something else.
+    """
+    path = folder / f"{study}_{origin.domain}.json"
+    if not path.exists():
+        return
+    try:
+        command = parse_json(read_text(path))["command"]
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        raise InvalidParameterError(
+            f"{path} exists and is no data of a study ({error!r}); give another --output, or "
+            "remove it"
+        ) from error
+    if command != origin.command:
+        raise InvalidParameterError(
+            f"{path} has the data of `{command}`; give another --output, or remove it"
+        )
+
+
 def write(folder: Path, report: StudyReport, origin: Provenance) -> list[Path]:
     """Write a report's files, in place of those of an earlier one.
 
@@ -98,6 +130,7 @@ def write(folder: Path, report: StudyReport, origin: Provenance) -> list[Path]:
         "study": report.study,
         "source": report.source,
         **origin.as_json(),
+        **report.circumstances,
         "found": report.found,
     }
     contents = {
@@ -122,9 +155,22 @@ def describe_library(name: str, library: Library) -> dict[str, Any]:
     }
 
 
+def describe_skills(domain: Domain) -> dict[str, Any]:
+    """Which library of acquired skills a domain has; empty where it has none.
+
+    It is told as libraries of shortcuts are, and never by the path of its folder.
+    """
+    digest = domain.configuration.get(DIGEST_KEY)
+    if digest is None:
+        return {}
+    name, skills = domain.configuration[SKILLS_KEY], list(domain.skills)
+    return {"name": name, "digest": digest, "skills": skills}
+
+
 def _page(name: str, report: StudyReport, origin: Provenance) -> str:
     data = f"[{name}.json]({name}.json)"
-    settings = [f"- {key}: {_said(value)}" for key, value in origin.settings.items()]
+    named = {**origin.settings, **report.circumstances}
+    settings = [f"- {key}: {_said(value)}" for key, value in named.items()]
     listed = "\n".join([*settings, f"- versions and every number: {data}"])
     after = (
         f"After {report.source}. Numbers are this system's unless they are said to be the paper's."

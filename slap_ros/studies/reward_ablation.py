@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from slap_ros.acquisition.complaints import REWARD_ERROR_GROUPS, ComplaintClass
 from slap_ros.acquisition.problem import AcquisitionProblem
@@ -18,8 +18,8 @@ from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.statistics import wilson_interval
 from slap_ros.language.budget import BudgetLimits
 from slap_ros.relational import LiftedOperator
-from slap_ros.studies.comparison import StudyProgress
 from slap_ros.studies.figures import LINES
+from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.model_attempts import Attempt, LanguageModel, attempt_rewards
 from slap_ros.studies.results import MarkdownTable, StudyReport
 
@@ -66,6 +66,16 @@ class RewardTrials:
         """Trials with an error of each of the paper's classes."""
         return Counter(group for one in self.attempts for group in error_groups(one))
 
+    def as_json(self, operators: Sequence[str]) -> dict[str, Any]:
+        """The figures for these operators, and every attempt."""
+        return {
+            "metrics": self.metrics,
+            "all_right": self.all_right,
+            "right": {name: self.right(name) for name in operators},
+            "errors": dict(sorted(self.groups.items())),
+            "attempts": [asdict(attempt) for attempt in self.attempts],
+        }
+
 
 def error_groups(attempt: Attempt) -> set[str]:
     """The paper's classes of the errors of an attempt; what is in none goes under its own name."""
@@ -81,7 +91,7 @@ def study(
     operators: Sequence[LiftedOperator],
     shown: Sequence[str],
     trials: int,
-    progress: StudyProgress,
+    runner: JobRunner,
 ) -> StudyReport:
     """Ask for the rewards of all operators, again and again.
 
@@ -91,7 +101,7 @@ def study(
         operators: Whose rewards.
         shown: Of :data:`METRICS`.
         trials: Of each.
-        progress: Is called as trials end.
+        runner: Keeps what was asked already, and is in this process: models cannot be sent.
 
     Returns:
         The report.
@@ -105,15 +115,17 @@ def study(
         raise InvalidParameterError(
             f"domain {problem.name} has no metrics, or no operators written by hand, to ask about"
         )
-    progress.begin("rewards", trials * len(shown))
+    asked = {
+        metrics: {
+            f"{metrics}: trial {number}": (model, problem, operators, metrics, number)
+            for number in range(trials)
+        }
+        for metrics in shown
+    }
     measured = []
-    for metrics in shown:
-        attempts = []
-        for number in range(trials):
-            inquiry = model.inquiry(number, BudgetLimits())
-            attempts.append(attempt_rewards(inquiry, operators, problem, metrics == FULL))
-            progress.advance()
-        measured.append(RewardTrials(metrics, tuple(attempts)))
+    for metrics, jobs in asked.items():
+        attempts = runner.run(f"rewards, {metrics}", _try, Attempt.from_json, jobs)
+        measured.append(RewardTrials(metrics, tuple(attempts.values())))
     names = [operator.name for operator in operators]
     return StudyReport(
         study="reward_ablation",
@@ -121,21 +133,30 @@ def study(
         title=f"Rewards of a language model: {problem.name}",
         measured=MEASURED,
         table=_table(measured, names),
-        found={
-            "trials": [
-                {
-                    "metrics": one.metrics,
-                    "all_right": one.all_right,
-                    "right": {name: one.right(name) for name in names},
-                    "errors": dict(sorted(one.groups.items())),
-                    "attempts": [asdict(attempt) for attempt in one.attempts],
-                }
-                for one in measured
-            ]
-        },
+        found={"trials": [one.as_json(names) for one in measured]},
         draw=lambda figure: draw(figure, measured, names),
         size=(6.4, 3.0),
     )
+
+
+def _try(
+    model: LanguageModel,
+    problem: AcquisitionProblem,
+    operators: Sequence[LiftedOperator],
+    metrics: str,
+    number: int,
+) -> Attempt:
+    """A trial of its own.
+
+    Args:
+        model: Whom to ask.
+        problem: Whose metrics there are to choose among.
+        operators: Whose rewards.
+        metrics: What is shown of them.
+        number: Of the trial.
+    """
+    inquiry = model.inquiry(number, BudgetLimits())
+    return attempt_rewards(inquiry, operators, problem, metrics == FULL)
 
 
 def _table(measured: Sequence[RewardTrials], names: Sequence[str]) -> MarkdownTable:

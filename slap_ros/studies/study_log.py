@@ -5,120 +5,86 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, read_text
-from slap_ros.learning.workers import SequentialWorkers, Workers, local_workers
-from slap_ros.studies.comparison import StudyProgress
+from slap_ros.studies.results import Provenance
 
 
 class StudyLog:
-    """A file of JSON lines: what the study is, then an entry per result, as they come."""
+    """A file of JSON lines: which study it is, then the result of a job per line, as they end."""
 
-    def __init__(self, path: Path, command: str) -> None:
-        """Open the log of a study; the file begins with its first entry.
+    def __init__(self, path: Path, origin: Provenance) -> None:
+        """Open the log of a study; there is a file from the first result on.
 
         Args:
             path: Of the file.
-            command: What makes the study; a log of another one is refused.
+            origin: From what the study is made; a log of another one is refused.
 
         Raises:
             InvalidParameterError: It is the log of another study, or none.
             OSError: It cannot be read.
         """
-        self._path = path
-        self._command = command
-        self.found: list[Any] = []  # the entries that were there already
-        if path.exists():
-            self._read(command)
+        self.path = path
+        self.results: dict[str, Any] = {}  # by the job's name
+        self._header = {"command": origin.command, "settings": origin.settings}
+        self._begun = path.exists() and self._read()
 
-    def append(self, entry: Mapping[str, Any]) -> None:
-        """Write an entry.
+    def add(self, job: str, result: Any) -> None:
+        """Write what a job came to.
+
+        Args:
+            job: Its name.
+            result: What JSON can hold.
 
         Raises:
             OSError: It cannot be written.
         """
-        lines = [entry]
-        if not self._path.exists():
-            self._path.parent.mkdir(parents=True, exist_ok=True)
-            lines = [{"command": self._command}, entry]
-        with self._path.open("a", encoding="utf-8") as file:
-            file.write("".join(json.dumps(line) + "\n" for line in lines))
+        lines = [{"job": job, "result": result}]
+        if not self._begun:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            lines.insert(0, self._header)
+        with self.path.open("a" if self._begun else "w", encoding="utf-8") as file:
+            file.write("".join(map(_line, lines)))
+        self._begun = True
+        self.results[job] = result
 
     def remove(self) -> None:
         """Remove the file, once its study is written."""
-        self._path.unlink(missing_ok=True)
+        self.path.unlink(missing_ok=True)
 
-    def _read(self, command: str) -> None:
+    def _read(self) -> bool:
+        """Whether the file has more than the beginning of its first line."""
         try:
-            header, *self.found = self._lines()
-            known = header["command"]
-        except (ValueError, KeyError, TypeError) as error:
+            text = read_text(self.path)
+            whole = text[: text.rfind("\n") + 1]
+            if not whole and _line(self._header).startswith(text):
+                return False
+            header, *entries = map(parse_json, whole.splitlines())
+            self._require_same(header["command"], header.get("settings"))
+            self.results = {str(entry["job"]): entry["result"] for entry in entries}
+        except (ValueError, LookupError, TypeError, AttributeError) as error:
             raise InvalidParameterError(
-                f"{self._path} is no log of a study ({error}); remove it"
+                f"{self.path} is no log of a study ({error!r}); remove it"
             ) from error
-        if known != command:
+        if whole != text:  # killed as it wrote the last line
+            self.path.write_text(whole, encoding="utf-8")
+        return True
+
+    def _require_same(self, command: str, settings: Any) -> None:
+        if command != self._header["command"]:
             raise InvalidParameterError(
-                f"{self._path} is what `{known}` has done so far; go on with that command, or "
+                f"{self.path} is what `{command}` has done so far; go on with that command, or "
                 "remove the file"
             )
-
-    def _lines(self) -> Iterator[Any]:
-        """Every whole line; the last one is cut off where the study was killed as it wrote."""
-        text = read_text(self._path)
-        whole = text[: text.rfind("\n") + 1]
-        if whole != text:
-            self._path.write_text(whole, encoding="utf-8")
-        return map(parse_json, whole.splitlines())
+        if settings != parse_json(_line(self._header["settings"])):
+            raise InvalidParameterError(
+                f"{self.path} is what this command has done so far with another library or other "
+                "settings; remove the file to begin again"
+            )
 
 
-def _workers(processes: int) -> AbstractContextManager[Workers]:
-    return local_workers(processes) if processes > 1 else nullcontext(SequentialWorkers())
-
-
-Job = tuple[Any, ...]  # the arguments of a function
-
-
-class JobLog(StudyLog):
-    """Results of jobs, each a function of its arguments, by the job's name."""
-
-    def __init__(self, path: Path, command: str) -> None:
-        """Open the log of a study, or begin it; see :class:`StudyLog`."""
-        super().__init__(path, command)
-        self._results = {entry["job"]: entry["result"] for entry in self.found}
-
-    def run(
-        self,
-        what: str,
-        function: Callable[..., Any],
-        jobs: Mapping[str, Job],
-        processes: int,
-        progress: StudyProgress,
-    ) -> dict[str, Any]:
-        """Do the jobs that were not done before.
-
-        Args:
-            what: They are, for the progress bar.
-            function: Does a job and returns what JSON can hold; importable by its name.
-            jobs: Its arguments, by the job's name.
-            processes: How many run at a time.
-            progress: Is called as jobs end.
-
-        Returns:
-            The results, in the order of ``jobs``.
-        """
-        waiting = [name for name in jobs if name not in self._results]
-        progress.begin(what, len(jobs))
-        for _ in range(len(jobs) - len(waiting)):
-            progress.advance()
-        if waiting:
-            with _workers(processes) as workers:
-                for i, result in workers.run(function, [jobs[name] for name in waiting]):
-                    self._results[waiting[i]] = result
-                    self.append({"job": waiting[i], "result": result})
-                    progress.advance()
-        return {name: self._results[name] for name in jobs}
+def _line(data: Any) -> str:
+    return json.dumps(data) + "\n"

@@ -9,21 +9,29 @@ chosen by what it does here (SLAP Table 1).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
+from slap_ros.acquisition.domain_choice import DomainChoice
 from slap_ros.core import Domain
 from slap_ros.evaluation.approaches import PURE_PLANNING, Approach, approaches, shooting
-from slap_ros.evaluation.experiment import Experiment, Trial, run_all
+from slap_ros.evaluation.experiment import Experiment, Trial
 from slap_ros.evaluation.statistics import Interval, ratio_interval, wilson_interval
 from slap_ros.evaluation.summary import Spread, lengths_of_both
 from slap_ros.shortcuts.library import Library
 from slap_ros.shortcuts.shortcut import Sampling
-from slap_ros.studies.comparison import StudyProgress, complaint, format_spread, spread_of
+from slap_ros.studies.comparison import (
+    PlanningSetup,
+    format_spread,
+    named_tasks,
+    not_solved,
+    solve_task,
+    spread_of,
+)
 from slap_ros.studies.figures import APPROACH_STYLES, label
+from slap_ros.studies.job_runner import Job, JobRunner
 from slap_ros.studies.results import MarkdownTable, StudyReport
-from slap_ros.studies.trial_log import TrialLog
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,8 +44,9 @@ here. Success has Wilson's 95 % interval. Length is the mean over solved tasks, 
 standard deviation over tasks, and over the means of the libraries. Relative length is the sum of
 lengths over that of pure planning, on tasks that both solved, with the 95 % interval of a bootstrap
 over tasks. "Search without learning" makes as many rollouts of random actions, between the same
-pairs of abstract states, as SLAP makes of its policies. "At limit" counts tasks that were given up
-at the domain's step limit. Seconds of planning are per task, on whatever machine made this page."""
+pairs of abstract states, as SLAP makes of its policies; libraries with the same pairs share it.
+"At limit" counts tasks that were given up at the domain's step limit. Seconds of planning are per
+task, on whatever machine made this page, whatever else it did."""
 
 
 @dataclass(frozen=True)
@@ -165,9 +174,7 @@ def study(
     experiments: Sequence[Experiment],
     libraries: Sequence[TrainedLibrary],
     sampling: Sampling,
-    jobs: int,
-    log: TrialLog,
-    progress: StudyProgress,
+    runner: JobRunner,
 ) -> StudyReport:
     """Evaluate every library under every preset.
 
@@ -175,17 +182,14 @@ def study(
         experiments: The tasks of each preset.
         libraries: Each evaluated under every preset.
         sampling: How shortcuts are tried out.
-        jobs: Number of processes.
-        log: What is done already; gets what is done here.
-        progress: Is called as tasks end.
+        runner: Solves tasks.
 
     Returns:
         The report.
     """
     rows: list[Row] = []
     for experiment in experiments:
-        run = _Runner(experiment.without_repetitions(), jobs, log, progress)
-        rows += run.rows(libraries, sampling)
+        rows += _rows(experiment.without_repetitions(), libraries, sampling, runner)
     domain = experiments[0].domain
     return StudyReport(
         study="table1",
@@ -199,54 +203,67 @@ def study(
     )
 
 
-@dataclass(frozen=True)
-class _Runner:
-    """Solves what the log does not have yet."""
+def _rows(
+    experiment: Experiment,
+    libraries: Sequence[TrainedLibrary],
+    sampling: Sampling,
+    runner: JobRunner,
+) -> list[Row]:
+    """Those of one preset, pure planning first.
 
-    experiment: Experiment
-    jobs: int
-    log: TrialLog
-    progress: StudyProgress
+    Args:
+        experiment: Its tasks.
+        libraries: What was trained.
+        sampling: How shortcuts are tried out.
+        runner: Solves tasks.
+    """
+    domain = experiment.domain
+    planned = [("", "", PURE_PLANNING)]
+    searched: set[tuple[str, ...]] = set()
+    for trained in libraries:
+        search, *ways = _ways(trained.library, domain, sampling)
+        if _signatures(search) not in searched:  # nothing else tells searches apart: once is enough
+            searched.add(_signatures(search))
+            ways = [search, *ways]
+        planned += [(trained.name, trained.library.digest, way) for way in ways]
+    batches = [_batch(experiment, *one) for one in planned]
+    found = runner.run(domain.preset, solve_task, Trial.from_json, *batches, failure=not_solved)
+    measured: dict[str, list[LibraryTrials]] = {}
+    for (library, _, way), batch in zip(planned, batches, strict=True):
+        trials = tuple(found[name] for name in batch)
+        measured.setdefault(way.name, []).append(LibraryTrials(library, way.name, trials))
+    baseline = measured[PURE_PLANNING.name][0].trials
+    return [
+        Row(domain.preset, name, len(experiment), tuple(results), baseline)
+        for name, results in measured.items()
+    ]
 
-    def rows(self, libraries: Sequence[TrainedLibrary], sampling: Sampling) -> list[Row]:
-        domain = self.experiment.domain
-        compared = [_ways(trained.library, domain, sampling) for trained in libraries]
-        count = 1 + sum(len(ways) for ways in compared)
-        self.progress.begin(domain.preset, len(self.experiment) * count)
-        baseline = self._solve("", "", PURE_PLANNING)
-        rows = [self._row(PURE_PLANNING.name, [baseline], baseline)]
-        measured: dict[str, list[LibraryTrials]] = {}
-        for trained, ways in zip(libraries, compared, strict=True):
-            for way in ways:
-                solved = self._solve(trained.name, trained.library.digest, way)
-                measured.setdefault(way.name, []).append(solved)
-        return rows + [self._row(name, found, baseline) for name, found in measured.items()]
 
-    def _row(self, name: str, results: list[LibraryTrials], baseline: LibraryTrials) -> Row:
-        preset, count = self.experiment.domain.preset, len(self.experiment)
-        return Row(preset, name, count, tuple(results), baseline.trials)
+def _batch(experiment: Experiment, library: str, digest: str, approach: Approach) -> dict[str, Job]:
+    """The tasks of an experiment, for an approach.
 
-    def _solve(self, library: str, digest: str, approach: Approach) -> LibraryTrials:
-        key = (self.experiment.domain.preset, f"{library} {digest}".strip(), approach.name)
-        trials = self.log.trials(key)
-        done = {(trial.seed, trial.index) for trial in trials}
-        for _ in done:
-            self.progress.advance()
-        left = replace(self.experiment, left_out=self.experiment.left_out | done)
-        for trial in run_all(left, approach, self.jobs) if len(left) else ():
-            trials.append(trial)
-            self.log.add(key, trial)
-            self.progress.advance()
-            if not trial.success:
-                said = complaint(approach, trial.seed, trial.index, trial.reason)
-                self.progress.report_failure(said)
-        trials.sort(key=lambda trial: (trial.seed, trial.index))
-        return LibraryTrials(library, approach.name, tuple(trials))
+    Args:
+        experiment: Its tasks.
+        library: Name of the library; empty for pure planning.
+        digest: Of the library.
+        approach: How to plan.
+    """
+    setup = PlanningSetup(DomainChoice.of(experiment.domain), experiment.planner, approach)
+    whose = " ".join(filter(None, (library, digest, approach.name)))
+    return {
+        f"{experiment.domain.preset}, {whose}: {name}": (setup, *task)
+        for name, task in named_tasks(experiment).items()
+    }
 
 
 def _ways(library: Library, domain: Domain, sampling: Sampling) -> tuple[Approach, ...]:
     """To plan with a library, the one that learned nothing first."""
     return (shooting(library, domain, sampling), *approaches(library, sampling)[1:])
+
+
+def _signatures(approach: Approach) -> tuple[str, ...]:
+    """Between which abstract states it looks for shortcuts."""
+    return tuple(shortcut.signature.name for shortcut in approach.shortcuts)
 
 
 COLUMNS = (

@@ -14,7 +14,10 @@ from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, read_text
 from slap_ros.learning.work_folder import DECODING_ERRORS
 from slap_ros.shortcuts.explore import ExplorationResult
+from slap_ros.shortcuts.library import Library, load_shortcut
 from slap_ros.shortcuts.settings import ExplorationSettings
+from slap_ros.shortcuts.shortcut import Shortcut
+from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 
 
 @dataclass(frozen=True)
@@ -106,12 +109,41 @@ class TrainingFolder:
             )
         return tuple(read_curve(path) for path in paths)
 
+    def while_learned(self, shortcut: Shortcut) -> tuple[tuple[int, Shortcut], ...] | None:
+        """How a shortcut was in the course of the attempt that came to it.
+
+        Args:
+            shortcut: As a library has it.
+
+        Returns:
+            Environment steps and the shortcut as it was then, and itself in the end; None where
+            none of the attempts came to it.
+
+        Raises:
+            InvalidLibraryError: A snapshot is damaged.
+        """
+        for done in sorted(self.path.glob(f"**/{shortcut.name}/finished")):
+            work = ShortcutWorkFolder(done.parent)
+            learned = load_shortcut(work.shortcut)
+            if _digest(learned) == _digest(shortcut):
+                total = int(learned.record["environment_steps"])
+                before = [steps for steps in work.snapshots if steps < total]
+                return (
+                    *((steps, load_shortcut(work.snapshot(steps))) for steps in before),
+                    (total, shortcut),
+                )
+        return None
+
     def _setting(self, name: str) -> Mapping[str, Any]:
         path = self.path / "settings.json"
         settings = _read(path)
         if not isinstance(settings, dict) or not isinstance(settings.get(name), dict):
             raise _damaged(path, f"no {name} in it")
         return dict(settings[name])
+
+
+def _digest(shortcut: Shortcut) -> str:
+    return Library("", (shortcut,)).digest
 
 
 def read_curve(path: Path) -> LearningCurve:

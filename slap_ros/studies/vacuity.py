@@ -14,17 +14,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from slap_ros.acquisition.domain_choice import DomainChoice, open_domain
+from slap_ros.acquisition.skill import LearnedSkill
 from slap_ros.core import Action, ActionSpace, Domain
 from slap_ros.drawing.palette import MUTED
 from slap_ros.errors import InvalidParameterError, SlapError
 from slap_ros.evaluation.statistics import Interval, wilson_interval
 from slap_ros.learning.demonstrator import Demonstration, demonstrate
-from slap_ros.learning.domain_choice import DomainChoice, open_domain
 from slap_ros.relational import GroundOperator, State, ground_operators
-from slap_ros.studies.comparison import StudyProgress
 from slap_ros.studies.figures import LINES
+from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.results import MarkdownTable, StudyReport
-from slap_ros.studies.study_log import JobLog
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,13 +45,19 @@ has to end in one. The share of starts is given, with Wilson's 95 % interval in 
 operator of which a policy succeeds in more than {allowed:.0%} of starts is vacuous. Approaches that
 did not arrive within {limit} steps, or after which the operator's preconditions did not hold any
 more, are no starts; they are counted."""
+LEARNED = "learned"
+JUDGED = """
+
+*learned* is the policy of the skill in the library {digest}, from the same starts and judged in the
+same way."""
 
 Blind = Callable[[np.random.Generator], Action]  # a policy that sees nothing
+Tried = Callable[[np.random.Generator, State], Action]
 
 
 @dataclass(frozen=True)
-class BlindSuccess:
-    """How often a policy that sees nothing did what an operator says."""
+class PolicySuccess:
+    """How often a policy did what an operator says."""
 
     policy: str
     successes: int
@@ -80,13 +86,15 @@ class OperatorVacuity:
         operator: Its name.
         starts: How many.
         lost: Approaches that did not lead to one.
-        policies: By policy.
+        policies: Those that see nothing.
+        learned: The skill of a library, if it is to be judged and there is one.
     """
 
     operator: str
     starts: int
     lost: int
-    policies: tuple[BlindSuccess, ...]
+    policies: tuple[PolicySuccess, ...]
+    learned: PolicySuccess | None = None
 
     @property
     def vacuous(self) -> bool:
@@ -101,10 +109,11 @@ class OperatorVacuity:
             "lost": self.lost,
             "vacuous": self.vacuous,
             "policies": [policy.as_json() for policy in self.policies],
+            **({LEARNED: self.learned.as_json()} if self.learned else {}),
         }
 
     def as_row(self) -> list[str]:
-        """Row of a table."""
+        """Row of a table, without what was learned."""
         rates = [f"{policy.rate:.1%}" for policy in self.policies]
         verdict = "**vacuous**" if self.vacuous else "no"
         return [self.operator, str(self.starts), str(self.lost), *rates, verdict]
@@ -114,9 +123,8 @@ def study(
     choice: DomainChoice,
     wanted: int,
     seed: int,
-    log: JobLog,
-    processes: int,
-    progress: StudyProgress,
+    runner: JobRunner,
+    learned: DomainChoice | None = None,
 ) -> StudyReport:
     """Let policies without eyes act where skills begin.
 
@@ -124,39 +132,82 @@ def study(
         choice: The domain, with its demonstrator for skills.
         wanted: Starts of each operator.
         seed: Of the tasks that are demonstrated.
-        log: Keeps what is done.
-        processes: Jobs at a time.
-        progress: Is called as jobs end.
+        runner: Does what takes long.
+        learned: The domain with a library of skills, which are judged from the same starts.
 
     Returns:
         The report.
 
     Raises:
-        InvalidParameterError: The domain has no demonstrator, or none of its tasks has a start.
+        InvalidParameterError: The domain has no demonstrator, or none of its tasks has a start; or
+            the library has no skill for any operator that is demonstrated.
     """
     domain = open_domain(choice)
-    starts, lost = _gather(domain, choice, wanted, seed, log, processes, progress)
+    judged = _judged(learned, domain)
+    starts, lost = _gather(domain, choice, wanted, seed, runner)
     jobs = {
-        f"policies {name} {i}": (choice, i, start)
+        f"policies {name} {i}": (choice, i, start, learned if name in judged else None)
         for name, found in starts.items()
         for i, start in enumerate(found)
     }
-    results = log.run(f"{choice.name}: policies", try_policies, jobs, processes, progress)
+    results = runner.run(f"{choice.name}: policies", try_policies, dict, jobs)
     found = []
     for name, own in starts.items():
         outcomes = [results[f"policies {name} {i}"] for i in range(len(own))]
         policies = tuple(
-            BlindSuccess(policy, sum(o[policy] is not None for o in outcomes), len(own))
+            PolicySuccess(policy, sum(o[policy] is not None for o in outcomes), len(own))
             for policy in blind_policies(domain.action_space)
         )
-        found.append(OperatorVacuity(name, len(own), lost.get(name, 0), policies))
+        skill = None
+        if name in judged:
+            successes = sum(o[LEARNED] is not None for o in outcomes)
+            skill = PolicySuccess(LEARNED, successes, len(own))
+        found.append(OperatorVacuity(name, len(own), lost.get(name, 0), policies, skill))
     never = [operator.name for operator in domain.operators if operator.name not in starts]
-    return _report(choice, _horizon(domain), found, never)
+    return _report(choice, _horizon(domain), found, never, learned)
+
+
+def _judged(learned: DomainChoice | None, domain: Domain) -> tuple[str, ...]:
+    """The operators whose learned skills are judged: those that are demonstrated.
+
+    Args:
+        learned: The domain with a library of skills; None without one.
+        domain: With its demonstrator for skills.
+
+    Raises:
+        InvalidParameterError: There are none.
+    """
+    if learned is None:
+        return ()
+    acquired = open_domain(learned)
+    names = tuple(o.name for o in acquired.operators if o in domain.operators)
+    if not names:
+        raise InvalidParameterError(
+            f"{learned.skills} has skills for {', '.join(acquired.skills) or 'nothing'}, and none "
+            f"for an operator of {domain.name}'s demonstrator, which leads to where skills begin"
+        )
+    return names
 
 
 def _report(
-    choice: DomainChoice, horizon: int, found: Sequence[OperatorVacuity], never: Sequence[str]
+    choice: DomainChoice,
+    horizon: int,
+    found: Sequence[OperatorVacuity],
+    never: Sequence[str],
+    learned: DomainChoice | None,
 ) -> StudyReport:
+    """What was found.
+
+    Args:
+        choice: The domain.
+        horizon: Environment steps of a skill.
+        found: By operator.
+        never: Operators without a start.
+        learned: The domain with the library whose skills were judged, if there is one.
+
+    Raises:
+        InvalidParameterError: Nothing was.
+    """
     if not found:
         raise InvalidParameterError(
             f"no operator of {choice.name} began in any demonstration; see `slap study "
@@ -164,6 +215,13 @@ def _report(
         )
     names = [policy.policy for policy in found[0].policies]
     measured = MEASURED.format(horizon=horizon, allowed=ALLOWED, limit=APPROACH_LIMIT)
+    rows = [one.as_row() for one in found]
+    columns = ["operator", "starts", "approaches lost", *names, "vacuous"]
+    if learned is not None:
+        measured += JUDGED.format(digest=learned.digest)
+        columns.append(LEARNED)
+        for row, one in zip(rows, found, strict=True):
+            row.append(f"{one.learned.rate:.1%}" if one.learned else "none")
     if never:
         measured += f"\n\nNo demonstration of this preset had a start of {', '.join(never)}."
     return StudyReport(
@@ -171,10 +229,7 @@ def _report(
         source="",
         title=f"Is there anything to learn: {choice.name}",
         measured=measured,
-        table=MarkdownTable(
-            ["operator", "starts", "approaches lost", *names, "vacuous"],
-            [one.as_row() for one in found],
-        ),
+        table=MarkdownTable(columns, rows),
         found={
             "horizon": horizon,
             "operators": [one.as_json() for one in found],
@@ -199,9 +254,7 @@ def _gather(
     choice: DomainChoice,
     wanted: int,
     seed: int,
-    log: JobLog,
-    processes: int,
-    progress: StudyProgress,
+    runner: JobRunner,
 ) -> tuple[dict[str, list[Any]], dict[str, int]]:
     """Starts by operator, in the order of tasks; and how many approaches led to none.
 
@@ -210,9 +263,7 @@ def _gather(
         choice: The domain, for other processes.
         wanted: Starts of each operator.
         seed: Of the tasks.
-        log: Keeps what is done.
-        processes: Jobs at a time.
-        progress: Is called as jobs end.
+        runner: Does what takes long.
     """
     goals = list(domain.goals) or [""]
     starts: dict[str, list[Any]] = {}
@@ -222,7 +273,7 @@ def _gather(
         tasks = range(done, done + min(BATCH, wanted))
         jobs = {f"starts {i}": (choice, goals[i % len(goals)], seed, i) for i in tasks}
         title = f"{choice.name}: demonstrations from task {done} on"
-        for found in log.run(title, gather_starts, jobs, processes, progress).values():
+        for found in runner.run(title, gather_starts, list, jobs).values():
             for start in found:
                 own = starts.setdefault(start["operator"], [])
                 if start["state"] is None:
@@ -318,13 +369,17 @@ def blind_policies(actions: ActionSpace) -> dict[str, Blind]:
     return policies
 
 
-def try_policies(choice: DomainChoice, number: int, start: dict[str, Any]) -> dict[str, int | None]:
+def try_policies(
+    choice: DomainChoice, number: int, start: dict[str, Any], learned: DomainChoice | None = None
+) -> dict[str, int | None]:
     """Let every policy act from a start.
 
     Args:
         choice: The domain, with its demonstrator for skills.
         number: Of the start among its operator's; with it the random policy's numbers.
         start: As :func:`gather_starts` gives it.
+        learned: The domain with a library that has a skill for the start's operator; its policy is
+            tried too, without the approach, which was made already.
 
     Returns:
         By policy, the steps after which it first succeeded; None where it did not.
@@ -350,7 +405,10 @@ def try_policies(choice: DomainChoice, number: int, start: dict[str, Any]) -> di
 
     world = domain.make_world(state)
     outcomes: dict[str, int | None] = {}
-    for name, policy in blind_policies(domain.action_space).items():
+    policies = {name: _tried(one) for name, one in blind_policies(domain.action_space).items()}
+    if learned is not None:
+        policies[LEARNED] = _learned(open_domain(learned), operator)
+    for name, policy in policies.items():
         rng = np.random.default_rng([RANDOM, seed, index, number])
         world.reset(state)
         outcomes[name] = None
@@ -359,8 +417,19 @@ def try_policies(choice: DomainChoice, number: int, start: dict[str, Any]) -> di
                 outcomes[name] = step
                 break
             if step < _horizon(domain):
-                world.step(policy(rng))
+                world.step(policy(rng, world.state))
     return outcomes
+
+
+def _tried(blind: Blind) -> Tried:
+    return lambda rng, _: blind(rng)
+
+
+def _learned(domain: Domain, operator: GroundOperator) -> Tried:
+    skill = domain.skills[operator.operator.name]
+    assert isinstance(skill, LearnedSkill)
+    act = skill.act(operator.objects)
+    return lambda _, state: act(state)
 
 
 def draw(figure: Figure, found: Sequence[OperatorVacuity]) -> None:
@@ -381,9 +450,17 @@ def draw(figure: Figure, found: Sequence[OperatorVacuity]) -> None:
         for place, policy in zip(places, policies, strict=True):
             ends = [100 * policy.interval.low, 100 * policy.interval.high]
             axes.plot(ends, [place, place], color=LINES[number], linewidth=1)
+    judged = [(i, one.learned) for i, one in enumerate(found) if one.learned is not None]
+    for number, (place, skill) in enumerate(judged):
+        label = LEARNED if number == 0 else None
+        axes.plot(100 * skill.rate, place, "*", color=MUTED, markersize=9, label=label)
+        ends = [100 * skill.interval.low, 100 * skill.interval.high]
+        axes.plot(ends, [place, place], color=MUTED, linewidth=1)
     axes.axvline(100 * ALLOWED, color=MUTED, linestyle="--", linewidth=1)
     axes.set_yticks(range(len(found)), [one.operator for one in found])
     axes.set_ylim(len(found) - 0.5, -0.5)
-    axes.set_xlim(-1, max(20.0, *(105 * p.interval.high for one in found for p in one.policies)))
-    axes.set_xlabel("starts from which a blind policy succeeds [%], with 95 % interval")
-    figure.legend(loc="outside upper center", ncols=len(names))
+    widest = max(20.0, *(105 * p.interval.high for one in found for p in one.policies))
+    axes.set_xlim(-1, 105.0 if judged else widest)
+    which = "policy" if judged else "blind policy"
+    axes.set_xlabel(f"starts from which a {which} succeeds [%], with 95 % interval")
+    figure.legend(loc="outside upper center", ncols=len(names) + bool(judged))

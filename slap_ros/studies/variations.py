@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from ast import literal_eval
+from collections.abc import Iterable
 from dataclasses import dataclass
+from statistics import fmean
 
 from slap_ros.core import Domain
 from slap_ros.domains.variation import parse_preset
@@ -31,36 +33,54 @@ class Variation:
         return LABELS.get(self.setting, self.setting.replace("_", " "))
 
 
-# What SLAP Fig. 5 varies, by whatever name a domain has for it: fewer and more of each thing;
-# half, the same, and twice the mass and friction that blocks have by default.
+# What SLAP Fig. 5 varies, by whatever name a domain has for it: fewer and more of each thing.
 OBSTACLES = Variation("obstacles", ("1", "2", "3", "4", "5"))
+TOYS = Variation("toys", ("1", "2", "3", "4"))  # a fifth has hardly any room
 DISTRACTORS = Variation("distractors", ("0", "1", "2", "3", "4"))
 BYSTANDERS = Variation("bystanders", ("0", "1", "2"))  # a fourth block has hardly any room
-MASS = Variation("mass", ("0.25", "0.5", "1.0"))
-FRICTION = Variation("friction", ("0.45", "0.9", "1.8"))
-USUAL = (OBSTACLES, DISTRACTORS, BYSTANDERS, MASS, FRICTION)
-NUMBERS = (OBSTACLES, BYSTANDERS, DISTRACTORS)  # of objects; the one that makes tasks harder first
+NUMBERS = (OBSTACLES, TOYS, BYSTANDERS, DISTRACTORS)  # what makes tasks harder first
+FACTORS = (0.5, 1.0, 2.0)  # of the mass and friction that things have by default
 LABELS = {
-    "obstacles": "obstacles",
-    "distractors": "distractors",
-    "bystanders": "bystanders",
-    "mass": "mass of a block [kg]",
+    "mass": "mass of a thing [kg]",
     "friction": "coefficient of friction",
 }
 
 
-def offered(domain: Domain, variations: Sequence[Variation] = USUAL) -> tuple[Variation, ...]:
-    """Those whose setting the domain's preset has.
+def offered(domain: Domain) -> tuple[Variation, ...]:
+    """The usual variations of what the domain's preset has settings for.
 
     Raises:
         InvalidParameterError: It has none of them.
     """
-    found = tuple(one for one in variations if one.setting in domain.configuration)
+    known = {one.setting: one for one in NUMBERS}
+    found = _settings(domain, (*known, "mass", "friction"))
+    return tuple(known.get(name) or _scaled(domain, name) for name in found)
+
+
+def offered_number(domain: Domain) -> Variation:
+    """The number of things, of what the domain's preset has a setting for.
+
+    Raises:
+        InvalidParameterError: It has none.
+    """
+    known = {one.setting: one for one in NUMBERS}
+    return known[_settings(domain, known)[0]]
+
+
+def _scaled(domain: Domain, setting: str) -> Variation:
+    """A setting at parts and multiples of what it is by default."""
+    middle = fmean(literal_eval(str(domain.configuration[setting])))
+    return Variation(setting, tuple(str(factor * middle) for factor in FACTORS))
+
+
+def _settings(domain: Domain, wanted: Iterable[str]) -> list[str]:
+    """Those that the domain's preset has, one at least."""
+    found = [setting for setting in wanted if setting in domain.configuration]
     if not found:
         raise InvalidParameterError(
             f"preset {domain.preset} of {domain.name} has none of the settings "
-            f"{', '.join(one.setting for one in variations)}; name others with --vary, as in "
-            f"--vary setting=1,2,3: it has {', '.join(domain.configuration) or 'none'}"
+            f"{', '.join(wanted)}; name others with --vary, as in --vary setting=1,2,3: it has "
+            f"{', '.join(domain.configuration) or 'none'}"
         )
     return found
 

@@ -7,6 +7,8 @@ acquired.
 """
 
 import hashlib
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -45,7 +47,8 @@ PLACE = Type("place", POSITION)
 THING = Type("thing", (*POSITION, Feature("held", TRUTH)), PLACE)
 AXES = (Feature("dx", "m"), Feature("dy", "m"), Feature("gripper", "1"))
 STEP = 0.02  # m, the most that the hand moves in a step
-GRASP = 0.012  # m, from the thing, where closing the gripper grasps it
+GRASP = 0.009  # m, from the thing, where closing the gripper grasps it
+PUSH = 0.04  # m, up to where a hand whose gripper is left alone pushes what is before it
 NEAR = 0.01  # m
 BEFORE = 0.04  # m, from where a skill acts to where it begins
 HORIZON = 12
@@ -170,11 +173,23 @@ class Points:
                     return
 
 
+class PushedPoints(Points):
+    """The same, but an empty hand whose gripper is left alone pushes what is before it."""
+
+    def _move(self, row, action):
+        if action[2] == 0 and not any(row[part][2] > 0.5 for part in self._things):
+            for part in self._things:
+                way = row[part][:2] - row[self._hand][:2]
+                if GRASP < np.linalg.norm(way) <= PUSH and way @ action[:2] > 0:
+                    row[part][:2] += action[:2]
+        super()._move(row, action)
+
+
 class Point:
     """One of these worlds by itself."""
 
-    def __init__(self, state):
-        self._world = Points([state])
+    def __init__(self, state, worlds=Points):
+        self._world = worlds([state])
 
     @property
     def state(self):
@@ -209,6 +224,25 @@ def approach(state, objects):
     return policy
 
 
+def _script(gripper):
+    """Straight to the last object, then the gripper does its part."""
+
+    def script(state, objects):
+        goal = state[objects[-1]][:2]
+
+        def policy(now):
+            way = goal - hand_xy(now)
+            there = np.linalg.norm(way) < 1e-6
+            return np.array([*np.clip(way, -STEP, STEP), gripper if there else 0.0])
+
+        return policy
+
+    return script
+
+
+SCRIPTS = {"Pick": _script(1.0), "Put": _script(-1.0)}
+
+
 def _robot(state, hand):
     return state.stack(Column(state.layout.of_type(HAND)), "closed")
 
@@ -226,6 +260,28 @@ def _distance(state, hand, column):
 
 def _separation(state, obj, column):
     return np.linalg.norm(state.gather(column, XY) - state[obj][..., None, :2], axis=-1)
+
+
+def reach(opens):
+    """A script: go to the last object with a closed hand; there, open it if that is meant."""
+
+    def script(state, objects):
+        before = approach(state, objects)
+        near = False
+
+        def policy(now):
+            nonlocal near
+            action = None if near else before(now)
+            if action is not None:
+                return action
+            near = True
+            way = now[objects[-1]][:2] - hand_xy(now)
+            there = np.linalg.norm(way) < NEAR / 2
+            return np.array([*np.clip(way, -STEP, STEP), -1.0 if there and opens else 1.0])
+
+        return policy
+
+    return script
 
 
 def begin(operator, tasks, seed=5):
@@ -249,6 +305,9 @@ def begin(operator, tasks, seed=5):
     return found
 
 
+SCRIPTS = {"Pick": reach(opens=False), "Put": reach(opens=True)}
+
+
 def sample_task(rng, things=2):
     hand = HAND("hand")
     loose, places = ([kind(f"{kind}{i}") for i in range(things)] for kind in (THING, PLACE))
@@ -259,6 +318,19 @@ def sample_task(rng, things=2):
         features[obj] |= {"held": 0.0} if obj.type.is_a(THING) else {}
     state = State.build(features)
     return Task(state, goal_of(state), 400)
+
+
+def sample_line(rng, things=1):
+    """Hand, thing, place, next thing and its place, in a line: a hand may push things along it."""
+    task = sample_task(rng, things)
+    angle = rng.uniform(0.0, 2.0 * np.pi)
+    way = 0.05 * np.array([np.cos(angle), np.sin(angle)])
+    (hand,) = task.initial_state.layout.of_type(HAND)
+    pairs = (atom.objects for atom in sorted(task.goal, key=str))
+    line = (hand, *(obj for pair in pairs for obj in pair))
+    positions = {obj: number * way for number, obj in enumerate(line)}
+    changes = {(obj, f): v for obj, xy in positions.items() for f, v in zip(XY, xy, strict=True)}
+    return replace(task, initial_state=task.initial_state.replace(changes))
 
 
 def goal_of(state):
@@ -273,15 +345,24 @@ def swapped(state):
     return frozenset(AT(thing, place) for thing, place in zip(things, places[::-1], strict=True))
 
 
+SAMPLERS = {
+    "two": sample_task,
+    "three": lambda rng: sample_task(rng, 3),
+    "line": sample_line,
+    "long_line": lambda rng: sample_line(rng, 2),
+}
+
+
 def _make(preset):
+    worlds = PushedPoints if preset.endswith("line") else Points
     return Domain(
         name="points",
         preset=preset,
         types=(HAND, PLACE, THING),
         predicates=(HAND_EMPTY, HOLDING, LOOSE, AT),
         action_space=ACTIONS,
-        sample_task=sample_task if preset == "two" else lambda rng: sample_task(rng, 3),
-        make_world=Point,
+        sample_task=SAMPLERS[preset],
+        make_world=partial(Point, worlds=worlds),
         default_goal=goal_of,
         step_limit=400,
         execution=Execution(0.05),
@@ -290,12 +371,22 @@ def _make(preset):
         goals={"train": goal_of, "swapped": swapped},
         robot_types=frozenset({HAND}),
         learning=Learning(
-            LearnerInterface(hand_xy, _robot, _objects, _distance, _separation),
-            make_vector_world=Points,
+            LearnerInterface(
+                hand_xy,
+                _robot,
+                _objects,
+                _distance,
+                _separation,
+                grasping=frozenset({HAND_EMPTY, HOLDING, LOOSE}),
+            ),
+            make_vector_world=worlds,
         ),
-        acquisition=Acquisition(approach, (PICK, PUT), REWARDS, {}, HORIZON),
+        acquisition=Acquisition(approach, (PICK, PUT), REWARDS, SCRIPTS, HORIZON),
     )
 
 
-make = presets("two", "three")(_make)
+make = presets(*SAMPLERS)(_make)
 POINTS = _make("two")
+
+assert POINTS.learning is not None
+INTERFACE = POINTS.learning.interface

@@ -5,24 +5,34 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+from model_answers import good_script
+from points import PICK, POINTS, PUT
+from scripted_server import serving
+
+from slap_ros.acquisition.problem import AcquisitionProblem
+from slap_ros.cli.acquire import why_left
+from slap_ros.errors import ErrorCode
 
 pytestmark = pytest.mark.usefixtures("points_installed")
-SMALL = ["rollouts=2", "validation=2", "skill_steps=200", "segment_episodes=2", "sac.hidden=8,8"]
+SMALL = [
+    "rollouts=2", "validation=2", "skill_steps=200", "segment_episodes=2", "sac.hidden=8,8",
+    "sac.random_steps=96",
+]  # fmt: skip
+SHORTCUTS = str(Path(__file__).parents[2] / "models" / "obstacle2d")
+BUDGET = [*(word for change in SMALL for word in ("--set", change)), "--steps", 200, "--jobs", 1]
 
 
 def slap(*arguments):
     command = [sys.executable, "-m", "ensemble.cli", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=240)
+    return subprocess.run(command, capture_output=True, text=True, timeout=600)
 
 
 def test_a_library_is_acquired_shown_and_begun_with(tmp_path):
-    changes = [word for change in SMALL for word in ("--set", change)]
-    made = slap(
-        "acquire", "points", "--output", tmp_path / "one", "--steps", 200, "--json", *changes,
-        "--set", "sac.random_steps=96", "--jobs", 1,
-    )  # fmt: skip
+    made = slap("acquire", "points", "--output", tmp_path / "one", "--json", *BUDGET)
     assert made.returncode == 0, made.stderr
     record = json.loads(made.stdout)
     assert (record["ended"], record["goal"]) == ("the budget is spent", "train")
@@ -31,13 +41,58 @@ def test_a_library_is_acquired_shown_and_begun_with(tmp_path):
     (skill,) = json.loads(shown.stdout)["skills"]
     assert (skill["operator"]["name"], skill["seed"]) == ("Pick", 0)
     assert "Holding(?thing)" in slap("skills", tmp_path / "one").stderr
-    again = slap(
-        "acquire", "points", "--output", tmp_path / "two", "--from", tmp_path / "one", "--steps",
-        200, "--json", *changes, "--set", "sac.random_steps=96", "--jobs", 1,
-    )  # fmt: skip
-    assert json.loads(again.stdout)["began_with"] == ["one"]
+    begin = ("--from", tmp_path / "one")
+    again = slap("acquire", "points", "--output", tmp_path / "two", *begin, "--json", *BUDGET)
+    record = json.loads(again.stdout)
+    assert record["began_with"] == ["one"]
+    assert " --from one " in record["command"]  # without the path of this machine
     (second,) = json.loads(slap("skills", tmp_path / "two", "--json").stdout)["skills"]
     assert second["began_with"]["similarity"] == 1.0
+    assert "(similarity 1.00, success" in slap("skills", tmp_path / "two").stderr
+
+
+def test_operators_and_rewards_come_from_whoever_is_named(tmp_path):
+    """From demonstrations and metrics; and the same training is not mistaken for another."""
+    asked = ("acquire", "points", "--output", tmp_path / "library", "--json", *BUDGET)
+    by = ("--proposer", "induced", "--demonstrations", 2, "--rewarder", "composed")
+    made = slap(*asked, *by)
+    assert made.returncode == 0, made.stderr
+    record = json.loads(made.stdout)
+    assert (record["proposer"], record["rewarder"]) == ("induced", "composed")
+    assert record["provenance"]["source"] == "demonstrations: 2, from the domain's demonstrator"
+    assert "--proposer induced --demonstrations 2 --rewarder composed" in record["command"]
+    assert "answered_by" not in record
+    assert json.loads(slap(*asked, *by).stdout) == record
+    other = slap(*asked)
+    assert "has another training, of `slap acquire points" in " ".join(other.stderr.split())
+    shown = slap("skills", tmp_path / "library").stderr
+    assert "AchieveHolding(?thing)" in shown
+    assert "proposer and rewarder: induced and composed" in shown
+
+
+def test_what_a_script_said_is_never_taken_for_a_models(tmp_path):
+    """Recorded, and replayed: both libraries say that no model answered, or not now."""
+    problem = AcquisitionProblem.of_task(POINTS, POINTS.task(0))
+    printed = SimpleNamespace(problem=problem, operators=(PICK, PUT))
+    recording = tmp_path / "script.jsonl"
+    by = ("acquire", "points", "--proposer", "language", "--rewarder", "language", "--json")
+    with serving(good_script(printed)) as server:
+        made = slap(
+            *by, "--output", tmp_path / "recorded", "--cassette", f"record:{recording}",
+            "--base-url", server.url, "--model", "scripted", *BUDGET,
+        )  # fmt: skip
+    assert made.returncode == 0, made.stderr
+    recorded = json.loads(made.stdout)
+    assert recorded["answered_by"]["scripted"]
+    assert recorded["answered_by"]["replayed_cassette"] == ""
+    again = slap(
+        *by, "--output", tmp_path / "replayed", "--cassette", f"replay:{recording}", *BUDGET
+    )
+    replayed = json.loads(again.stdout)
+    assert replayed["answered_by"]["scripted"]
+    assert replayed["digest"] == recorded["digest"]
+    assert "a script's" in again.stderr
+    assert "replayed from recording" in slap("skills", tmp_path / "replayed").stderr
 
 
 @pytest.mark.parametrize(
@@ -45,10 +100,16 @@ def test_a_library_is_acquired_shown_and_begun_with(tmp_path):
     [
         (["obstacle2d"], "does not say what skills are acquired with"),
         (["points", "--goal", "nope"], "no goal 'nope'"),
+        (["points", "--steps", "10"], "a skill is judged after 480; give more --steps"),
         (["points", "--settings", "huge"], "unknown settings 'huge'"),
         (["points", "--set", "sac.gamma=1"], "unknown setting 'sac.gamma'"),
         (["points", "--proposer", "oracle"], "--proposer 'oracle'"),
+        (["points", "--rewarder", "none"], "--rewarder 'none'"),
+        (["points", "--demonstrations", "3"], "are for --proposer induced"),
+        (["points", "--proposer", "language", "--cassette", "off"], "--cassette is off"),
         (["points", "--from", "nowhere"], "nowhere: no such folder"),
+        (["points", "--keep", "nowhere"], "nowhere: no such folder"),
+        (["points", "--from", SHORTCUTS], "a library of shortcuts, not of skills; `slap acquire"),
     ],
 )
 def test_bad_input_is_refused(tmp_path, arguments, reason):
@@ -56,3 +117,24 @@ def test_bad_input_is_refused(tmp_path, arguments, reason):
     assert answer.returncode not in (0, 1)
     assert reason in " ".join(answer.stderr.split())
     assert not (tmp_path / "library").exists()
+
+
+def test_a_command_that_was_corrected_finds_no_other_training_in_its_folder(tmp_path):
+    """Libraries are read before anything is proposed, which may cost a model's time."""
+    asked = ("acquire", "points", "--output", tmp_path / "library", "--json", *BUDGET)
+    assert "no such folder" in slap(*asked, "--from", tmp_path / "nowhere").stderr
+    assert slap(*asked).returncode == 0
+
+
+def test_a_library_of_shortcuts_is_not_shown_as_one_of_skills():
+    shown = slap("skills", SHORTCUTS)
+    assert shown.returncode == ErrorCode.INVALID_LIBRARY
+    assert "a library of shortcuts, not of skills" in " ".join(shown.stderr.split())
+
+
+def test_a_skill_that_was_given_up_is_described_in_words():
+    found = {"why": "no progress", "states": 3, "ends": {"effect not reached": 2}, "atoms": {}}
+    assert why_left(found) == "no progress from 3 states: effect not reached (2 times)"
+    found["atoms"] = {"Holding(thing0)": 2}
+    assert why_left(found).endswith("; most often not as it should be: Holding(thing0) (2 times)")
+    assert why_left({"why": "the approach did not arrive"}) == "the approach did not arrive"

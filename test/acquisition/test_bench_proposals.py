@@ -59,3 +59,19 @@ def test_one_demonstration_is_enough_for_every_goal(name):
     shown = record_traces(with_scripts(domain), 1, training)
     proposer = InducedProposer("one", hold_steps_of(domain.execution.control_period_s))
     assert plans(domain, proposer, ComposedRewarder(), shown) == LENGTHS[name]
+
+
+def test_composed_rewards_do_not_pay_for_what_holds_anyway():
+    """All things lie still from the start; lids and drawers have to be moved, away and back."""
+    composed = {}
+    for name in ("stack_at_target", "make_coffee"):
+        domain = get_domain(name)
+        problem = AcquisitionProblem.of_task(domain, domain.task(0))
+        templates = ComposedRewarder().rewards(domain.acquisition.operators, problem)
+        composed |= {
+            (name, operator): {term.metric.name for term in template.terms}
+            for operator, template in templates.items()
+        }
+    assert not any("at_rest" in metrics for metrics in composed.values())
+    assert composed["stack_at_target", "Place"] == {"parallel_dis", "perpendicular_dis"}
+    assert "closure" in composed["make_coffee", "Close"]  # closed at first, not where it begins

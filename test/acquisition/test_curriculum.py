@@ -4,29 +4,37 @@
 
 import json
 import shutil
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from points import PICK, POINTS, REWARDS, begin
+from points import HORIZON, PICK, POINTS, PUT, REWARDS, begin
+from steady_skills import PICKING, PUTTING, towards, write_library
 
-from slap_ros.acquisition import skill_training
+from slap_ros.acquisition import curriculum, skill_training
+from slap_ros.acquisition.acquired_domain import acquired_domain
 from slap_ros.acquisition.curriculum import Curriculum
+from slap_ros.acquisition.curriculum_state import CurriculumState, SkillProgress
+from slap_ros.acquisition.dead_ends import MOST_ATTEMPTS, DeadEnd, find_dead_ends
+from slap_ros.acquisition.proposal_request import Demonstrations, ProposalRequest
 from slap_ros.acquisition.retrieval import nearest, signature_of
-from slap_ros.acquisition.rollouts import roll_out
+from slap_ros.acquisition.rollouts import PlanRollout, Stage, roll_out
 from slap_ros.acquisition.sac_settings import SacSettings
 from slap_ros.acquisition.settings import AcquisitionSettings
 from slap_ros.acquisition.skill_library import (
     AcquiredSkill,
-    acquired_domain,
     load_skill_library,
     save_skill,
     save_skill_library,
 )
+from slap_ros.acquisition.skill_selection import failing_often, select_skills
 from slap_ros.acquisition.task_source import TaskSource
 from slap_ros.core.goals import task_with_goal
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError, UnsolvableError
+from slap_ros.learning.demonstrator import record_traces
 from slap_ros.learning.mlp_policy import MlpPolicy
+from slap_ros.learning.scripted_skill import with_scripts
 from slap_ros.learning.workers import SequentialWorkers, local_workers
 from slap_ros.planning.execution import Executor
 from slap_ros.planning.planner import make_planner
@@ -52,21 +60,31 @@ class Events:
     """Notes what happens."""
 
     def __init__(self):
-        self.progress, self.judged, self.computed = [], [], []
+        self.progress, self.judged, self.computed, self.begun = [], [], [], []
+        self.dead_ends = []
 
     def on_progress(self, what, done, total):
         if done == 0:
             self.computed.append(what)
 
-    def on_rollouts(self, iteration, progress, failures):
-        self.progress.append((progress, failures))
+    def on_rollouts(self, iteration, rollouts):
+        failures = Counter(one.failure.operator for one in rollouts if one.failure)
+        self.progress.append((np.mean([one.progress for one in rollouts]), dict(failures)))
+
+    def on_dead_end(self, iteration, dead_end):
+        self.dead_ends.append(dead_end)
+
+    def on_learning(self, iteration, rounds, steps_left):
+        self.begun.append((rounds, steps_left))
 
     def on_judged(self, iteration, skill, outcome):
         self.judged.append((skill, outcome))
 
 
-def acquire(folder, settings, seed=1, workers=None, goal="train", **more):
-    source = TaskSource.of(POINTS, goal, seed, OPERATORS, REWARDS)
+def acquire(
+    folder, settings, seed=1, workers=None, goal="train", made=(OPERATORS, REWARDS), **more
+):
+    source = TaskSource.of(POINTS, goal, seed, *made)
     events = Events()
     workers = workers or SequentialWorkers()
     library = Curriculum(source, settings, folder, workers, events, **more).run()
@@ -108,6 +126,59 @@ def test_both_skills_are_acquired(whole):
         assert skill.record["vacuity"]["success"] <= 0.25  # of 12 steps, all within 40 mm
     assert library.record["steps"] == sum(s.record["steps"] for s in library.skills)
     assert library.record["steps"] <= WHOLE.total_steps
+
+
+def test_skills_are_acquired_without_anything_written_by_hand(tmp_path):
+    """Operators from demonstrations, rewards from metrics."""
+    shown = Demonstrations(tuple(record_traces(with_scripts(POINTS), 3)), "the demonstrator")
+    task = task_with_goal(POINTS, 1, 0, "train")
+    proposal = ProposalRequest.of_task(POINTS, task, "induced", "composed", shown).propose()
+    made = (proposal.operators, proposal.rewards)
+    library, _ = acquire(tmp_path, WHOLE, made=made)
+    assert library.record["ended"] == "nothing fails"
+    assert {skill.operator for skill in library.skills} == set(proposal.operators)
+    assert library.record["progress_on_fresh_tasks"] >= 0.95
+
+
+def test_a_skill_that_never_succeeds_is_learned_from_scratch_and_so_is_what_comes_before(tmp_path):
+    """What is put down is to be still in the hand: no policy does that."""
+    impossible = replace(PUT, delete_effects=frozenset())
+    impatient = replace(WHOLE, patience=1, skill_steps=1_600)
+    made = ((PICK, impossible), REWARDS)
+    library, events = acquire(tmp_path, impatient, made=made)
+    assert events.dead_ends == [DeadEnd(skill="Put", before="Pick")] * (MOST_ATTEMPTS - 1)
+    assert [name for name, _ in events.judged] == ["Pick", "Put"] * MOST_ATTEMPTS
+    picks = [outcome for name, outcome in events.judged if name == "Pick"]
+    assert all(outcome.initial < 0.5 < outcome.success for outcome in picks)
+    assert len({outcome.segments for outcome in picks}) > 1  # other weights, other episodes
+    assert library.record["ended"] == "no progress"
+    assert {skill.record["attempts"] for skill in library.skills} == {MOST_ATTEMPTS}
+    learned = sum(len(outcome.segments) for _, outcome in events.judged)
+    assert library.record["steps"] == learned * impatient.segment_steps(HORIZON)
+    read, others = acquire(tmp_path, impatient, made=made)
+    assert read.digest == library.digest
+    assert not others.computed
+
+
+def test_dead_ends_are_behind_skills_that_were_learned_and_not_too_often():
+    def rolled_out(*operators):
+        ends = ["done"] * (len(operators) - 1) + ["effect not reached"]
+        stages = [Stage(o, (), (0.0,), end, 1) for o, end in zip(operators, ends, strict=True)]
+        return PlanRollout(0, operators, tuple(stages))
+
+    rollouts = [rolled_out("Pick", "Put")]
+    found = DeadEnd(skill="Put", before="Pick")
+    tried = SkillProgress(rounds=2, success=0.0)
+    for pick, put, expected in (
+        (replace(tried, success=1.0), tried, [found]),
+        (SkillProgress(), tried, []),  # a skill that was given
+        (tried, replace(tried, success=0.1), []),  # it does succeed
+        (replace(tried, attempt=MOST_ATTEMPTS - 1), tried, []),
+    ):
+        state = CurriculumState({"Pick": pick, "Put": put})
+        assert find_dead_ends(["Put"], rollouts, state) == expected
+    state = CurriculumState({"Pick": tried, "Put": tried})
+    assert not find_dead_ends(["Pick"], [rolled_out("Pick")], state)  # nothing comes before
 
 
 def test_a_finished_curriculum_is_read(whole, finished):
@@ -178,9 +249,55 @@ def test_the_library_is_the_same_with_two_processes(tmp_path):
 def test_a_curriculum_without_budget_or_need_says_so(tmp_path):
     library, events = acquire(tmp_path / "none", replace(SHORT, total_steps=0))
     assert (library.record["ended"], library.skills) == ("the budget is spent", ())
+    assert library.record["progress_on_fresh_tasks"] == 0.0
     library, events = acquire(tmp_path / "holds", SHORT, goal="(Loose thing0)")
-    assert (library.record["ended"], library.skills) == ("nothing fails", ())
+    assert library.record["ended"] == "the goal holds at the start of every task"
+    assert (library.record["progress_on_fresh_tasks"], library.skills) == (1.0, ())
     assert not events.judged
+
+
+def test_a_skill_that_is_not_learned_is_given_up_and_the_record_says_how_it_failed(tmp_path):
+    """Weights that hardly change make no progress, and there is no other skill to go on with."""
+    stuck = replace(SHORT, patience=2, total_steps=30_000, sac=replace(SAC, learning_rate=1e-12))
+    library, events = acquire(tmp_path, stuck)
+    assert library.record["ended"] == "no progress"
+    assert [name for name, _ in events.judged] == ["Pick", "Pick"]
+    left = library.record["left"]["Pick"]
+    assert left["why"] == "no progress"
+    assert left["states"] == sum(left["ends"].values()) == stuck.rollouts
+    assert set(left["ends"]) <= {"effect not reached", "something else disturbed"}
+    assert any(atom.startswith("Holding(") for atom in left["atoms"])
+
+
+def test_a_skill_that_was_left_once_is_not_said_to_be_left_in_the_end(tmp_path, monkeypatch):
+    """Put is left besides in the first iteration; in the last one Pick alone is."""
+    iterations = []
+
+    def with_put_left_first(*given):
+        selection = select_skills(*given)
+        left = {} if iterations else {"Put": {"why": "no progress"}}
+        iterations.append({**selection.not_trained, **left})
+        return replace(selection, not_trained=iterations[-1])
+
+    monkeypatch.setattr(curriculum, "select_skills", with_put_left_first)
+    stuck = replace(SHORT, patience=1, total_steps=30_000, sac=replace(SAC, learning_rate=1e-12))
+    library, _ = acquire(tmp_path, stuck)
+    assert [sorted(left) for left in iterations] == [["Put"], ["Pick"]]
+    assert library.record["ended"] == "no progress"
+    assert sorted(library.record["left"]) == ["Pick"]
+
+
+@pytest.mark.parametrize(
+    ("failures", "chosen"),
+    [
+        ({"Open": 4, "Pick": 36}, ["Pick"]),
+        ({"Open": 12, "Pick": 20}, ["Pick", "Open"]),
+        ({"Open": 1, "Pick": 2}, ["Pick", "Open"]),  # nothing is worse
+        ({}, []),
+    ],
+)
+def test_what_fails_rarely_waits_for_what_fails_often(failures, chosen):
+    assert failing_often(Counter(failures), Counter(Open=40, Pick=40), 0.95) == chosen
 
 
 def test_a_goal_out_of_reach_is_refused(tmp_path):
@@ -208,6 +325,60 @@ def test_a_skill_begins_with_the_nearest_known_one(tmp_path):
     library, _ = acquire(tmp_path / "work", SHORT, known={str(folder): known})
     pick = library.skills[0]
     assert pick.record["began_with"]["skill"] == known.folder_name
+
+
+def kept(path, *skills):
+    """The skills of a library, by folder."""
+    write_library(path, *skills)
+    return {str(path / skill.folder_name): skill for skill in skills}
+
+
+def files(path):
+    return {str(p.relative_to(path)): p.read_bytes() for p in path.rglob("*") if p.is_file()}
+
+
+def test_skills_that_are_there_are_kept_and_what_is_missing_is_learned(tmp_path):
+    there = kept(tmp_path / "some", PICKING)
+    library, events = acquire(tmp_path / "work", SHORT, kept=there)
+    assert events.progress[0][1] == {"Put": 3}
+    assert {name for name, _ in events.judged} == {"Put"}
+    followed = [(one.skill, one.so_far()) for rounds, _ in events.begun for one in rounds]
+    assert followed == events.judged
+    assert events.begun[0][1] == SHORT.total_steps
+    made = saved(library, tmp_path / "library")
+    before = files(tmp_path / "some")
+    assert {name: made[name] for name in before if "Pick" in name} == {
+        name: data for name, data in before.items() if "Pick" in name
+    }
+    assert [skill.operator.name for skill in library.skills] == ["Pick", "Put"]
+    with pytest.raises(InvalidParameterError, match="has another training"):
+        slower = replace(PICKING, horizon=PICKING.horizon - 1)
+        acquire(tmp_path / "work", SHORT, kept=kept(tmp_path / "slower", slower))
+
+
+def test_where_all_skills_are_there_nothing_is_learned(tmp_path):
+    there = kept(tmp_path / "both", PICKING, PUTTING)
+    library, events = acquire(tmp_path / "work", SHORT, kept=there)
+    assert (library.record["ended"], library.record["steps"]) == ("nothing fails", 0)
+    assert not events.judged
+    assert library.digest == load_skill_library(tmp_path / "both", POINTS).digest
+
+
+def test_a_skill_that_fails_again_is_learned_further(tmp_path):
+    """From its own weights; what it was worth stays a candidate."""
+    weak = replace(PICKING, policy=towards(0, False))
+    weak.policy.layers[1][0][0, 1] = 0.0  # it never goes to the left
+    there = kept(tmp_path / "weak", weak, PUTTING)
+    settings = replace(SHORT, rollouts=8, sac=replace(SAC, hidden=(4,)))
+    library, events = acquire(tmp_path / "work", settings, kept=there)
+    assert {name for name, _ in events.judged} == {"Pick"}
+    first = events.judged[0][1]
+    assert 0.0 < first.initial < 1.0
+    assert first.success >= first.initial
+    (pick,) = (skill for skill in library.skills if skill.operator.name == "Pick")
+    assert pick.record["began_with"] == {
+        "skill": weak.folder_name, "similarity": 1.0, "success": first.initial
+    }  # fmt: skip
 
 
 def rename(about):

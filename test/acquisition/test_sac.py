@@ -8,16 +8,19 @@ import gymnasium as gym
 import numpy as np
 import pytest
 import torch
-from points import HORIZON, PICK, POINTS, REWARDS, begin
+from points import HORIZON, INTERFACE, PICK, POINTS, REWARDS, begin
 from stable_baselines3 import SAC
+from stable_baselines3.common.torch_layers import create_mlp
 
 from slap_ros.acquisition.episodes import load_episodes, save_episodes
 from slap_ros.acquisition.groundings import Groundings
+from slap_ros.acquisition.observations import SIZE
 from slap_ros.acquisition.reward import SkillReward
 from slap_ros.acquisition.sac import SkillLearner
 from slap_ros.acquisition.sac_settings import SAC_PRESETS, SMALL, sac_preset
 from slap_ros.acquisition.sac_update import LeanSac
 from slap_ros.acquisition.skill_env import SkillMdp, SkillVecEnv
+from slap_ros.acquisition.twin_critics import NormalisedRectifier, Rectifier, TwinCritics
 from slap_ros.errors import InvalidParameterError
 from slap_ros.relational import RewardTemplate
 
@@ -26,7 +29,7 @@ STARTS = begin(PICK, range(40))
 FRESH = begin(PICK, range(40, 80))
 MDP = SkillMdp(
     POINTS,
-    SkillReward(PICK, REWARDS["Pick"]),
+    SkillReward(PICK, REWARDS["Pick"], INTERFACE),
     Groundings(list(dict.fromkeys(one.grounding for one in STARTS))),
 )
 
@@ -68,6 +71,40 @@ def test_an_update_is_stable_baselines3s_up_to_rounding(task):
         torch.testing.assert_close(ours.log_ent_coef, theirs.log_ent_coef, rtol=1e-4, atol=1e-5)
 
 
+@pytest.mark.parametrize("activation", [Rectifier(), NormalisedRectifier()])
+def test_gradients_of_critics_are_those_of_automatic_differentiation_to_the_bit(activation):
+    torch.manual_seed(0)
+    networks = [create_mlp(SIZE + 5, 1, [64, 64]) for _ in range(2)]
+    critics = TwinCritics([torch.nn.Sequential(*layers) for layers in networks])
+    critics.activation = activation
+    observations, actions = torch.randn(128, SIZE), torch.randn(128, 5)
+    by_values = torch.randn(2, 128, 1)
+    done = critics(observations, actions)
+    by_weights = critics.weight_gradients(done, by_values)
+    by_actions = critics.action_gradient(done, by_values, 5)
+    given = [tensor.requires_grad_() for tensor in (*critics.tensors, actions)]
+    values = critics(observations, actions).values
+    assert torch.equal(values, done.values)
+    *expected, expected_by_actions = torch.autograd.grad(values, given, by_values)
+    assert torch.equal(by_actions, expected_by_actions)
+    for gradient, other in zip(by_weights, expected, strict=True):
+        assert torch.equal(gradient, other)
+
+
+def test_values_of_what_is_far_from_everything_tried_are_bounded_by_normalised_layers():
+    """Else the actor goes after values that nothing speaks for."""
+    near, actions = torch.randn(100, SIZE), torch.zeros(100, MDP.action_map.size)
+
+    def spread(scale, settings):
+        sac = SkillLearner(SkillVecEnv(MDP, STARTS, 8, HORIZON, (1,)), settings, 1)._sac
+        with torch.no_grad():
+            return sac._online(scale * near, actions).values.std()
+
+    plain = replace(QUICK, critic_layer_norm=False)
+    assert spread(1e3, plain) > 100.0 * spread(1.0, plain)
+    assert spread(1e3, QUICK) < 3.0 * spread(1.0, QUICK)
+
+
 def test_what_is_resumed_ends_with_the_same_weights(tmp_path):
     whole = learner()
     for segment in range(2):
@@ -82,9 +119,21 @@ def test_what_is_resumed_ends_with_the_same_weights(tmp_path):
     assert resumed.steps == whole.steps == 6 * HORIZON * 8
     for one, other in zip(weights(whole).values(), weights(resumed).values(), strict=True):
         assert torch.equal(one, other)
+    assert np.array_equal(whole.policy().mean(FRESH_SEEN), resumed.policy().mean(FRESH_SEEN))
     other = learner(seed=2)
     other.learn(6)
     assert not torch.equal(weights(other)["actor.mu.weight"], weights(whole)["actor.mu.weight"])
+
+
+@pytest.mark.parametrize(("tau", "same"), [(1.0, True), (0.005, False)])
+def test_the_policy_is_the_actors_average(tau, same):
+    one = SkillLearner(SkillVecEnv(MDP, STARTS, 8, HORIZON, (1,)), replace(QUICK, tau=tau), 1)
+    before = one.policy().mean(FRESH_SEEN)
+    one.learn(3)
+    latest = np.tanh(one._sac.distribution(torch.as_tensor(FRESH_SEEN))[0].detach().numpy())
+    policy = one.policy().mean(FRESH_SEEN)
+    assert np.allclose(policy, latest, atol=1e-5) == same
+    assert not np.allclose(policy, before, atol=1e-5)
 
 
 def test_a_damaged_checkpoint_is_refused(tmp_path):
@@ -104,7 +153,7 @@ def test_rewards_are_computed_again_when_the_template_changes():
     halved = RewardTemplate(
         "Pick", tuple(replace(term, weight=term.weight / 2) for term in REWARDS["Pick"].terms)
     )
-    mdp = SkillMdp(POINTS, SkillReward(PICK, halved), MDP.groundings)
+    mdp = SkillMdp(POINTS, SkillReward(PICK, halved, INTERFACE), MDP.groundings)
     second = SkillLearner(SkillVecEnv(mdp, STARTS, 8, HORIZON, (1,)), QUICK, 1)
     second.buffer.add_episodes(episodes)
     after = second.buffer.rewards[: second.buffer.size(), 0]
@@ -144,6 +193,18 @@ def test_a_skill_can_begin_with_another_ones_weights():
     large = SkillLearner(SkillVecEnv(MDP, STARTS, 8, HORIZON, (1,)), SAC_PRESETS["large"], 1)
     with pytest.raises(InvalidParameterError, match="same hidden layers"):
         large.begin_with(policy)
+
+
+def test_random_actions_are_held_longer_in_each_environment():
+    one = learner()
+    one.learn(1)  # whole episodes of random actions, then of the policy's with noise
+    random = one.buffer.actions[: HORIZON * 8, 0].reshape(8, HORIZON, -1)[
+        :, : QUICK.random_steps // 8
+    ]
+    for env, actions in enumerate(random):
+        changes = (np.abs(np.diff(actions, axis=0)).max(axis=1) > 0).nonzero()[0] + 1
+        held = 1 + env
+        assert np.array_equal(changes, np.arange(held, len(actions), held)), env
 
 
 FRESH_SEEN = SkillVecEnv(MDP, FRESH, 8, HORIZON, (9,)).observations

@@ -11,6 +11,7 @@ from points import (
     DIS_TO_OBJ,
     HOLDING,
     HORIZON,
+    INTERFACE,
     PICK,
     POINTS,
     PUT,
@@ -80,9 +81,9 @@ def one_by_one(operator, template, state, objects):
 def test_rewards_of_a_batch_are_those_of_each_state(operator):
     states, template = scattered(200), REWARDS[operator.name]
     groundings = Groundings(groundings_of(states[0], operator))
-    mdp = SkillMdp(POINTS, SkillReward(operator, template), groundings)
+    mdp = SkillMdp(POINTS, SkillReward(operator, template, INTERFACE), groundings)
     numbers = np.arange(len(states)) % len(groundings.groundings)
-    rewards, success = mdp.rewards(State.batch(states).data, numbers)
+    rewards, success = mdp.rewards(State.batch(states).data, numbers, State.batch(states).data)
     for state, number, reward in zip(states, numbers, rewards, strict=True):
         objects = groundings.groundings[number].objects
         assert reward == pytest.approx(one_by_one(operator, template, state, objects))
@@ -93,13 +94,13 @@ def test_rewards_of_a_batch_are_those_of_each_state(operator):
 def test_states_of_different_objects_are_rows_of_one_array():
     small, large = scattered(1)[0], make_three()
     groundings = Groundings([*groundings_of(small, PUT), *groundings_of(large, PUT)])
-    mdp = SkillMdp(POINTS, SkillReward(PUT, REWARDS["Put"]), groundings)
+    mdp = SkillMdp(POINTS, SkillReward(PUT, REWARDS["Put"], INTERFACE), groundings)
     rows = np.concatenate([groundings.rows(s.data[None]) for s in (small, large, small)])
     numbers = np.array([1, 6, 3])
-    rewards, _ = mdp.rewards(rows, numbers)
+    rewards, _ = mdp.rewards(rows, numbers, rows)
     for state, number, reward in zip((small, large, small), numbers, rewards, strict=True):
         alone = SkillMdp(POINTS, mdp.reward, Groundings([groundings.groundings[number]]))
-        expected, _ = alone.rewards(state.data[None], np.zeros(1, dtype=np.intp))
+        expected, _ = alone.rewards(state.data[None], np.zeros(1, dtype=np.intp), state.data[None])
         assert reward == expected[0]
     assert mdp.observe(rows, numbers).shape == (3, SIZE)
 
@@ -111,7 +112,9 @@ def make_three():
 def test_observations_are_of_the_operators_objects_alone():
     state = scattered(1)[0]
     mdp = SkillMdp(
-        POINTS, SkillReward(PICK, REWARDS["Pick"]), Groundings(groundings_of(state, PICK))
+        POINTS,
+        SkillReward(PICK, REWARDS["Pick"], INTERFACE),
+        Groundings(groundings_of(state, PICK)),
     )
     other = state.replace({(state.layout.by_name["thing1"], "x"): 0.7})
     rows, numbers = State.batch([state, other]).data, np.zeros(2, dtype=np.intp)
@@ -132,15 +135,17 @@ def test_observations_are_of_the_operators_objects_alone():
 )
 def test_templates_that_cannot_be_weighed_are_refused(terms, reason):
     with pytest.raises(InvalidRewardError, match=reason):
-        SkillReward(PICK, RewardTemplate("Pick", terms))
+        SkillReward(PICK, RewardTemplate("Pick", terms), INTERFACE)
     with pytest.raises(InvalidRewardError, match="the reward of Put is given for Pick"):
-        SkillReward(PICK, REWARDS["Put"])
+        SkillReward(PICK, REWARDS["Put"], INTERFACE)
 
 
 def test_a_parameter_of_a_foreign_type_is_refused():
     hand = Variable("?thing", POINTS.types_by_name["hand"])
     with pytest.raises(InvalidRewardError):
-        SkillReward(PICK, RewardTemplate("Pick", (RewardTerm(DIS_TO_OBJ, (hand,), 0.5),)))
+        SkillReward(
+            PICK, RewardTemplate("Pick", (RewardTerm(DIS_TO_OBJ, (hand,), 0.5),)), INTERFACE
+        )
 
 
 def pick_env(num_envs=2, **changes):
@@ -154,7 +159,7 @@ def pick_env(num_envs=2, **changes):
     )
     initiations = [Initiation(near, (state.layout.by_name[name],)) for name in ("thing0", "thing1")]
     groundings = Groundings([initiation.grounding for initiation in initiations])
-    mdp = SkillMdp(POINTS, SkillReward(PICK, REWARDS["Pick"]), groundings)
+    mdp = SkillMdp(POINTS, SkillReward(PICK, REWARDS["Pick"], INTERFACE), groundings)
     kept = initiations[: changes.pop("initiations", 1)]
     return SkillVecEnv(mdp, kept, num_envs, HORIZON, (3,), **changes)
 
@@ -203,7 +208,7 @@ def test_episodes_go_on_after_success_and_are_truncated_together():
     episodes = env.take_episodes()
     assert episodes.states.shape == (4, HORIZON + 1, env.mdp.groundings.width)
     assert env.take_episodes() is None
-    rewards, _ = env.mdp.rewards(episodes.states[:, -1], episodes.numbers)
+    rewards, _ = env.mdp.rewards(episodes.states[:, -1], episodes.numbers, episodes.states[:, 0])
     assert (rewards == 1.0).all()
 
 

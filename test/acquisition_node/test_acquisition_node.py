@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import json
 import sys
-import time
 from contextlib import contextmanager
 from html import unescape
 from pathlib import Path
@@ -23,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "language"))  # for the sc
 from model_answers import decomposition_json, operator_json
 from scripted_server import Step, serving
 
-from ensemble.interfaces import ACQUISITION_EVENTS, PROPOSE_OPERATORS
+from ensemble.interfaces import ACQUISITION_EVENTS, CLOSE_BAG, PROPOSE_OPERATORS
 from ensemble.launcher import ProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.spinner import temporary_node
@@ -35,7 +34,7 @@ from slap_ros.relational.pddl import parse_domain
 from slap_ros.report.content import read_report
 from slap_ros.report.page import render
 
-LIMIT = 60.0  # s
+LIMIT = 120.0  # s
 KEY = "sk-this-is-nobodys-key"
 DOMAIN = get_domain("obstacle2d")
 SCRIPT = {
@@ -83,6 +82,14 @@ def send(asker, spinner, **goal):
     return sent.result()
 
 
+def close_bag(asker, spinner):
+    """Wait until the recorder has read whatever was sent."""
+    closing = asker.create_client(CLOSE_BAG.type, CLOSE_BAG.name)
+    assert spinner.spin_until(closing.service_is_ready, LIMIT)
+    closed = closing.call_async(CLOSE_BAG.type.Request())
+    assert spinner.spin_until(closed.done, LIMIT)
+
+
 def propose(asker, spinner, **goal):
     """The result of a goal."""
     result = send(asker, spinner, **goal).get_result_async()
@@ -122,6 +129,9 @@ def test_a_model_is_asked_and_told_what_is_wrong(network, tmp_path):
             result = propose(asker, spinner, proposer="language")
             assert result.success, result.error_msg
             assert spinner.spin_until(lambda: len(asker.events) >= len(script) + 5, LIMIT)
+            answers = sum(event.kind == AcquisitionEvent.ANSWERED for event in asker.events)
+            assert spinner.spin_until(lambda: len(asker.feedback) > answers, LIMIT)
+            close_bag(asker, spinner)
         sent = {name.lower(): value for name, value in server.headers[0].items()}
         assert sent["authorization"] == f"Bearer {KEY}"
     kinds = [event.kind for event in asker.events]
@@ -148,18 +158,16 @@ def test_a_model_is_asked_and_told_what_is_wrong(network, tmp_path):
 
 
 def test_canceling_ends_the_wait(network):
-    script = SCRIPT | {"decomposition": [Step(SCRIPT["decomposition"][0].text, stall_s=20.0)]}
+    script = SCRIPT | {"decomposition": [Step(SCRIPT["decomposition"][0].text, stall_s=2 * LIMIT)]}
     with serving(script) as server, asking(base_url=server.url, model="m") as (asker, spinner):
         handle = send(asker, spinner, proposer="language")
         assert spinner.spin_until(lambda: server.asked("decomposition") == 1, LIMIT)
         busy = propose(asker, spinner)
         assert busy.error_code == ErrorCode.BUSY
-        canceled = time.monotonic()
         handle.cancel_goal_async()
         result = handle.get_result_async()
         assert spinner.spin_until(result.done, LIMIT)
         assert result.result().result.error_code == ErrorCode.GOAL_CANCELED
-        assert time.monotonic() - canceled < 15.0  # the answer would take 20 s
         assert propose(asker, spinner).success
 
 

@@ -12,8 +12,11 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
-from slap_ros.bags import evaluate_bag, replay_bag
-from slap_ros.bags.digest import bag_digest
+from truthful_run import make
+
+from slap_ros.bags import evaluate_bag, read_bag, replay_bag
+from slap_ros.bags.digest import _canonical, bag_digest
+from slap_ros.messages.interfaces import PLAN
 from slap_ros.report import read_report, render
 
 DATA = Path(__file__).parent / "data"
@@ -49,3 +52,14 @@ def test_its_report_shows_the_plan_and_the_shortcut() -> None:
     assert [edge.is_shortcut for edge in run.chains[0].edges] == [False, True]
     assert run.scene is not None
     assert f"solved in {THEN['plan_length']} steps" in render([report])
+
+
+def test_fields_that_came_later_change_no_digest_while_they_are_empty() -> None:
+    (plan,) = (message for _, kind, _, message in read_bag(BAG) if kind == PLAN)
+    old = plan.edges[0]
+    values = {name: getattr(old, name) for name in old.__dataclass_fields__}
+    assert not set(values) & {"others_may_appear", "forbidden_atoms"}
+    new = make(old.__msgtype__, **values, others_may_appear=False, forbidden_atoms=[])
+    assert list(_canonical(new)) == list(_canonical(old))
+    new.others_may_appear = True
+    assert list(_canonical(new)) != list(_canonical(old))

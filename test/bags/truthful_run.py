@@ -209,7 +209,9 @@ class Script:
         for number, edge in enumerate(plan.edges):
             self.plan_event(PlanEventKind.EDGE_STARTED, step, number)
             self.skill_event(SkillEventKind.STARTED, step, edge.option)
-            execution = OptionExecution(edge.option, edge.target, domain.action_space, state)
+            execution = OptionExecution(
+                edge.option, edge.target, self.space, domain.action_space, state
+            )
             started = step
             while not isinstance(
                 action := execution.advance(state, self.space.abstract(state)), OptionResult
@@ -257,7 +259,9 @@ class Script:
                 name=edge.option.skill.name,
                 attempt=edge.option.attempt,
                 objects=[obj.name for obj in edge.option.objects],
-                expected_atoms=self.atoms_of(self.space.decode(edge.target)),
+                expected_atoms=self.atoms_of(self.space.decode(edge.target.required)),
+                others_may_appear=False,
+                forbidden_atoms=[],
                 predicted_steps=edge.predicted_steps,
             )
             for edge in plan.edges

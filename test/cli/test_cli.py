@@ -29,7 +29,7 @@ UNSOLVABLE = "(define (problem p) (:domain d) (:objects a - thing) (:init) (:goa
 
 def slap(*arguments, **options):
     command = [sys.executable, "-m", "ensemble.cli", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=90, **options)
+    return subprocess.run(command, capture_output=True, text=True, timeout=200, **options)
 
 
 @pytest.mark.parametrize(
@@ -39,7 +39,7 @@ def test_what_brings_no_node_up_needs_no_ros(arguments):
     hide = "import sys; sys.modules |= dict.fromkeys(['rclpy', 'slap_msgs', 'embedded_ros'])"
     command = f"{hide}; from ensemble.cli import main; main()"
     arguments = [sys.executable, "-c", command, *arguments]
-    ran = subprocess.run(arguments, capture_output=True, text=True, timeout=90)
+    ran = subprocess.run(arguments, capture_output=True, text=True, timeout=200)
     assert ran.returncode == 0, ran.stderr
 
 
@@ -265,6 +265,8 @@ def test_a_recorded_tower_is_rendered_frame_by_frame(network, tmp_path):
         "--json",
         "--size",
         "320x200",
+        "--patience",
+        "10",
     )
     assert run.returncode == 0, run.stderr
     rendered = slap("bag", "render", bag, "--output", gif)

@@ -77,14 +77,14 @@ def test_a_fault_of_our_own_is_kept_for_the_report():
 
 def slap(*arguments, **options):
     command = [sys.executable, "-m", "ensemble.cli", *arguments]
-    return subprocess.run(command, text=True, timeout=60, **options)
+    return subprocess.run(command, text=True, timeout=200, **options)
 
 
 @pytest.mark.parametrize("target", ["/dev/full", "closed"])
 def test_a_stdout_that_takes_nothing_is_an_error_and_no_traceback(target):
     shell = f">{target}" if target != "closed" else ">&-"
     command = f"{sys.executable} -m ensemble.cli domains --json {shell}"
-    run = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=60)
+    run = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=200)
     assert run.returncode == ErrorCode.INPUT_OUTPUT, run.stderr
     assert "Traceback" not in run.stderr
 
@@ -92,7 +92,7 @@ def test_a_stdout_that_takes_nothing_is_an_error_and_no_traceback(target):
 @pytest.mark.parametrize("shell", ["2>/dev/full", "2>&-"])
 def test_a_stderr_that_takes_nothing_leaves_the_exit_code(shell):
     command = f"{sys.executable} -m ensemble.cli plan moon {shell}"
-    run = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=60)
+    run = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=200)
     assert run.returncode == ErrorCode.UNKNOWN_DOMAIN
 
 

@@ -25,8 +25,9 @@ websocket = pytest.importorskip("websocket", reason="websocket-client is not ins
 pytest.importorskip("foxglove", reason="foxglove-sdk is not installed")
 
 RUN = ["run", "obstacle2d", "--seed", "3", "--shortcuts", "none", "--in-process", "--live"]
+RUN += ["--patience", "10"]  # for a loaded machine
 MESSAGE = 1  # opcode of the protocol's binary frames that carry one
-WAIT = 60.0  # s, far more than anything here takes
+WAIT = 120.0  # s, far more than anything here takes
 
 
 class Viewer:

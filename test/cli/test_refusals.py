@@ -82,24 +82,38 @@ def test_what_is_within_the_limits_is_a_task_or_an_error(name, monkeypatch):
 # -- options and parameters -----------------------------------------------------------------------
 
 
-def float_options(group=app, path=()):
-    """Every command with its options that are floats."""
+def options_of(kind, group=app, path=()):
+    """Every command with its options that are of a kind, such as float."""
     for command in group.registered_commands:
         name = command.name or command.callback.__name__
         for option, parameter in signature(command.callback).parameters.items():
-            if float in get_args(parameter.annotation):
+            if kind in kinds_in(parameter.annotation):
                 yield (*path, name), f"--{option.replace('_', '-')}"
     for sub in group.registered_groups:
-        yield from float_options(sub.typer_instance, (*path, sub.name))
+        yield from options_of(kind, sub.typer_instance, (*path, sub.name))
+
+
+def kinds_in(annotation):
+    """The types in an annotation such as ``Annotated[int | None, ...]``."""
+    parts = get_args(annotation)[:1] or (annotation,)
+    return {part for whole in parts for part in (whole, *get_args(whole))}
 
 
 def test_every_option_that_is_a_number_is_finite():
-    options = list(float_options())
+    options = list(options_of(float))
     assert {option for _, option in options} >= {"--pace", "--timeout", "--seconds"}
     for path, option in options:
         for value in NO_NUMBERS:
             result = slap(*path, "obstacle2d", f"{option}={value}")
             assert result.exit_code in (2, ErrorCode.INVALID_PARAMETER), (path, option, value)
+
+
+def test_every_option_that_is_a_whole_number_has_an_upper_end():
+    options = list(options_of(int))
+    assert {option for _, option in options} >= {"--tasks", "--seed", "--jobs", "--steps"}
+    for path, option in options:
+        result = slap(*path, "obstacle2d", f"{option}={'9' * 400}")
+        assert result.exit_code in (2, ErrorCode.INVALID_PARAMETER), (path, option)
 
 
 NODES = ("sim_node", "perception_node", "planner_node", "skill_server")

@@ -4,7 +4,6 @@
 
 import itertools
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -14,22 +13,16 @@ from pathlib import Path
 
 import psutil
 import pytest
+from process_state import handles_signals
 
 from slap_ros.bags import evaluate_bag
 
 LIBRARY = Path(__file__).parents[1] / "shortcuts" / "data" / "obstacle2d"
-LIMIT_S = 60.0  # far more than anything here takes
+LIMIT_S = 120.0  # far more than anything here takes
 ENDINGS = {signal.SIGINT: ("interrupted", 130), signal.SIGTERM: ("terminated", 143)}
 IN_THE_MIDDLE_S = 1.0  # of processor time: everything is imported by then
 EVALUATE = ("evaluate", "obstacle2d", "--tasks", "10000", "--jobs", "2", "--shortcuts", "none")
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
-
-
-def handles_signals(pid):
-    """Whether a process has begun to handle SIGTERM: before, it is the interpreter that starts."""
-    status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
-    caught = int(re.search(r"SigCgt:\s*(\w+)", status)[1], 16)
-    return bool(caught >> (signal.SIGTERM - 1) & 1)
 
 
 def wait_until(condition):
@@ -144,6 +137,7 @@ def hanoi(folder):
 
 def test_a_run_closes_its_bag(network, tmp_path):
     arguments = ("run", "obstacle2d", "--record", "bag", "--pace", "20", "--shortcuts", "none")
+    arguments += ("--patience", "10")  # for a loaded machine
     with started(*arguments, folder=tmp_path) as process:
         recorded = tmp_path / "bag" / "bag_0.mcap"
         # It moves: the topic of commands is announced in the bag with the first of them.
@@ -178,9 +172,71 @@ except KeyboardInterrupt as error:
 def test_a_signal_that_falls_into_a_destructor_is_not_lost(number):
     """Python drops what is raised there, and would go on."""
     code = IN_A_DESTRUCTOR.format(number=int(number))
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=30)
+    run = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=LIMIT_S
+    )
     assert run.returncode == ENDINGS[number][1]
     assert not run.stderr
+
+
+IN_A_STRING = """
+import os, signal, typer
+from slap_ros.cli.console import exits
+from slap_ros.signals import exit_at_once_on_signals
+
+def command():
+    exec("os.kill(os.getpid(), signal.SIGINT)\\nfor _ in range(1000): pass")
+
+exit_at_once_on_signals()
+typer.run(exits(command))
+"""
+
+
+def test_ctrl_c_while_a_class_is_made_from_a_string_keeps_the_exit_code(tmp_path):
+    """Python notes such an interrupt, and kills itself at the end of `python -m`."""
+    (tmp_path / "program.py").write_text(IN_A_STRING)
+    command = [sys.executable, "-m", "program"]
+    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=LIMIT_S)
+    assert (run.returncode, run.stderr) == (130, "interrupted\n")
+
+
+WHERE_IT_HURTS = """
+import os, signal, sys, threading, time
+from slap_ros.learning.workers import local_workers
+from slap_ros.signals import exit_at_once_on_signals, exit_code, signals_raised
+
+moments = 0
+
+def look(frame, event, arg):
+    global moments
+    if frame.f_code.co_name in ("start", "__enter__"):  # of a process or thread, of a lock
+        moments += 1
+        if moments == {moment}:
+            os.kill(os.getpid(), signal.SIGINT)
+    return look
+
+if __name__ == "__main__":
+    exit_at_once_on_signals()
+    # Such as the one that draws progress bars: it takes signals that the main thread has blocked.
+    threading.Thread(target=time.sleep, args=(1000,), daemon=True).start()
+    try:
+        with signals_raised(), local_workers(2) as workers:
+            results = workers.run(abs, [(-1,)] * 40)
+            sys.settrace(look)
+            list(results)
+            sys.settrace(None)
+    except KeyboardInterrupt as error:
+        sys.settrace(None)
+        raise SystemExit(exit_code(error))
+"""
+
+
+def test_ctrl_c_while_locks_are_taken_or_processes_started_leaves_neither(tmp_path, attempt):
+    """The pool would wait for a lock that was left taken, a lost process would fail aloud."""
+    program = tmp_path / "program.py"
+    program.write_text(WHERE_IT_HURTS.format(moment=20 * attempt + 11))
+    run = subprocess.run([sys.executable, program], capture_output=True, text=True, timeout=LIMIT_S)
+    assert (run.returncode, run.stderr) == (130, "")
 
 
 def test_what_is_ignored_stays_ignored(tmp_path):

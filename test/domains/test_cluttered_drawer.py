@@ -32,7 +32,7 @@ from slap_ros.planning.model import Model
 from slap_ros.planning.options import given_option
 from slap_ros.planning.planner import GraphPlanner, Problem
 from slap_ros.planning.search import search_exhaustively, search_lazily
-from slap_ros.relational import Column, State
+from slap_ros.relational import Column, State, Target
 
 FAIR, PAPER = get_domain("cluttered_drawer"), get_domain("cluttered_drawer", "paper")
 HALF = 0.025  # m, half a block
@@ -297,7 +297,8 @@ def test_a_hand_that_turns_around_the_block_frees_two_sides_and_holds_nothing():
     robot, target = (task.initial_state.layout.object(name) for name in ("robot", "block1"))
     reach = next(g for g, _ in problem.operators if str(g) == "Reach(robot, block1)")
     option = given_option(PAPER, "Reach", (robot, target))
-    state = problem.model.roll_out(option, task.initial_state, reach.apply(start)).final
+    reached = Target.exactly(reach.apply(start))
+    state = problem.model.roll_out(option, task.initial_state, reached).final
     world = PAPER.make_world(state)
     x, y, z = pose_of(state, target).position
     ahead = rotate(grasp_pose(joints_of(state)).quaternion, (1.0, 0.0, 0.0))

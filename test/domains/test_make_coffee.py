@@ -19,10 +19,19 @@ from drawer_states import (
     put,
 )
 
+from slap_ros.acquisition.domain_choice import DomainChoice, open_domain
+from slap_ros.contact.world import MAX_SHIFT
 from slap_ros.domains import get_domain
 from slap_ros.domains.benchtop import drawers
 from slap_ros.domains.benchtop.cabinet import TRAVEL
-from slap_ros.domains.benchtop.state_access import hand_position, pose_of, position_of
+from slap_ros.domains.benchtop.hand_motion import OPEN, HandGoal
+from slap_ros.domains.benchtop.scripts import Move, follow, over
+from slap_ros.domains.benchtop.state_access import (
+    hand_position,
+    hand_target,
+    pose_of,
+    position_of,
+)
 from slap_ros.domains.make_coffee.scenery import (
     BOTTOM,
     HOLDER_RADIUS,
@@ -34,7 +43,6 @@ from slap_ros.domains.make_coffee.scenery import (
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.geometry.pose import Pose
 from slap_ros.learning.demonstrator import demonstrate
-from slap_ros.learning.domain_choice import DomainChoice, open_domain
 from slap_ros.relational import State
 
 DOMAIN = get_domain("make_coffee")
@@ -140,6 +148,17 @@ def test_a_pod_is_in_its_drawer_until_it_is_lifted_out():
     assert "HandEmpty()" not in grasped
 
 
+@pytest.mark.parametrize(("degrees", "stands"), [(14, True), (16, False), (90, False)])
+def test_a_pod_that_leans_is_neither_in_its_drawer_nor_held(degrees, stands):
+    """It would not go into the holder."""
+    half = 0.5 * math.radians(degrees)
+    state = changed(in_drawer(DOMAIN.task(4).initial_state), "pod", held=1.0)
+    upright = pose_of(state, state.layout.object("pod"))
+    leaning = Pose(upright.position, (math.sin(half), 0.0, 0.0, math.cos(half)))
+    found = atoms(DOMAIN, put(state, "pod", leaning))
+    assert ("InCabinet(pod, cabinet)" in found) == ("Holding(pod)" in found) == stands
+
+
 @pytest.mark.parametrize(
     ("degrees", "names"), [(14, {"IsLidClose"}), (16, set()), (59, set()), (61, {"IsLidOpen"})]
 )
@@ -206,6 +225,27 @@ def test_an_approach_ends_behind_the_lid():
         assert after[holder].tobytes() == state[holder].tobytes()  # it was not touched
         assert behind > 0.12
         assert 0.1 < over < 0.2
+
+
+@pytest.mark.parametrize("pushed", [(-1.0, 1.0), (1.0, -1.0)])
+def test_a_hand_that_is_pressed_against_the_holder_leaves_the_pod_in_it(pushed):
+    """Walls that let it go with a jerk would let it tear the pod out."""
+    acquisition = DOMAIN.acquisition
+    state = inserted(DOMAIN.task(5).initial_state)
+    pod, holder = map(state.layout.object, ("pod", "holder"))
+    x, y, _ = position_of(state, pod)
+    with DOMAIN.make_world(state) as world:
+        around = HandGoal((x, y, 0.033), yaw=0.4)
+        carry_out(world, follow(*over(state, around, OPEN, 0.2), Move(around, OPEN)))
+        aside, ahead = pushed
+        for _ in range(4):
+            world.step(np.array([MAX_SHIFT * aside, MAX_SHIFT * ahead, -MAX_SHIFT, 0.0, -1.0]))
+        target, _ = hand_target(world.state)
+        assert math.dist(target, hand_position(world.state)) > 0.02
+        before = atoms(DOMAIN, world.state)
+        assert "In(pod, holder)" in before
+        after = carry_out(world, acquisition.approach(world.state, (holder,)))
+        assert "In(pod, holder)" in atoms(DOMAIN, after)
 
 
 # -- what cannot be -------------------------------------------------------------------------------

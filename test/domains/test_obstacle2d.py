@@ -170,6 +170,31 @@ def test_paper_preset_has_the_three_start_states_of_the_reference():
     assert obstacles == {0.4, 0.5, 0.6}
 
 
+@pytest.mark.parametrize(("preset", "reach", "gap"), [("fair", 0.05, 0.02), ("paper", 0.02, 0.001)])
+@pytest.mark.parametrize("past", [-1e-6, 1e-6])
+def test_a_block_is_grasped_as_far_away_as_the_preset_says(preset, reach, gap, past):
+    domain = get_domain("obstacle2d", preset)
+    for sideways, above in [(reach + past, 0.0), (0.0, gap + past)]:
+        task = make_task((0.8 + sideways, BLOCK_SIZE + above), 0.4, [0.8, 0.45])
+        close = np.array([0.0, 0.0, 1.0])
+        block = task.initial_state.layout.object("block1")
+        grasped = past < 0.0
+        alone = domain.make_world(task.initial_state).step(close)
+        assert (alone.get(block, "held") > 0.5) == grasped
+        (together,) = domain.make_vector_world([task.initial_state]).step(close[None]).data
+        assert np.array_equal(together, alone.data)
+
+
+@pytest.mark.parametrize(("preset", "tolerance"), [("fair", 0.01), ("paper", 1e-4)])
+def test_a_block_is_in_the_target_area_as_exactly_as_the_preset_says(preset, tolerance):
+    domain = get_domain("obstacle2d", preset)
+    for off, inside in [(0.999 * tolerance, True), (1.001 * tolerance, False)]:
+        state = make_task((0.5, 1.0), 0.4, [0.4 + off, 0.8]).initial_state
+        space = domain.atom_space(state)
+        held = {str(atom) for atom in space.decode(space.abstract(state))}
+        assert ("On(block1, target)" in held) == inside
+
+
 def test_every_task_starts_with_an_overlapped_target_and_room():
     counts = set()
     for seed in range(200):

@@ -50,19 +50,16 @@ def foxglove_paths():
 
 @pytest.fixture
 def published(network):
-    """Types by topic, of the nodes of a run in Obstacle Tower."""
+    """Types by topic, where the nodes of a run in Obstacle Tower publish whatever is shown."""
     pytest.importorskip("pybullet")
     settings = RunSettings("obstacle_tower", "fair", 1, 0, "lazy", None, shortcuts="none")
     with (
         temporary_node(lambda: RunClient(lambda *_: None)) as (client, spinner),
         InProcessLauncher(node_parameters(settings), spinner.executor),
     ):
-        assert spinner.spin_until(lambda: client.ready(recording=False), 60.0)
-        return {
-            name: types
-            for name, types in client.get_topic_names_and_types()
-            if client.count_publishers(name)
-        }
+        shown = {topic for topic, _ in rviz_topics()} | {topic for topic, _ in foxglove_paths()}
+        assert spinner.spin_until(lambda: all(map(client.count_publishers, shown)), 120.0), shown
+        return dict(client.get_topic_names_and_types())
 
 
 def test_what_is_shown_is_published_and_has_such_fields(published):

@@ -23,11 +23,13 @@ from ensemble.nodes import RunSettings, node_parameters
 from ensemble.spinner import temporary_node
 from ensemble.state_synchronizer import StateSynchronizer
 from slap_ros.bags import evaluate_bag
-from slap_ros.messages.interfaces import STATE
+from slap_ros.messages.events import PlanEventKind
+from slap_ros.messages.interfaces import PLAN_EVENT, STATE
 
 LIBRARY = Path(__file__).parent.parent / "shortcuts" / "data" / "obstacle2d"
 ALL = ("sim_node", "perception_node", "skill_server", "planner_node", "recorder_node")
-LIMIT = 60.0  # s, far more than anything here takes: a loaded machine takes its time
+PATIENTLY = ("--patience", "10")  # for a loaded machine
+LIMIT = 120.0  # s, far more than anything here takes: a loaded machine takes its time
 
 
 class Listener(RunClient):
@@ -40,7 +42,9 @@ class Listener(RunClient):
 
 def parameters(record=None, seed=3, pace=0.0):
     return node_parameters(
-        RunSettings("obstacle2d", "fair", seed, 0, "lazy", record, pace=pace, shortcuts="none")
+        RunSettings(
+            "obstacle2d", "fair", seed, 0, "lazy", record, pace=pace, shortcuts="none", patience=5.0
+        )
     )
 
 
@@ -124,6 +128,23 @@ def test_a_node_that_comes_back_is_taken_up_again(network, victim):
             assert solve(client, spinner, episode=opened.episode).success
 
 
+def test_a_skill_server_that_comes_after_the_plan_is_waited_for(network):
+    nodes = parameters()
+    nodes["planner_node"]["patience"] = 24.0  # 120 s for it to come
+    late = {"skill_server": nodes.pop("skill_server")}
+    with temporary_node(Listener) as (client, spinner), ProcessLauncher(nodes):
+        assert spinner.spin_until(client._solve.server_is_ready, LIMIT)
+        sent = client.send((), 0, 5)
+        assert spinner.spin_until(lambda: PLAN_EVENT in client.newest, LIMIT)
+        edge_started = PlanEventKind.EDGE_STARTED
+        assert spinner.spin_until(lambda: client.newest[PLAN_EVENT].kind == edge_started, LIMIT)
+        with ProcessLauncher(late):
+            assert spinner.spin_until(sent.done, LIMIT)
+            result = sent.result().get_result_async()
+            assert spinner.spin_until(result.done, LIMIT)
+            assert result.result().result.success
+
+
 def test_a_simulator_that_comes_back_opens_a_new_episode(network):
     nodes = parameters()
     others = {name: p for name, p in nodes.items() if name != "sim_node"}
@@ -203,17 +224,22 @@ def test_cancelling_makes_the_robot_hold(network):
         sent = client.send((), 0, 5)
         assert spinner.spin_until(sent.done, LIMIT)
         assert spinner.spin_until(lambda: len(states(client)) > 5, LIMIT)
-        canceled = sent.result().cancel_goal_async()
-        assert spinner.spin_until(canceled.done, LIMIT)
+        answer = sent.result().cancel_goal_async()
+        assert spinner.spin_until(answer.done, LIMIT)
         result = sent.result().get_result_async()
         assert spinner.spin_until(result.done, LIMIT)
         assert result.result().result.error_code == 34
-        spinner.spin_until(lambda: False, 0.5)
-        seen = states(client)
-        assert len(seen) < 20  # mid-way
-        assert seen[-1].objects[0].features == seen[-2].objects[0].features  # it held
-        spinner.spin_until(lambda: False, 0.5)
-        assert len(states(client)) == len(seen)  # and nothing more was commanded
+        # A command may have been under way, then comes the one that holds, and nothing more.
+        assert spinner.spin_until(lambda: holds(states(client)), LIMIT)
+        held = len(states(client))
+        spinner.spin_until(lambda: False, 1.0)
+        assert len(states(client)) == held
+
+
+def holds(told):
+    """Whether the robot did not move in the last step."""
+    before, after = told[-2:]
+    return before.objects[0].features == after.objects[0].features
 
 
 def test_skills_are_listed_with_their_signatures(network):
@@ -237,7 +263,7 @@ def test_a_killed_node_ends_the_run_with_a_code_and_a_readable_bag(network, tmp_
     bag = tmp_path / "bag"
     runner = subprocess.Popen(
         [sys.executable, "-m", "ensemble.cli", "run", "obstacle2d", "--seed", "3",
-         "--pace", "10", "--record", str(bag)],
+         "--pace", "10", "--record", str(bag), *PATIENTLY],
         stderr=subprocess.PIPE,
         text=True,
     )  # fmt: skip
@@ -254,12 +280,12 @@ def victim_of(runner, victim, bag):
     """Wait until the run is under way and recorded; the victim's process id."""
     import psutil
 
-    end = time.monotonic() + LIMIT
+    end = time.monotonic() + 3 * LIMIT
     while time.monotonic() < end:
         children = psutil.Process(runner).children()
         pids = [child.pid for child in children if victim in child.cmdline()]
         recorded = sum(f.stat().st_size for f in bag.glob("*.mcap")) if bag.exists() else 0
-        if pids and recorded > 60_000:
+        if pids and recorded > 40_000:  # of some 90,000: long before the end
             return pids[0]
         time.sleep(0.002)
     raise AssertionError("the run did not get under way")
@@ -280,10 +306,11 @@ def test_a_full_disk_ends_the_run_and_keeps_what_was_recorded(network, tmp_path)
             "30",
             "--record",
             str(bag),
+            *PATIENTLY,
         ],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=2 * LIMIT,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (80_000, 80_000)),
     )
     assert result.returncode == 92, result.stderr

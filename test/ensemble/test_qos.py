@@ -10,7 +10,7 @@ from ensemble.launcher import InProcessLauncher
 from ensemble.spinner import temporary_node
 from slap_ros.bags.rosbag2 import TopicRecord
 
-LIMIT = 60.0  # s
+LIMIT = 120.0  # s
 
 
 @pytest.mark.parametrize("namespace", ["", "/robot1"])

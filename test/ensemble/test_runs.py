@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 
 import numpy as np
@@ -27,8 +28,9 @@ from slap_ros.planning.execution import Executor
 from slap_ros.planning.planner import make_planner
 
 FRAMES = "tf2_msgs/msg/TFMessage"
+PATIENCE = 5.0  # for a loaded machine
 # Of `slap run obstacle2d --seed 3`, whatever the machine, the Python and the numpy.
-DIGEST_OF_SEED_3 = "6ba176d79c8889b9b98a12fc8084d2315e8f77256d8fd15f372b77ce527912ad"
+DIGEST_OF_SEED_3 = "d538363d5738338dbf0fab42edadf582fdd946453c1412bc45be5608c68ef610"
 
 
 def ignore(type_name, message):
@@ -36,13 +38,15 @@ def ignore(type_name, message):
 
 
 def request(record=None, seed=3, in_process=True, **options):
-    settings = RunSettings("obstacle2d", "fair", seed, 0, "lazy", record, shortcuts="none")
-    return RunRequest(settings, timeout_s=60, in_process=in_process, **options)
+    settings = RunSettings(
+        "obstacle2d", "fair", seed, 0, "lazy", record, shortcuts="none", patience=PATIENCE
+    )
+    return RunRequest(settings, timeout_s=200, in_process=in_process, **options)
 
 
 def slap(*arguments, **options):
     command = [sys.executable, "-m", "ensemble.cli", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=90, **options)
+    return subprocess.run(command, capture_output=True, text=True, timeout=200, **options)
 
 
 def atoms_by_step(bag):
@@ -55,6 +59,7 @@ def atoms_by_step(bag):
 
 def test_live_bag_in_process_and_offline_agree_to_the_digit(network, tmp_path):
     arguments = ["--seed", "3", "--shortcuts", "none", "--record", str(tmp_path / "a")]
+    arguments += ["--patience", str(PATIENCE)]
     live = slap("run", "obstacle2d", *arguments, "--json")
     assert live.returncode == 0, live.stderr
     from_bag = slap("bag", "evaluate", str(tmp_path / "a"), "--json")
@@ -111,9 +116,17 @@ def test_with_noise_the_ensemble_errs_as_an_experiment_does(network, tmp_path, s
     """The same looks, plans and replans, whoever runs them; bags tell what cannot be checked."""
     noise = {"position_noise": 0.005, "threshold_noise": 0.002, "noise_seed": 2}
     settings = RunSettings(
-        "obstacle2d", "fair", seed, 0, "lazy", tmp_path / "bag", shortcuts="none", perception=noise
+        "obstacle2d",
+        "fair",
+        seed,
+        0,
+        "lazy",
+        tmp_path / "bag",
+        shortcuts="none",
+        perception=noise,
+        patience=PATIENCE,
     )
-    live = run(RunRequest(settings, max_replans=10, timeout_s=60, in_process=True), ignore)
+    live = run(RunRequest(settings, max_replans=10, timeout_s=200, in_process=True), ignore)
     (recorded,) = evaluate_bag(tmp_path / "bag").runs
     assert recorded == live
     assert evaluate_bag(tmp_path / "bag").compared == 0
@@ -145,6 +158,7 @@ def test_with_noise_the_ensemble_errs_as_an_experiment_does(network, tmp_path, s
 
 def test_an_object_that_nobody_sees_ends_a_run_with_its_own_code(network):
     arguments = ["--seed", "3", "--shortcuts", "none", "--in-process"]
+    arguments += ["--patience", str(PATIENCE)]
     live = slap("run", "obstacle2d", *arguments, "--perception", "hidden=block1,memory=5")
     assert live.returncode == 77, live.stderr
     assert "the goal is about what is not detected: block1" in live.stderr
@@ -202,7 +216,7 @@ def test_the_story_of_a_run_is_told(network, capsys):
     assert "PlaceInTarget(robot, block1, target): reached" in told
 
 
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(1200)
 def test_100_runs_leave_no_thread_no_file_and_no_process(network, tmp_path):
     def left():
         return (
@@ -212,20 +226,30 @@ def test_100_runs_leave_no_thread_no_file_and_no_process(network, tmp_path):
         )
 
     run(request(tmp_path / "first"), ignore)
-    before, children = left(), psutil.Process().children()
+    before, children = left(), set(psutil.Process().children())
     for number in range(100):
         bag = tmp_path / str(number) if number % 10 == 0 else None
         assert run(request(bag, seed=number), ignore).success
-    after = left()
-    assert all(b <= a for b, a in zip(after, before, strict=True)), (before, after)
-    assert psutil.Process().children() == children
+    # The kernel lists a thread for a moment after it was joined.
+    end = time.monotonic() + 60.0
+    while any(now > then for now, then in zip(left(), before, strict=True)):
+        assert time.monotonic() < end, (before, left())
+        time.sleep(0.02)
+    assert set(psutil.Process().children()) <= children
 
 
 def test_a_tower_is_taken_apart_by_the_ensemble_and_replayed_bit_for_bit(network, tmp_path):
     settings = RunSettings(
-        "obstacle_tower", "fair", 1, 0, "lazy", tmp_path / "bag", shortcuts="none"
+        "obstacle_tower",
+        "fair",
+        1,
+        0,
+        "lazy",
+        tmp_path / "bag",
+        shortcuts="none",
+        patience=PATIENCE,
     )
-    live = run(RunRequest(settings, timeout_s=100), ignore)
+    live = run(RunRequest(settings, timeout_s=500), ignore)
     assert live.success, live.error_msg
     assert replay_bag(tmp_path / "bag").identical
     found = evaluate_bag(tmp_path / "bag")

@@ -16,14 +16,19 @@ from ensemble.interfaces import ATOMS, DOMAIN
 from ensemble.spinner import Spinner
 from perception_node.node import PerceptionNode
 
-LIMIT = 60.0  # s, far more than anything here takes
+LIMIT = 120.0  # s, far more than anything here takes
 SLOW = '''
-import sys, threading, time
+import os, sys, threading, time
+from pathlib import Path
 from dataclasses import replace
 from slap_ros.domains import get_domain
 
 IMPORTED_IN = threading.current_thread().name
-time.sleep(2.0)
+if "SLOW_UNTIL" in os.environ:
+    while not Path(os.environ["SLOW_UNTIL"]).exists():
+        time.sleep(0.02)
+else:
+    time.sleep(2.0)
 IN_SIMULATOR = "sim_node" in sys.argv[0]
 
 
@@ -67,7 +72,11 @@ def test_a_slow_domain_is_waited_for(network, slow_domain):
     assert json.loads(done.stdout)["success"]
 
 
-def test_what_the_simulator_announces_is_imported_in_a_thread(network, slow_domain):
+def test_what_the_simulator_announces_is_imported_in_a_thread(
+    network, slow_domain, tmp_path, monkeypatch
+):
+    go_on = tmp_path / "go on"
+    monkeypatch.setenv("SLOW_UNTIL", str(go_on))
     rclpy.init()
     executor, source = SingleThreadedExecutor(), rclpy.create_node("source")
     node = PerceptionNode()
@@ -83,8 +92,10 @@ def test_what_the_simulator_announces_is_imported_in_a_thread(network, slow_doma
         assert sys.modules["slow_domain"].IMPORTED_IN.startswith("episode")
         # Callbacks run meanwhile: the import is not over yet.
         assert not hasattr(sys.modules["slow_domain"], "make")
+        go_on.touch()
         assert spinner.spin_until(lambda: hasattr(sys.modules["slow_domain"], "make"), LIMIT)
     finally:
+        go_on.touch()
         node.destroy_node()
         source.destroy_node()
         executor.shutdown()

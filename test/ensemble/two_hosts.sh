@@ -1,12 +1,14 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-# Two network namespaces joined by a cable, a node in each: `unshare -rn bash two_hosts.sh PYTHON`.
+# Two network namespaces joined by a cable, a node in each, which have so long to hear each other:
+# `unshare -rn bash two_hosts.sh PYTHON FOLDER SECONDS`.
 set -euo pipefail
 here="$(dirname "$0")"
 node="$here/lonely_node.py"
+python="$1" folder="$2" seconds="$3"
 port=$((7410 + 250 * ROS_DOMAIN_ID)) # where a domain's first participant listens
 
-unshare -n sleep 150 & other=$!
+unshare -n sleep 500 & other=$!
 trap 'kill $other' EXIT
 until [ "$(readlink /proc/$other/ns/net)" != "$(readlink /proc/self/ns/net)" ]; do sleep 0.1; done
 there() { nsenter --target $other --net "$@"; }
@@ -20,11 +22,18 @@ there ip link set lo up
 there ip addr add 10.9.0.2/24 dev outside
 there ip link set outside up
 
-"$1" "$node" inside & one=$!
-"$1" "$here/knock.py" 127.0.0.1 $port open
-if there "$1" "$here/knock.py" 10.9.0.1 $port refused; then echo door:False; else echo door:True; fi
+"$python" "$node" inside "$folder" & one=$!
+"$python" "$here/knock.py" 127.0.0.1 $port open
+if there "$python" "$here/knock.py" 10.9.0.1 $port refused; then echo door:False; else echo door:True; fi
 export CYCLONEDDS_URI='<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="outside"/>
   </Interfaces></General><Discovery><ParticipantIndex>auto</ParticipantIndex>
   <Peers><Peer address="10.9.0.1"/></Peers></Discovery></Domain></CycloneDDS>'
-there "$1" "$node" outside & two=$!
+there "$python" "$node" outside "$folder" & two=$!
+there_is() { [ -e "$folder/inside.$1" ] && [ -e "$folder/outside.$1" ]; }
+until there_is up; do sleep 0.1; done
+for ((i = 0; i < 10 * seconds; i++)); do
+  if there_is heard; then break; fi
+  sleep 0.1
+done
+touch "$folder/end"
 wait $one && wait $two

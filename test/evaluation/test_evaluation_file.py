@@ -44,8 +44,14 @@ def test_the_figures_are_those_of_the_trials(file):
     assert data["library"]["name"] == "obstacle2d"
 
 
-def test_its_command_makes_it_again(file, tmp_path):
+@pytest.mark.parametrize("more", [[], ["--shooting"]])
+def test_its_command_makes_it_again(file, tmp_path, more):
+    if more:
+        file = tmp_path / "data.json"
+        code, said = evaluate(file, *WITH, *more)
+        assert code == 0, said
     command = json.loads(file.read_text())["command"]
+    assert [option for option in more if option not in shlex.split(command)] == []
     again = tmp_path / "again.json"
     arguments = [*shlex.split(command)[1:], "--output", str(again)]
     assert CliRunner().invoke(app, arguments).exit_code == 0
@@ -65,6 +71,13 @@ def test_the_data_of_another_command_stays(file):
     assert code == ErrorCode.INVALID_PARAMETER
     assert "has the data of `slap evaluate obstacle2d" in said
     assert file.read_bytes() == before
+
+
+def test_a_search_without_learning_needs_a_library_all_the_same(tmp_path):
+    code, said = evaluate(tmp_path / "data.json", "--shooting", "--shortcuts", "none")
+    assert code == ErrorCode.INVALID_PARAMETER
+    assert "give --shortcuts" in said
+    assert not list(tmp_path.iterdir())
 
 
 def test_what_is_no_evaluation_stays(tmp_path):

@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from slap_ros.errors import ErrorCode
-from slap_ros.evaluation.metrics import RunLog, RunMetrics
+from slap_ros.evaluation.metrics import RunMetrics
+from slap_ros.evaluation.run_log import RunLog
 from slap_ros.messages.events import PlanEventKind, SkillEventKind
 from slap_ros.messages.interfaces import (
     ATOMS,

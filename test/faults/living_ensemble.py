@@ -77,9 +77,11 @@ class Laboratory:
 
 
 @contextmanager
-def laboratory(seed, bag, pace):
+def laboratory(seed, bag, pace, patience=1.0):
     """An ensemble on a task, at so many steps a second; ``bag`` may be None."""
-    settings = RunSettings("obstacle2d", "fair", seed, 0, "lazy", bag, pace=pace, shortcuts="none")
+    settings = RunSettings(
+        "obstacle2d", "fair", seed, 0, "lazy", bag, pace=pace, shortcuts="none", patience=patience
+    )
     heard = []
 
     def client_node():

@@ -18,6 +18,7 @@ from typer.testing import CliRunner
 from ensemble.cli.application import app
 from ensemble.entry_point import run_node
 from sim_node.node import SimNode
+from slap_ros.acquisition.domain_choice import DomainChoice
 from slap_ros.bags import bag_digest, bag_info, evaluate_bag, read_bag, replay_bag
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode, SlapError
@@ -244,7 +245,7 @@ def test_damaged_pddl_is_planned_for_or_refused(tmp_path, name, count):
 
 # -- trainings ------------------------------------------------------------------------------------
 
-PLACE = TaskDistribution("obstacle2d", "fair", 3)
+PLACE = TaskDistribution(DomainChoice("obstacle2d", "fair"), 3)
 BRIEF = replace(
     training_settings("ours", get_domain("obstacle2d")),
     exploration=ExplorationSettings(tasks=1, rollouts=60, length=30, action_repeat=4),

@@ -27,7 +27,7 @@ from slap_ros.shortcuts.library import load_library
 
 ROOT = Path(__file__).parents[2]
 LIBRARY = ROOT / "test" / "shortcuts" / "data" / "obstacle2d"
-LIMIT = 60.0  # s, far more than anything here takes
+LIMIT = 120.0  # s, far more than anything here takes
 NAMES = ("../../elsewhere", "/etc/passwd", "..", "a/b", "os", "slap_ros.domains", "$(id)", "é\n{}")
 
 
@@ -194,7 +194,7 @@ def objection(node):
         return None
     called = ast.unparse(node.func)
     options = {option.arg: ast.unparse(option.value) for option in node.keywords}
-    if called in ("eval", "exec"):
+    if called in ("eval", "exec") and not all(isinstance(arg, ast.Constant) for arg in node.args):
         return called
     if called == "torch.load" and options.get("weights_only") != "True":
         return called

@@ -5,6 +5,7 @@
 from contextlib import contextmanager
 from copy import deepcopy
 from functools import partial
+from threading import Event
 
 import pytest
 import rclpy
@@ -15,13 +16,15 @@ from rclpy.parameter import Parameter
 from slap_msgs.msg import DomainInfo, EpisodeFault
 
 from ensemble.client import RunClient
+from ensemble.episode_tracker import EpisodeTracker
 from ensemble.interfaces import ATOMS, DIAGNOSTICS, DOMAIN, FAULT, STATE, TASK
 from ensemble.nodes import RunSettings, node_class, node_parameters
+from ensemble.refusals import Refusals
 from ensemble.spinner import Spinner
 from sim_node.node import SimNode
 from slap_ros.bags import evaluate_bag
 
-LIMIT = 60.0  # s, far more than anything here takes
+LIMIT = 120.0  # s, far more than anything here takes
 LISTENERS = ("/perception_node", "/planner_node", "/skill_server")
 HEARD_BY = {DOMAIN.name: 6, TASK.name: 6, STATE.name: 6, ATOMS.name: 5, FAULT.name: 4}  # nodes
 LATEST = 2**31 - 1  # s since the epoch, in 2038: the last that a stamp can have
@@ -83,7 +86,7 @@ class StrayLaboratory(Laboratory):
 
 @contextmanager
 def laboratory(bag):
-    settings = RunSettings("obstacle2d", "fair", 3, 0, "lazy", bag, shortcuts="none")
+    settings = RunSettings("obstacle2d", "fair", 3, 0, "lazy", bag, shortcuts="none", patience=5.0)
     rclpy.init()
     executor, nodes = SingleThreadedExecutor(), []
     try:
@@ -181,6 +184,53 @@ def test_strays_are_refused_and_do_not_stick(network, tmp_path):
     assert len(found.runs) == len(STRAYS) + 1
     assert all(run.success for run in found.runs)
     assert "states that are not finite: 1" in found.damage
+
+
+def test_a_task_is_opened_that_a_refused_one_overtook(network, tmp_path):
+    opened = []
+    with laboratory(tmp_path / "bag") as bench:
+        episode = bench.episode_from(seed=0)
+        tracker = EpisodeTracker(
+            bench.client,
+            lambda _: None,
+            lambda episode, _: opened.append(episode.number),
+            Refusals(bench.client),
+        )
+        assert bench.spinner.spin_until(lambda: opened == [episode], LIMIT)
+        after = changed(bench.newest[TASK.name], episode=episode + 1)
+        for message in (after, spoilt(after)):  # before either is open
+            tracker._on_task(message)
+        assert bench.spinner.spin_until(lambda: tracker.refusal is not None, LIMIT)
+        assert opened == [episode, episode + 1]
+        tracker.destroy()
+
+
+def test_a_world_that_is_reset_twice_at_once_is_perceived(network, tmp_path):
+    with laboratory(tmp_path / "bag") as bench:
+        nodes = {node.get_name(): node for node in bench.nodes}
+        perception = nodes["perception_node"]
+        synchronizers = [nodes[name]._synchronizer for name in ("planner_node", "skill_server")]
+        trackers = [perception._episodes, *(waiting._episodes for waiting in synchronizers)]
+        perceive, observe = Event(), Event()
+        for tracker, begin in zip(trackers, (perceive, observe, observe), strict=True):
+            tracker._workers.submit(begin.wait)  # so that both tasks are heard before one is open
+        try:
+            bench.reset(1)
+            newest = bench.reset(2)
+            assert bench.spinner.spin_until(
+                lambda: {tracker._task.episode for tracker in trackers} == {newest}, LIMIT
+            )
+            assert bench.spinner.spin_until(lambda: len(perception._early) == 2, LIMIT)
+            perceive.set()
+            assert bench.spinner.spin_until(
+                lambda: all(len(waiting._early) == 2 for waiting in synchronizers), LIMIT
+            )
+        finally:
+            perceive.set()
+            observe.set()
+        assert bench.spinner.spin_until(
+            lambda: all(waiting.latest.episode.number == newest for waiting in synchronizers), LIMIT
+        )
 
 
 def test_a_second_simulator_is_named_and_followed_once_the_first_is_gone(network, tmp_path, capfd):

@@ -12,6 +12,7 @@ from slap_ros.messages.events import SkillEventKind
 from slap_ros.messages.interfaces import SKILL_EVENT, STATE
 
 SLOWLY = 1.0  # environment steps a second: a skill takes longer than a dead node is missed
+PATIENCE = 3.0  # a state that a loaded machine delays by as long as a step is not missed
 # As embedded_ros has it; CycloneDDS's own is 10 s, in which a skill ends even so.
 LEASE = (
     "<CycloneDDS><Domain><Discovery><LeaseDuration>4 s</LeaseDuration></Discovery></Domain>"
@@ -25,26 +26,24 @@ def short_lease(network, monkeypatch):
         monkeypatch.setenv("CYCLONEDDS_URI", LEASE)
 
 
-def holds(bench):
-    """Whether the robot stands still."""
+def require_rest(bench):
+    """The robot stands still: one command may be under way, after that there are no more."""
     before = len(bench.told(STATE))
-    bench.spinner.spin_until(lambda: False, 3.0 / SLOWLY)
-    return len(bench.told(STATE)) == before
+    bench.spinner.spin_until(lambda: False, 4.0 / SLOWLY)
+    assert len(bench.told(STATE)) <= before + 1
 
 
 @pytest.mark.timeout(3 * LIMIT)
 def test_a_planner_that_dies_leaves_the_robot_holding(network):
-    with laboratory(3, None, SLOWLY) as bench:
+    with laboratory(3, None, SLOWLY, PATIENCE) as bench:
         bench.ask()
-        bench.until(lambda: len(bench.told(STATE)) > 2)
+        bench.until(lambda: len(bench.told(STATE)) > 1)
         bench.kill("planner_node")
         bench.until(lambda: len(bench.told(SKILL_EVENT)) == 2)
         _, end = bench.told(SKILL_EVENT)
         assert (end.kind, end.error_code) == (SkillEventKind.FAILED, ErrorCode.NODE_DIED)
         assert "the planner is gone" in end.error_msg
-        # One command may be under way; after that there are no more.
-        bench.spinner.spin_until(lambda: False, 2.0 / SLOWLY)
-        assert holds(bench)
+        require_rest(bench)
 
 
 @pytest.mark.timeout(3 * LIMIT)
@@ -57,10 +56,10 @@ def test_a_planner_that_dies_leaves_the_robot_holding(network):
     ],
 )
 def test_whoever_else_dies_ends_the_run_and_the_robot_holds(network, victim, code):
-    with laboratory(3, None, SLOWLY) as bench:
+    with laboratory(3, None, SLOWLY, PATIENCE) as bench:
         result = bench.ask()
-        bench.until(lambda: len(bench.told(STATE)) > 2)
+        bench.until(lambda: len(bench.told(STATE)) > 1)
         bench.kill(victim)
         bench.until(result.done)
         assert result.result().result.error_code == code
-        assert holds(bench)
+        require_rest(bench)

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from hashlib import sha256
+from pathlib import Path
 
 import pytest
 from model_answers import SETTINGS, decomposition_json, operator_json
@@ -14,8 +16,10 @@ from scripted_server import Step, serving
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
+from slap_ros.cli.language_study import ModelOptions
 from slap_ros.errors import ErrorCode, InvalidCassetteError
-from slap_ros.language.cassette import open_client
+from slap_ros.language.cassette import open_client, read_cassette
+from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.model_attempts import LanguageModel, ModelsOnly
 from slap_ros.studies.planning_ablation import (
     ALONE,
@@ -26,9 +30,12 @@ from slap_ros.studies.planning_ablation import (
     one_shot_success,
 )
 from slap_ros.studies.planning_ablation import study as planning_ablation
+from slap_ros.studies.results import MarkdownTable, Provenance, StudyReport, write
 from slap_ros.studies.reward_ablation import FULL, HEADERS
 from slap_ros.studies.reward_ablation import study as reward_ablation
+from slap_ros.studies.study_log import StudyLog
 
+ROOT = Path(__file__).parents[2]
 PEGS = peg_in_hole()
 PICK, INSERT = PEGS.operators
 GOOD = {
@@ -57,19 +64,27 @@ def plan_json(steps: Sequence[str]) -> str:
     )
 
 
-def ask(script: Mapping[str, Sequence[Step]], variants: Sequence[str], plans: int = 2) -> dict:
+def runner(folder: Path) -> JobRunner:
+    return JobRunner(StudyLog(folder / "log", Provenance("pegs", "", {})), 1, Silent())
+
+
+def ask(
+    folder: Path, script: Mapping[str, Sequence[Step]], variants: Sequence[str], plans: int = 2
+) -> dict:
     with serving(script) as server:
         settings = type(SETTINGS)(model="scripted", base_url=server.url, retry=SETTINGS.retry)
         model = LanguageModel(open_client("live", settings), settings)
-        report = planning_ablation({"m": model}, [PEGS.problem] * plans, variants, 3, Silent())
+        report = planning_ablation(
+            {"m": model}, [PEGS.problem] * plans, variants, 3, runner(folder)
+        )
         seeds = [request["seed"] for request in server.requests]
     assert len(set(seeds)) > 1 or plans == 1
     return {tally["variant"]: tally for tally in report.found["tallies"]}
 
 
-def test_a_good_model_needs_one_attempt_and_the_planner_does_the_rest() -> None:
+def test_a_good_model_needs_one_attempt_and_the_planner_does_the_rest(tmp_path: Path) -> None:
     script = GOOD | {"plan": [Step(plan_json(STEPS))]}
-    found = ask(script, (SEARCH, ALONE, ONE_SHOT))
+    found = ask(tmp_path, script, (SEARCH, ALONE, ONE_SHOT))
     for variant in (SEARCH, ALONE, ONE_SHOT):
         assert found[variant]["operators"] == (2, 2)
         assert found[variant]["planning"] == (2, 2)
@@ -77,45 +92,73 @@ def test_a_good_model_needs_one_attempt_and_the_planner_does_the_rest() -> None:
         assert found[variant]["attempts"] == 1.0
 
 
-def test_what_is_wrong_is_counted_by_class_and_tried_again() -> None:
+def test_an_attempt_ends_with_the_first_answer_that_does_not_pass(tmp_path: Path) -> None:
+    wrong = json.loads(operator_json(PICK))
+    wrong["preconditions"][0]["predicate"] = "Shiny"
+    with serving(GOOD | {"operator Pick": [Step(json.dumps(wrong))]}) as server:
+        settings = type(SETTINGS)(model="scripted", base_url=server.url, retry=SETTINGS.retry)
+        model = LanguageModel(open_client("live", settings), settings)
+        report = planning_ablation({"m": model}, [PEGS.problem], (SEARCH,), 3, runner(tmp_path))
+    assert len(server.requests) == 3 * len(("decomposition", "Pick"))
+    (trial,) = report.found["tallies"][0]["trials"]
+    assert trial["attempts"] == ["operator: unknown_predicate"] * 3
+    assert "**Plans: 1; wanted: 25.**" in report.measured
+
+
+def test_what_was_asked_already_is_not_asked_again(tmp_path: Path) -> None:
+    found = ask(tmp_path, GOOD, (SEARCH,))
+    with serving(GOOD) as server:
+        settings = type(SETTINGS)(model="scripted", base_url=server.url, retry=SETTINGS.retry)
+        model = LanguageModel(open_client("live", settings), settings)
+        again = planning_ablation({"m": model}, [PEGS.problem] * 3, [SEARCH], 3, runner(tmp_path))
+        seeds = {request["seed"] for request in server.requests}
+    assert seeds == {6}  # of the third plan; the others are known
+    (tally,) = again.found["tallies"]
+    assert tally["trials"][:2] == found[SEARCH]["trials"]
+    assert tally["overall"] == (3, 3)
+
+
+def test_what_is_wrong_is_counted_by_class_and_tried_again(tmp_path: Path) -> None:
     wrong = json.loads(operator_json(PICK))
     wrong["preconditions"][0]["predicate"] = "Shiny"
     script = GOOD | {
         "operator Pick": [Step(json.dumps(wrong)), *GOOD["operator Pick"]],
         "plan": [Step(plan_json(STEPS))],
     }
-    found = ask(script, (SEARCH,))[SEARCH]
+    found = ask(tmp_path, script, (SEARCH,))[SEARCH]
     assert found["operators"] == (2, 3)
     assert found["overall"] == (2, 2)
     assert found["attempts"] == 1.5
     assert found["errors"] == {"unknown_predicate": 1}
-    found = ask(script, (ONE_SHOT,))[ONE_SHOT]
+    found = ask(tmp_path, script, (ONE_SHOT,))[ONE_SHOT]
     assert found["overall"] == (1, 2)
     assert found["operators"] == (1, 2)
 
 
-def test_a_plan_of_the_model_is_carried_out() -> None:
+def test_a_plan_of_the_model_is_carried_out(tmp_path: Path) -> None:
     short = Step(plan_json(STEPS[:2]))
     impossible = Step(plan_json(STEPS[1:]))
     script = GOOD | {"plan": [short, impossible, Step(plan_json(STEPS))]}
-    found = ask(script, (ALONE,), plans=1)[ALONE]
+    found = ask(tmp_path, script, (ALONE,), plans=1)[ALONE]
     assert found["operators"] == (3, 3)
     assert found["planning"] == (1, 3)
     assert found["attempts"] == 3.0
     assert found["errors"] == {"goal_not_reached": 1, "impossible_step": 1}
 
 
-def test_the_printed_operators_never_chain() -> None:
+def test_the_printed_operators_never_chain(tmp_path: Path) -> None:
     printed = json.loads(operator_json(INSERT))
     printed["add_effects"] = [a for a in printed["add_effects"] if a["predicate"] != "HandEmpty"]
-    found = ask(GOOD | {"operator Insert": [Step(json.dumps(printed))]}, (SEARCH,))[SEARCH]
+    found = ask(tmp_path, GOOD | {"operator Insert": [Step(json.dumps(printed))]}, (SEARCH,))[
+        SEARCH
+    ]
     assert found["operators"] == (0, 6)
     assert found["overall"] == (0, 2)
     assert found["attempts"] is None
     assert found["errors"] == {"goals_never_together": 6}
 
 
-def test_rewards_are_judged_by_the_papers_classes() -> None:
+def test_rewards_are_judged_by_the_papers_classes(tmp_path: Path) -> None:
     good = Step('{"parallel_dis(?peg, ?hole)": 0.4}')
     to_peg = Step('{"dis_to_obj(?peg)": 0.4}')
     invented = Step('{"depth(?peg)": 0.4}')
@@ -123,7 +166,9 @@ def test_rewards_are_judged_by_the_papers_classes() -> None:
     with serving(script) as server:
         settings = type(SETTINGS)(model="scripted", base_url=server.url, retry=SETTINGS.retry)
         model = LanguageModel(open_client("live", settings), settings)
-        report = reward_ablation(model, PEGS.problem, PEGS.operators, (FULL, HEADERS), 2, Silent())
+        report = reward_ablation(
+            model, PEGS.problem, PEGS.operators, (FULL, HEADERS), 2, runner(tmp_path)
+        )
         asked = [request["messages"][-1]["content"] for request in server.requests]
     full, headers = report.found["trials"]
     assert (full["all_right"], headers["all_right"]) == (1, 2)
@@ -149,7 +194,11 @@ def test_what_a_script_says_is_no_result(tmp_path) -> None:
         client = ModelsOnly(open_client("live", settings))
         with pytest.raises(InvalidCassetteError, match="no result of a study"):
             planning_ablation(
-                {"m": LanguageModel(client, settings)}, [PEGS.problem], (SEARCH,), 1, Silent()
+                {"m": LanguageModel(client, settings)},
+                [PEGS.problem],
+                (SEARCH,),
+                1,
+                runner(tmp_path),
             )
         live = CliRunner().invoke(
             app,
@@ -158,6 +207,22 @@ def test_what_a_script_says_is_no_result(tmp_path) -> None:
     assert live.exit_code == ErrorCode.INVALID_CASSETTE
     assert "no result of a study" in " ".join(live.stderr.split())
     assert not list(tmp_path.iterdir())
+
+
+def test_a_page_names_the_day_and_the_recording(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    cassette = ROOT / "examples" / "peg_in_hole" / "scripted.jsonl"
+    report = StudyReport(
+        "models", "", "title", "", MarkdownTable(("a",), ()), {}, lambda figure: None, (2.0, 2.0)
+    )
+    dated = ModelOptions(cassette=f"replay:{cassette}").dated(report)
+    digest = sha256(cassette.read_bytes()).hexdigest()
+    assert dated.circumstances["recording_sha256"] == digest
+    assert dated.circumstances["answered_on"] == read_cassette(cassette).recorded[:10]
+    write(tmp_path, dated, Provenance("pegs", "", {}))
+    assert digest in (tmp_path / "models_pegs.md").read_text()
+    assert json.loads((tmp_path / "models_pegs.json").read_text())["recording_sha256"] == digest
+    assert set(ModelOptions().dated(report).circumstances) == {"answered_on"}
 
 
 def test_the_command_refuses_what_cannot_be() -> None:

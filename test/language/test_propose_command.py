@@ -68,6 +68,8 @@ def test_operators_of_anyone_in_each_format(tmp_path: Path) -> None:
         ('{"operators": 3}', "MALFORMED_ANSWER", "no proposal's JSON"),
         ("(define (domain x)", "MALFORMED_PDDL", ""),
         ("Pick\nPAR: {?peg}", "MALFORMED_ANSWER", "no part PRE"),
+        ('{"operators": [1]}', "MALFORMED_ANSWER", "no proposal's JSON"),
+        ('{"operators": [{"name": "Pick"}]}', "MALFORMED_ANSWER", "operators, operator 1: the"),
         ("Pick\nPAR: {?peg}\nPRE: {}\nEFF-: {}\nEFF+: {Gripped(?peg)}", "PROPOSAL_REJECTED",
          "there is no predicate 'Gripped'"),
     ],
@@ -90,8 +92,10 @@ def test_a_server_is_asked_and_what_it_costs_is_shown(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.stderr
     assert "4 attempts, 440 tokens" in result.stderr
     assert "goals_never_together" in result.stderr
+    assert "answers are a script's" in result.stderr
     again = slap(*command, "--cassette", f"replay:{cassette}")
     assert again.exit_code == 0 and "4 attempts, 440 tokens" in again.stderr
+    assert "replayed from recording" in " ".join(again.stderr.split())
 
 
 def test_a_domain_with_a_world_proposes_its_own_operators() -> None:
@@ -125,6 +129,8 @@ def test_a_bag_is_a_demonstration() -> None:
         ((*TASK, "--proposer", "language", "--seconds", "0"), "INVALID_PARAMETER"),
         (("obstacle2d", "--proposer", "induced", "--demonstrations", "/nowhere"), "DAMAGED_BAG"),
         (("obstacle2d", "--rewarder", "composed"), "INVALID_DOMAIN"),
+        (("obstacle2d", "--model", "m"), "INVALID_PARAMETER"),
+        (("obstacle2d", "--cassette", REPLAY), "INVALID_PARAMETER"),
         (("nowhere",), "UNKNOWN_DOMAIN"),
     ],
 )

@@ -90,3 +90,10 @@ def test_in_tens():
     np.testing.assert_allclose(motion[:10], START + 0.2 * np.arange(1, 11)[:, None])
     assert retime_fixed_steps(START[None]).shape == (0, 7)
     assert len(retime_fixed_steps(path, 30)) == 60
+
+
+def test_in_tens_for_each_radian_begun():
+    path = np.stack([START, START + 2.0, START + 2.1, START + 2.1])
+    motion = retime_fixed_steps(path, per_radian=True)
+    assert motion.shape == (30, 7)
+    np.testing.assert_array_equal(motion[[19, 29]], path[1:3])

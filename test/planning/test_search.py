@@ -17,7 +17,7 @@ from slap_ros.planning.model import Rollout
 from slap_ros.planning.options import Option, OptionKind
 from slap_ros.planning.planner import Problem, make_planner
 from slap_ros.planning.search import search_exhaustively, search_lazily
-from slap_ros.relational import Feature, Layout, State, Type
+from slap_ros.relational import Feature, Layout, State, Target, Type
 
 COUNTER = Type("counter", (Feature("value", "1"),))
 LAYOUT = Layout.of((COUNTER("c"),))
@@ -216,7 +216,7 @@ def test_lower_bounds_never_exceed_the_true_steps():
             abstract = model.space.abstract(state)
             choices = [(g, o) for g, o in problem.operators if g.applicable(abstract)]
             ground, option = choices[rng.integers(len(choices))]
-            rollout = model.roll_out(option, state, ground.apply(abstract))
+            rollout = model.roll_out(option, state, Target.exactly(ground.apply(abstract)))
             if not rollout.reached:
                 break
             assert option.skill.lower_bound(state, option.objects) <= rollout.steps

@@ -205,8 +205,9 @@ def test_nodes_of_their_own_run_a_strangers_default(install, network, tmp_path):
     """Every node imports the domain by itself; nothing tells them a preset."""
     install({"stranger": "stranger:make"}, stranger=PRESETS)
     command = [sys.executable, "-m", "ensemble.cli", "run", "stranger", "--json"]
+    command += ["--patience", "10"]  # for a loaded machine
     run = subprocess.run(
-        [*command, "--record", str(tmp_path / "bag")], capture_output=True, text=True, timeout=90
+        [*command, "--record", str(tmp_path / "bag")], capture_output=True, text=True, timeout=200
     )
     assert run.returncode == 0, run.stderr
     assert json.loads(run.stdout)["preset"] == "narrow"

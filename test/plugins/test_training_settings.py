@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
+from slap_ros.acquisition.domain_choice import DomainChoice
 from slap_ros.core import Learning
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode, InvalidDomainError, InvalidParameterError, UnsolvableError
@@ -148,7 +149,7 @@ def train(folder, preset, listener):
     settings = changed(
         training_settings("ours", get_domain("patchy")), {"validation": 6, "exploration.tasks": 4}
     )
-    distribution = TaskDistribution("patchy", preset, 0)
+    distribution = TaskDistribution(DomainChoice("patchy", preset), 0)
     return Training(distribution, settings, folder, SequentialWorkers(), listener).run()
 
 

@@ -115,8 +115,8 @@ def test_command_line_bag_and_result_say_the_same(install, network, tmp_path):
     assert planned.exit_code == ErrorCode.UNSOLVABLE
     assert CAME_OUT in planned.stderr
     bag = tmp_path / "bag"
-    settings = RunSettings("patchy", "none", 0, 0, "lazy", str(bag), shortcuts="none")
-    metrics = run(RunRequest(settings, timeout_s=60, in_process=True), lambda *_: None)
+    settings = RunSettings("patchy", "none", 0, 0, "lazy", str(bag), shortcuts="none", patience=5.0)
+    metrics = run(RunRequest(settings, timeout_s=200, in_process=True), lambda *_: None)
     assert metrics.error_code == ErrorCode.UNSOLVABLE
     assert CAME_OUT in metrics.error_msg
     (recorded,) = evaluate_bag(bag).runs

@@ -10,6 +10,7 @@ import untaught
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
+from slap_ros.acquisition.domain_choice import DomainChoice, open_domain
 from slap_ros.core import task_with_goal
 from slap_ros.domain_check import check_domain
 from slap_ros.domains import get_domain
@@ -21,7 +22,6 @@ from slap_ros.errors import (
     UnsolvableError,
 )
 from slap_ros.learning.demonstrator import demonstrate
-from slap_ros.learning.domain_choice import DomainChoice, open_domain
 from slap_ros.learning.scripted_skill import with_scripts
 from slap_ros.planning.planner import SymbolicPlanner, ground_options, make_planner
 
@@ -99,7 +99,7 @@ def test_astar_takes_the_fewest_operators_and_tries_none():
     assert list(map(str, ours.plan.edges)) == list(map(str, named.plan.edges))
     assert len(ours.plan.edges) <= len(shortest.plan.edges)
     assert ours.edges_rolled_out == 0
-    assert ours.plan.edges[-1].target & goal == goal
+    assert ours.plan.edges[-1].target.required & goal == goal
     with pytest.raises(UnsolvableError, match="no operator leads to On"):
         SymbolicPlanner(space, ()).plan(task.initial_state, goal)
 
@@ -196,7 +196,8 @@ def test_study_of_demonstrations(installed, tmp_path):
     assert training["success_rate"] == other["success_rate"] == 1.0
     assert training["success_interval"]["low"] == pytest.approx(0.4385, abs=1e-4)
     assert data == study("demonstrations", tmp_path, *counts, "--jobs", "2")
-    (alone,) = study("demonstrations", tmp_path, *counts, "--goal", "other")["found"]["goals"]
+    alone = study("demonstrations", tmp_path / "alone", *counts, "--goal", "other")
+    (alone,) = alone["found"]["goals"]
     assert len(alone["tasks"]) == 3
 
 
@@ -205,10 +206,15 @@ def test_a_study_goes_on_where_it_was_stopped(installed, tmp_path):
     arguments = ["--goal", "other", "--preset", "fair", "--tasks", "2", "--others", "50"]
     command = f"slap study demonstrations untaught {' '.join([*arguments, '--seed', '500'])}"
     known = {"index": 0, "success": True, "steps": 777, "replans": 0, "begun": {}, "failed": {}}
-    entries = [{"command": command}, {"job": "other 0", "result": {**known, "reason": ""}}]
+    settings = {"preset": "fair", "tasks": 2, "others": 50, "seed": 500}
+    entries = [
+        {"command": command, "settings": settings},
+        {"job": "other: seed 500, task 0", "result": {**known, "reason": ""}},
+    ]
     log.write_text("".join(json.dumps(entry) + "\n" for entry in entries) + '{"job": "oth')
     (goal,) = study("demonstrations", tmp_path, *arguments)["found"]["goals"]
     assert [task["steps"] == 777 for task in goal["tasks"]] == [True, False]
+    (tmp_path / "demonstrations_untaught.json").unlink()
     log.write_text(json.dumps({"command": "slap study demonstrations untaught --seed 9"}) + "\n")
     ran = slap("study", "demonstrations", "untaught", "--output", str(tmp_path))
     assert ran.exit_code == ErrorCode.INVALID_PARAMETER

@@ -27,9 +27,8 @@ from slap_ros.bags import evaluate_bag, read_bag
 from slap_ros.errors import ErrorCode, InvalidParameterError
 from slap_ros.messages.interfaces import STATE
 
-LIMIT = 60.0  # s, far more than anything here takes: a loaded machine takes its time
-# All nodes share a process here, and its time: joint positions may be late.
-# All nodes share this process, where planning keeps the others waiting.
+LIMIT = 120.0  # s, far more than anything here takes: a loaded machine takes its time
+# All nodes share this process and a loaded machine's time: joint positions may be late.
 PATIENT = {"joint_timeout": 60.0, "controller_timeout": 60.0, "detection_timeout": 60.0}
 QUICK = {"pace": 20.0, "rate": 200.0, "latency": 0.01}
 STILL = [0.0] * 7
@@ -38,7 +37,7 @@ STILL = [0.0] * 7
 def settings(mock=None, bridge=None, record=None, **options):
     options = {"shortcuts": "none", "world": "mock", "mock": QUICK | (mock or {})} | options
     return RunSettings(
-        "obstacle_tower", "fair", 1, 0, "lazy", record, bridge=bridge or {}, **options
+        "obstacle_tower", "fair", 1, 0, "lazy", record, patience=5.0, bridge=bridge or {}, **options
     )
 
 
@@ -66,6 +65,10 @@ class Lab:
     def states(self):
         return [m for kind, m in self.heard if kind == STATE]
 
+    @property
+    def faults(self):
+        return [m for kind, m in self.heard if kind == FAULT.type_name]
+
     def until(self, condition):
         assert self.spinner.spin_until(condition, LIMIT)
 
@@ -83,9 +86,9 @@ class Lab:
 
     def fault(self, code):
         """Wait until the bridge holds for this reason; it then stands."""
-        self.until(lambda: self.health.get("fault") == code.name)
+        self.until(lambda: self.health.get("fault") == code.name and self.faults)
         assert self.health["holding"] == "True"
-        (said,) = [m for kind, m in self.heard if kind == FAULT.type_name]
+        (said,) = self.faults
         assert (said.error_code, said.episode) == (code, self.states[-1].episode)
         states, joints = len(self.states), self.joints[-1][:7]
         self.command(deltas=[0.02, *STILL[1:]])
@@ -103,7 +106,7 @@ class Lab:
 
 @contextmanager
 def lab(mock=None, bridge=None, started=True):
-    nodes = node_parameters(settings(mock, bridge))
+    nodes = node_parameters(settings(mock, PATIENT | (bridge or {})))
     only = {name: nodes[name] for name in ("robot_bridge.mock", "robot_bridge")}
     heard = []
     with (
@@ -156,7 +159,7 @@ def test_commands_are_answered_one_by_one_and_bad_ones_move_nothing(network):
         bench.until(lambda: len(bench.states) == 2)
         bench.wait(0.5)
         assert [state.step for state in bench.states] == [0, 1]
-        assert bench.joints[-1][0] == pytest.approx(before[0] + 0.05, abs=1e-6)
+        bench.until(lambda: bench.joints[-1][0] == pytest.approx(before[0] + 0.05, abs=1e-6))
         bench.until(lambda: bench.health.get("steps") == "1")
         assert bench.health["stale_commands"] == "3"
         assert bench.health["invalid_commands"] == "4"
@@ -180,30 +183,37 @@ def test_what_leaves_the_workspace_is_refused(network):
     ],
 )
 def test_a_controller_that_fails_leaves_the_robot_holding(network, fault, code):
-    with lab({"fault": fault, "fault_after": 1}) as bench:
-        bench.step(deltas=[0.05, *STILL[1:]])
+    quickly = {"controller_timeout": 2.0} if fault == "ignore" else {}
+    done = 0 if fault == "ignore" else 1  # a loaded machine may take longer than that for a step
+    with lab({"fault": fault, "fault_after": done}, quickly) as bench:
+        if done:
+            bench.step(deltas=[0.05, *STILL[1:]])
         bench.command(deltas=[0.05, *STILL[1:]])
         bench.fault(code)
 
 
 def test_an_object_that_is_never_seen_is_named(network):
     with lab({"hidden": "block2"}, started=False) as bench:
-        bench.wait(1.0)
+        answers = []
+
+        def the_others_are_seen():
+            answers.append(bench.reset())
+            return answers[-1].error_msg.endswith(": block2")
+
+        bench.until(the_others_are_seen)
+        assert answers[-1].error_code == ErrorCode.NO_DETECTION
         assert not bench.states
-        answer = bench.reset()
-        assert answer.error_code == ErrorCode.NO_DETECTION
-        assert answer.error_msg.endswith("block2")
 
 
 def test_sensors_that_fall_silent_stop_the_state(network):
     """The mock robot is taken away: joint positions, detections and controllers with it."""
-    with lab() as bench:
+    with lab(bridge={"joint_timeout": 5.0}) as bench:
         bench.step()
         (mock,) = [n for n in bench.spinner.executor.get_nodes() if n.get_name() == "mock_robot"]
         for timer in list(mock.timers):
             mock.destroy_timer(timer)
-        bench.wait(1.0)
-        assert bench.health["fault"] == "NONE"  # it stands anyway
+        bench.wait(6.0)
+        bench.until(lambda: bench.health.get("fault") == "NONE")  # it stands anyway
         bench.command(deltas=[0.02, *STILL[1:]])
         bench.until(lambda: bench.health.get("fault") == "NO_JOINT_STATE")
         assert len(bench.states) == 2
@@ -246,10 +256,11 @@ def test_a_clock_that_is_ahead_is_not_believed(network):
         assert bench.states[-1].objects[0].features == bench.states[0].objects[0].features
 
 
-@pytest.mark.parametrize("set_by", [-0.3, -3.0, 3.0, -86_400.0])
+@pytest.mark.parametrize("set_by", [-0.3, -60.0, 60.0, -86_400.0])
 def test_a_robot_goes_on_after_its_clock_was_set(network, set_by):
     """Bridge, sensors and controllers go by one clock, and none of their deadlines does."""
-    with lab(BY_THE_CLOCK, BY_THE_CLOCK, started=False) as bench:
+    deadlines = dict.fromkeys(("joint_timeout", "controller_timeout", "detection_timeout"), 30.0)
+    with lab(BY_THE_CLOCK, BY_THE_CLOCK | deadlines, started=False) as bench:
         clock = SettableClock()
         bench.spinner.executor.add_node(clock)
         bench.until(lambda: bench.states and bench.commands.get_subscription_count())
@@ -272,7 +283,7 @@ def test_a_reset_opens_an_episode_as_measured_and_ends_a_fault(network):
         assert explicit.error_code == ErrorCode.INVALID_STATE
         assert "cannot be put into a state" in explicit.error_msg
         bench.until(lambda: bench.reset().error_code == 0)
-        assert bench.states[-1].episode == 2
+        bench.until(lambda: bench.states[-1].episode == 2)
         assert bench.states[-1].step == 0
 
 
@@ -292,12 +303,14 @@ def test_a_skill_server_that_dies_leaves_the_robot_holding(network):
             bench.until(lambda: client.ready(False))
             client.send((), 0, 5)
             bench.until(lambda: len(bench.states) > 5)
-        bench.wait(1.0)  # for the motion under way
+        bench.health.clear()
+        # The motion under way ends, and nobody commands another.
+        bench.until(
+            lambda: bench.health.get("phase") == "READY" and bench.health["holding"] == "True"
+        )
         states, joints = len(bench.states), bench.joints[-1]
         bench.wait(1.5)
         assert (len(bench.states), bench.joints[-1]) == (states, joints)
-        bench.until(lambda: bench.health.get("phase") == "READY")
-        bench.until(lambda: bench.health["holding"] == "True")
 
 
 def test_options_of_the_mock_robot_have_types_and_names():

@@ -14,6 +14,7 @@ import numpy as np
 from slap_ros.domains import get_domain
 from slap_ros.learning.task_distribution import TRAINING_SEED
 from slap_ros.planning.planner import Problem
+from slap_ros.relational import Target
 from slap_ros.shortcuts.library import Library, save_library
 from slap_ros.shortcuts.ppo import Learner, normalisation_of
 from slap_ros.shortcuts.ppo_settings import PpoSettings
@@ -40,7 +41,7 @@ def start(index: int) -> Start | None:
     added = space.mask([space.atom("Clear", ["target"]), space.atom("On", ["block2", "table"])])
     deleted = space.mask([space.atom("Overlap", ["block2", "target"])])
     inside = space.mask([space.atom("On", ["block2", "target"])])
-    picked = problem.model.roll_out(option, state, holding)
+    picked = problem.model.roll_out(option, state, Target.exactly(holding))
     if not picked.reached or holding & inside:
         return None
     return Start(picked.final, space, Change(added, deleted))

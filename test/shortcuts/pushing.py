@@ -4,6 +4,7 @@
 
 from slap_ros.domains import get_domain
 from slap_ros.planning.planner import Problem
+from slap_ros.relational import Target
 from slap_ros.shortcuts.signature import Change, Signature
 from slap_ros.shortcuts.starts import Start
 
@@ -17,9 +18,8 @@ def start_of(index):
     space = problem.model.space
     (pick,) = [o for g, o in problem.operators if str(g) == "Pick(robot, block1, table)"]
     (ground,) = [g for g, _ in problem.operators if str(g) == "Pick(robot, block1, table)"]
-    held = problem.model.roll_out(
-        pick, task.initial_state, ground.apply(space.abstract(task.initial_state))
-    )
+    target = Target.exactly(ground.apply(space.abstract(task.initial_state)))
+    held = problem.model.roll_out(pick, task.initial_state, target)
     assert held.reached
     add = space.mask([space.atom("Clear", ["target"]), space.atom("On", ["block2", "table"])])
     return Start(held.final, space, Change(add, space.mask([overlap(space)])))

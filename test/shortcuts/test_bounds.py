@@ -18,5 +18,5 @@ def test_no_rollout_of_a_shipped_shortcut_is_shorter_than_its_bound(domain, task
     figures = measure(domain, tasks)
     assert figures["states"] >= min(tasks, 8)  # else nothing was measured
     assert figures["below_bound"] == 0
-    # Far from it: every rollout takes more than three quarters of the shortest success.
-    assert figures["least_ratio"] > 0.75
+    # Far from it: every rollout takes at least three quarters of the shortest success.
+    assert figures["least_ratio"] >= 0.75

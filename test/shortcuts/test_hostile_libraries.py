@@ -150,3 +150,9 @@ def test_a_result_that_cannot_be_decoded_is_damaged(tmp_path, decode):
     (tmp_path / "plans.json").write_text("[1e999]")
     with pytest.raises(InvalidParameterError, match="damaged"):
         WorkFolder(tmp_path).cached("plans", dict, decode)
+
+
+def test_a_library_of_skills_is_refused():
+    skills = Path(__file__).parents[2] / "models" / "skills" / "stow_hammer"
+    with pytest.raises(InvalidLibraryError, match="a library of skills, not of shortcuts"):
+        load_library(skills, get_domain("stow_hammer"))

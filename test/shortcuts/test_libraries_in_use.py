@@ -238,7 +238,7 @@ def test_a_rollout_is_the_same_in_every_process_and_needs_no_torch():
 
 
 def test_the_shipped_shortcut_halves_what_the_drawer_takes():
-    domain = get_domain("cluttered_drawer", "paper")
+    domain = get_domain("cluttered_drawer", "paper:shortcut_speed=1")
     library = chosen_library(None, domain)
     given, *_, learned = approaches(library, DEFAULT)
     alone, together = (

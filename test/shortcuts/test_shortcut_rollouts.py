@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from slap_ros.domains import get_domain
+from slap_ros.domains.obstacle2d.dynamics import Obstacle2DVectorWorld
 from slap_ros.planning.planner import Problem
+from slap_ros.relational import Target
 from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
-from slap_ros.shortcuts.shortcut import Sampling
+from slap_ros.shortcuts.shortcut import DEFAULT, Sampling
 from slap_ros.shortcuts.shortcut_rollouts import ShortcutRollouts
 from slap_ros.shortcuts.signature import Change
 
@@ -30,7 +32,7 @@ def situations(count=6):
         ((ground, pick),) = [
             pair for pair in problem.operators if str(pair[0]) == "Pick(robot, block1, table)"
         ]
-        target = ground.apply(space.abstract(task.initial_state))
+        target = Target.exactly(ground.apply(space.abstract(task.initial_state)))
         state = problem.model.roll_out(pick, task.initial_state, target).final
         add = space.mask([space.atom("Clear", ["target"]), space.atom("On", ["block2", "table"])])
         change = Change(add, space.mask([space.atom("Overlap", ["block2", "target"])]))
@@ -63,6 +65,22 @@ def test_worlds_that_cannot_be_stepped_together_try_one_after_the_other():
         one, many = (successes(domain, alone, encoder, state) for domain in (apart, DOMAIN))
         assert [a.steps for a in one] == [a.steps for a in many]
         assert len(one) <= 1
+
+
+def test_a_shortcut_is_tried_as_often_as_the_readme_says():
+    begun = []
+
+    class Counted(Obstacle2DVectorWorld):
+        def reset(self, world, state):
+            begun.append(world)
+            super().reset(world, state)
+
+    counting = replace(DOMAIN, learning=replace(DOMAIN.learning, make_vector_world=Counted))
+    encoder, state = next(situations())
+    assert successes(counting, DEFAULT, encoder, state)
+    assert len(begun) == 482 + 481
+    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    assert "482 rollouts from a state, and 481 random variations" in " ".join(readme.split())
 
 
 @pytest.mark.parametrize("batch", [1, 8])

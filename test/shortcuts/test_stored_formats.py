@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from slap_ros.acquisition.domain_choice import DomainChoice
 from slap_ros.domains import get_domain
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.workers import SequentialWorkers
@@ -35,7 +36,7 @@ THEN = replace(  # as the training was started then
 )
 # They change only where a library is trained again.
 SHIPPED = {
-    "obstacle2d": "adcfeac1f9a39f82",
+    "obstacle2d": "fda2f44dc59680f0",
     "obstacle_tower": "9d0737ba67ae3d53",
     "cluttered_drawer": "acfa279422f2e792",
     "cleanup_table": "51de94fd3e2bb078",
@@ -71,7 +72,7 @@ def work(tmp_path, request):
 
 def train(work):
     steps = Steps()
-    tasks = TaskDistribution("obstacle2d", "fair", 5)
+    tasks = TaskDistribution(DomainChoice("obstacle2d", "fair"), 5)
     return Training(tasks, THEN, work, SequentialWorkers(), steps).run(), steps
 
 
@@ -121,8 +122,10 @@ def test_all_named_settings_are_written_as_they_were():
         for domain, settings in kinds.items():
             # The general ones are those of a domain that has none of its own.
             now = training_settings(name, get_domain(domain)) if domain else GENERAL[name]
-            assert json.loads(json.dumps(now.as_json())) == settings
-            assert list(now.as_json()) == list(settings)  # in this order, too
+            written = json.loads(json.dumps(now.as_json()))
+            assert written.pop("attempts", 1) == (3 if domain == "cleanup_table" else 1)  # is new
+            assert written == settings
+            assert list(written) == list(settings)  # in this order, too
             read = ExplorationSettings.from_json(settings["exploration"])
             assert read == now.exploration
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from pushing import SIGNATURE, STARTS
 
+from slap_ros.acquisition.domain_choice import DomainChoice
 from slap_ros.errors import InvalidStateError
 from slap_ros.learning.subproc_vec_env import make_vec_env
 from slap_ros.learning.vec_env import VecEnvStep
@@ -20,8 +21,9 @@ RECORDS = tuple(
     StartRecord(21, index, tuple(start.state.data), start.change.add, start.change.delete)
     for index, start in enumerate(STARTS)
 )
+OBSTACLE2D = DomainChoice("obstacle2d", "fair")
 SPECS = [
-    ShortcutEnvSpec("obstacle2d", "fair", SIGNATURE, RECORDS, 5, 12, Rewards(), (3, part))
+    ShortcutEnvSpec(OBSTACLE2D, SIGNATURE, RECORDS, 5, 12, Rewards(), (3, part))
     for part in range(3)
 ]
 

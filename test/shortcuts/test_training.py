@@ -10,17 +10,21 @@ from pathlib import Path
 
 import pytest
 
+from slap_ros.acquisition.domain_choice import DomainChoice
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.workers import SequentialWorkers, ray_workers
+from slap_ros.shortcuts import training
 from slap_ros.shortcuts.explore import ExplorationResult, ShortcutCandidate
-from slap_ros.shortcuts.library import load_library, save_library
-from slap_ros.shortcuts.settings import ExplorationSettings, training_settings
+from slap_ros.shortcuts.library import load_library, load_shortcut, save_library
+from slap_ros.shortcuts.progress import SNAPSHOTS, latest
+from slap_ros.shortcuts.settings import POLISH, ExplorationSettings, training_settings
 from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.training import CandidateGroup, Training, rank
+from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 
-TASKS = TaskDistribution("obstacle2d", "fair", 5)
+TASKS = TaskDistribution(DomainChoice("obstacle2d", "fair"), 5)
 OURS = training_settings("ours", get_domain("obstacle2d"))
 SMALL = replace(
     OURS,
@@ -30,6 +34,7 @@ SMALL = replace(
     validation=3,
     shortcuts=1,
 )
+BRIEF_POLISH = replace(POLISH, total_steps=2_048)
 
 
 class Recorder:
@@ -57,8 +62,8 @@ class Recorder:
 
 def train(folder, settings=SMALL, callback=None, workers=None):
     callback = callback or Recorder()
-    training = Training(TASKS, settings, folder, workers or SequentialWorkers(), callback)
-    return training.run(), callback
+    run = Training(TASKS, settings, folder, workers or SequentialWorkers(), callback).run
+    return run(), callback
 
 
 def files(folder):
@@ -71,6 +76,13 @@ def files(folder):
 
 def without_time(record):
     return {k: v for k, v in record.items() if k != "cpu_s"}
+
+
+def snapshots_in(folder):
+    """Weights of a shortcut's first layer, by environment steps."""
+    work = ShortcutWorkFolder(folder)
+    taken = {steps: load_shortcut(work.snapshot(steps)) for steps in work.snapshots}
+    return {steps: one.policy.layers[0][0].tobytes() for steps, one in taken.items()}
 
 
 def test_pushing_is_discovered_learned_and_worth_it_and_twice_the_same(tmp_path):
@@ -87,6 +99,10 @@ def test_pushing_is_discovered_learned_and_worth_it_and_twice_the_same(tmp_path)
         assert without_time(one.record) == without_time(other.record)
         for mine, its in zip(one.policy.layers, other.policy.layers, strict=True):
             assert mine[0].tobytes() == its[0].tobytes()
+    snapshots, same = (snapshots_in(tmp_path / work / name) for work in ("work", "work2"))
+    assert 2 <= len(snapshots) <= SNAPSHOTS + 1  # a rollout may be longer than from one to the next
+    assert snapshots == same
+    assert len(set(snapshots.values())) == len(snapshots)
     loaded = load_library(tmp_path / "first", get_domain("obstacle2d"))
     assert [shortcut.name for shortcut in loaded.shortcuts] == [name]
     assert not loaded.refused
@@ -149,6 +165,35 @@ def test_a_killed_training_resumes_from_its_checkpoint(tmp_path):
     assert steps[before] > 1024  # not from the beginning
     assert steps[-1] >= 6000
     assert len(library.shortcuts) == 1
+
+
+def test_what_hardly_succeeds_is_learned_again_and_the_best_attempt_counts(tmp_path, monkeypatch):
+    brief = replace(SMALL, ppo=replace(SMALL.ppo, total_steps=2_048), polish=BRIEF_POLISH)
+    once, _ = train(tmp_path / "once", brief)
+    monkeypatch.setattr(training, "ENOUGH_SUCCESS", 0.0)
+    enough, _ = train(tmp_path / "enough", replace(brief, attempts=3))
+    assert enough.digest == once.digest  # the first attempt is what a single one is
+    assert not (tmp_path / "enough" / "attempt2").exists()
+
+    monkeypatch.setattr(training, "ENOUGH_SUCCESS", 1.1)
+    callback, work = Recorder(), tmp_path / "again"
+    train(work, replace(brief, attempts=2, least_saving=0.0), callback)
+    ((name, *_),) = callback.verdicts
+    folders = [ShortcutWorkFolder(folder / name) for folder in (work, work / "attempt2")]
+    first_stages = [latest(folder)[0] for folder in folders]
+    assert first_stages[0] != first_stages[1]
+    best = max(range(2), key=lambda attempt: first_stages[attempt].success)
+    assert [folder.finished.exists() for folder in folders] == [i == best for i in range(2)]
+
+
+def test_steps_of_attempts_in_vain_are_counted(tmp_path, monkeypatch):
+    monkeypatch.setattr(training, "ENOUGH_SUCCESS", 1.1)
+    once, _ = train(tmp_path / "once", replace(SMALL, least_saving=0.0, polish=None))
+    twice, _ = train(tmp_path / "twice", replace(SMALL, least_saving=0.0, polish=None, attempts=2))
+    (one,), (other,) = once.shortcuts, twice.shortcuts
+    assert other.record["attempts"] == 2
+    assert other.record["environment_steps"] == 2 * one.record["environment_steps"]
+    assert twice.record["environment_steps"]["learning"] == other.record["environment_steps"]
 
 
 def test_another_training_in_the_same_folder_is_refused(tmp_path):

@@ -5,32 +5,36 @@
 import json
 import shlex
 import xml.etree.ElementTree as ET
-from contextlib import nullcontext
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
+from study_helpers import without_seconds
 from typer.main import get_command
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
+from slap_ros.acquisition.domain_choice import DomainChoice
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
-from slap_ros.evaluation import experiment as experiments
 from slap_ros.evaluation.approaches import approaches
 from slap_ros.evaluation.experiment import Experiment
 from slap_ros.files import pretty_json
 from slap_ros.learning.task_distribution import TaskDistribution
-from slap_ros.learning.workers import SequentialWorkers
 from slap_ros.planning.planner import Problem, make_planner
 from slap_ros.shortcuts import jobs
-from slap_ros.shortcuts.library import load_library
+from slap_ros.shortcuts.explore import ExplorationResult
+from slap_ros.shortcuts.library import load_library, save_shortcut
 from slap_ros.shortcuts.settings import training_settings
 from slap_ros.shortcuts.shortcut import Sampling
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
-from slap_ros.studies import comparison, perception, pruning
+from slap_ros.studies import perception, pruning
 from slap_ros.studies.goals import sample_goals
+from slap_ros.studies.job_runner import JobRunner
+from slap_ros.studies.results import Provenance
+from slap_ros.studies.study_log import StudyLog
 from slap_ros.studies.trainings import TrainingFolder, read_curve
 from slap_ros.studies.variations import Variation, offered, parse_variation
 
@@ -38,14 +42,8 @@ PUBLISHED = Path(__file__).parent.parent.parent / "docs" / "results"
 LIBRARY = Path(__file__).parent.parent / "shortcuts" / "data" / "obstacle2d"
 DOMAIN = get_domain("obstacle2d")
 SAMPLES = 2
-PLANNING = ["--shortcuts", LIBRARY, "--samples", SAMPLES]
-
-
-@pytest.fixture(autouse=True)
-def _in_this_process(monkeypatch):
-    """Starting processes takes longer than what they would do here."""
-    for module in (experiments, comparison, pruning):
-        monkeypatch.setattr(module, "local_workers", lambda _: nullcontext(SequentialWorkers()))
+PLANNING = ["--first-seed", 0, "--shortcuts", LIBRARY, "--samples", SAMPLES]
+ALONE = ["--shortcuts", "none"]  # learning curves alone
 
 
 def study(folder, *arguments):
@@ -60,13 +58,6 @@ def refusal(*arguments):
     """How a study is refused: exit code and message."""
     result = CliRunner().invoke(app, ["study", *map(str, arguments)])
     return result.exit_code, " ".join(result.stderr.split())
-
-
-def without_seconds(data):
-    """Data without measured times."""
-    if isinstance(data, dict):
-        return {k: without_seconds(v) for k, v in data.items() if not k.endswith("seconds")}
-    return [without_seconds(part) for part in data] if isinstance(data, list) else data
 
 
 def compared(preset="fair"):
@@ -124,7 +115,7 @@ def test_a_task_without_a_plan_counts_as_failed_and_is_told_of(tmp_path, monkeyp
     ("arguments", "words"),
     [
         (["--preset", "hard"], "unknown preset 'hard'; there are fair, paper"),
-        (["--vary", "obstacles=1,2"], "unknown setting 'obstacles'; there are bystanders"),
+        (["--vary", "obstacles=1,2"], "unknown setting 'obstacles'; there are grasp_reach"),
         (["--preset", "fair:mass=2"], "unknown setting 'mass'"),
         (["--preset", "paper"], "preset paper of obstacle2d has none of the settings obstacles"),
         (["--vary", "bystanders"], "is not of the form setting=value"),
@@ -233,8 +224,15 @@ def training(tmp_path):
     ):  # fmt: skip
         kept.append(entry)
     how = training_settings("ours", get_domain("obstacle2d"))
-    settings = {"place": vars(TaskDistribution("obstacle2d", "fair", 3)), **how.as_json()}
+    settings = {"place": {"domain": "obstacle2d", "preset": "fair", "seed": 3}, **how.as_json()}
     (folder / "settings.json").write_text(json.dumps(settings))
+    (shortcut,) = load_library(LIBRARY, DOMAIN).shortcuts
+    save_shortcut(kept.shortcut, replace(shortcut, record={"environment_steps": 450}))
+    save_shortcut(kept.snapshot(300), shortcut)
+    weights, bias = shortcut.policy.layers[-1]
+    away = replace(shortcut.policy, layers=(*shortcut.policy.layers[:-1], (-weights, -bias)))
+    save_shortcut(kept.snapshot(100), replace(shortcut, policy=away))
+    kept.finished.touch()
     return folder
 
 
@@ -264,13 +262,42 @@ def test_trainings_with_several_seeds_are_averaged(tmp_path, training):
     kept.append(line(0, 100, 0.2, 11.0))
     kept.append(line(0, 200, 0.9, 5.0))
     (other / "settings.json").write_bytes((training / "settings.json").read_bytes())
-    data = study(tmp_path, "dynamics", "obstacle2d", "--work", training, "--work", other)
+    data = study(tmp_path, "dynamics", "obstacle2d", "--work", training, "--work", other, *ALONE)
     (learned,) = data["found"]["shortcuts"]
     assert learned["trainings"] == 2
     first, second = learned["moments"]
     assert (first["steps"], first["length_mean"], first["length_sd"]) == (100, 11.0, 0.0)
     assert second["success_mean"] == pytest.approx(0.7)
     assert second["success_sd"] == pytest.approx(np.std([0.5, 0.9], ddof=1))
+
+
+def test_plans_are_made_with_what_was_learned_so_far(tmp_path, training):
+    arguments = ["--work", training, "--tasks", 2, "--seeds", 1, *PLANNING]
+    data = study(tmp_path, "dynamics", "obstacle2d", *arguments)
+    nothing, away, learned, whole = data["found"]["plans"]
+    steps = [one["steps"] for one in data["found"]["plans"]]
+    assert steps == [0, 100, 300, 450]
+    assert (nothing["shortcuts"], nothing["relative_length"]) == ([], 1.0)
+    assert (away["shortcuts"], away["used"], away["relative_length"]) == (
+        ["Clear_On-e41568a9"], [], 1.0,
+    )  # fmt: skip
+    assert learned["used"] == learned["shortcuts"] == ["Clear_On-e41568a9"]
+    assert learned["relative_length"] == whole["relative_length"] < 1.0
+    _, by_name = compared()
+    lengths = [Experiment(DOMAIN, 2, 1).run(0, i, by_name["slap"]).plan_length for i in range(2)]
+    assert [trial["plan_length"] for trial in whole["trials"]] == lengths
+    assert data["library"]["digest"] == load_library(LIBRARY, DOMAIN).digest
+
+
+def test_a_training_of_another_library_is_refused(tmp_path, training):
+    for damage in ("snapshots", "finished"):
+        (kept,) = training.glob(f"*/{damage}")
+        kept.rename(tmp_path / damage)
+        arguments = ["--work", training, "--output", tmp_path / "out", *PLANNING]
+        code, message = refusal("dynamics", "obstacle2d", *arguments)
+        assert code == InvalidParameterError.code
+        assert "train the library again" in message
+        (tmp_path / damage).rename(kept)
 
 
 @pytest.mark.parametrize(
@@ -295,7 +322,7 @@ def test_a_damaged_line_is_refused_and_named(tmp_path, training, damage):
 def test_a_folder_without_a_training_or_with_another_domains_is_refused(tmp_path, name, training):
     code, message = refusal(name, "obstacle2d", "--work", tmp_path / "nothing")
     assert (code, "give the work folder" in message) == (InvalidParameterError.code, True)
-    code, message = refusal(name, "obstacle_tower", "--work", training)
+    code, message = refusal(name, "obstacle_tower", "--work", training, "--output", tmp_path)
     assert (code, "a training of domain 'obstacle2d'" in message) == (
         InvalidParameterError.code,
         True,
@@ -303,11 +330,12 @@ def test_a_folder_without_a_training_or_with_another_domains_is_refused(tmp_path
 
 
 def test_pruning_counts_what_a_training_has_explored(tmp_path, training):
-    distribution = TaskDistribution("obstacle2d", "fair", 3)
+    distribution = TaskDistribution(DomainChoice("obstacle2d", "fair"), 3)
     how = training_settings("ours", get_domain("obstacle2d")).exploration
     explored = [jobs.explore(distribution, index, how) for index in range(2)]
     (training / "explored.json").write_text(json.dumps(explored))
-    data = study(tmp_path / "kept", "pruning", "obstacle2d", "--work", training)
+    tasks = ["--tasks", 1, "--seeds", 2, *PLANNING]
+    data = study(tmp_path / "kept", "pruning", "obstacle2d", "--work", training, *tasks)
     tasks = data["found"]["tasks"]
     assert [task["candidates"] for task in tasks] == [one["candidates"] for one in explored]
     assert [len(task["hits"]) for task in tasks] == [len(one["finds"]) for one in explored]
@@ -315,8 +343,41 @@ def test_pruning_counts_what_a_training_has_explored(tmp_path, training):
     for row in data["found"]["thresholds"]:
         assert row["remaining"] == sum(hit >= row["k"] for hit in hits)
     assert data["found"]["thresholds"][0]["remaining"] == len(hits) > 0
-    other = TaskDistribution("obstacle2d", "fair", 0)
-    fresh = pruning.explore([other], 1, how, 1, SilentProgress())
+    _, by_name = compared()
+    experiment = Experiment(DOMAIN, 1, 2)
+    lengths = {
+        shortcuts: [experiment.run(*which, by_name[name]).plan_length for which in experiment]
+        for shortcuts, name in (((), "pure_planning"), (("Clear_On-e41568a9",), "slap"))
+    }
+    wanted = {c.hits for one in explored for c in _candidates_of_library(one)}
+    for row in data["found"]["thresholds"]:
+        assert bool(row["shortcuts"]) == (max(wanted) >= row["k"])
+        own = lengths[tuple(row["shortcuts"])]
+        (plans,) = [p for p in data["found"]["plans"] if p["shortcuts"] == row["shortcuts"]]
+        assert [trial["plan_length"] for trial in plans["trials"]] == own
+        assert row["relative_length"] == pytest.approx(sum(own) / sum(lengths[()]))
+    assert data["library"]["digest"] == load_library(LIBRARY, DOMAIN).digest
+
+
+def _candidates_of_library(explored):
+    (shortcut,) = load_library(LIBRARY, DOMAIN).shortcuts
+    candidates = ExplorationResult.from_json(explored).candidates
+    return [c for c in candidates if c.signature.patterns == shortcut.signature.patterns]
+
+
+def test_without_a_library_candidates_are_counted_all_the_same(tmp_path):
+    arguments = ["--tasks", 1, "--seeds", 1, "--shortcuts", "none"]
+    data = study(tmp_path, "pruning", "obstacle2d", *arguments)
+    assert "library" not in data
+    assert "plan_length" not in data["found"]["thresholds"][0]
+    assert data["found"]["tasks"][0]["candidates"] > 0
+
+
+def test_tasks_of_a_training_are_explored_as_it_does(tmp_path):
+    how = training_settings("ours", get_domain("obstacle2d")).exploration
+    other = TaskDistribution(DomainChoice("obstacle2d", "fair"), 0)
+    log = StudyLog(tmp_path / "log", Provenance("obstacle2d", "", {}))
+    fresh = pruning.explore([other], 1, how, JobRunner(log, 1, SilentProgress()))
     assert fresh[0].explored.pairs == jobs.explore(other, 0, how)["candidates"]
 
 
@@ -352,8 +413,8 @@ def test_files_are_complete_and_made_again_byte_for_byte_but_for_times(tmp_path,
          "--vary", "bystanders=0,1"],
         ["goals", "obstacle2d", "--goals", 3, "--seeds", 1, *PLANNING],
         ["planning_time", "obstacle2d", "--tasks", 1, "--seeds", 1, *PLANNING],
-        ["pruning", "obstacle2d", "--tasks", 1, "--seeds", 1],
-        ["dynamics", "obstacle2d", "--work", training],
+        ["pruning", "obstacle2d", "--tasks", 1, "--seeds", 1, *PLANNING],
+        ["dynamics", "obstacle2d", "--work", training, "--tasks", 1, "--seeds", 1, *PLANNING],
     ]  # fmt: skip
     for command in commands:
         name = f"{command[0]}_obstacle2d"
@@ -375,11 +436,29 @@ def test_files_are_complete_and_made_again_byte_for_byte_but_for_times(tmp_path,
     assert len(list(one.iterdir())) == 3 * len(commands)
 
 
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ('{"command": "slap study goals obstacle2d"}', "has the data of `slap study goals obs"),
+        ('{"rows": []}', "is no data of a study"),
+        ("notes", "is no data of a study"),
+    ],
+)
+def test_other_data_stays(tmp_path, content, said):
+    path = tmp_path / "goals_obstacle2d.json"
+    path.write_text(content)
+    code, message = refusal("goals", "obstacle2d", "--tasks", 2, "--output", tmp_path)
+    assert code == InvalidParameterError.code
+    assert said in message
+    assert path.read_text() == content
+    assert list(tmp_path.iterdir()) == [path]
+
+
 def test_data_tells_where_it_comes_from(tmp_path):
     data = study(tmp_path, "goals", "obstacle2d", "--goals", 1, "--seeds", 1, *PLANNING)
     assert data["command"] == (
-        f"slap study goals obstacle2d --goals 1 --shortcuts {LIBRARY} --preset fair --tasks 1 "
-        f"--seeds 1 --samples {SAMPLES}"
+        f"slap study goals obstacle2d --shortcuts {LIBRARY} --goals 1 --preset fair --tasks 1 "
+        f"--seeds 1 --first-seed 0 --samples {SAMPLES}"
     )
     assert data["versions"]["slap_ros"]
     library = data["library"]
@@ -437,6 +516,6 @@ def test_published_data_can_be_made_again_by_its_command(path):
     command = get_command(app).commands[study].commands[name]
     given = command.make_context(name, arguments).params
     assert given["domain"] == data["domain"]
-    for setting in ("preset", "tasks", "seeds", "samples"):
+    for setting in ("preset", "tasks", "seeds", "first_seed", "samples"):
         if setting in data:
             assert given[setting] == data[setting]

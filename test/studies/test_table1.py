@@ -1,29 +1,22 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The main table is what its trials say, and a study that is killed goes on where it was."""
+"""The main table is what its trials say."""
 
 import json
 import shutil
-from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
+from study_helpers import in_this_process
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode
-from slap_ros.evaluation import experiment as experiments
 from slap_ros.evaluation.experiment import Experiment
-from slap_ros.learning.workers import SequentialWorkers
 
 LIBRARY = Path(__file__).parent.parent / "shortcuts" / "data" / "obstacle2d"
 NAME = "table1_obstacle2d"
-
-
-@pytest.fixture(autouse=True)
-def _in_this_process(monkeypatch):
-    monkeypatch.setattr(experiments, "local_workers", lambda _: nullcontext(SequentialWorkers()))
 
 
 @pytest.fixture(scope="module")
@@ -46,17 +39,11 @@ def rows(output):
     return json.loads((output / f"{NAME}.json").read_text())["found"]["rows"]
 
 
-def without_seconds(data):
-    if isinstance(data, dict):
-        return {k: without_seconds(v) for k, v in data.items() if not k.endswith("seconds")}
-    return [without_seconds(part) for part in data] if isinstance(data, list) else data
-
-
 @pytest.fixture(scope="module")
 def written(libraries, tmp_path_factory):
     output = tmp_path_factory.mktemp("results")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(experiments, "local_workers", lambda _: nullcontext(SequentialWorkers()))
+        in_this_process(patch)
         code, said = table1(output, libraries)
     assert code == 0, said
     return output
@@ -76,6 +63,8 @@ def test_figures_are_those_of_the_trials(written):
         share = len(row["libraries"]) * sum(t["plan_length"] for t in pure)
         assert row["relative_length"] == pytest.approx(sum(lengths) / share)
         assert len(lengths) == len(row["libraries"]) * row["tasks"]
+    # Nothing is learned in a search: libraries with the same signatures share it.
+    assert [len(row["libraries"]) for row in found[:4]] == [1, 1, 2, 2]
     assert {(t["seed"], t["index"]) for t in pure} == {(500, 0), (500, 1), (501, 0), (501, 1)}
 
 
@@ -83,44 +72,6 @@ def test_equal_tasks_count_once():
     experiment = Experiment(get_domain("obstacle2d", "paper"), 10, 2).without_repetitions()
     starts = {experiment.domain.task(*which).initial_state.key for which in experiment}
     assert len(experiment) == len(list(experiment)) == len(starts) == 3
-
-
-def test_a_study_that_was_killed_goes_on(written, libraries, tmp_path, monkeypatch):
-    solve, solved = experiments.Experiment.run, []
-
-    def killed(self, seed, index, approach):
-        if len(solved) == 5:
-            raise KeyboardInterrupt
-        solved.append((seed, index))
-        return solve(self, seed, index, approach)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(experiments.Experiment, "run", killed)
-        assert table1(tmp_path, libraries)[0] != 0
-    assert not (tmp_path / f"{NAME}.json").exists()
-    log = tmp_path / f".{NAME}.jsonl"
-    log.write_text(log.read_text() + '{"key": ["fair", "", "pure')  # killed while it wrote
-
-    def counted(self, seed, index, approach):
-        solved.append((seed, index))
-        return solve(self, seed, index, approach)
-
-    monkeypatch.setattr(experiments.Experiment, "run", counted)
-    assert table1(tmp_path, libraries)[0] == 0
-    everything = sum(len(lib["trials"]) for row in rows(written) for lib in row["libraries"])
-    assert len(solved) == everything
-    assert without_seconds(rows(tmp_path)) == without_seconds(rows(written))
-    assert not log.exists()
-
-
-def test_another_study_does_not_go_on_with_it(libraries, tmp_path):
-    log = tmp_path / f".{NAME}.jsonl"
-    log.write_text('{"command": "slap study table1 obstacle2d --tasks 7"}\n')
-    before = log.read_bytes()
-    code, said = table1(tmp_path, libraries)
-    assert code == ErrorCode.INVALID_PARAMETER
-    assert "is what `slap study table1 obstacle2d --tasks 7` has done so far" in said
-    assert log.read_bytes() == before
 
 
 def test_a_library_of_another_domain(tmp_path):

@@ -99,14 +99,14 @@ TOWER = Subject(
 )
 DRAWER = Subject(
     "cluttered_drawer",
-    "paper",
+    "fair",
     0,
     lambda state: SceneVisuals(scene_of_drawer(state)),
     cluttered_drawer.VIEWPOINT,
 )
 TABLE = Subject(
     "cleanup_table",
-    "paper",
+    "fair",
     0,
     lambda state: SceneVisuals(scene_of_table(state, shipped())),
     cleanup_table.VIEWPOINT,

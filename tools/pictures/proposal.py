@@ -25,7 +25,8 @@ EXAMPLE = ROOT / "examples" / "peg_in_hole"
 TITLE = "A proposal: question, answer, complaint, better answer, plan"
 WIDTH_PX, MARGIN_PX, PADDING_PX, GAP_PX = 840.0, 16.0, 12.0, 22.0
 SIZE_PX, LINE_PX, COLUMNS = 12.0, 17.0, 112  # of text; characters of a line
-SHOWN_LINES = 5  # of the question
+LEFT_OUT = "… types, predicates, eight rules …"  # of the question
+NAMED_LINES = 3  # at its end: the goal, all skills, the skill
 ASKED = "operator Insert"
 TINTS = {"complaint": "#fdeeee", "plan": "#eef8ee"}
 
@@ -70,10 +71,10 @@ def tell(cassette: Cassette, entries: list[Entry]) -> list[tuple[str, str, list[
     verdicts = [e for e in entries if e["event"] == "verification"]
     digests = {e.request.digest: e.request for e in cassette.exchanges}
     question = digests[answers[0]["request"]].messages[-1].content
-    first = [line for part in question.splitlines()[:4] for line in _wrapped(part)]
+    asked = question.splitlines()
     told = digests[answers[1]["request"]].messages[-1].content.splitlines()[1]
     return [
-        ("Question", "question", [*first[:SHOWN_LINES], "… predicates, types, eight rules"]),
+        ("Question", "question", [*_wrapped(asked[0]), LEFT_OUT, *asked[-NAMED_LINES:]]),
         ("Answer, as the paper prints it", "answer", _operator(answers[0]["answer"])),
         ("Complaint", "complaint", _wrapped(told.removeprefix("- "))),
         ("Better answer", "answer", _operator(answers[1]["answer"])),

@@ -12,20 +12,26 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
+from slap_ros.contact.world import MAX_SHIFT
 from slap_ros.core import Approach, Policy
 from slap_ros.domains.benchtop.features import THING
-from slap_ros.domains.benchtop.hand_motion import KEEP, OPEN, HandGoal
+from slap_ros.domains.benchtop.hand_motion import CLOSE, KEEP, OPEN, HandGoal
 from slap_ros.domains.benchtop.scripts import Move, follow, over, release, travel_height
-from slap_ros.domains.benchtop.state_access import held_thing
+from slap_ros.domains.benchtop.state_access import hand_position, hand_target, held_thing
 from slap_ros.geometry.pose import Vector
 from slap_ros.relational import Object, State
 
 DISTANCE = 0.04  # m before where the skill acts (LG-SAIL §5.1)
 # What is stacked is within 10 mm, so opening the fingers where a skill begins stacks nothing.
 ASIDE = (0.015, 0.025)  # m, least and most
+HELD_STEPS = 6  # environment steps after which a hand that should be away is held by something
+TRIES = 3  # at freeing it
+RELAXED = 0.01  # m, from a hand to where it is pulled
+RELAX_STEPS = 4  # environment steps at most; two take it as far as it can be pulled
 STRAIGHT = (0.0, 0.0)  # rad, turned neither way
 UP: Vector = (0.0, 0.0, 1.0)
 
@@ -34,6 +40,8 @@ UP: Vector = (0.0, 0.0, 1.0)
 ActsAt = Callable[[State, tuple[Object, ...]], HandGoal]
 # Of length 1: from there to where the skill is approached from.
 Outwards = Callable[[State, tuple[Object, ...]], Vector]
+# The moves of an empty hand, the last of which goes up to where nothing is in the way.
+Leave = Callable[[State, Move], tuple[Move, ...]]
 
 
 def from_above(state: State, objects: tuple[Object, ...]) -> Vector:
@@ -62,11 +70,44 @@ def acted_on(state: State, objects: tuple[Object, ...]) -> Object:
     return (others or objects)[-1]
 
 
+def withdraw(state: State, up: Move) -> tuple[Move, ...]:
+    """The moves of a hand up from where it has nothing to do any more.
+
+    What it holds is let go. An empty hand goes as it is: fingers that open push a drawer shut that
+    they are in. Learned skills end where that works (``can_leave``); where it does not, closing and
+    opening them frees the hand from most of what it is caught in.
+
+    Args:
+        state: Where it begins.
+        up: The move up to where nothing is in the way.
+    """
+    if held_thing(state) is not None:
+        return release(), up
+    steps = math.ceil((up.goal(state).position[2] - hand_position(state)[2]) / MAX_SHIFT)
+    first = replace(up, gripper=KEEP, patience=steps + HELD_STEPS)
+    opened, closed = (replace(up, gripper=told, patience=HELD_STEPS) for told in (OPEN, CLOSE))
+    return (first, *(TRIES * (opened, closed)), opened)
+
+
+def relax_and_withdraw(state: State, up: Move) -> tuple[Move, ...]:
+    """:func:`withdraw` for a hand that may be pressed against walls.
+
+    On its way up these would let it go with a jerk to where it is pulled, and it would take along
+    what stands between its fingers. So it is first pulled to where it is.
+
+    Args:
+        state: Where it begins.
+        up: The move up to where nothing is in the way.
+    """
+    return Move(_as_it_is, until=_is_relaxed, patience=RELAX_STEPS), *withdraw(state, up)
+
+
 def make_approach(
     acts_at: ActsAt,
     outwards: Outwards = from_above,
     height: Callable[[State], float] = travel_height,
     turned: tuple[float, float] = STRAIGHT,
+    leave: Leave = withdraw,
 ) -> Approach:
     """The approach of a domain.
 
@@ -75,6 +116,7 @@ def make_approach(
         outwards: From there to where it begins.
         height: Of the grasp point while it travels, m.
         turned: By how much what is held is turned from how it is to be, least and most, rad.
+        leave: How a hand goes up that has nothing to bring.
     """
 
     def approach(state: State, objects: tuple[Object, ...]) -> Policy:
@@ -82,8 +124,9 @@ def make_approach(
         acts, out = acts_at(state, objects), outwards(state, objects)
         goal = begin_at(state, objects, acts, out, STRAIGHT if empty else turned)
         gripper = OPEN if empty else KEEP
-        way = (*over(state, goal, gripper, height(state)), Move(goal, gripper))
-        return follow(release(), *way) if empty else follow(*way)
+        up, across = over(state, goal, gripper, height(state))
+        rise = leave(state, up) if empty else (up,)
+        return follow(*rise, across, Move(goal, gripper))
 
     return approach
 
@@ -114,6 +157,17 @@ def begin_at(
     x, y, z = (np.array(goal.position) + DISTANCE * np.array(outwards) + aside).tolist()
     turn = rng.choice((-1.0, 1.0)) * rng.uniform(*turned)
     return HandGoal((x, y, z), goal.yaw + turn)
+
+
+def _as_it_is(state: State) -> HandGoal:
+    """Where the hand is, turned as it is told."""
+    _, yaw = hand_target(state)
+    return HandGoal(hand_position(state), yaw)
+
+
+def _is_relaxed(state: State) -> bool:
+    target, _ = hand_target(state)
+    return math.dist(target, hand_position(state)) <= RELAXED
 
 
 def _seed(state: State, objects: tuple[Object, ...]) -> int:

@@ -67,8 +67,17 @@ def middle_of(state: State, cabinet: Object) -> Vector:
     return in_drawer(state, cabinet, MIDDLE)
 
 
-def _in_drawers(state: State, cabinets: Column, point: Vector) -> Array:
-    """The same point of several drawers, m, shape (..., cabinets, 3)."""
+def in_drawers(state: State, cabinets: Column, point: Vector) -> Array:
+    """The same point of several drawers.
+
+    Args:
+        state: A state or a batch of states.
+        cabinets: Whose drawers.
+        point: Where it is in a cabinet's frame while the drawer is closed, m.
+
+    Returns:
+        m, shape (..., cabinets, 3).
+    """
     x, y, z = point
     opening = state.stack(cabinets, "opening")
     local = np.stack([np.full_like(opening, x), opening + y, np.full_like(opening, z)], axis=-1)
@@ -84,7 +93,7 @@ def dis_to_handle(state: State, cabinet: Object) -> float:
 
 
 def _dis_to_handle(state: State, cabinets: Column) -> Array:
-    return distances(_in_drawers(state, cabinets, HANDLE), hand_positions(state))
+    return distances(in_drawers(state, cabinets, HANDLE), hand_positions(state))
 
 
 def drawer_dis(state: State, thing: Object, cabinet: Object) -> float:
@@ -102,7 +111,7 @@ def drawer_dis(state: State, thing: Object, cabinet: Object) -> float:
 
 
 def _drawer_dis(state: State, things: Column, cabinets: Column) -> Array:
-    middles = _in_drawers(state, cabinets, MIDDLE)
+    middles = in_drawers(state, cabinets, MIDDLE)
     return distances(positions(state, things)[..., :2], middles[..., :2])
 
 

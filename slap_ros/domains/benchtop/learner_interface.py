@@ -4,13 +4,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
 
 from slap_ros.contact.features import ROBOT
 from slap_ros.contact.hand import LEASH
+from slap_ros.contact.scene import ContactScene
+from slap_ros.contact.snapshot import StateIndex
+from slap_ros.contact.way_up import way_up_is_free
 from slap_ros.core import LearnerInterface
+from slap_ros.domains.benchtop.cabinet import CABINET, HANDLE, MIDDLE
+from slap_ros.domains.benchtop.drawers import in_drawers
 from slap_ros.domains.benchtop.features import DRAWER, LID, REST_HEIGHT, THING
 from slap_ros.domains.benchtop.metrics import REST_SPEED, REST_SPIN
 from slap_ros.domains.benchtop.state_access import (
@@ -23,25 +29,32 @@ from slap_ros.domains.benchtop.state_access import (
     positions,
 )
 from slap_ros.physics.panda import FINGER_OPEN
-from slap_ros.relational import Column, Object, Predicate, State, Type
+from slap_ros.relational import Column, GroundAtom, Object, Predicate, State, Type
 from slap_ros.relational.predicates import Bools
 from slap_ros.relational.state import Array
 
-DISTANCE_SCALE = 0.2  # m, the scale of what is observed
+HEIGHT_SCALE = 0.2  # m, the scale of what is observed of the hand's height
+FINE = 0.01  # m: below, what is observed of a distance is linear in it; above, its logarithm
 SIZE_SCALE = 0.05  # m
 SPEED_SCALE = 0.5  # m/s
 OPENING_SCALE = {"m": 0.1, "rad": 1.0}
 FALLEN = -0.05  # m, the height of what fell off the table
 LENGTH_M = 0.05  # the scale of distances and margins
+# By which share of a threshold a learned skill goes past it: the hand moves a drawer as it goes
+# away, and what is done next moves what lies on or in something.
+PLAY = {"IsCabinetOpen": 0.3, "IsCabinetClose": 0.5, "On": 0.1, "InCabinet": 0.3}
 FINGERS = ("left_finger", "right_finger")
 OF_ALL = {feature.name for kind in (THING, DRAWER, LID) for feature in kind.features}
 
 
-def learner_interface(held: Predicate) -> LearnerInterface:
+def learner_interface(
+    held: Predicate, scene_of: Callable[[State], ContactScene]
+) -> LearnerInterface:
     """What is observed in a domain.
 
     Args:
         held: Its predicate Holding.
+        scene_of: The bodies of a state.
     """
     return LearnerInterface(
         hand=lambda state: hand_positions(state)[..., 0, :],
@@ -52,7 +65,10 @@ def learner_interface(held: Predicate) -> LearnerInterface:
         at_rest=_all_at_rest,
         failed=_fallen,
         grasping=frozenset({held}),
+        success_tolerance=_success_tolerance,
+        can_leave=lambda states: _can_leave(states, scene_of),
         length_m=LENGTH_M,
+        frames=_frames,
     )
 
 
@@ -66,7 +82,7 @@ def _robot(state: State, hand: Array) -> Array:
         state.gather(robot, FINGERS)[..., 0, :] / FINGER_OPEN,
         state.stack(robot, "gripper"),
         np.stack([np.sin(yaw), np.cos(yaw)], axis=-1),
-        hand[..., 2:] / DISTANCE_SCALE,
+        hand[..., 2:] / HEIGHT_SCALE,
         state.gather(robot, LINEAR)[..., 0, :] / SPEED_SCALE,
         lag / LEASH,
     ]
@@ -79,7 +95,7 @@ def _object_features(state: State, hand: Array, column: Column) -> Array:
     if kind.is_a(ROBOT):
         return np.zeros((*state.data.shape[:-1], len(column.objects), 0))
     parts = [
-        (positions(state, column) - hand[..., None, :]) / DISTANCE_SCALE,
+        np.arcsinh((_grips(state, column) - hand[..., None, :]) / FINE),
         state.gather(column, QUATERNION),
     ]
     if kind.is_a(THING):
@@ -91,6 +107,19 @@ def _object_features(state: State, hand: Array, column: Column) -> Array:
     if sizes := _sizes(kind):
         parts.append(state.gather(column, sizes) / SIZE_SCALE)
     return np.concatenate(parts, axis=-1)
+
+
+def _grips(state: State, column: Column) -> Array:
+    """Where the hand acts on objects, m, shape (..., objects, 3): on a drawer, at its handle."""
+    drawer = column.objects[0].type.is_a(CABINET)
+    return in_drawers(state, column, HANDLE) if drawer else positions(state, column)
+
+
+def _frames(state: State, column: Column) -> tuple[Array, Array]:
+    """Where things go, and how objects are turned: of a drawer, the middle of its floor."""
+    drawer = column.objects[0].type.is_a(CABINET)
+    origins = in_drawers(state, column, MIDDLE) if drawer else positions(state, column)
+    return origins, state.gather(column, QUATERNION)
 
 
 def _sizes(kind: Type) -> tuple[str, ...]:
@@ -124,6 +153,20 @@ def _all_at_rest(state: State) -> Bools:
 def _fallen(state: State) -> Bools:
     fallen: Bools = state.stack(state.layout.column_of(THING), "z").min(axis=-1) < FALLEN
     return fallen
+
+
+def _success_tolerance(atom: GroundAtom) -> float:
+    return PLAY.get(atom.predicate.name, 0.0)
+
+
+def _can_leave(states: State, scene_of: Callable[[State], ContactScene]) -> Bools:
+    return np.array([_can_go_up(State(states.layout, row), scene_of) for row in states.data])
+
+
+def _can_go_up(state: State, scene_of: Callable[[State], ContactScene]) -> bool:
+    scene = scene_of(state)
+    index = StateIndex.of(scene, state.layout)
+    return way_up_is_free(scene, index.read(state), index.placement(scene, state))
 
 
 @lru_cache(maxsize=256)

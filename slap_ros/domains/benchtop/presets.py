@@ -107,7 +107,7 @@ def benchtop_domain(
         static=model.static,
         goals=model.goals,
         robot_types=frozenset({ROBOT}),
-        learning=Learning(interface=learner_interface(model.holding)),
+        learning=Learning(interface=learner_interface(model.holding, scene_of)),
         acquisition=model.acquisition,
         configuration=settings.as_configuration(),
     )

@@ -15,6 +15,7 @@ from slap_ros.contact.features import ROBOT
 from slap_ros.contact.hand import wrapped
 from slap_ros.domains.benchtop.features import THING
 from slap_ros.geometry.pose import Pose, Vector, rotate
+from slap_ros.geometry.rotations import rotate_each, x_axes
 from slap_ros.physics.features import POSE_FEATURES
 from slap_ros.relational import Column, Layout, Object, State
 from slap_ros.relational.state import Array
@@ -144,10 +145,7 @@ def positions(state: State, column: Column) -> Array:
 
 def axes(state: State, column: Column) -> Array:
     """The directions of their own x axes, shape (..., objects, 3)."""
-    x, y, z, w = np.moveaxis(state.gather(column, QUATERNION), -1, 0)
-    return np.stack(
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)], axis=-1
-    )
+    return x_axes(state.gather(column, QUATERNION))
 
 
 def in_base(state: State, column: Column, points: Array) -> Array:
@@ -161,11 +159,7 @@ def in_base(state: State, column: Column, points: Array) -> Array:
     Returns:
         Of the same shape.
     """
-    turns = state.gather(column, QUATERNION)
-    axis, cosine = turns[..., :3], turns[..., 3:]
-    around = 2.0 * np.cross(axis, points)
-    turned: Array = points + cosine * around + np.cross(axis, around)
-    return positions(state, column) + turned
+    return positions(state, column) + rotate_each(state.gather(column, QUATERNION), points)
 
 
 def distances(points: Array, others: Array) -> Array:

@@ -285,9 +285,7 @@ def fixed_station(name: str, pose: Pose, gap: float = 0.0) -> Station:
         What takes room, without room for a hand.
     """
     body = PLATE_BODY if name == "plate" else FURNITURE[name].body
-    boxes = (
-        OrientedBox(pose.compose(b.pose), b.half) for b in (p.bounding_box for p in body.parts)
-    )
+    boxes = (part.bounding_box.at(pose) for part in body.parts)
     return Station(tuple(box.grown(gap) for box in boxes))
 
 

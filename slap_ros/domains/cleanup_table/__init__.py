@@ -15,10 +15,14 @@ from types import MappingProxyType
 
 from slap_ros.core import Display, Domain, Execution, Learning, presets
 from slap_ros.domains.cleanup_table import features, operators, predicates, skills, tasks
-from slap_ros.domains.cleanup_table.learner_interface import LEARNER_INTERFACE, TRAINING_SETTINGS
+from slap_ros.domains.cleanup_table.learner_interface import (
+    ABLATIONS,
+    LEARNER_INTERFACE,
+    TRAINING_SETTINGS,
+)
 from slap_ros.domains.cleanup_table.scene import scene_of
 from slap_ros.domains.cleanup_table.shapes import shipped
-from slap_ros.domains.tabletop.presets import ACTION_SPACES, TIMINGS
+from slap_ros.domains.tabletop.presets import TIMINGS
 from slap_ros.domains.tabletop.settling import settling
 from slap_ros.domains.tabletop.visualization import animation, visible_arm, visible_bodies
 from slap_ros.domains.variation import varied
@@ -26,12 +30,12 @@ from slap_ros.meshes.solid import Solid
 from slap_ros.physics.panda import CONTROL_PERIOD_S
 from slap_ros.physics.scene import Scene
 from slap_ros.physics.viewpoint import Viewpoint
-from slap_ros.physics.world import ACTION_SPACE, PandaWorld
+from slap_ros.physics.world import PandaWorld
 from slap_ros.relational import State
 
-SETTINGS: Mapping[str, tasks.RandomCleanupTasks | tasks.PaperCleanupTasks] = {
+SETTINGS: Mapping[str, tasks.RandomCleanupTasks] = {
     "fair": tasks.RandomCleanupTasks(),
-    "paper": tasks.PaperCleanupTasks(),
+    "paper": tasks.PAPER,
 }
 VIEWPOINT = Viewpoint(eye=(1.7, 1.15, 0.95), target=(0.33, 0.13, 0.13))  # m, into the bin
 
@@ -42,7 +46,7 @@ def make(
     changes: Mapping[str, str] = MappingProxyType({}),
     shapes: Mapping[str, Solid] | None = None,
 ) -> Domain:
-    """The domain: preset ``fair`` samples different tasks, ``paper`` has a single one.
+    """The domain: preset ``fair`` samples different tasks, ``paper`` fewer, at the paper's pace.
 
     Args:
         preset: ``fair`` or ``paper``.
@@ -57,7 +61,7 @@ def make(
         InvalidParameterError: No such setting, or it cannot have that value.
     """
     shapes = shipped() if shapes is None else shapes
-    settings, actions = varied(SETTINGS[preset], changes), ACTION_SPACES[preset]
+    settings = varied(SETTINGS[preset], changes)
 
     def scene(state: State) -> Scene:
         return scene_of(state, shapes)
@@ -68,10 +72,10 @@ def make(
         types=features.TYPES,
         predicates=predicates.PREDICATES,
         operators=operators.OPERATORS,
-        skills=skills.skills(TIMINGS[preset]),
-        action_space=actions,
+        skills=skills.skills(TIMINGS[settings.timing]),
+        action_space=settings.actions,
         sample_task=lambda rng: settings.sample(rng, shapes),
-        make_world=lambda state: PandaWorld(scene(state), state, actions=actions),
+        make_world=lambda state: PandaWorld(scene(state), state, actions=settings.actions),
         default_goal=tasks.everything_in_the_bin,
         step_limit=tasks.STEP_LIMIT,
         execution=Execution(
@@ -86,7 +90,8 @@ def make(
         learning=Learning(
             interface=LEARNER_INTERFACE,
             settings=TRAINING_SETTINGS,
-            actions=ACTION_SPACE,
+            ablations=ABLATIONS,
+            actions=settings.learned_actions,
         ),
         configuration=settings.as_configuration(),
     )

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Cleanup Table: operators (SLAP Table 9). Reach, Grasp and Lift a block, Drop it into the bin."""
+"""Cleanup Table: operators (SLAP, appendix): Reach, Grasp and Lift a block, Drop it in the bin."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Cleanup Table: predicates (SLAP Table 9). Margins in m."""
+"""Cleanup Table: predicates (SLAP, appendix). Margins in m."""
 
 from __future__ import annotations
 

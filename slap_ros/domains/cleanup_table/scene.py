@@ -75,13 +75,12 @@ def _parts(half: Vector) -> Mapping[str, OrientedBox]:
 def solid(state: State) -> Iterable[tuple[Object, OrientedBox]]:
     """The boxes that things fill: a block, the box around it."""
     for block in state.layout.of_type(BLOCK):
-        frame, half = carried(state, block)
-        yield block, OrientedBox(pose_of(state, block).compose(frame), half)
+        yield block, carried(state, block).at(pose_of(state, block))
     for surface in state.layout.of_type(SURFACE):
         pose, half = box_of(state, surface)
         if state.get(surface, "is_drawer") > 0.5:
-            for frame, size in _parts(half).values():
-                yield surface, OrientedBox(pose.compose(frame), size)
+            for part in _parts(half).values():
+                yield surface, part.at(pose)
         else:
             yield surface, OrientedBox(pose, half)
 

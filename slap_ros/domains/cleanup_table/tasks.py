@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Cleanup Table: tasks, sampled, and a single start state. Lengths in m, angles in rad."""
+"""Cleanup Table: tasks, all sampled. Lengths in m, angles in rad."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from slap_ros.domains.cleanup_table.features import BLOCK, HALF, MIDDLE, SURFACE
 from slap_ros.domains.cleanup_table.predicates import IS_DRAWER, ON
 from slap_ros.domains.cleanup_table.scene import BIN, MATERIAL, TABLE, TABLE_TOP, kind_of
 from slap_ros.domains.cleanup_table.shapes import WIPER
+from slap_ros.domains.tabletop.presets import ARM_LIMITS, ArmSettings
 from slap_ros.domains.tabletop.variation_limits import MATERIAL_LIMITS, REACH, TURN
-from slap_ros.domains.variation import TaskSettings
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Vector, from_yaw
@@ -80,19 +80,23 @@ def everything_in_the_bin(state: State) -> frozenset[GroundAtom]:
 
 
 @dataclass(frozen=True)
-class RandomCleanupTasks(TaskSettings):
+class RandomCleanupTasks(ArmSettings):
     """Toys anywhere beside the bin, turned as they like; the wiper on the other side."""
 
-    limits: ClassVar = MATERIAL_LIMITS | {
-        "toys": (0, 20),
-        "toy_x": REACH,
-        "toy_y": REACH,
-        "toy_yaw": TURN,
-        "gap": (0.0, REACH[1]),
-        "wiper_x": REACH,
-        "wiper_y": REACH,
-        "wiper_yaw": TURN,
-    }
+    limits: ClassVar = (
+        ARM_LIMITS
+        | MATERIAL_LIMITS
+        | {
+            "toys": (0, 20),
+            "toy_x": REACH,
+            "toy_y": REACH,
+            "toy_yaw": TURN,
+            "gap": (0.0, REACH[1]),
+            "wiper_x": REACH,
+            "wiper_y": REACH,
+            "wiper_yaw": TURN,
+        }
+    )
 
     toys: tuple[int, int] = (3, 3)  # inclusive
     toy_x: Range = (0.38, 0.62)
@@ -132,19 +136,14 @@ class RandomCleanupTasks(TaskSettings):
         raise InvalidParameterError(f"the table has no room for {count} toys {self.gap} m apart")
 
 
-@dataclass(frozen=True)
-class PaperCleanupTasks(TaskSettings):
-    """One start state, as the reference has; toys in its ranges."""
-
-    limits: ClassVar = {"toys": TURN, "wiper": TURN}  # m and rad; cannot be given as text
-
-    toys: tuple[PlanarPose, ...] = ((0.40, 0.10, 0.0), (0.50, 0.20, 0.0), (0.60, 0.10, 0.0))
-    wiper: PlanarPose = (0.5, -0.12, 0.0)
-
-    def sample(self, _: np.random.Generator, shapes: Mapping[str, Solid]) -> Task:
-        """The task of the single start state."""
-        names = _names(shapes, len(self.toys))
-        return make_task({**dict(zip(names, self.toys, strict=True)), WIPER: self.wiper}, shapes)
+# Toys anywhere in the reference's ranges, the wiper where the reference has it.
+PAPER = RandomCleanupTasks(
+    timing="tens",
+    shortcut_speed=1 / 3,
+    wiper_x=(0.5, 0.5),
+    wiper_y=(-0.12, -0.12),
+    wiper_yaw=(0.0, 0.0),
+)
 
 
 def _names(shapes: Mapping[str, Solid], count: int) -> Sequence[str]:

@@ -16,17 +16,21 @@ from types import MappingProxyType
 from slap_ros.core import Display, Domain, Execution, Learning, presets
 from slap_ros.domains.cluttered_drawer import features, operators, skills, tasks
 from slap_ros.domains.cluttered_drawer.blocking import FingerClearance
-from slap_ros.domains.cluttered_drawer.learner_interface import LEARNER_INTERFACE, TRAINING_SETTINGS
+from slap_ros.domains.cluttered_drawer.learner_interface import (
+    ABLATIONS,
+    LEARNER_INTERFACE,
+    TRAINING_SETTINGS,
+)
 from slap_ros.domains.cluttered_drawer.predicates import HAND_PREDICATES, predicates
 from slap_ros.domains.cluttered_drawer.scene import scene_of
-from slap_ros.domains.tabletop.presets import ACTION_SPACES, TIMINGS
+from slap_ros.domains.tabletop.presets import TIMINGS
 from slap_ros.domains.tabletop.settling import settling
 from slap_ros.domains.tabletop.visualization import animation, visible_arm, visible_bodies
 from slap_ros.domains.variation import varied
 from slap_ros.physics.features import ROBOT
 from slap_ros.physics.panda import CONTROL_PERIOD_S
 from slap_ros.physics.viewpoint import Viewpoint
-from slap_ros.physics.world import ACTION_SPACE, PandaWorld
+from slap_ros.physics.world import PandaWorld
 
 SETTINGS: Mapping[str, tasks.RandomDrawerTasks | tasks.PaperDrawerTasks] = {
     "fair": tasks.RandomDrawerTasks(),
@@ -41,7 +45,7 @@ VIEWPOINT = Viewpoint(
 @presets(*SETTINGS)
 def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Domain:
     """The domain: preset ``fair`` samples different tasks, ``paper`` has the reference's one."""
-    settings, actions = varied(SETTINGS[preset], changes), ACTION_SPACES[preset]
+    settings = varied(SETTINGS[preset], changes)
     clearance = FingerClearance(settings.reach, settings.half_width)
     return Domain(
         name="cluttered_drawer",
@@ -49,10 +53,10 @@ def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Doma
         types=features.TYPES,
         predicates=predicates(clearance),
         operators=operators.OPERATORS,
-        skills=skills.skills(TIMINGS[preset]),
-        action_space=actions,
+        skills=skills.skills(TIMINGS[settings.timing]),
+        action_space=settings.actions,
         sample_task=settings.sample,
-        make_world=lambda state: PandaWorld(scene_of(state), state, actions=actions),
+        make_world=lambda state: PandaWorld(scene_of(state), state, actions=settings.actions),
         default_goal=tasks.target_block_on_table,
         step_limit=tasks.STEP_LIMIT,
         robot_types=frozenset({ROBOT}),
@@ -69,7 +73,8 @@ def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Doma
         learning=Learning(
             interface=LEARNER_INTERFACE,
             settings=TRAINING_SETTINGS,
-            actions=ACTION_SPACE,
+            ablations=ABLATIONS,
+            actions=settings.learned_actions,
         ),
         configuration=settings.as_configuration(),
     )

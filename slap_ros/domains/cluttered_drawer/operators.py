@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Cluttered Drawer: operators (SLAP Table 9).
+"""Cluttered Drawer: operators (SLAP, appendix).
 
 The paper names the predicates and operators, but says little of what they mean. We want operators
 whose effects are exactly what their skills bring about, without conditional effects:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Cluttered Drawer: predicates (SLAP Table 9). Margins in m; ``blocking`` says what they mean."""
+"""Cluttered Drawer: predicates (SLAP, appendix). Margins in m; ``blocking`` says what they mean."""
 
 from __future__ import annotations
 

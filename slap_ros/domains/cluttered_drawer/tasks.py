@@ -18,8 +18,8 @@ from slap_ros.domains.cluttered_drawer.features import BLOCK, TABLE, TARGET
 from slap_ros.domains.cluttered_drawer.predicates import ON
 from slap_ros.domains.cluttered_drawer.scene import BOTTOM, FIXED, HALF_WIDTH, MIDDLE, OPENING
 from slap_ros.domains.tabletop.placements import GAP
+from slap_ros.domains.tabletop.presets import ARM_LIMITS, ArmSettings
 from slap_ros.domains.tabletop.variation_limits import MATERIAL_LIMITS, REACH, TURN
-from slap_ros.domains.variation import TaskSettings
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.geometry.pose import Pose, from_yaw
 from slap_ros.physics.features import (
@@ -33,7 +33,7 @@ from slap_ros.physics.panda import HOME
 from slap_ros.physics.scene import CUBE_EDGE, CUBE_MATERIAL, Material
 from slap_ros.relational import GroundAtom, Object, State
 
-STEP_LIMIT = 500  # environment steps (SLAP Table 8)
+STEP_LIMIT = 500  # environment steps (SLAP, appendix)
 TRIES = 10_000  # arrangements drawn before there is said to be no room
 NEIGHBOUR = 0.0675  # between the middles of the target block and of a blocker (reference)
 APART = 0.15  # from the target block to a block that blocks no side of it
@@ -91,11 +91,12 @@ TOWARDS: tuple[complex, ...] = tuple(blocking.TOWARDS.tolist())
 
 
 @dataclass(frozen=True)
-class RandomDrawerTasks(TaskSettings):
+class RandomDrawerTasks(ArmSettings):
     """Everything is sampled for each task. Lengths in m, angles in rad, masses in kg."""
 
     limits: ClassVar = (
-        MATERIAL_LIMITS
+        ARM_LIMITS
+        | MATERIAL_LIMITS
         | BLOCKING_LIMITS
         | {
             "obstacles": (0, 20),
@@ -169,10 +170,10 @@ class RandomDrawerTasks(TaskSettings):
 
 
 @dataclass(frozen=True)
-class PaperDrawerTasks(TaskSettings):
+class PaperDrawerTasks(ArmSettings):
     """The single start state of the reference."""
 
-    limits: ClassVar = BLOCKING_LIMITS
+    limits: ClassVar = ARM_LIMITS | BLOCKING_LIMITS
 
     # In the configuration that bags record, arrangements go by this name.
     scenery: DrawerArrangement = field(
@@ -185,6 +186,8 @@ class PaperDrawerTasks(TaskSettings):
     )
     reach: float = FingerClearance.reach
     half_width: float = FingerClearance.half_width
+    timing: str = "tens"
+    shortcut_speed: float = 1 / 3
 
     def sample(self, _: np.random.Generator) -> Task:
         """The task of the single start state."""

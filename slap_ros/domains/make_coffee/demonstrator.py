@@ -9,7 +9,13 @@ from collections.abc import Mapping
 
 from slap_ros.core import Policy, Script
 from slap_ros.domains.benchtop import drawers
-from slap_ros.domains.benchtop.approach import UP, acted_on, carried, make_approach
+from slap_ros.domains.benchtop.approach import (
+    UP,
+    acted_on,
+    carried,
+    make_approach,
+    relax_and_withdraw,
+)
 from slap_ros.domains.benchtop.cabinet import CABINET
 from slap_ros.domains.benchtop.hand_motion import CLOSE, OPEN, GoalOf, HandGoal
 from slap_ros.domains.benchtop.scripts import GENTLE, Move, follow, grasp, over, release
@@ -57,7 +63,8 @@ def outwards(state: State, objects: tuple[Object, ...]) -> Vector:
     return axis_of(state, there) if behind else UP
 
 
-APPROACH = make_approach(acts_at, outwards, lambda _: TRAVEL_HEIGHT)
+# Between the walls of holder and drawer the hand is pressed against them.
+APPROACH = make_approach(acts_at, outwards, lambda _: TRAVEL_HEIGHT, leave=relax_and_withdraw)
 
 
 def at_pod(state: State, pod: Object) -> HandGoal:

@@ -20,6 +20,7 @@ from slap_ros.domains.benchtop.goals import goal
 from slap_ros.domains.benchtop.metrics import (
     DIS_TO_OBJ,
     NEAR_METRES,
+    NEAR_RADIANS,
     PARALLEL_DIS,
     PERPENDICULAR_DIS,
     XY_DIS,
@@ -36,6 +37,7 @@ from slap_ros.domains.benchtop.predicates import (
     on,
 )
 from slap_ros.domains.benchtop.state_access import (
+    QUATERNION,
     distances,
     hand_position,
     hand_positions,
@@ -52,6 +54,7 @@ TYPES = (PLACE, THING, DRAWER, LID, POD, CABINET, HOLDER)
 INSERTED = 0.006  # between the axes of pod and holder, whose walls leave 4 mm to each side
 INSIDE = 0.07  # from the middle of the drawer, whose walls leave a pod less
 LIFTED_OUT = 0.02  # over the drawer's floor
+UPRIGHT = math.radians(15.0)  # a pod that leans more catches on the walls of the holder
 LID_OPEN, LID_CLOSED = math.radians(60.0), math.radians(15.0)
 
 
@@ -81,22 +84,41 @@ DIS_TO_LID = Metric(
     NEAR_METRES,
     of_hand=True,
 )
+
+
+def tilt(state: State, pod: Object) -> float:
+    """Between the pod's axis and upright."""
+    return float(_tilt(state, Column((pod,)))[0])
+
+
+def _tilt(state: State, pods: Column) -> Array:
+    x, y, _, _ = np.moveaxis(state.gather(pods, QUATERNION), -1, 0)
+    angles: Array = np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0))
+    return angles
+
+
+TILT = Metric(
+    "tilt", (POD,), "rad", "Angle between the pod's axis and upright.", _tilt, tilt, NEAR_RADIANS
+)
 LID_OPENING = opening_metric(HOLDER, LID_OPEN, "lid_opening")
 LID_CLOSURE = closure_metric(HOLDER, "lid_closure")
-METRICS = (*drawers.METRICS, DIS_TO_LID, LID_OPENING, LID_CLOSURE)
+METRICS = (*drawers.METRICS, DIS_TO_LID, LID_OPENING, LID_CLOSURE, TILT)
 
 
 # -- predicates -----------------------------------------------------------------------------------
 
-HOLDING = holding(POD)
+# A pod that leans in the hand cannot be inserted, so it is not what Insert is to begin with.
+HOLDING = Predicate.of("Holding", (POD,), [*holding(POD).conditions, at_most(TILT, UPRIGHT)])
 HAND_EMPTY = hand_empty(HOLDING)
-# Until it is lifted out: what is grasped in the drawer and let go again is still there.
+# Until it is lifted out: what is grasped in the drawer and let go again is still there. A drawer
+# that is pulled by jerks tips its pod over, and is not opened by that.
 IN_CABINET = Predicate.of(
     "InCabinet",
     (POD, CABINET),
     [
         at_most(drawers.DRAWER_DIS, INSIDE),
         within(PERPENDICULAR_DIS, -LIFTED_OUT, LIFTED_OUT),
+        at_most(TILT, UPRIGHT),
     ],
 )
 IN = on(POD, HOLDER, "In", INSERTED)

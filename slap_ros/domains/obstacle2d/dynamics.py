@@ -32,10 +32,24 @@ ACTION_SPACE = ActionSpace(
 )
 CONTROL_PERIOD = 0.1  # s, nominal: the world has no dynamics
 CLOSE, OPEN = 0.5, -0.5  # gripper commands beyond which it closes or opens
-GRASP_REACH = 0.05  # m, sideways distance between gripper and block at which it still grasps
-GRASP_GAP = 0.02  # m, height of the gripper over the block at which it still grasps
 ROUNDING = 1e-9  # m, overlap that does not push
 CONTACT = 1e-6  # m, overlap below which bodies only touch
+
+
+@dataclass(frozen=True)
+class GraspTolerance:
+    """How far from a block the gripper still grasps it, m.
+
+    Args:
+        reach: Sideways, between their middles.
+        gap: Height of the gripper over the block.
+    """
+
+    reach: float = 0.05
+    gap: float = 0.02
+
+
+GRASP_TOLERANCE = GraspTolerance()
 
 
 @dataclass(frozen=True)
@@ -58,13 +72,16 @@ def _columns(layout: Layout) -> _Columns:
     )
 
 
-def step(layout: Layout, data: Array, actions: Array) -> Array:
+def step(
+    layout: Layout, data: Array, actions: Array, tolerance: GraspTolerance = GRASP_TOLERANCE
+) -> Array:
     """Step many worlds of the same objects once: the gripper acts, then the robot moves.
 
     Args:
         layout: The worlds' objects.
         data: States, shape (worlds, layout.size). Not changed.
         actions: Shape (worlds, 3), within the action space.
+        tolerance: Of a grasp.
 
     Returns:
         The next states, shape (worlds, layout.size).
@@ -73,7 +90,8 @@ def step(layout: Layout, data: Array, actions: Array) -> Array:
     robot = data[:, columns.robot]
     x, y, held = data[:, columns.x], data[:, columns.y], data[:, columns.held] > 0.5
 
-    y, held = _grip(robot, x, y, held, actions[:, 2])
+    graspable = _graspable(robot, x, y, tolerance)
+    y, held = _grip(graspable, x, y, held, actions[:, 2])
     robot, x, y = _move(robot, x, y, held, actions[:, :2])
 
     after = data.copy()
@@ -82,18 +100,22 @@ def step(layout: Layout, data: Array, actions: Array) -> Array:
     return after
 
 
+def _graspable(robot: Array, x: Array, y: Array, tolerance: GraspTolerance) -> NDArray[np.bool_]:
+    """The block that the gripper is over, if there is one: the nearest of those within reach."""
+    sideways = np.abs(x - robot[:, :1])
+    gap = robot[:, 1:] - y - BLOCK_SIZE
+    within = (sideways <= tolerance.reach) & (gap >= -CONTACT) & (gap <= tolerance.gap)
+    nearest = np.argmin(np.where(within, sideways, 9.0), axis=1)[:, None]
+    graspable: NDArray[np.bool_] = within & (np.arange(x.shape[1]) == nearest)
+    return graspable
+
+
 def _grip(
-    robot: Array, x: Array, y: Array, held: NDArray[np.bool_], command: Array
+    graspable: NDArray[np.bool_], x: Array, y: Array, held: NDArray[np.bool_], command: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Grasp the block below the gripper, or let the carried one down onto free table."""
     holding = held.any(axis=1)
-    sideways = np.abs(x - robot[:, :1])
-    gap = robot[:, 1:] - y - BLOCK_SIZE
-    graspable = (sideways <= GRASP_REACH) & (gap >= -CONTACT) & (gap <= GRASP_GAP)
-    nearest = (
-        np.arange(x.shape[1]) == np.argmin(np.where(graspable, sideways, 9.0), axis=1)[:, None]
-    )
-    grasped = graspable & nearest & ((command > CLOSE) & ~holding)[:, None]
+    grasped = graspable & ((command > CLOSE) & ~holding)[:, None]
 
     carried_x = np.sum(x * held, axis=1, keepdims=True)
     below = (np.abs(x - carried_x) < BLOCK_SIZE - CONTACT) & ~held
@@ -202,12 +224,15 @@ def _apart(places: Array) -> Array:
 class Obstacle2DVectorWorld:
     """Many worlds of the same objects, stepped by one computation."""
 
-    def __init__(self, states: Sequence[State]) -> None:
-        """Begin in ``states``.
+    def __init__(
+        self, states: Sequence[State], tolerance: GraspTolerance = GRASP_TOLERANCE
+    ) -> None:
+        """Begin in ``states``; grasps have this tolerance.
 
         Raises:
             InvalidStateError: A scene that cannot be.
         """
+        self._tolerance = tolerance
         for state in states:
             require_valid(state)
         self._layout = states[0].layout
@@ -224,20 +249,21 @@ class Obstacle2DVectorWorld:
 
     def step(self, actions: Array) -> State:
         """Act in every world once; ``actions``: shape (worlds, 3)."""
-        self._data = step(self._layout, self._data, actions)
+        self._data = step(self._layout, self._data, actions, self._tolerance)
         return self.states
 
 
 class Obstacle2DWorld:
     """A world in one state, stepped by itself; :func:`step` steps many at once."""
 
-    def __init__(self, state: State) -> None:
-        """Begin in ``state``.
+    def __init__(self, state: State, tolerance: GraspTolerance = GRASP_TOLERANCE) -> None:
+        """Begin in ``state``; grasps have this tolerance.
 
         Raises:
             InvalidStateError: A scene that cannot be.
         """
         require_valid(state)
+        self._tolerance = tolerance
         self._state = state
 
     @property
@@ -257,5 +283,6 @@ class Obstacle2DWorld:
         """
         ACTION_SPACE.check(action)
         layout = self._state.layout
-        self._state = State(layout, step(layout, self._state.data[None], action[None])[0])
+        after = step(layout, self._state.data[None], action[None], self._tolerance)
+        self._state = State(layout, after[0])
         return self._state

@@ -5,11 +5,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from slap_ros.core import LearnerInterface, SettingValue
-from slap_ros.domains.obstacle2d.model import BLOCK, BLOCK_SIZE, GRIPPER_EMPTY, HOLDING, ROBOT
+from slap_ros.domains.obstacle2d.model import (
+    BLOCK,
+    BLOCK_SIZE,
+    GRIPPER_EMPTY,
+    HOLDING,
+    ROBOT,
+    SURFACE,
+)
 from slap_ros.relational import Column, Object, State
 from slap_ros.relational.state import Array
 
@@ -66,6 +74,51 @@ LEARNER_INTERFACE = LearnerInterface(
     separation=_separation,
     grasping=frozenset({HOLDING, GRIPPER_EMPTY}),
 )
+
+
+def _gripper(state: State) -> Array:
+    """As the hand, but with the gripper's own height, whatever it carries."""
+    place = state.gather(state.layout.column_of(ROBOT), ("x", "y"))[..., 0, :]
+    return np.concatenate([place, place[..., 1:]], axis=-1)
+
+
+def _relative_features(state: State, hand: Array, column: Column) -> Array:
+    """The same as above without the place on the table, which is the same for every hand."""
+    return _object_features(state, hand, column)[..., 1:]
+
+
+def _distance_to_middle(state: State, hand: Array, column: Column) -> Array:
+    """From the gripper to the middle of blocks, m."""
+    if not column.objects[0].type.is_a(BLOCK):
+        return _distance(state, hand, column)
+    aside = state.stack(column, "x") - hand[..., 0, None]
+    below = state.stack(column, "y") - hand[..., 1, None]
+    distance: Array = np.hypot(aside, below)
+    return distance
+
+
+def _straight_separation(state: State, thing: Object, column: Column) -> Array:
+    """Between middles, along a straight line; fixed places lie on the table, at y = 0."""
+    apart = _separation(state, thing, column)
+    height = 0.0 if thing.type.is_a(SURFACE) else state.stack(Column((thing,)), "y")
+    separation: Array = np.hypot(apart, state.stack(column, "y") - height)
+    return separation
+
+
+# Without one of the terms above; see docs/shortcuts.md#what-is-made-by-hand.
+ABLATIONS: Mapping[str, LearnerInterface] = {
+    "reach of what is carried": replace(LEARNER_INTERFACE, hand=_gripper),
+    "place on the table": replace(LEARNER_INTERFACE, objects=_relative_features),
+    "touch from the side": replace(LEARNER_INTERFACE, distance=_distance_to_middle),
+    "separation along the table": replace(LEARNER_INTERFACE, separation=_straight_separation),
+    "all of them (plain)": replace(
+        LEARNER_INTERFACE,
+        hand=_gripper,
+        objects=_relative_features,
+        distance=_distance_to_middle,
+        separation=_straight_separation,
+    ),
+}
 # Where a training in this domain differs; see `slap train --settings`.
 _OURS: Mapping[str, SettingValue] = {
     # Its worlds are stepped together, so that many cost little.

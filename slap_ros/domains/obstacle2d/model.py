@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Obstacle 2D: types, predicates, operators (SLAP Table 9)."""
+"""Obstacle 2D: types, predicates, operators (SLAP, appendix)."""
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -72,9 +72,9 @@ def _overlap_margin(state: State, block: Column, surface: Column) -> Array:
     return np.minimum(_rest_margin(state, block), reach)
 
 
-def _inside_margin(state: State, block: Column, surface: Column) -> Array:
+def _inside_margin(tolerance: float, state: State, block: Column, surface: Column) -> Array:
     distance = np.abs(state.stack(block, "x") - state.stack(surface, "x"))
-    room = (state.stack(surface, "width") - BLOCK_SIZE) / 2 + INSIDE_TOLERANCE
+    room = (state.stack(surface, "width") - BLOCK_SIZE) / 2 + tolerance
     return _both(_rest_margin(state, block), room - distance)
 
 
@@ -93,12 +93,12 @@ def _columns_of(layout: Layout, kind: Type) -> list[Column]:
     return [Column((obj,)) for obj in layout.of_type(kind)]
 
 
-def _on_margin(state: State, block: Column, surface: Column) -> Array:
+def _on_margin(tolerance: float, state: State, block: Column, surface: Column) -> Array:
     """On a target area: inside it. On the table: at rest and off every target area."""
     overlaps = [_overlap_margin(state, block, other) for other in _each(state, SURFACE)]
     off_targets = strictly(-np.max(overlaps, axis=0))
     on_table = np.minimum(_rest_margin(state, block), off_targets)
-    inside = _inside_margin(state, block, surface)
+    inside = _inside_margin(tolerance, state, block, surface)
     return np.where(_is_target(state, surface), inside, on_table)
 
 
@@ -113,12 +113,17 @@ def _gripper_empty(state: State, _: Column) -> Bools:
     return empty
 
 
+def on(inside_tolerance: float = INSIDE_TOLERANCE) -> Predicate:
+    """On; a block in the target area may reach so far over its edge, m."""
+    return Predicate.threshold("On", (BLOCK, SURFACE), partial(_on_margin, inside_tolerance))
+
+
 IS_ROBOT = Predicate("IsRobot", (ROBOT,), always)
 IS_BLOCK = Predicate("IsBlock", (BLOCK,), always)
 IS_SURFACE = Predicate("IsSurface", (SURFACE,), always)
 IS_TARGET = Predicate("IsTarget", (SURFACE,), _is_target)
 NOT_IS_TARGET = Predicate("NotIsTarget", (SURFACE,), _is_not_target)
-ON = Predicate.threshold("On", (BLOCK, SURFACE), _on_margin)
+ON = on()
 OVERLAP = Predicate.threshold("Overlap", (BLOCK, SURFACE), _overlap_margin)
 HOLDING = Predicate("Holding", (ROBOT, BLOCK), is_held)
 GRIPPER_EMPTY = Predicate("GripperEmpty", (ROBOT,), _gripper_empty)
@@ -135,6 +140,12 @@ PREDICATES = (
     GRIPPER_EMPTY,
     CLEAR,
 )
+
+
+@lru_cache(maxsize=64)
+def predicates(inside_tolerance: float) -> tuple[Predicate, ...]:
+    """All of them; equal by name and types to those above, which stand for any tolerance."""
+    return tuple(on(inside_tolerance) if p == ON else p for p in PREDICATES)
 
 
 # -- operators ----------------------------------------------------------------------------------

@@ -11,18 +11,32 @@ from typing import ClassVar
 import numpy as np
 
 from slap_ros.core import Task
-from slap_ros.domains.obstacle2d.model import BLOCK, BLOCK_SIZE, IS_TARGET, ON, ROBOT, SURFACE
+from slap_ros.domains.obstacle2d.dynamics import GRASP_TOLERANCE
+from slap_ros.domains.obstacle2d.model import (
+    BLOCK,
+    BLOCK_SIZE,
+    INSIDE_TOLERANCE,
+    IS_TARGET,
+    ON,
+    ROBOT,
+    SURFACE,
+)
 from slap_ros.domains.obstacle2d.skills import nearest_free_place
 from slap_ros.domains.variation import TaskSettings
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.relational import GroundAtom, Object, State
 
-STEP_LIMIT = 50  # environment steps (SLAP Table 8)
+STEP_LIMIT = 50  # environment steps (SLAP, appendix)
 TABLE_WIDTH = 1.0 + BLOCK_SIZE  # m: block centres range over the unit square
 TARGET_WIDTH = BLOCK_SIZE  # m, an area for one block
 TRIES = 20_000  # scenes drawn before there is said to be no room
 LEAST_OVERLAP = 0.02  # m, by which the obstacle reaches into the target area at least
 UNIT_SQUARE = (0.0, 1.0)  # m, along either axis
+TOLERANCE_LIMITS = {  # m: below the lower ones, rounding decides
+    "grasp_reach": (1e-5, BLOCK_SIZE),
+    "grasp_gap": (1e-5, BLOCK_SIZE),
+    "inside_tolerance": (1e-5, BLOCK_SIZE),
+}
 
 Range = tuple[float, float]
 
@@ -40,11 +54,28 @@ def target_block_in_target_area(state: State) -> frozenset[GroundAtom]:
     return frozenset({ON(blocks[0], targets[0])})
 
 
+@dataclass(frozen=True, kw_only=True)
+class Tolerances(TaskSettings):
+    """How exact the world and its predicates are, m.
+
+    Args:
+        grasp_reach: Sideways, from the gripper to the middle of a block that it still grasps.
+        grasp_gap: From the gripper down to that block.
+        inside_tolerance: By which a block in the target area may reach over its edge.
+    """
+
+    limits: ClassVar = TOLERANCE_LIMITS
+
+    grasp_reach: float = GRASP_TOLERANCE.reach
+    grasp_gap: float = GRASP_TOLERANCE.gap
+    inside_tolerance: float = INSIDE_TOLERANCE
+
+
 @dataclass(frozen=True)
-class RandomObstacle2DTasks(TaskSettings):
+class RandomObstacle2DTasks(Tolerances):
     """Everything is sampled for each task. Lengths in m."""
 
-    limits: ClassVar = {
+    limits: ClassVar = TOLERANCE_LIMITS | {
         "bystanders": (0, 10),
         "robot_x": UNIT_SQUARE,
         "robot_y": UNIT_SQUARE,
@@ -89,10 +120,10 @@ class RandomObstacle2DTasks(TaskSettings):
 
 
 @dataclass(frozen=True)
-class PaperObstacle2DTasks(TaskSettings):
+class PaperObstacle2DTasks(Tolerances):
     """The reference's start states: one scene, the obstacle at one of three places."""
 
-    limits: ClassVar = {
+    limits: ClassVar = TOLERANCE_LIMITS | {
         "robot": UNIT_SQUARE,
         "target_x": UNIT_SQUARE,
         "target_block_x": UNIT_SQUARE,
@@ -103,6 +134,9 @@ class PaperObstacle2DTasks(TaskSettings):
     target_x: float = 0.5  # m
     target_block_x: float = 0.8  # m
     obstacle_x: tuple[float, ...] = (0.4, 0.5, 0.6)  # m
+    grasp_reach: float = 0.02
+    grasp_gap: float = 0.001
+    inside_tolerance: float = 1e-4
 
     def sample(self, rng: np.random.Generator) -> Task:
         """One of the start states."""

@@ -14,15 +14,19 @@ from types import MappingProxyType
 
 from slap_ros.core import Display, Domain, Execution, Learning, presets
 from slap_ros.domains.obstacle_tower import features, operators, predicates, skills, tasks
-from slap_ros.domains.obstacle_tower.learner_interface import LEARNER_INTERFACE, TRAINING_SETTINGS
+from slap_ros.domains.obstacle_tower.learner_interface import (
+    ABLATIONS,
+    LEARNER_INTERFACE,
+    TRAINING_SETTINGS,
+)
 from slap_ros.domains.obstacle_tower.scene import scene_of
-from slap_ros.domains.tabletop.presets import ACTION_SPACES, TIMINGS
+from slap_ros.domains.tabletop.presets import TIMINGS
 from slap_ros.domains.tabletop.settling import settling
 from slap_ros.domains.tabletop.visualization import animation, visible_arm, visible_bodies
 from slap_ros.domains.variation import varied
 from slap_ros.physics.features import ROBOT
 from slap_ros.physics.panda import CONTROL_PERIOD_S
-from slap_ros.physics.world import ACTION_SPACE, PandaWorld
+from slap_ros.physics.world import PandaWorld
 
 SETTINGS: Mapping[str, tasks.RandomTowerTasks | tasks.PaperTowerTasks] = {
     "fair": tasks.RandomTowerTasks(),
@@ -33,17 +37,17 @@ SETTINGS: Mapping[str, tasks.RandomTowerTasks | tasks.PaperTowerTasks] = {
 @presets(*SETTINGS)
 def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Domain:
     """The domain: preset ``fair`` samples different tasks, ``paper`` has the reference's one."""
-    settings, actions = varied(SETTINGS[preset], changes), ACTION_SPACES[preset]
+    settings = varied(SETTINGS[preset], changes)
     return Domain(
         name="obstacle_tower",
         preset=preset,
         types=features.TYPES,
         predicates=predicates.PREDICATES,
         operators=operators.OPERATORS,
-        skills=skills.skills(TIMINGS[preset]),
-        action_space=actions,
+        skills=skills.skills(TIMINGS[settings.timing]),
+        action_space=settings.actions,
         sample_task=settings.sample,
-        make_world=lambda state: PandaWorld(scene_of(state), state, actions=actions),
+        make_world=lambda state: PandaWorld(scene_of(state), state, actions=settings.actions),
         default_goal=tasks.target_block_on_target,
         step_limit=tasks.STEP_LIMIT,
         robot_types=frozenset({ROBOT}),
@@ -59,7 +63,8 @@ def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Doma
         learning=Learning(
             interface=LEARNER_INTERFACE,
             settings=TRAINING_SETTINGS,
-            actions=ACTION_SPACE,
+            ablations=ABLATIONS,
+            actions=settings.learned_actions,
         ),
         configuration=settings.as_configuration(),
     )

@@ -5,10 +5,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from slap_ros.core import LearnerInterface, SettingValue
+from slap_ros.core.learner_interface import exactly, no_penalty
 from slap_ros.domains.obstacle_tower.features import BLOCK, SURFACE
 from slap_ros.domains.obstacle_tower.predicates import (
     GRIPPER_EMPTY,
@@ -17,6 +19,7 @@ from slap_ros.domains.obstacle_tower.predicates import (
     NOTHING_ON,
 )
 from slap_ros.domains.tabletop import observation
+from slap_ros.domains.tabletop.observation import Features, joined
 from slap_ros.physics.features import ROBOT
 from slap_ros.physics.scene import CUBE_EDGE, TABLE_TOP
 from slap_ros.relational import Column, GroundAtom, State
@@ -28,34 +31,36 @@ FINGER_ROOM = 0.005  # m, between the target and what lies beside it: enough for
 BESIDE, OVER = CUBE_EDGE / 2, CUBE_EDGE  # m, of the hand over a block's middle and a target's
 
 
-def _object_features(state: State, hand: Array, column: Column) -> Array:
-    """Where from the hand, in the base's axes; and which joints take the hand there.
+def _object_features(blocks: Features, fixed: Features) -> Features:
+    """Of blocks and of what is fixed; the robot is observed already."""
 
-    Of blocks also: how fast, where over the target, and which joints push them away from there. Of
-    what is fixed: which way it is turned.
-    """
-    if column.objects[0].type.is_a(ROBOT):
-        return observation.no_features(state, column)
-    place = observation.scaled_displacements(state, hand, column)
-    if column.objects[0].type.is_a(BLOCK):
-        off = _off_target(state, column)
-        parts = [
-            place,
-            observation.scaled_velocities(state, column),
-            _over_target(state, off) / NEAR,
-            observation.joint_contributions(
-                hand, observation.displacements_above(state, hand, column, BESIDE)
-            ),
-            observation.joint_contributions(hand, np.pad(off, ((0, 0), (0, 0), (0, 1)))),
-        ]
-        return np.concatenate(parts, axis=-1)
-    turn = state.gather(column, ("qz", "qw"))
-    yaw = 8.0 * np.arctan2(turn[..., 0], turn[..., 1])  # a square looks the same four times
-    turned = np.stack([np.sin(yaw), np.cos(yaw)], axis=-1)
-    there = observation.joint_contributions(
-        hand, observation.displacements_above(state, hand, column, OVER)
-    )
-    return np.concatenate([place, turned, there], axis=-1)
+    def features(state: State, hand: Array, column: Column) -> Array:
+        kind = column.objects[0].type
+        if kind.is_a(ROBOT):
+            return observation.no_features(state, column)
+        return (blocks if kind.is_a(BLOCK) else fixed)(state, hand, column)
+
+    return features
+
+
+def _place_over_target(state: State, _: Array, column: Column) -> Array:
+    return _over_target(state, _off_target(state, column)) / NEAR
+
+
+def _joints_above(height: float) -> Features:
+    """Which joints take the hand to so many m above things."""
+
+    def features(state: State, hand: Array, column: Column) -> Array:
+        above = observation.displacements_above(state, hand, column, height)
+        return observation.joint_contributions(hand, above)
+
+    return features
+
+
+def _joints_off_target(state: State, hand: Array, column: Column) -> Array:
+    """Which joints push blocks away from the target."""
+    off = np.pad(_off_target(state, column), ((0, 0), (0, 0), (0, 1)))
+    return observation.joint_contributions(hand, off)
 
 
 def _off_target(state: State, column: Column) -> Array:
@@ -80,18 +85,22 @@ def _target(state: State) -> Column:
     return observation.single(surfaces.objects[int(np.argmax(labels))])
 
 
-def _distance(state: State, hand: Array, column: Column) -> Array:
-    """From the hand to blocks and targets: so high that the table is not in the way.
+def _distances(beside: float, over: float) -> Features:
+    """From the hand to so many m above blocks and targets, where the table is not in the way.
 
     A hand that is where a block should go keeps the block from coming to lie there.
     """
-    thing = column.objects[0].type
-    if thing.is_a(ROBOT):
-        return observation.unreachable(state, column)
-    if thing.is_a(BLOCK):
-        return observation.distances_above(state, hand, column, BESIDE)
-    distance = observation.distances_above(state, hand, column, OVER)
-    return np.where(state.stack(column, "is_target") > 0.5, distance, np.inf)
+
+    def distances(state: State, hand: Array, column: Column) -> Array:
+        thing = column.objects[0].type
+        if thing.is_a(ROBOT):
+            return observation.unreachable(state, column)
+        if thing.is_a(BLOCK):
+            return observation.distances_above(state, hand, column, beside)
+        distance = observation.distances_above(state, hand, column, over)
+        return np.where(state.stack(column, "is_target") > 0.5, distance, np.inf)
+
+    return distances
 
 
 def _success_tolerance(atom: GroundAtom) -> float:
@@ -100,11 +109,21 @@ def _success_tolerance(atom: GroundAtom) -> float:
     return FINGER_ROOM if frees_target else 0.0
 
 
+# In the order in which policies that ship observe them.
+PLACE, SPEED, TURN = (
+    observation.scaled_displacements,
+    observation.speeds,
+    observation.square_turns,
+)
+TO_BLOCKS, TO_TARGET = _joints_above(BESIDE), _joints_above(OVER)
 LEARNER_INTERFACE = LearnerInterface(
     hand=observation.hand_frame_and_velocities,
     robot=observation.robot,
-    objects=_object_features,
-    distance=_distance,
+    objects=_object_features(
+        joined(PLACE, SPEED, _place_over_target, TO_BLOCKS, _joints_off_target),
+        joined(PLACE, TURN, TO_TARGET),
+    ),
+    distance=_distances(BESIDE, OVER),
     separation=observation.separations,
     at_rest=observation.at_rest,
     failed=observation.fallen_below(FALLEN),
@@ -112,6 +131,37 @@ LEARNER_INTERFACE = LearnerInterface(
     success_tolerance=_success_tolerance,
     grasping=frozenset({HOLDING, NOT_HOLDING, GRIPPER_EMPTY}),
 )
+# Without one of the terms above; see docs/shortcuts.md#what-is-made-by-hand.
+ABLATIONS: Mapping[str, LearnerInterface] = {
+    "joints towards things": replace(
+        LEARNER_INTERFACE,
+        objects=_object_features(
+            joined(PLACE, SPEED, _place_over_target, _joints_off_target), joined(PLACE, TURN)
+        ),
+    ),
+    "joints that push off the target": replace(
+        LEARNER_INTERFACE,
+        objects=_object_features(
+            joined(PLACE, SPEED, _place_over_target, TO_BLOCKS), joined(PLACE, TURN, TO_TARGET)
+        ),
+    ),
+    "place over the target": replace(
+        LEARNER_INTERFACE,
+        objects=_object_features(
+            joined(PLACE, SPEED, TO_BLOCKS, _joints_off_target), joined(PLACE, TURN, TO_TARGET)
+        ),
+    ),
+    "heights above things": replace(LEARNER_INTERFACE, distance=_distances(0.0, 0.0)),
+    "room for fingers": replace(LEARNER_INTERFACE, success_tolerance=exactly),
+    "joint limits": replace(LEARNER_INTERFACE, joint_limit_penalty=no_penalty),
+    "all of them (plain)": replace(
+        LEARNER_INTERFACE,
+        objects=_object_features(joined(PLACE, SPEED), joined(PLACE, TURN)),
+        distance=_distances(0.0, 0.0),
+        success_tolerance=exactly,
+        joint_limit_penalty=no_penalty,
+    ),
+}
 # Where a training in this domain differs; see `slap train --settings`.
 TRAINING_SETTINGS: Mapping[str, Mapping[str, SettingValue]] = {
     "ours": {

@@ -1,6 +1,9 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Obstacle Tower: operators (SLAP Table 9). Pick up from and put down on table, target or block."""
+"""Obstacle Tower: operators (SLAP, appendix).
+
+A block is picked up from, and put down on, table, target or another block.
+"""
 
 from __future__ import annotations
 

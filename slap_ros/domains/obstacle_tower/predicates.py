@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Obstacle Tower: predicates (SLAP Table 9). Margins in m; ``support`` says what they mean."""
+"""Obstacle Tower: predicates (SLAP, appendix). Margins in m; ``support`` says what they mean."""
 
 from __future__ import annotations
 

@@ -15,8 +15,8 @@ from slap_ros.core import Task
 from slap_ros.domains.obstacle_tower.features import BLOCK, SURFACE
 from slap_ros.domains.obstacle_tower.predicates import NOT_IS_TARGET, ON
 from slap_ros.domains.tabletop.placements import GAP
+from slap_ros.domains.tabletop.presets import ARM_LIMITS, ArmSettings
 from slap_ros.domains.tabletop.variation_limits import MATERIAL_LIMITS, REACH, TURN
-from slap_ros.domains.variation import TaskSettings
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.geometry.pose import Pose, from_yaw
 from slap_ros.physics.features import (
@@ -30,7 +30,7 @@ from slap_ros.physics.panda import HOME
 from slap_ros.physics.scene import CUBE_EDGE, CUBE_MATERIAL, TABLE, TABLE_TOP, Material
 from slap_ros.relational import GroundAtom, Object, State
 
-STEP_LIMIT = 500  # environment steps (SLAP Table 8)
+STEP_LIMIT = 500  # environment steps (SLAP, appendix)
 TRIES = 10_000  # places drawn before there is said to be no room
 PLATE_HALF = (0.026, 0.026, 0.0005)  # the target: a plate for one block, flush with the table
 
@@ -77,20 +77,24 @@ def target_block_on_target(state: State) -> frozenset[GroundAtom]:
 
 
 @dataclass(frozen=True)
-class RandomTowerTasks(TaskSettings):
+class RandomTowerTasks(ArmSettings):
     """Everything is sampled for each task. Lengths in m, angles in rad, masses in kg."""
 
-    limits: ClassVar = MATERIAL_LIMITS | {
-        "obstacles": (0, 20),
-        "distractors": (0, 20),
-        "target_x": REACH,
-        "target_y": REACH,
-        "yaw": TURN,
-        "block_x": REACH,
-        "block_y": REACH,
-        "stacking_offset": (0.0, CUBE_EDGE),
-        "stacking_turn": TURN,
-    }
+    limits: ClassVar = (
+        ARM_LIMITS
+        | MATERIAL_LIMITS
+        | {
+            "obstacles": (0, 20),
+            "distractors": (0, 20),
+            "target_x": REACH,
+            "target_y": REACH,
+            "yaw": TURN,
+            "block_x": REACH,
+            "block_y": REACH,
+            "stacking_offset": (0.0, CUBE_EDGE),
+            "stacking_turn": TURN,
+        }
+    )
 
     obstacles: tuple[int, int] = (3, 3)  # blocks of the tower, inclusive
     distractors: tuple[int, int] = (0, 2)  # blocks that stand about besides, inclusive
@@ -148,7 +152,7 @@ class RandomTowerTasks(TaskSettings):
 
 
 @dataclass(frozen=True)
-class PaperTowerTasks(TaskSettings):
+class PaperTowerTasks(ArmSettings):
     """The single start state of the reference."""
 
     arrangement: TowerArrangement = TowerArrangement(
@@ -156,14 +160,17 @@ class PaperTowerTasks(TaskSettings):
         target_block=(0.375, -0.2, 0.0),
         tower=((0.5, 0.0, 0.0),) * 3,
     )
+    timing: str = "tens"
 
     def sample(self, _: np.random.Generator) -> Task:
         """The task of the single start state."""
         return self.arrangement.task()
 
     def as_configuration(self) -> Mapping[str, str]:
-        """The arrangement's parts by name."""
-        return {name: str(value) for name, value in asdict(self.arrangement).items()}
+        """The settings and the arrangement's parts by name."""
+        parts = asdict(self)
+        parts |= parts.pop("arrangement")
+        return {name: str(value) for name, value in parts.items()}
 
 
 def _block(

@@ -128,6 +128,30 @@ def scaled_velocities(state: State, column: Column) -> Array:
     return np.clip(state.gather(column, VELOCITY) / SPEED_SCALE, -3, 3)
 
 
+Features = Callable[[State, Array, Column], Array]  # of objects, as LearnerInterface.objects
+
+
+def joined(*parts: Features) -> Features:
+    """Several features of objects as one."""
+
+    def features(state: State, hand: Array, column: Column) -> Array:
+        return np.concatenate([part(state, hand, column) for part in parts], axis=-1)
+
+    return features
+
+
+def speeds(state: State, _: Array, column: Column) -> Array:
+    """How fast bodies are; see :func:`scaled_velocities`."""
+    return scaled_velocities(state, column)
+
+
+def square_turns(state: State, _: Array, column: Column) -> Array:
+    """Which way squares are turned, which look the same four times, shape (n, objects, 2)."""
+    turn = state.gather(column, ("qz", "qw"))
+    yaw = 8.0 * np.arctan2(turn[..., 0], turn[..., 1])
+    return np.stack([np.sin(yaw), np.cos(yaw)], axis=-1)
+
+
 def no_features(state: State, column: Column) -> Array:
     """No features, shape (n, objects, 0): of the robot, which is observed already."""
     return np.zeros((*state.data.shape[:-1], len(column.objects), 0))

@@ -57,5 +57,4 @@ class PlanningScene:
         )
 
     def _in_hand(self, state: State, held: Object) -> OrientedBox:
-        pose, half = self.carried(state, held)
-        return OrientedBox(grasp_of(state).compose(pose), half)
+        return self.carried(state, held).at(grasp_of(state))

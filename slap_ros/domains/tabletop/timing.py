@@ -49,19 +49,33 @@ class SpeedLimitTiming:
 
 
 class FixedStepTiming:
-    """The paper's timing: ten steps up, ten down, ten for each straight piece across."""
+    """The paper's timing: ten steps up, ten down, ten for each radian begun on the way across."""
 
     max_step: Sequence[float] = (math.pi,) * JOINTS
 
     def positions(self, pieces: Sequence[Path], free: Free) -> Joints:
-        """Ten positions for each piece, without cutting corners; see :class:`Timing`."""
+        """Multiples of ten positions, without cutting corners; see :class:`Timing`."""
         del free  # corners are not cut
-        up, *across, down = (*pieces, pieces[-1][-1:]) if len(pieces) == 1 else pieces
-        return np.concatenate([retime_fixed_steps(p) for p in (_ends(up), *across, _ends(down))])
+        timed = zip(_straightened(pieces), _by_radians(pieces), strict=True)
+        return np.concatenate([retime_fixed_steps(p, per_radian=radians) for p, radians in timed])
 
     def least_steps(self, pieces: Sequence[Path]) -> int:
-        """Ten for each piece that has a length; see :class:`Timing`."""
-        return sum(len(retime_fixed_steps(_ends(piece))) for piece in pieces)
+        """As many as if the way across were straight; see :class:`Timing`."""
+        timed = zip(map(_ends, pieces), _by_radians(pieces), strict=True)
+        return sum(len(retime_fixed_steps(p, per_radian=radians)) for p, radians in timed)
+
+
+def _by_radians(pieces: Sequence[Path]) -> list[bool]:
+    """Which pieces lead across, and not up or down: all but the first and the last."""
+    return [0 < i < len(pieces) - 1 for i in range(len(pieces))]
+
+
+def _straightened(pieces: Sequence[Path]) -> list[Path]:
+    """The pieces, those up and down straight from end to end."""
+    return [
+        piece if across else _ends(piece)
+        for piece, across in zip(pieces, _by_radians(pieces), strict=True)
+    ]
 
 
 def _ends(path: Path) -> Path:

@@ -57,6 +57,9 @@ def operator_question(
 ) -> str:
     """What an action needs and changes (LG-SAIL B.2).
 
+    What all actions of a task have in common comes first: models and servers do not read again
+    how a question begins that they know already.
+
     Args:
         action: The one in question, as ``Insert(?peg: peg, ?hole: hole)``.
         actions: All of the decomposition.

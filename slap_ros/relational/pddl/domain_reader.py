@@ -26,7 +26,7 @@ from slap_ros.relational.pddl.sexpr import (
 )
 from slap_ros.relational.pddl.task import PddlDomain
 from slap_ros.relational.pddl.tokens import located
-from slap_ros.relational.pddl.typed_list import Typed, read_names, read_variables
+from slap_ros.relational.pddl.typed_list import TypedName, read_names, read_variables
 from slap_ros.relational.predicates import Bools, Classifier, Predicate
 from slap_ros.relational.state import State
 
@@ -75,33 +75,33 @@ def parse_domain(text: str, source: str = "<domain>") -> PddlDomain:
 
 
 @dataclass(frozen=True)
-class _Signature:
+class _PredicateDeclaration:
     """A predicate as it is declared."""
 
     name: Word
-    parameters: list[Typed]
+    parameters: list[TypedName]
 
 
 @dataclass(frozen=True)
-class _Action:
+class _ActionDefinition:
     """An operator as it is written."""
 
     name: Word
-    parameters: list[Typed]
+    parameters: list[TypedName]
     preconditions: list[Formula]
     add_effects: list[Formula]
     delete_effects: list[Formula]
 
 
-def _read_signature(node: Node) -> _Signature:
+def _read_signature(node: Node) -> _PredicateDeclaration:
     listed = expect_list(node, "a predicate")
     if not listed.items:
         raise MalformedPddlError(f"{listed.position}: expected a predicate, found an empty list")
     name = expect_word(listed.items[0], "the name of a predicate")
-    return _Signature(name, read_variables(listed.items[1:]))
+    return _PredicateDeclaration(name, read_variables(listed.items[1:]))
 
 
-def _read_action(listed: ListNode) -> _Action:
+def _read_action(listed: ListNode) -> _ActionDefinition:
     if len(listed.items) < 2:
         raise MalformedPddlError(f"{listed.position}: an action without a name")
     name = expect_word(listed.items[1], "the name of an action")
@@ -110,7 +110,7 @@ def _read_action(listed: ListNode) -> _Action:
         raise MalformedPddlError(f"{name.position}: action {name.text} has no :parameters")
     nothing = ListNode((), name.position)
     add_effects, delete_effects = read_effect(parts.get(":effect", nothing))
-    return _Action(
+    return _ActionDefinition(
         name,
         read_variables(expect_list(parts[":parameters"], "a list of parameters").items),
         read_conjunction(parts.get(":precondition", nothing)),
@@ -140,7 +140,7 @@ def _action_parts(name: Word, nodes: tuple[Node, ...]) -> dict[str, Node]:
 # -- the relational layer's classes ---------------------------------------------------------------
 
 
-def _make_types(declared: list[Typed], with_object: bool) -> dict[str, Type]:
+def _make_types(declared: list[TypedName], with_object: bool) -> dict[str, Type]:
     """The types by name: ``object`` first where it is wanted, then the declared ones in order."""
     for entry in declared:
         if entry.word.keyword == OBJECT and entry.type.keyword != OBJECT:
@@ -150,7 +150,7 @@ def _make_types(declared: list[Typed], with_object: bool) -> dict[str, Type]:
     root = Type(OBJECT) if with_object else None
     built: dict[str, Type] = {}
 
-    def build(entry: Typed, below: tuple[str, ...]) -> Type:
+    def build(entry: TypedName, below: tuple[str, ...]) -> Type:
         name, position = entry.word.text, entry.word.position
         if name in below:
             raise MalformedPddlError(f"{position}: type {name} descends from itself")
@@ -167,7 +167,7 @@ def _make_types(declared: list[Typed], with_object: bool) -> dict[str, Type]:
     return types | {name: build(entry, ()) for name, entry in entries.items()}
 
 
-def _make_predicate(signature: _Signature, types: Names[Type]) -> Predicate:
+def _make_predicate(signature: _PredicateDeclaration, types: Names[Type]) -> Predicate:
     name = signature.name.text
     return Predicate(
         name, tuple(types.find(entry.type) for entry in signature.parameters), _no_classifier(name)
@@ -185,7 +185,7 @@ def _no_classifier(name: str) -> Classifier:
 
 
 def _make_operator(
-    action: _Action, types: Names[Type], predicates: Names[Predicate]
+    action: _ActionDefinition, types: Names[Type], predicates: Names[Predicate]
 ) -> LiftedOperator:
     name = action.name.text
     parameters = tuple(Variable(p.word.text, types.find(p.type)) for p in action.parameters)

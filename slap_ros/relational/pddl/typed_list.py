@@ -14,14 +14,14 @@ from slap_ros.relational.pddl.tokens import located
 
 
 @dataclass(frozen=True)
-class Typed:
+class TypedName:
     """A name and the name of its type."""
 
     word: Word
     type: Word  # OBJECT where the text says nothing
 
 
-def read_names(kind: str, nodes: Iterable[Node]) -> list[Typed]:
+def read_names(kind: str, nodes: Iterable[Node]) -> list[TypedName]:
     """A typed list of names, no two of them alike.
 
     Raises:
@@ -32,7 +32,7 @@ def read_names(kind: str, nodes: Iterable[Node]) -> list[Typed]:
     return found
 
 
-def read_variables(nodes: Iterable[Node]) -> list[Typed]:
+def read_variables(nodes: Iterable[Node]) -> list[TypedName]:
     """A typed list of variables, no two of them alike.
 
     Raises:
@@ -48,14 +48,14 @@ def _bare(word: Word) -> Word:
         return Word(bare_variable(word.text), word.position)
 
 
-def _read(kind: str, nodes: Iterable[Node]) -> list[Typed]:
-    found: list[Typed] = []
+def _read(kind: str, nodes: Iterable[Node]) -> list[TypedName]:
+    found: list[TypedName] = []
     untyped = 0  # how many at the end of `found` wait for their type
     remaining = iter(nodes)
     for node in remaining:
         word = expect_word(node, f"the name of a {kind}")
         if word.text != "-":
-            found.append(Typed(word, Word(OBJECT, word.position)))
+            found.append(TypedName(word, Word(OBJECT, word.position)))
             untyped += 1
             continue
         if not untyped:

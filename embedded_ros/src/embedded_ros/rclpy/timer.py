@@ -128,7 +128,7 @@ class Timer(Entity):
                 self._simulated = self._clock.is_simulated
                 self._last_ns = self._now_ns()
                 self._next_ns = self._last_ns + self._period_ns
-            elif self._now_ns() < self._last_ns:  # a bag or a simulation began anew
+            elif self._now_ns() < self._last_ns:  # a bag or a simulation began again
                 self._last_ns = self._now_ns()
                 self._next_ns = self._last_ns + self._period_ns
         self.wake_executor()

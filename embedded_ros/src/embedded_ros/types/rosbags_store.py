@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Message definitions out of rosbags' Jazzy type store.
 
-Two gaps of the store are mended by the catalogue: it has no services and actions, and it drops
+Two gaps of the store are filled by the catalogue: it has no services and actions, and it drops
 default values. Both are shipped as text in ``embedded_ros/interfaces``, which comes first.
 """
 

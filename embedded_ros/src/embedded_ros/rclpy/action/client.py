@@ -9,6 +9,7 @@ import threading
 import time
 import weakref
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
@@ -143,38 +144,30 @@ class ActionClient(Generic[ActT]):
         self._goals: weakref.WeakValueDictionary[bytes, ClientGoalHandle] = (
             weakref.WeakValueDictionary()
         )
-        implementation = action_type.Impl
+        kinds = action_type.Impl
         self._feedback = node.create_subscription(
-            implementation.FeedbackMessage,
+            kinds.FeedbackMessage,
             names.feedback(name),
             self._on_feedback,
             feedback_sub_qos_profile or QoSProfile(depth=10),
             callback_group=callback_group,
         )
         self._status = node.create_subscription(
-            implementation.GoalStatusMessage,
+            kinds.GoalStatusMessage,
             names.status(name),
             self._on_status,
             status_sub_qos_profile,
             callback_group=callback_group,
         )
-        self._goal_client = node.create_client(
-            implementation.SendGoalService,
-            names.send_goal(name),
-            qos_profile=goal_service_qos_profile,
-            callback_group=callback_group,
+        ask = partial(node.create_client, callback_group=callback_group)
+        self._goal_client = ask(
+            kinds.SendGoalService, names.send_goal(name), qos_profile=goal_service_qos_profile
         )
-        self._cancel_client = node.create_client(
-            implementation.CancelGoalService,
-            names.cancel_goal(name),
-            qos_profile=cancel_service_qos_profile,
-            callback_group=callback_group,
+        self._cancel_client = ask(
+            kinds.CancelGoalService, names.cancel_goal(name), qos_profile=cancel_service_qos_profile
         )
-        self._result_client = node.create_client(
-            implementation.GetResultService,
-            names.get_result(name),
-            qos_profile=result_service_qos_profile,
-            callback_group=callback_group,
+        self._result_client = ask(
+            kinds.GetResultService, names.get_result(name), qos_profile=result_service_qos_profile
         )
 
     def send_goal(

@@ -10,6 +10,7 @@ import time
 import traceback
 from collections.abc import Callable
 from enum import Enum
+from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from embedded_ros.types import Action, message_class
@@ -214,39 +215,31 @@ class ActionServer(Generic[ActT]):
 
         name = node.resolve_service_name(action_name)
         self.action_name = name
-        group = callback_group or node.default_callback_group
-        implementation = action_type.Impl
+        kinds = action_type.Impl
         self._feedback = node.create_publisher(
-            implementation.FeedbackMessage,
+            kinds.FeedbackMessage,
             names.feedback(name),
             feedback_pub_qos_profile or QoSProfile(depth=10),
         )
         self._status: Any = node.create_publisher(
-            implementation.GoalStatusMessage, names.status(name), status_pub_qos_profile
+            kinds.GoalStatusMessage, names.status(name), status_pub_qos_profile
         )
-        self._goal_service = node.make_service(
-            DeferredService,
-            implementation.SendGoalService,
-            names.send_goal(name),
-            self._on_goal,
-            goal_service_qos_profile,
-            group,
+        group = callback_group or node.default_callback_group
+        serve = partial(node.make_service, DeferredService, callback_group=group)
+        self._goal_service = serve(
+            kinds.SendGoalService, names.send_goal(name), self._on_goal, goal_service_qos_profile
         )
-        self._cancel_service = node.make_service(
-            DeferredService,
-            implementation.CancelGoalService,
+        self._cancel_service = serve(
+            kinds.CancelGoalService,
             names.cancel_goal(name),
             self._on_cancel,
             cancel_service_qos_profile,
-            group,
         )
-        self._result_service = node.make_service(
-            DeferredService,
-            implementation.GetResultService,
+        self._result_service = serve(
+            kinds.GetResultService,
             names.get_result(name),
             self._on_result_request,
             result_service_qos_profile,
-            group,
         )
         self._expiry = node.create_timer(
             max(EXPIRY_POLL_S, result_timeout),

@@ -1,0 +1,40 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The option ``--skills`` of several commands."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from slap_ros.acquisition.domain_choice import DomainChoice, chosen_skills, open_domain
+from slap_ros.cli.console import console, styled
+from slap_ros.core import Domain
+
+Skills = Annotated[
+    str,
+    typer.Option(
+        help="Whose: a folder that `slap acquire` made; none; or demonstrator (hand-written "
+        "operators, and scripts that show how tasks are solved). Default: what ships, else the "
+        "domain's own."
+    ),
+]
+
+
+def open_chosen(domain: str, preset: str | None, skills: str) -> Domain:
+    """The domain with the skills that were chosen; warns about skills that are left out.
+
+    Args:
+        domain: Its name.
+        preset: Its preset; None for the first.
+        skills: As ``--skills`` has it.
+
+    Raises:
+        SlapError: There is no such domain, preset, or library.
+    """
+    choice = DomainChoice(domain, preset or "", skills)
+    library = chosen_skills(choice)
+    for reason in library.refused if library is not None else ():
+        console.print(styled("warning", "yellow", f" a skill is left out: {reason}"))
+    return open_domain(choice)

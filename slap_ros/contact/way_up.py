@@ -1,0 +1,73 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Whether a hand can go straight up from where it is without touching anything."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from slap_ros.contact.scene import ContactScene, Part
+from slap_ros.contact.snapshot import ContactSnapshot, Placement
+from slap_ros.geometry.oriented_box import OrientedBox
+from slap_ros.geometry.pose import Pose
+
+MARGIN = 0.001  # m, between the hand and what it passes
+TIP = 0.002  # m, at the bottom of what may lean on something
+RISE = 0.3  # m, more than anything on a table is high
+
+Boxes = tuple[OrientedBox, ...]  # around the same part
+
+
+def way_up_is_free(
+    scene: ContactScene, snapshot: ContactSnapshot, placement: Placement, margin: float = MARGIN
+) -> bool:
+    """Whether a hand can go straight up without touching anything, its fingers as they are.
+
+    Args:
+        scene: What there is.
+        snapshot: How it is.
+        placement: Where the bodies stand that do not move.
+        margin: Least distance from what it passes, m.
+
+    Returns:
+        True also where it holds something, which goes up with it.
+    """
+    if snapshot.held is not None:
+        return True
+    swept = [_swept(box, margin) for box in snapshot.hand.boxes()]
+    reach = max(box.radius for box in swept) + RISE
+    near = [
+        part
+        for part in _solids(scene, snapshot, placement)
+        if part[0].near(snapshot.hand.pose.position, reach)
+    ]
+    return not any(all(box.overlaps(way) for box in part) for part in near for way in swept)
+
+
+def _swept(box: OrientedBox, margin: float) -> OrientedBox:
+    """What a box of a hand that points down passes through on its way up, less its lowest part."""
+    (x, y, z), turn = box.pose
+    length, width, height = box.half
+    half = (length + margin, width + margin, height + 0.5 * (RISE - TIP))
+    return OrientedBox(Pose((x, y, z + 0.5 * (RISE + TIP)), turn), half)
+
+
+def _solids(
+    scene: ContactScene, snapshot: ContactSnapshot, placement: Placement
+) -> Iterator[Boxes]:
+    """What is around each part of each body."""
+    for body, motion in zip(scene.free, snapshot.bodies, strict=True):
+        yield from _boxes(body.parts, motion.pose)
+    for fixed, pose in zip(scene.fixed, placement.fixed, strict=True):
+        if fixed.solid:
+            yield from _boxes(fixed.parts, pose)
+    for jointed, pose, opening in zip(
+        scene.jointed, placement.jointed, snapshot.openings, strict=True
+    ):
+        yield from _boxes(jointed.frame, pose)
+        yield from _boxes(jointed.moving, jointed.moving_pose(pose, opening.position))
+
+
+def _boxes(parts: Sequence[Part], pose: Pose) -> Iterator[Boxes]:
+    for part in parts:
+        yield tuple(box.at(pose) for box in part.bounding_boxes)

@@ -1,0 +1,359 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the terms of a learner's interface that were made by hand are worth.
+
+The same shortcut is learned from the same starts with all terms, without each, and with none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import fmean
+from typing import TYPE_CHECKING, Any
+
+from slap_ros.core import Domain
+from slap_ros.domains import get_domain
+from slap_ros.errors import InvalidParameterError, UnsolvableError
+from slap_ros.evaluation.approaches import PURE_PLANNING, approaches
+from slap_ros.evaluation.experiment import solve
+from slap_ros.evaluation.summary import Spread
+from slap_ros.learning.learner_interface import learner_interface, without
+from slap_ros.learning.task_distribution import TaskDistribution
+from slap_ros.shortcuts import jobs
+from slap_ros.shortcuts.explore import ExplorationResult
+from slap_ros.shortcuts.library import Library
+from slap_ros.shortcuts.settings import OURS, TrainingSettings, training_settings
+from slap_ros.shortcuts.shortcut import Sampling
+from slap_ros.shortcuts.signature import Signature
+from slap_ros.shortcuts.starts import StartRecord
+from slap_ros.shortcuts.training import mean_steps, rank
+from slap_ros.studies.comparison import format_spread
+from slap_ros.studies.figures import APPROACH_STYLES, LINES, label
+from slap_ros.studies.job_runner import JobRunner
+from slap_ros.studies.results import MarkdownTable, StudyReport
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+NOTHING = "nothing"  # is left out: what ships was learned so
+SETTINGS = "training settings"  # of the domain are left out: the general ones instead
+PURE = "pure planning"
+SHOWN = ("slap_1_sample", "slap")
+MEASURED = """\
+Each row leaves out what it names, and nothing else; the terms are described in [What is made by
+hand](../shortcuts.md#what-is-made-by-hand). The training settings are those of every domain instead
+of this one's. For each of {trainings} seeds, the most promising shortcut is looked for once, and
+learned in every row from the same starts, with {steps} environment steps. Success is the share of
+the last {recent} episodes of training that reached the target, with the noise of the policy, and
+steps are those of successful ones. Length is that of plans that are executed, relative to pure
+planning on the same {tasks} tasks; a task that was not solved counts in its own column alone. With
+all samples, search in the planner's model makes up for much of what a policy has not learned, so
+what a term is worth for learning shows with 1 sample.
+Means ± sample standard deviations are over the seeds of training: with so few, a difference of
+less than two of them says nothing. One domain and one budget of steps: a term that is worth nothing
+here may be worth much elsewhere."""
+
+
+@dataclass(frozen=True)
+class AblatedDomain:
+    """A domain whose learner's interface leaves a term out, made where it is needed.
+
+    Args:
+        name: The domain's.
+        preset: The domain's.
+        term: Of ``Learning.ablations``; :data:`NOTHING` and :data:`SETTINGS` are not of the
+            interface.
+    """
+
+    name: str
+    preset: str
+    term: str
+
+    @property
+    def identity(self) -> dict[str, str]:
+        """See :attr:`slap_ros.learning.domain_spec.DomainSpec.identity`."""
+        return {"domain": self.name, "preset": self.preset, "without": self.term}
+
+    def make(self) -> Domain:
+        """See :meth:`slap_ros.learning.domain_spec.DomainSpec.make`."""
+        domain = get_domain(self.name, self.preset)
+        return domain if self.term in (NOTHING, SETTINGS) else without(domain, self.term)
+
+
+@dataclass(frozen=True)
+class AblationSetup:
+    """What is learned, and how it is tried.
+
+    Args:
+        domain: Name of the domain.
+        preset: Of the domain.
+        steps: Environment steps of each training, all stages together; None: as the domain's
+            settings have it.
+        tasks: How many are planned for with what was learned.
+        first_seed: Seed of these tasks.
+        sampling: How shortcuts are tried out in the model.
+    """
+
+    domain: str
+    preset: str
+    steps: int | None
+    tasks: int
+    first_seed: int
+    sampling: Sampling
+
+    def tasks_of(self, seed: int, term: str = NOTHING) -> TaskDistribution:
+        """Those of a training without a term."""
+        return TaskDistribution(AblatedDomain(self.domain, self.preset, term), seed)
+
+    def settings(self, term: str) -> TrainingSettings:
+        """Hyper-parameters of learning without a term; the steps are the same for all."""
+        own = training_settings("ours", get_domain(self.domain, self.preset))
+        steps = own.total_steps if self.steps is None else self.steps
+        return (OURS if term == SETTINGS else own).with_total_steps(steps)
+
+    def terms(self) -> tuple[str, ...]:
+        """What can be left out, :data:`NOTHING` first.
+
+        Raises:
+            InvalidParameterError: The domain names nothing.
+            InvalidDomainError: Nothing can be learned in it.
+        """
+        domain = get_domain(self.domain, self.preset)
+        learner_interface(domain)  # or an error that says that there is none
+        assert domain.learning is not None
+        if not domain.learning.ablations:
+            raise InvalidParameterError(
+                f"domain {self.domain} does not say what in its learner's interface was made by "
+                "hand; see Learning.ablations"
+            )
+        settings = (SETTINGS,) if "ours" in domain.learning.settings else ()
+        return (NOTHING, *domain.learning.ablations, *settings)
+
+
+@dataclass(frozen=True)
+class TermResult:
+    """What was learned without a term, as JSON has it, a training each."""
+
+    term: str
+    trainings: tuple[Mapping[str, Any], ...]
+    pure: tuple[Mapping[str, Any], ...]  # pure planning's trials
+
+    @property
+    def success(self) -> Spread:
+        """Share of episodes, over trainings."""
+        return Spread.of([float(training["success"]) for training in self.trainings])
+
+    @property
+    def steps(self) -> Spread | None:
+        """Of successful episodes, over the trainings that had any."""
+        known = [float(one["steps"]) for one in self.trainings if one["success"] > 0.0]
+        return Spread.of(known) if known else None
+
+    def relative(self, approach: str) -> list[float]:
+        """Length relative to pure planning on tasks that both solved, of each training."""
+        found = []
+        for training in self.trainings:
+            both = [
+                (own["steps"], other["steps"])
+                for own, other in zip(training[approach], self.pure, strict=True)
+                if own["success"] and other["success"]
+            ]
+            if both:
+                found.append(sum(own for own, _ in both) / sum(other for _, other in both))
+        return found
+
+    @property
+    def solved(self) -> float:
+        """Share of tasks that were solved with all samples."""
+        return fmean(trial["success"] for one in self.trainings for trial in one["slap"])
+
+
+def study(
+    setup: AblationSetup,
+    terms: Sequence[str],
+    trainings: int,
+    runner: JobRunner,
+    folder: Path,
+) -> StudyReport:
+    """Learn with and without each term, and plan with what was learned.
+
+    Args:
+        setup: What is learned, and how it is tried.
+        terms: What is left out, of :meth:`AblationSetup.terms`.
+        trainings: How many of each, with seeds from 0 on.
+        runner: Does what takes long.
+        folder: Of checkpoints.
+
+    Returns:
+        The report.
+
+    Raises:
+        InvalidParameterError: A term is unknown.
+        UnsolvableError: There is nothing to learn with one of the seeds.
+    """
+    if unknown := [term for term in terms if term not in setup.terms()]:
+        raise InvalidParameterError(
+            f"{setup.domain} has no term {unknown[0]!r}; there are {', '.join(setup.terms())}"
+        )
+    seeds = range(trainings)
+    looked_for = {f"problem {seed}": (setup, seed) for seed in seeds}
+    problems = runner.run("what to learn", find_problem, dict, looked_for)
+    planned = runner.run("pure planning", plan_purely, list, {PURE: (setup,)})
+    learning = {
+        f"{term} {seed}": (setup, term, seed, problems[f"problem {seed}"], str(folder))
+        for term in terms
+        for seed in seeds
+    }
+    learned = runner.run("learning", learn_without, dict, learning)
+    results = [
+        TermResult(term, tuple(learned[f"{term} {seed}"] for seed in seeds), tuple(planned[PURE]))
+        for term in terms
+    ]
+    steps = setup.settings(NOTHING).total_steps
+    return StudyReport(
+        study="ablation",
+        source="",
+        title=f"What is made by hand: {setup.domain}",
+        measured=MEASURED.format(trainings=trainings, steps=steps, recent=200, tasks=setup.tasks),
+        table=_table(results),
+        found={
+            "environment_steps": steps,
+            "shortcuts": [problem["name"] for problem in problems.values()],
+            "pure_planning": planned[PURE],
+            "terms": [{"without": one.term, "trainings": one.trainings} for one in results],
+        },
+        draw=lambda figure: draw(figure, results),
+        size=(6.4, 0.8 + 0.42 * len(results)),
+    )
+
+
+def find_problem(setup: AblationSetup, seed: int) -> dict[str, Any]:
+    """The most promising shortcut of a training that can begin somewhere, and its starts.
+
+    Args:
+        setup: Domain and settings.
+        seed: Of the training.
+
+    Returns:
+        Name, signature and starts, as JSON.
+
+    Raises:
+        UnsolvableError: There is none.
+    """
+    distribution = setup.tasks_of(seed)
+    settings = setup.settings(NOTHING)
+    tasks = range(settings.exploration.tasks)
+    found = [jobs.try_to_explore(distribution, index, settings.exploration) for index in tasks]
+    explored = [ExplorationResult.from_json(one) for one in found if not isinstance(one, str)]
+    operator_steps = mean_steps(explored)
+    for group in rank(explored) if explored else ():
+        signature, path = group.signature, group.operator_path
+        starts = [
+            jobs.start(distribution, index, signature, path, operator_steps)
+            for index in range(settings.starts)
+        ]
+        if any(starts):
+            return {
+                "name": signature.name,
+                "signature": signature.as_json(),
+                "starts": [start for start in starts if start is not None],
+            }
+    raise UnsolvableError(
+        f"no shortcut to learn was found in the {len(tasks)} tasks that training "
+        f"{seed} explores in {setup.domain}"
+    )
+
+
+def plan_purely(setup: AblationSetup) -> list[dict[str, Any]]:
+    """Whether pure planning solves each task, and in how many environment steps."""
+    domain = get_domain(setup.domain, setup.preset)
+    episodes = [
+        solve(domain, domain.task(setup.first_seed, index), PURE_PLANNING)
+        for index in range(setup.tasks)
+    ]
+    return [{"success": one.success, "steps": one.plan_length} for one in episodes]
+
+
+def learn_without(
+    setup: AblationSetup, term: str, seed: int, problem: Mapping[str, Any], folder: str
+) -> dict[str, Any]:
+    """Learn a shortcut without a term, and plan with it.
+
+    Args:
+        setup: What is learned, and how it is tried.
+        term: What is left out.
+        seed: Of the training.
+        problem: What :func:`find_problem` found for that seed.
+        folder: Of checkpoints.
+
+    Returns:
+        Success and steps in training, and how each task was solved by each approach.
+    """
+    distribution = setup.tasks_of(seed, term)
+    attempt = jobs.LearningAttempt(
+        distribution,
+        Signature.from_json(problem["signature"]),
+        tuple(StartRecord.from_json(start) for start in problem["starts"]),
+        setup.settings(term),
+        str(Path(folder) / f"{term} {seed}" / problem["name"]),
+    )
+    shortcut = jobs.learn(attempt, processes=1)
+    domain = distribution.make_domain()
+    library = Library(setup.domain, (shortcut,), {})
+    found: dict[str, Any] = {
+        "success": shortcut.record["success"],
+        "steps": shortcut.record["length"],
+        "cpu_seconds": shortcut.record["cpu_s"],
+    }
+    for approach in approaches(library, setup.sampling)[1:]:
+        episodes = [
+            solve(domain, domain.task(setup.first_seed, index), approach)
+            for index in range(setup.tasks)
+        ]
+        found[approach.name] = [{"success": e.success, "steps": e.plan_length} for e in episodes]
+    return found
+
+
+def _table(results: Sequence[TermResult]) -> MarkdownTable:
+    columns = (
+        "without",
+        "success in training",
+        "steps",
+        *(f"length, {label(approach)}" for approach in SHOWN),
+        "solved",
+    )
+    return MarkdownTable(columns, [list(_row(result)) for result in results])
+
+
+def _row(result: TermResult) -> Iterator[str]:
+    yield result.term
+    yield format_spread(result.success, 2)
+    yield format_spread(result.steps, 1)
+    for approach in SHOWN:
+        relative = result.relative(approach)
+        yield format_spread(Spread.of(relative) if relative else None, 2)
+    yield f"{result.solved:.0%}"
+
+
+def draw(figure: Figure, results: Sequence[TermResult]) -> None:
+    """Draw the relative length of each training, by what was left out."""
+    axes = figure.subplots()
+    for number, approach in enumerate(SHOWN):
+        style = APPROACH_STYLES[approach]
+        for place, result in enumerate(results):
+            relative = result.relative(approach)
+            axes.plot(
+                relative,
+                [place + 0.2 * (number - 0.5)] * len(relative),
+                linestyle="none",
+                marker=style.marker,
+                color=LINES[number],
+                markersize=5,
+                label=style.label if place == 0 else None,
+            )
+    axes.set_yticks(range(len(results)), [result.term for result in results])
+    axes.set_ylim(len(results) - 0.5, -0.5)
+    axes.set_xlabel("plan length relative to pure planning; a mark for each training")
+    figure.legend(loc="outside upper center", ncols=len(SHOWN))

@@ -1,0 +1,265 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How far plans get with acquired skills: task progress, never planned again (LG-SAIL Table 1)."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from statistics import fmean
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from slap_ros.acquisition.domain_choice import DomainChoice, chosen_skills, open_domain
+from slap_ros.acquisition.rollouts import PlanRollout, Stage, roll_out
+from slap_ros.acquisition.skill import LearnedSkill
+from slap_ros.core.goals import task_with_goal
+from slap_ros.drawing.palette import MUTED
+from slap_ros.evaluation.statistics import Interval, wilson_interval
+from slap_ros.evaluation.summary import Spread
+from slap_ros.studies.comparison import format_spread
+from slap_ros.studies.figures import LINES
+from slap_ros.studies.job_runner import JobRunner
+from slap_ros.studies.results import MarkdownTable, StudyReport
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MEASURED = """\
+A plan of acquired operators (A*, shortest in operators) is carried out with the learned skills,
+approach and policy, and never planned again. Task progress is the share of its stages that were
+done in order. A stage is done once all atoms that are expected hold and none that its operator
+deletes. Tasks are of seeds that no training and no judgement used. Task progress is the mean over
+tasks, mean ± sample standard deviation over libraries whose operators are from the same proposer
+and whose rewards are from the same rewarder; solved are tasks whose stages were all done,
+of these libraries together, with Wilson's 95 % interval; the paper's figures are LG-SAIL's, in a
+simulator of its own."""
+# Task progress that LG-SAIL's Table 1 has, by domain and goal.
+PAPER: Mapping[tuple[str, str], float] = {
+    ("stack_at_target", "training"): 1.00,
+    ("stow_hammer", "training"): 0.96,
+    ("stow_hammer", "test1"): 0.91,
+    ("stow_hammer", "test2"): 0.71,
+    ("peg_in_hole", "training"): 0.92,
+    ("peg_in_hole", "test1"): 0.59,
+    ("peg_in_hole", "test2"): 0.93,
+}
+
+
+class Origin(NamedTuple):
+    """Where operators and rewards of a library are from, by name."""
+
+    proposer: str
+    rewarder: str
+
+
+@dataclass(frozen=True)
+class LibraryProgress:
+    """What came of a goal's tasks with one library.
+
+    Args:
+        digest: Of the library.
+        seed: That it was trained with.
+        rollouts: One for each task.
+    """
+
+    digest: str
+    seed: int
+    rollouts: tuple[PlanRollout, ...]
+
+    @property
+    def progress(self) -> float:
+        """Mean task progress."""
+        return fmean(rollout.progress for rollout in self.rollouts)
+
+    @property
+    def failures(self) -> Counter[str]:
+        """Stages that failed, by operator."""
+        return Counter(r.failure.operator for r in self.rollouts if r.failure is not None)
+
+    def as_json(self) -> dict[str, Any]:
+        """The summary, and every task: of each stage operator, environment steps, why it failed."""
+        return {
+            "library": self.digest,
+            "seed": self.seed,
+            "progress": self.progress,
+            "failures": dict(self.failures),
+            "tasks": [
+                {
+                    "progress": rollout.progress,
+                    "stages": list(map(_in_words, rollout.stages)),
+                }
+                for rollout in self.rollouts
+            ],
+        }
+
+
+def _in_words(stage: Stage) -> str:
+    failed = "" if stage.done else f": {stage.end}"
+    return f"{stage.operator} {stage.steps}{failed}"
+
+
+@dataclass(frozen=True)
+class GoalProgress:
+    """All libraries of one origin at one goal.
+
+    Args:
+        domain: Its name.
+        goal: By name; empty for the goal that comes with each task.
+        origin: Of the libraries: their proposer and their rewarder.
+        libraries: One at least.
+    """
+
+    domain: str
+    goal: str
+    origin: Origin
+    libraries: tuple[LibraryProgress, ...]
+
+    @property
+    def rollouts(self) -> list[PlanRollout]:
+        """Of all libraries."""
+        return [rollout for library in self.libraries for rollout in library.rollouts]
+
+    @property
+    def progress(self) -> Spread:
+        """Mean task progress, over libraries."""
+        return Spread.of([library.progress for library in self.libraries])
+
+    @property
+    def solved(self) -> Interval:
+        """Wilson's, of the share of tasks whose stages were all done."""
+        done = sum(rollout.progress == 1.0 for rollout in self.rollouts)
+        return wilson_interval(done, len(self.rollouts))
+
+    @property
+    def paper(self) -> float | None:
+        """LG-SAIL's task progress."""
+        return PAPER.get((self.domain, self.goal))
+
+    def as_json(self) -> dict[str, Any]:
+        """The summary, and each library's."""
+        return {
+            "goal": self.goal,
+            **self.origin._asdict(),
+            "progress": asdict(self.progress),
+            "solved_interval": asdict(self.solved),
+            "paper": self.paper,
+            "libraries": [library.as_json() for library in self.libraries],
+        }
+
+    def as_row(self) -> list[str]:
+        """Row of a table."""
+        done = sum(rollout.progress == 1.0 for rollout in self.rollouts)
+        failures = sum((library.failures for library in self.libraries), Counter[str]())
+        return [
+            self.goal or "(the task's own)",
+            ", ".join(self.origin),
+            f"{len(self.libraries)} × {len(self.libraries[0].rollouts)}",
+            format_spread(self.progress, 2),
+            f"{done / len(self.rollouts):.0%} [{self.solved.low:.0%}, {self.solved.high:.0%}]",
+            ", ".join(f"{name} {count}" for name, count in failures.most_common()) or "none",
+            "" if self.paper is None else f"{self.paper:.2f}",
+        ]
+
+
+def study(
+    choices: Sequence[DomainChoice],
+    counts: Mapping[str, int],
+    seed: int,
+    runner: JobRunner,
+) -> StudyReport:
+    """Carry out plans with the skills of libraries.
+
+    Args:
+        choices: The domain, with each library for skills.
+        counts: Tasks of each goal, by name; an empty name for the goal that comes with each task.
+        seed: Of the tasks.
+        runner: Carries out plans.
+
+    Returns:
+        The report.
+
+    Raises:
+        InvalidLibraryError: A folder has no library of the domain.
+        UnknownGoalError: The domain has no goal of that name.
+    """
+    name = choices[0].name
+    goals = []
+    for goal, count in counts.items():
+        found: dict[Origin, list[LibraryProgress]] = {}
+        for choice in choices:
+            origin, progress = _of_library(choice, goal, range(count), seed, runner)
+            found.setdefault(origin, []).append(progress)
+        goals += [GoalProgress(name, goal, origin, tuple(each)) for origin, each in found.items()]
+    return StudyReport(
+        study="acquisition",
+        source="LG-SAIL Table 1",
+        title=f"Task progress with acquired skills: {name}",
+        measured=MEASURED,
+        table=MarkdownTable(
+            [
+                "goal",
+                "operators, rewards",
+                "libraries × tasks",
+                "task progress",
+                "solved",
+                "stages that failed",
+                "paper",
+            ],
+            [goal.as_row() for goal in goals],
+        ),
+        found={"goals": [goal.as_json() for goal in goals]},
+        draw=lambda figure: draw(figure, goals),
+        size=(7.0, 1.4 + 0.35 * len(goals)),
+    )
+
+
+def _of_library(
+    choice: DomainChoice, goal: str, indices: Sequence[int], seed: int, runner: JobRunner
+) -> tuple[Origin, LibraryProgress]:
+    """Where a library is from, and what comes of a goal's tasks with it."""
+    library = chosen_skills(choice)
+    assert library is not None
+    record = library.record
+    origin = Origin(*(str(record.get(name, "manual")) for name in Origin._fields))
+    jobs = {f"{goal} {library.digest} {i}": (choice, goal, seed, i) for i in indices}
+    rollouts = runner.run(goal or choice.name, carry_out_task, PlanRollout.from_json, jobs)
+    trained = int(record.get("seed", 0))
+    return origin, LibraryProgress(library.digest, trained, tuple(rollouts.values()))
+
+
+def carry_out_task(choice: DomainChoice, goal: str, seed: int, index: int) -> dict[str, Any]:
+    """Carry out one task's plan.
+
+    Args:
+        choice: The domain, with a library for skills.
+        goal: By name; empty for the task's own.
+        seed: Of the task.
+        index: Of the task.
+
+    Returns:
+        A :class:`~slap_ros.acquisition.rollouts.PlanRollout` as JSON, without states.
+    """
+    domain = open_domain(choice)
+    skills = {n: skill for n, skill in domain.skills.items() if isinstance(skill, LearnedSkill)}
+    task = task_with_goal(domain, seed, index, goal)
+    rollout = roll_out(domain, task, index, domain.operators, skills).as_json()
+    for stage in rollout["stages"]:
+        stage["state"] = ()
+    return rollout
+
+
+def draw(figure: Figure, goals: Sequence[GoalProgress]) -> None:
+    """Draw every library's task progress, their mean, and the paper's."""
+    axes = figure.subplots()
+    for place, goal in enumerate(goals):
+        each = [library.progress for library in goal.libraries]
+        axes.plot(each, [place] * len(each), "|", color=LINES[0], markersize=9)
+        axes.plot([goal.progress.mean], [place], "o", color=LINES[0], markersize=5)
+        if goal.paper is not None:
+            axes.plot([goal.paper], [place], "D", color=MUTED, markersize=5, fillstyle="none")
+    names = [f"{goal.goal or 'own goal'}: {', '.join(goal.origin)}" for goal in goals]
+    axes.set_yticks(range(len(goals)), names)
+    axes.set_ylim(len(goals) - 0.5, -0.5)
+    axes.set_xlim(-0.03, 1.03)
+    axes.set_xlabel("task progress: each library, their mean (dot), the paper's (diamond)")

@@ -1,0 +1,101 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How studies do what takes long: jobs in processes, each result kept at once."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import asdict, dataclass
+from typing import Any, TypeVar
+
+from slap_ros.errors import InvalidParameterError
+from slap_ros.files import parse_json
+from slap_ros.learning.work_folder import DECODING_ERRORS
+from slap_ros.learning.workers import SequentialWorkers, Workers, local_workers
+from slap_ros.studies.study_log import StudyLog
+from slap_ros.studies.study_progress import StudyProgress
+
+Job = tuple[Any, ...]  # the arguments of a function
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class JobRunner:
+    """Does the jobs of a study; what a log has already is not done again.
+
+    Args:
+        log: Keeps results.
+        processes: Jobs at a time.
+        progress: Is called as jobs end.
+    """
+
+    log: StudyLog
+    processes: int
+    progress: StudyProgress
+
+    def run(
+        self,
+        what: str,
+        function: Callable[..., Any],
+        decode: Callable[[Any], Result],
+        *batches: Mapping[str, Job],
+        failure: Callable[[Result], str | None] = lambda _: None,
+    ) -> dict[str, Result]:
+        """Do the jobs that were not done before.
+
+        Several batches are done one after the other, and have processes of their own: what one has
+        in its caches would make another faster than it is.
+
+        Args:
+            what: They are, for the progress bar.
+            function: Does a job and returns what JSON can hold, or a dataclass of that; importable
+                by its name, for other processes.
+            decode: Makes a result of its JSON.
+            batches: Arguments of jobs, by the job's name, which no other job of the study has.
+            failure: What there is to say of a job that failed; None of one that did not.
+
+        Returns:
+            The results by the job's name, in the order of ``batches``.
+
+        Raises:
+            InvalidParameterError: The log has a result that is none of such a job.
+        """
+        jobs = {name: job for batch in batches for name, job in batch.items()}
+        found: dict[str, Result] = {}
+
+        def ended(name: str) -> None:
+            found[name] = self._decoded(name, decode)
+            self.progress.advance()
+            if (said := failure(found[name])) is not None:
+                self.progress.report_failure(f"{name} {said}")
+
+        self.progress.begin(what, len(jobs))
+        for name in jobs:
+            if name in self.log.results:
+                ended(name)
+        for batch in batches:
+            left = [name for name in batch if name not in found]
+            if left:
+                with self._workers(apart=len(batches) > 1) as workers:
+                    for i, result in workers.run(function, [batch[name] for name in left]):
+                        self.log.add(left[i], parse_json(json.dumps(result, default=asdict)))
+                        ended(left[i])
+        return {name: found[name] for name in jobs}
+
+    def _decoded(self, name: str, decode: Callable[[Any], Result]) -> Result:
+        """Always from JSON, so that results are alike whether or not the study was interrupted."""
+        try:
+            return decode(self.log.results[name])
+        except DECODING_ERRORS as error:
+            raise InvalidParameterError(
+                f"{self.log.path}: what it has of {name!r} is damaged: {error!r}; remove the file "
+                "to begin again"
+            ) from error
+
+    def _workers(self, apart: bool) -> AbstractContextManager[Workers]:
+        """Processes, or this one where a single one is enough and need not be a new one."""
+        if self.processes == 1 and not apart:
+            return nullcontext(SequentialWorkers())
+        return local_workers(self.processes)

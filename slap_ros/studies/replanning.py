@@ -1,0 +1,229 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How many tasks acquired skills solve where a plan that fails is made again."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from slap_ros.acquisition.domain_choice import DomainChoice, chosen_skills
+from slap_ros.drawing.palette import MUTED
+from slap_ros.errors import ErrorCode
+from slap_ros.evaluation.approaches import PURE_PLANNING
+from slap_ros.evaluation.experiment import Experiment, Trial, task_job, try_task
+from slap_ros.evaluation.statistics import Interval, wilson_interval
+from slap_ros.evaluation.summary import Spread
+from slap_ros.planning.execution import MAX_REPLANS
+from slap_ros.studies.comparison import format_spread, named_tasks, not_solved, spread_of
+from slap_ros.studies.figures import LINES
+from slap_ros.studies.job_runner import JobRunner
+from slap_ros.studies.results import MarkdownTable, StudyReport
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MEASURED = f"""\
+Each task is planned and executed as `slap evaluate` does it: the planner tries the skills in its
+model, and where a skill fails in the world, it plans again from there, {MAX_REPLANS} times at most.
+A task is solved where the goal holds within the domain's step limit. Success has Wilson's 95 %
+interval, over the tasks of all libraries of a row. Replans are the mean over tasks, steps that over
+solved tasks, both ± sample standard deviation. Failures are counted by the error code that ended
+the task: `UNSOLVABLE` where no plan was left, `REPLANS_EXHAUSTED`, `STEP_LIMIT`. Tasks are of seeds
+that no training and no judgement used. The library that ships solves the tasks of all seeds, those
+that other seeds trained the tasks of the first ones, as many as `others` says. The data has the
+options of every task in order, each with its environment steps."""
+
+
+FIGURES = ("success", "replans", "steps", "failures")
+
+
+@dataclass(frozen=True)
+class LibraryOutcomes:
+    """What came of a goal's tasks with one library.
+
+    Args:
+        digest: Of the library.
+        seed: That it was trained with.
+        trials: One for each task.
+    """
+
+    digest: str
+    seed: int
+    trials: tuple[Trial, ...]
+
+    @property
+    def rate(self) -> float:
+        """The share of solved tasks."""
+        return sum(trial.success for trial in self.trials) / len(self.trials)
+
+    def as_json(self) -> dict[str, Any]:
+        """The summary, and every task in words."""
+        return {
+            "library": self.digest,
+            "seed": self.seed,
+            "success_rate": self.rate,
+            "planning_seconds": sum(trial.planning_seconds for trial in self.trials),
+            "tasks": list(map(_in_words, self.trials)),
+        }
+
+
+def _in_words(trial: Trial) -> str:
+    """Options in order, and why the task was not solved."""
+    options = [
+        f"{edge.option} {edge.steps}{'' if edge.reached else ' failed'}" for edge in trial.edges
+    ]
+    end = [] if trial.success else [f"{ErrorCode(trial.error_code).name}: {trial.reason}"]
+    return "; ".join([", ".join(options), *end])
+
+
+@dataclass(frozen=True)
+class ReplanningRow:
+    """Libraries at one goal: the one that ships, or those that other seeds trained.
+
+    Args:
+        goal: By name; empty for the goal that comes with each task.
+        libraries: One at least.
+    """
+
+    goal: str
+    libraries: tuple[LibraryOutcomes, ...]
+
+    @property
+    def trials(self) -> list[Trial]:
+        """Of all libraries."""
+        return [trial for library in self.libraries for trial in library.trials]
+
+    @property
+    def seeds(self) -> str:
+        """That the libraries were trained with."""
+        plural = "s" if len(self.libraries) > 1 else ""
+        return f"seed{plural} {', '.join(str(library.seed) for library in self.libraries)}"
+
+    @property
+    def solved(self) -> int:
+        """Tasks whose goal was reached."""
+        return sum(trial.success for trial in self.trials)
+
+    @property
+    def rate(self) -> float:
+        """The share of solved tasks."""
+        return self.solved / len(self.trials)
+
+    @property
+    def interval(self) -> Interval:
+        """Wilson's, of the rate."""
+        return wilson_interval(self.solved, len(self.trials))
+
+    @property
+    def replans(self) -> Spread:
+        """Over all tasks."""
+        return Spread.of([float(trial.replans) for trial in self.trials])
+
+    @property
+    def steps(self) -> Spread | None:
+        """Over solved tasks; None without any."""
+        return spread_of([float(trial.plan_length) for trial in self.trials if trial.success])
+
+    @property
+    def failures(self) -> Counter[str]:
+        """Tasks that were not solved, by the name of their error code."""
+        failed = [trial for trial in self.trials if not trial.success]
+        return Counter(ErrorCode(trial.error_code).name for trial in failed)
+
+    def as_json(self) -> dict[str, Any]:
+        """The summary, and each library's."""
+        return {
+            "goal": self.goal,
+            "tasks": len(self.trials),
+            "success_rate": self.rate,
+            "success_interval": asdict(self.interval),
+            "replans": asdict(self.replans),
+            "replanned": sum(trial.replans > 0 for trial in self.trials),
+            "steps": asdict(self.steps) if self.steps else None,
+            "failures": dict(self.failures),
+            "libraries": [library.as_json() for library in self.libraries],
+        }
+
+    def as_row(self) -> list[str]:
+        """Row of a table."""
+        tasks = len(self.libraries[0].trials)
+        failures = [f"`{name}` {count}" for name, count in self.failures.most_common()]
+        return [
+            self.goal or "(the task's own)",
+            self.seeds,
+            f"{len(self.libraries)} × {tasks}",
+            f"{self.rate:.0%} [{self.interval.low:.0%}, {self.interval.high:.0%}]",
+            format_spread(self.replans, 2),
+            format_spread(self.steps, 0),
+            ", ".join(failures) or "none",
+        ]
+
+
+def study(
+    experiments: Sequence[Experiment], goals: Sequence[str], runner: JobRunner
+) -> StudyReport:
+    """Solve tasks with the skills of libraries, planning again where plans fail.
+
+    Args:
+        experiments: The tasks of each library, that which ships first.
+        goals: By name; an empty name for the goal that comes with each task.
+        runner: Solves tasks.
+
+    Returns:
+        The report.
+
+    Raises:
+        InvalidLibraryError: A folder has no library of the domain.
+        UnknownGoalError: The domain has no goal of that name.
+    """
+    first, *others = experiments
+    found = []
+    for goal in goals:
+        for some in filter(None, ([first], others)):
+            trials = [_of_library(replace(one, goal=goal or None), runner) for one in some]
+            found.append(ReplanningRow(goal, tuple(trials)))
+    return StudyReport(
+        study="replanning",
+        source="",
+        title=f"Success with acquired skills and replanning: {first.domain.name}",
+        measured=MEASURED,
+        table=MarkdownTable(
+            ["goal", "trained with", "libraries × tasks", *FIGURES],
+            [row.as_row() for row in found],
+        ),
+        found={"goals": [row.as_json() for row in found]},
+        draw=lambda figure: draw(figure, found),
+        size=(7.0, 1.4 + 0.35 * len(found)),
+    )
+
+
+def _of_library(experiment: Experiment, runner: JobRunner) -> LibraryOutcomes:
+    """What comes of an experiment with one library."""
+    library = chosen_skills(DomainChoice.of(experiment.domain, experiment.skills))
+    assert library is not None
+    goal = experiment.goal or "own goal"
+    jobs = {
+        f"{goal}, {library.digest}: {name}": task_job(experiment, PURE_PLANNING, seed, index)
+        for name, (seed, index) in named_tasks(experiment).items()
+    }
+    trials = runner.run(goal, try_task, Trial.from_json, jobs, failure=not_solved)
+    trained = int(library.record.get("seed", 0))
+    return LibraryOutcomes(library.digest, trained, tuple(trials.values()))
+
+
+def draw(figure: Figure, goals: Sequence[ReplanningRow]) -> None:
+    """Draw success with its interval, and that of each library."""
+    axes = figure.subplots()
+    for place, goal in enumerate(goals):
+        each = [100 * library.rate for library in goal.libraries]
+        low, high = 100 * goal.interval.low, 100 * goal.interval.high
+        axes.plot([low, high], [place, place], color=MUTED, linewidth=1)
+        axes.plot(each, [place] * len(each), "|", color=LINES[0], markersize=9)
+        axes.plot([100 * goal.rate], [place], "o", color=LINES[0], markersize=5)
+    axes.set_yticks(range(len(goals)), [f"{one.goal or 'own goal'}: {one.seeds}" for one in goals])
+    axes.set_ylim(len(goals) - 0.5, -0.5)
+    axes.set_xlim(-3, 103)
+    axes.set_xlabel("success [%]: each library, all of a row (dot) with 95 % interval")

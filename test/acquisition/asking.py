@@ -1,0 +1,94 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A simulator of points, the acquisition node, and whoever asks it to acquire skills."""
+
+from contextlib import contextmanager
+from dataclasses import replace
+
+from rclpy.action import ActionClient
+from rclpy.node import Node
+from slap_msgs.action import AcquireSkills
+from slap_msgs.msg import AcquisitionEvent, SkillLibrary
+
+from ensemble.interfaces import ACQUIRE_SKILLS, ACQUISITION_EVENTS, RESET_TASK, SKILLS, SOLVE_TASK
+from ensemble.launcher import ProcessLauncher
+from ensemble.nodes import RunSettings, node_parameters
+from ensemble.spinner import temporary_node
+
+LIMIT = 120.0  # s
+# Both skills of `points` are learned with these in seconds.
+LEARNED = (
+    "sac.hidden=32,32 sac.batch_size=64 sac.learning_rate=0.002 sac.discount=0.9 sac.tau=0.02 "
+    "sac.random_steps=192 rollouts=12 validation=12 judged=24 segment_episodes=4 skill_steps=4000"
+)
+
+
+SETTINGS = RunSettings("points", "two", 3, 0, "lazy", None, patience=5.0)
+
+
+class Asker(Node):
+    """Asks for skills, and notes what it is told."""
+
+    def __init__(self) -> None:
+        super().__init__("asker")
+        self.client = ActionClient(self, ACQUIRE_SKILLS.type, ACQUIRE_SKILLS.name)
+        self.solver = ActionClient(self, SOLVE_TASK.type, SOLVE_TASK.name)
+        self.reset = self.create_client(RESET_TASK.type, RESET_TASK.name)
+        self.events: list[AcquisitionEvent] = []
+        self.libraries: list[SkillLibrary] = []
+        self.feedback: list[AcquireSkills.Feedback] = []
+        for topic, kept in ((ACQUISITION_EVENTS, self.events), (SKILLS, self.libraries)):
+            self.create_subscription(topic.type, topic.name, kept.append, topic.qos)
+
+
+@contextmanager
+def asking(record=None, names=("sim_node", "acquisition_node"), **parameters):
+    """The nodes that are named, the recorder where there is a bag, and whoever asks them.
+
+    Yields:
+        Who asks, what spins it, and the nodes' launcher.
+    """
+    every = node_parameters(replace(SETTINGS, record=record))
+    every |= {"acquisition_node": parameters}
+    nodes = {name: every[name] for name in (*names, *(("recorder_node",) if record else ()))}
+    with ProcessLauncher(nodes) as launcher, temporary_node(Asker) as (asker, spinner):
+        assert spinner.spin_until(asker.client.server_is_ready, LIMIT)
+        yield asker, spinner, launcher
+
+
+def send(asker, spinner, **goal):
+    """The handle of a goal that was accepted."""
+    request = AcquireSkills.Goal(**goal)
+    sent = asker.client.send_goal_async(request, lambda m: asker.feedback.append(m.feedback))
+    assert spinner.spin_until(sent.done, LIMIT)
+    return sent.result()
+
+
+def acquire(asker, spinner, **goal):
+    """The result of a goal."""
+    result = send(asker, spinner, **goal).get_result_async()
+    assert spinner.spin_until(result.done, LIMIT)
+    return result.result().result
+
+
+def planner_parameters():
+    """Of a planner that is started again."""
+    return node_parameters(SETTINGS)["planner_node"]
+
+
+def begin_again(asker, spinner):
+    """The number of a new episode."""
+    answer = asker.reset.call_async(RESET_TASK.type.Request(seed=4))
+    assert spinner.spin_until(answer.done, LIMIT)
+    assert not answer.result().error_code, answer.result().error_msg
+    return answer.result().episode
+
+
+def solve(asker, spinner, episode):
+    """What comes of an episode's task."""
+    assert spinner.spin_until(asker.solver.server_is_ready, LIMIT)
+    sent = asker.solver.send_goal_async(SOLVE_TASK.type.Goal(episode=episode, max_replans=5))
+    assert spinner.spin_until(sent.done, LIMIT)
+    result = sent.result().get_result_async()
+    assert spinner.spin_until(result.done, LIMIT)
+    return result.result().result

@@ -1,0 +1,189 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Skills retrieved by the embeddings of a server, which here counts words."""
+
+import json
+import subprocess
+import sys
+import threading
+import zlib
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+import pytest
+from points import PICK, PUT
+from steady_skills import PICKING, PUTTING, write_library
+
+from slap_ros.acquisition.embedding_encoder import EmbeddingEncoder, operator_sentence
+from slap_ros.acquisition.retrieval import nearest
+from slap_ros.errors import (
+    ErrorCode,
+    InvalidParameterError,
+    LanguageRefusedError,
+    LanguageUnavailableError,
+)
+from slap_ros.language.settings import KEY_VARIABLE, LanguageSettings, RetryPolicy
+from slap_ros.learning.work_folder import WorkFolder
+
+pytest.importorskip("openai")
+SIZE = 64
+KEY = "sk-secret-of-this-test"
+RETRY = RetryPolicy(tries=3, first_pause=0.0, longest_pause=0.0)
+
+
+def vector(text):
+    """How often words of each kind occur."""
+    counts = [0.0] * SIZE
+    for word in text.split():
+        counts[zlib.crc32(word.encode()) % SIZE] += 1.0
+    return counts
+
+
+def answer(texts):
+    data = [{"index": i, "embedding": vector(text)} for i, text in enumerate(texts)]
+    return {"object": "list", "model": "words", "data": data[::-1]}
+
+
+class Handler(BaseHTTPRequestHandler):
+    """Gives the first answers as they were scripted, then what is right."""
+
+    def do_POST(self):
+        body = json.loads(self.rfile.read(int(self.headers["content-length"])))
+        self.server.asked.append((self.path, body, self.headers))
+        status, said = next(self.server.script, (200, answer(body["input"])))
+        data = said if isinstance(said, bytes) else json.dumps(said).encode()
+        self.send_response(status)
+        self.send_header("content-type", "application/json")
+        self.send_header("content-length", str(len(data)))
+        self.end_headers()
+        self.wfile.write(data)
+
+    def log_message(self, *_):
+        pass
+
+
+@contextmanager
+def serving(*script):
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    server.asked, server.script = [], iter(script)
+    server.url = f"http://127.0.0.1:{server.server_address[1]}/v1"
+    thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
+    thread.start()
+    try:
+        yield server
+    finally:
+        server.shutdown()
+        thread.join()
+        server.server_close()
+
+
+def encoder(server, folder):
+    settings = LanguageSettings(model="words", base_url=server.url, retry=RETRY)
+    return EmbeddingEncoder(settings, WorkFolder(folder))
+
+
+def test_keys_are_what_the_server_says_of_sentences_and_are_asked_for_once(tmp_path, monkeypatch):
+    monkeypatch.setenv(KEY_VARIABLE, KEY)
+    with serving((503, {"error": {"message": f"busy, {KEY}"}}), (200, b"nonsense")) as server:
+        pick, put = (encoder(server, tmp_path).encode(operator) for operator in (PICK, PUT))
+        again = encoder(server, tmp_path).encode(PICK)
+    path, body, headers = server.asked[-1]
+    assert (path, body["model"], body["input"]) == (
+        "/v1/embeddings", "words", [operator_sentence(PUT)]
+    )  # fmt: skip
+    assert headers["Authorization"] == f"Bearer {KEY}"
+    assert len(server.asked) == 4  # twice again, and not for what is known
+    assert again == pick
+    assert nearest(pick, {"pick": pick, "put": put}) == ("pick", pytest.approx(1.0))
+    assert 0.0 < pick.similarity(put) < 1.0
+    assert not any(KEY in file.read_text() for file in tmp_path.rglob("*.json"))
+
+
+def test_the_sentence_says_what_a_skill_does():
+    assert operator_sentence(PUT) == (
+        "Preconditions: Holding(?thing). "
+        "Add effects: At(?thing, ?place), HandEmpty(), Loose(?thing). "
+        "Delete effects: Holding(?thing)."
+    )
+
+
+def embedded(*data):
+    return {"data": [{"index": i, "embedding": numbers} for i, numbers in enumerate(data)]}
+
+
+@pytest.mark.parametrize(
+    ("reply", "error", "reason"),
+    [
+        ((401, {"error": f"wrong key {KEY}"}), LanguageRefusedError, "refused the key"),
+        ((404, {"error": "no such model"}), LanguageRefusedError, "the model or the address"),
+        ((400, {"error": "chat only"}), LanguageRefusedError, "makes no embeddings"),
+        ((500, {"error": "broken"}), LanguageUnavailableError, "tried 3 times"),
+        ((200, embedded()), LanguageUnavailableError, "no 1 embeddings"),
+        ((200, embedded([1.0], [2.0])), LanguageUnavailableError, "no 1 embeddings"),
+        ((200, embedded([float("nan")])), LanguageUnavailableError, "no 1 embeddings"),
+        ((200, embedded(["x"])), LanguageUnavailableError, "no 1 embeddings"),
+        ((200, embedded([])), LanguageUnavailableError, "no 1 embeddings"),
+    ],
+)
+def test_a_server_that_gives_no_vectors_is_named(tmp_path, monkeypatch, reply, error, reason):
+    monkeypatch.setenv(KEY_VARIABLE, KEY)
+    with serving(*[reply] * 3) as server, pytest.raises(error, match=reason) as raised:
+        encoder(server, tmp_path).encode(PICK)
+    assert server.url in str(raised.value) and KEY not in str(raised.value)
+    assert not list(tmp_path.rglob("*.json"))
+
+
+def test_a_vector_that_was_damaged_is_named(tmp_path):
+    with serving() as server:
+        encoder(server, tmp_path).encode(PICK)
+        (kept,) = tmp_path.rglob("*.json")
+        kept.write_text("{}")
+        with pytest.raises(InvalidParameterError, match=kept.name):
+            encoder(server, tmp_path).encode(PICK)
+
+
+def slap(*arguments):
+    command = [sys.executable, "-m", "ensemble.cli", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=600)
+
+
+@pytest.mark.usefixtures("points_installed")
+def test_new_skills_begin_with_those_that_the_server_finds_alike(tmp_path, monkeypatch):
+    monkeypatch.setenv(KEY_VARIABLE, KEY)
+    known = write_library(tmp_path / "known", PUTTING, PICKING)
+    changes = [
+        "rollouts=2", "validation=2", "skill_steps=200", "segment_episodes=2", "sac.hidden=4",
+        "sac.random_steps=96",
+    ]  # fmt: skip
+    with serving() as server:
+        asked = (
+            "acquire", "points", "--from", known, "--encoder", "words", "--base-url", server.url,
+            "--output", tmp_path / "library", "--steps", 200, "--jobs", 1, "--json",
+            *(word for change in changes for word in ("--set", change)),
+        )  # fmt: skip
+        made = slap(*asked)
+        assert made.returncode == 0, made.stderr
+    record = json.loads(made.stdout)
+    assert record["encoder"] == f"words at {server.url}"
+    (pick,) = json.loads(slap("skills", tmp_path / "library", "--json").stdout)["skills"]
+    assert pick["began_with"]["skill"] == PICKING.folder_name
+    assert pick["began_with"]["similarity"] == 1.0
+    again = slap(*asked)  # with no server there any more
+    assert json.loads(again.stdout) == record
+    kept = [path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()]
+    assert not any(KEY.encode() in data for data in kept)
+    assert KEY not in made.stdout + made.stderr + again.stderr
+
+
+@pytest.mark.usefixtures("points_installed")
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        (["--encoder", "words"], "--encoder is for --from"),
+        (["--encoder", "words", "--from", ".", "--base-url", "local:x"], "asks a server"),
+    ],
+)
+def test_an_encoder_without_use_or_server_is_refused(tmp_path, options, reason):
+    answered = slap("acquire", "points", *options, "--output", tmp_path / "library")
+    assert answered.returncode == ErrorCode.INVALID_PARAMETER
+    assert reason in " ".join(answered.stderr.split())

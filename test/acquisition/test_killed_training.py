@@ -1,0 +1,33 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A curriculum whose process is killed ten times, at random moments."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.usefixtures("points_installed")
+
+
+def files(folder):
+    """What is kept, by name; without checkpoints, of which one more may be left."""
+    paths = [p for part in ("library", "work") for p in (folder / part).rglob("*") if p.is_file()]
+    return {str(p.relative_to(folder)): p.read_bytes() for p in paths if p.suffix != ".pt"}
+
+
+def test_killed_ten_times_it_makes_the_same_library_to_the_byte(tmp_path):
+    """And the same work folder: plans carried out, episodes, judgements."""
+    program = Path(__file__).with_name("killed_training.py")
+    ran = subprocess.run([sys.executable, program, tmp_path], capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr
+    kills = (tmp_path / "kills").read_text().splitlines()
+    assert len(kills) == 10
+    assert len(set(kills)) > 2  # at different stages
+    undisturbed = files(tmp_path / "undisturbed")
+    assert {"library/library.json", "work/Put/rounds.json"} <= set(undisturbed)
+    disturbed = list(tmp_path.glob("killed*"))
+    assert disturbed
+    for killed in disturbed:
+        assert files(killed) == undisturbed

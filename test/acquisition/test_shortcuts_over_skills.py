@@ -1,0 +1,95 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Shortcuts that are learned over acquired skills: both halves in one plan."""
+
+import json
+import shutil
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+from steady_skills import PICKING, PUTTING, write_library
+from typer.testing import CliRunner
+
+from ensemble.cli.application import app
+from slap_ros.acquisition.domain_choice import DomainChoice, open_domain
+from slap_ros.domains import get_domain
+from slap_ros.errors import ErrorCode
+from slap_ros.shortcuts.library import load_library
+
+pytestmark = pytest.mark.usefixtures("points_installed")
+SMALL = [
+    "polish=none", "ppo.total_steps=6144", "starts=24", "validation=3", "shortcuts=1",
+    "exploration.tasks=3", "exploration.nodes=1", "exploration.rollouts=128",
+    "exploration.action_repeat=3", "exploration.length=20",
+]  # fmt: skip
+CHANGES = [word for change in SMALL for word in ("--set", change)]
+
+
+def slap(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def train(skills, output, *more):
+    """In processes of its own, which open the library by themselves."""
+    return slap(
+        "train", "points", "--preset", "line", "--skills", skills, "--output", output,
+        "--jobs", 1, "--json", *CHANGES, *more,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def learned(tmp_path_factory):
+    """Room for what is trained once for all tests here."""
+    return SimpleNamespace(folder=tmp_path_factory.mktemp("learned"), answer=None)
+
+
+@pytest.fixture
+def trained(learned):
+    if learned.answer is None:
+        write_library(learned.folder / "steady")
+        learned.answer = train(learned.folder / "steady", learned.folder / "library")
+    assert learned.answer.exit_code == 0, learned.answer.output
+    return learned
+
+
+def test_a_shortcut_over_acquired_skills_is_found_learned_and_recorded(trained):
+    record = json.loads(trained.answer.stdout)
+    assert record["validation"]["slap"] < 0.6 * record["validation"]["pure_planning"]
+    domain = open_domain(DomainChoice("points", "line", str(trained.folder / "steady")))
+    digest = domain.configuration["skills_digest"]
+    assert record["skills"] == {"name": "steady", "digest": digest, "skills": ["Pick", "Put"]}
+    assert "--skills" in record["command"] and f"--skills {trained.folder}" not in record["command"]
+    place = json.loads((trained.folder / "library-training" / "settings.json").read_text())["place"]
+    assert place == {"domain": "points", "preset": "line", "skills": digest, "seed": 0}
+
+
+def test_a_plan_has_acquired_skills_and_shortcuts(trained):
+    """In tasks of two things, of which the shortcut, learned with one, moves one."""
+    answer = slap(
+        "plan", "points", "--preset", "long_line", "--skills", trained.folder / "steady",
+        "--shortcuts", trained.folder / "library", "--json",
+    )  # fmt: skip
+    assert answer.exit_code == 0, answer.output
+    (shortcut,) = load_library(trained.folder / "library", get_domain("points", "line")).shortcuts
+    options = [edge["option"] for edge in json.loads(answer.stdout)["plan"]]
+    assert [option.split("(")[0] for option in options] == ["Pick", "Put", shortcut.name]
+
+
+def test_the_same_training_goes_on_with_the_same_skills_alone(trained, tmp_path):
+    """Wherever their folder is; others make another training."""
+    elsewhere = shutil.copytree(trained.folder / "steady", tmp_path / "elsewhere")
+    again = train(elsewhere, tmp_path / "again", "--work", trained.folder / "library-training")
+    made, first = json.loads(again.stdout), json.loads(trained.answer.stdout)
+    assert made["validation"] == first["validation"]
+    slower = write_library(tmp_path / "slower", PICKING, replace(PUTTING, horizon=20))
+    refused = train(slower, tmp_path / "other", "--work", trained.folder / "library-training")
+    assert refused.exit_code == ErrorCode.INVALID_PARAMETER
+    assert "has a training with other settings" in " ".join(refused.stderr.split())
+
+
+def test_skills_that_lack_an_operator_leave_nothing_to_shorten(tmp_path):
+    half = write_library(tmp_path / "half", PICKING)
+    answer = train(half, tmp_path / "library")
+    assert answer.exit_code == ErrorCode.UNSOLVABLE
+    assert "lacks a skill for Put(" in " ".join(answer.stderr.split())

@@ -1,0 +1,167 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Published tables are those of the data, and the data is about the libraries that ship."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from ensemble.cli.application import app
+from slap_ros.acquisition.skill_library import load_skill_library
+from slap_ros.domains import get_domain
+from slap_ros.errors import ErrorCode
+from slap_ros.learning.shipped_models import shipped_with_siblings
+from slap_ros.shortcuts.library import load_library
+from slap_ros.shortcuts.shipped import shipped_libraries, shipped_library
+from slap_ros.studies.readme import PLACE, with_tables
+from slap_ros.studies.reproducing import CUT, TASKS
+
+ROOT = Path(__file__).parent.parent.parent
+PUBLISHED = ROOT / "docs" / "results"
+PAGES = [ROOT / "README.md", *ROOT.glob("docs/**/*.md")]
+OF_TRAININGS = {"dynamics_obstacle_tower", "pruning_obstacle_tower"}
+RESULTS = {path.stem: json.loads(path.read_text()) for path in PUBLISHED.glob("*.json")}
+
+
+def digests(folders, domain):
+    return [load_library(folder, get_domain(domain)).digest for folder in folders]
+
+
+def test_tables_of_pages_are_those_of_the_data():
+    assert "table1" in {name for _, name, _ in PLACE.findall(PAGES[0].read_text(encoding="utf-8"))}
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        assert with_tables(text, PUBLISHED) == text, f"slap study readme {page}"
+
+
+@pytest.mark.parametrize("name", sorted(n for n, data in RESULTS.items() if "library" in data))
+def test_figures_are_of_the_shipped_library(name):
+    data = RESULTS[name]
+    assert [data["library"]["digest"]] == digests(
+        [shipped_library(data["domain"])], data["domain"]
+    ), data["command"]
+    assert f"`{data['library']['digest']}`" in (PUBLISHED / f"{name}.md").read_text()
+
+
+def test_every_page_on_slap_names_its_libraries():
+    """But for those that were made of a training whose work folder is not there any more."""
+    pages = {n for n, data in RESULTS.items() if data.get("source", "").startswith("SLAP")}
+    without = {n for n in pages if not {"library", "libraries"} & set(RESULTS[n])}
+    assert without == OF_TRAININGS
+
+
+def test_pages_have_tasks_enough_or_say_why_not():
+    per_condition = ("generalisation", "perception", "planning_time", "pruning", "dynamics")
+    few = {
+        name
+        for name, data in RESULTS.items()
+        if data.get("study") in per_condition
+        and "library" in data
+        and data["tasks"] * data["seeds"] < TASKS
+    }
+    assert few == set(CUT)
+    page = (ROOT / "docs" / "reproducing.md").read_text(encoding="utf-8")
+    assert all(reason in page for reason in CUT.values())
+
+
+@pytest.mark.parametrize("name", sorted(n for n, data in RESULTS.items() if "libraries" in data))
+def test_the_main_table_is_of_all_shipped_libraries(name):
+    data = RESULTS[name]
+    shipped = digests(shipped_libraries(data["domain"]), data["domain"])
+    assert [library["digest"] for library in data["libraries"]] == shipped, data["command"]
+    assert len(set(shipped)) == len(shipped)
+
+
+@pytest.mark.parametrize("name", sorted(n for n in RESULTS if n.startswith("acquisition_")))
+def test_task_progress_is_that_of_all_shipped_skills(name):
+    data = RESULTS[name]
+    domain = get_domain(data["domain"], data["preset"])
+    shipped = shipped_with_siblings("skills", domain.name)
+    wanted = {load_skill_library(folder, domain).digest for folder in shipped}
+    for goal in {one["goal"] for one in data["found"]["goals"]}:
+        rows = [one for one in data["found"]["goals"] if one["goal"] == goal]
+        measured = [one["library"] for row in rows for one in row["libraries"]]
+        assert sorted(measured) == sorted(wanted), data["command"]
+
+
+@pytest.mark.parametrize("name", sorted(n for n in RESULTS if n.startswith("replanning_")))
+def test_success_with_replanning_is_that_of_all_shipped_skills_with_written_rewards(name):
+    data = RESULTS[name]
+    domain = get_domain(data["domain"], data["preset"])
+    folders = shipped_with_siblings("skills", domain.name)
+    libraries = [load_skill_library(folder, domain) for folder in folders]
+    wanted = [one.digest for one in libraries if one.record["rewarder"] == "manual"]
+    goals = data["found"]["goals"]
+    for goal in {row["goal"] for row in goals}:
+        rows = [one for row in goals if row["goal"] == goal for one in row["libraries"]]
+        assert [one["library"] for one in rows] == wanted, data["command"]
+        assert len(rows[0]["tasks"]) == 100, data["command"]
+
+
+def test_what_search_without_learning_and_slap_save_is_said_as_measured():
+    readme = " ".join(PAGES[0].read_text(encoding="utf-8").split())
+    saved = {}
+    for domain in ("obstacle2d", "obstacle_tower", "cluttered_drawer", "cleanup_table"):
+        rows = RESULTS[f"table1_{domain}"]["found"]["rows"]
+        for name in ("shooting", "slap"):
+            (row,) = (r for r in rows if (r["preset"], r["approach"]) == ("fair", name))
+            saved[domain, name] = f"{1 - row['relative_length']:.0%}".replace("%", " %")
+    for (domain, name), share in saved.items():
+        if name == "slap":
+            assert f"(SLAP: {share})" in readme, domain
+        elif share != "0 %":
+            assert re.search(rf"\b{share} (shorter|in the tower|on the table)", readme), domain
+
+
+def test_every_page_is_linked():
+    index = (PUBLISHED / "README.md").read_text(encoding="utf-8")
+    pages = {path.name for path in PUBLISHED.glob("*.md")} - {"README.md"}
+    assert pages <= set(re.findall(r"\]\((\w+\.md)\)", index))
+
+
+def test_random_policies_are_said_to_succeed_as_often_as_measured():
+    page = (ROOT / "docs" / "benchtop.md").read_text(encoding="utf-8")
+    said = re.findall(r"a random one in ([^\n]*?) \(\[table\]\(results/(vacuity_\w+)\.md\)\)", page)
+    assert {name for _, name in said} == {n for n in RESULTS if n.startswith("vacuity_")}
+    for sentence, name in said:
+        measured = {
+            round(100 * policy["rate"], 1)
+            for operator in RESULTS[name]["found"]["operators"]
+            for policy in operator["policies"]
+            if policy["policy"] == "random"
+        }
+        percents = set(map(float, re.findall(r"([\d.]+) %", sentence)))
+        assert percents <= measured, f"docs/benchtop.md: {name}: a random one in {sentence}"
+
+
+def test_what_noise_costs_is_said_as_measured():
+    page = (ROOT / "docs" / "perception.md").read_text(encoding="utf-8")
+    rates = {
+        one["approach"]: f"{one['success_rate']:.0%}".replace("%", " %")
+        for one in RESULTS["perception_obstacle2d"]["found"]["levels"]
+        if (one["kind"], one["value"]) == ("position noise [mm]", "2")
+    }
+    assert (
+        f"with 2 mm of noise, {rates['pure_planning']} of tasks are solved by pure planning and "
+        f"{rates['slap']} with shortcuts"
+    ) in page
+
+
+@pytest.mark.parametrize(
+    ("page", "said"),
+    [
+        ("<!-- table9: slap study readme -->\n<!-- end -->\n", "there is no table 'table9'"),
+        ("<!-- table1: slap study readme -->\n<!-- end -->\n", "no data in"),
+    ],
+)
+def test_a_page_is_left_as_it_is_where_a_table_cannot_be_made(tmp_path, page, said):
+    path = tmp_path / "page.md"
+    path.write_text(page)
+    arguments = ["study", "readme", str(path), "--results", str(tmp_path)]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == ErrorCode.INVALID_PARAMETER
+    assert said in " ".join(result.stderr.split())
+    assert path.read_text() == page
