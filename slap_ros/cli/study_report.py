@@ -79,7 +79,7 @@ def make_report(
     log = StudyLog(output / f".{study}_{origin.domain}.jsonl", origin)
     with StudyBars() as bars:
         report = make(JobRunner(log, jobs, bars))
-    paths = write(output, report, origin)
+    paths = write(output, report, origin, log.cpu_seconds)
     console.print(f"{report.title}: {', '.join(map(str, paths))}")
     log.remove()
 

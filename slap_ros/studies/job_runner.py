@@ -8,6 +8,7 @@ import json
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass
+from resource import RUSAGE_CHILDREN, RUSAGE_SELF, getrusage
 from typing import Any, TypeVar
 
 from slap_ros.errors import InvalidParameterError
@@ -79,8 +80,10 @@ class JobRunner:
             left = [name for name in batch if name not in found]
             if left:
                 with self._workers(apart=len(batches) > 1) as workers:
-                    for i, result in workers.run(function, [batch[name] for name in left]):
-                        self.log.add(left[i], parse_json(json.dumps(result, default=asdict)))
+                    work = [(function, batch[name]) for name in left]
+                    for i, (result, seconds) in workers.run(_timed, work):
+                        plain = parse_json(json.dumps(result, default=asdict))
+                        self.log.add(left[i], plain, seconds)
                         ended(left[i])
         return {name: found[name] for name in jobs}
 
@@ -99,3 +102,16 @@ class JobRunner:
         if self.processes == 1 and not apart:
             return nullcontext(SequentialWorkers())
         return local_workers(self.processes)
+
+
+def _timed(function: Callable[..., Any], job: Job) -> tuple[Any, float]:
+    """The result of a job, and the seconds of the processor that it took."""
+    before = _cpu_seconds()
+    result = function(*job)
+    return result, _cpu_seconds() - before
+
+
+def _cpu_seconds() -> float:
+    """Of this process, and of those that it started and that have ended."""
+    usages = getrusage(RUSAGE_SELF), getrusage(RUSAGE_CHILDREN)
+    return sum(usage.ru_utime + usage.ru_stime for usage in usages)

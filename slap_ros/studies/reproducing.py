@@ -279,6 +279,8 @@ class PublishedFigure:
     @property
     def core_seconds(self) -> tuple[float | None, str]:
         """Of one core, and what of it was measured; None where nothing was."""
+        if "cpu_seconds" in self.data:
+            return float(self.data["cpu_seconds"]), ""
         if self.name in MINUTES:
             return 60.0 * MINUTES[self.name], ""
         seconds = sum(_seconds(self.data["found"]))

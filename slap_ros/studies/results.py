@@ -114,13 +114,14 @@ def require_replaceable(folder: Path, study: str, origin: Provenance) -> None:
         )
 
 
-def write(folder: Path, report: StudyReport, origin: Provenance) -> list[Path]:
+def write(folder: Path, report: StudyReport, origin: Provenance, cpu_seconds: float) -> list[Path]:
     """Write a report's files, in place of those of an earlier one.
 
     Args:
         folder: Where to; it is made if need be.
         report: What to write.
         origin: From what it was made.
+        cpu_seconds: Of the processor, that making it took.
 
     Returns:
         The files: JSON, SVG and Markdown.
@@ -131,6 +132,7 @@ def write(folder: Path, report: StudyReport, origin: Provenance) -> list[Path]:
         "source": report.source,
         **origin.as_json(),
         **report.circumstances,
+        "cpu_seconds": round(cpu_seconds, 2),
         "found": report.found,
     }
     contents = {

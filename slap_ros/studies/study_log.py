@@ -29,20 +29,22 @@ class StudyLog:
         """
         self.path = path
         self.results: dict[str, Any] = {}  # by the job's name
+        self.cpu_seconds = 0.0  # of all jobs so far
         self._header = {"command": origin.command, "settings": origin.settings}
         self._begun = path.exists() and self._read()
 
-    def add(self, job: str, result: Any) -> None:
+    def add(self, job: str, result: Any, cpu_seconds: float) -> None:
         """Write what a job came to.
 
         Args:
             job: Its name.
             result: What JSON can hold.
+            cpu_seconds: Of the processor, that it took.
 
         Raises:
             OSError: It cannot be written.
         """
-        lines = [{"job": job, "result": result}]
+        lines = [{"job": job, "result": result, "cpu_seconds": cpu_seconds}]
         if not self._begun:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             lines.insert(0, self._header)
@@ -50,6 +52,7 @@ class StudyLog:
             file.write("".join(map(_line, lines)))
         self._begun = True
         self.results[job] = result
+        self.cpu_seconds += cpu_seconds
 
     def remove(self) -> None:
         """Remove the file, once its study is written."""
@@ -65,6 +68,7 @@ class StudyLog:
             header, *entries = map(parse_json, whole.splitlines())
             self._require_same(header["command"], header.get("settings"))
             self.results = {str(entry["job"]): entry["result"] for entry in entries}
+            self.cpu_seconds = sum(float(entry["cpu_seconds"]) for entry in entries)
         except (ValueError, LookupError, TypeError, AttributeError) as error:
             raise InvalidParameterError(
                 f"{self.path} is no log of a study ({error!r}); remove it"

@@ -37,9 +37,9 @@ from slap_ros.studies.study_log import StudyLog
 
 left, add = int(sys.argv.pop(1)), StudyLog.add
 
-def add_and_die(log, job, result):
+def add_and_die(log, job, result, cpu_seconds):
     global left
-    add(log, job, result)
+    add(log, job, result, 1000.0)
     left -= 1
     if left == 0:
         log.path.open("a").write('{"job": "a line that was not')  # as the kernel may leave it
@@ -98,6 +98,9 @@ def test_a_study_that_is_killed_goes_on_and_comes_to_the_same(tmp_path, name, do
     assert sum(done) == everything - DONE > 0
     one, other = data_of(name, killed), data_of(name, whole)
     assert without_seconds(one) == without_seconds(other)
+    before_it_was_killed = 1000.0 * DONE  # seconds, as said above
+    assert before_it_was_killed <= one["cpu_seconds"] < before_it_was_killed + 500.0
+    assert 0.0 < other["cpu_seconds"] < 500.0
     endings = [".json", ".md", ".svg"]
     assert sorted(path.suffix for path in killed.iterdir()) == endings  # and no log
     if name not in ("planning_time", "table1"):  # their pages have times
