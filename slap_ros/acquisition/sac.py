@@ -112,7 +112,10 @@ class SkillLearner:
             replay_buffer_kwargs={"mdp": env.mdp, "normalisation": AS_OBSERVED, "seed": seed},
             target_entropy=settings.entropy_per_action * actions,
             policy_kwargs={
-                "net_arch": list(settings.hidden),
+                "net_arch": {
+                    "pi": list(settings.hidden),
+                    "qf": list(settings.critic_hidden or settings.hidden),
+                },
                 "optimizer_kwargs": {"fused": True},
             },
             seed=seed,

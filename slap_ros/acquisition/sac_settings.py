@@ -19,7 +19,9 @@ class SacSettings:
 
     Args:
         environments: Episodes side by side.
-        hidden: Units of each hidden layer, of actor and critics alike.
+        hidden: Units of each hidden layer of the actor, which is what a library ships.
+        critic_hidden: Of the critics, where they differ. Larger ones cost time in training, and
+            nothing where the skill is used.
         critic_layer_norm: Whether hidden layers of the critics are normalised. Without, the value
             of what was never tried runs ahead of what is known, and success swings late.
         batch_size: Transitions of an update.
@@ -42,6 +44,7 @@ class SacSettings:
 
     environments: int = 8
     hidden: tuple[int, ...] = (64, 64)
+    critic_hidden: tuple[int, ...] = ()
     critic_layer_norm: bool = True
     batch_size: int = 128
     steps_per_update: int = 2

@@ -34,8 +34,8 @@ MDP = SkillMdp(
 )
 
 
-def learner(first_round=0, seed=1):
-    return SkillLearner(SkillVecEnv(MDP, STARTS, 8, HORIZON, (seed,), first_round), QUICK, seed)
+def learner(first_round=0, seed=1, settings=QUICK):
+    return SkillLearner(SkillVecEnv(MDP, STARTS, 8, HORIZON, (seed,), first_round), settings, seed)
 
 
 def weights(learner):
@@ -105,14 +105,15 @@ def test_values_of_what_is_far_from_everything_tried_are_bounded_by_normalised_l
     assert spread(1e3, QUICK) < 3.0 * spread(1.0, QUICK)
 
 
-def test_what_is_resumed_ends_with_the_same_weights(tmp_path):
-    whole = learner()
+@pytest.mark.parametrize("settings", [QUICK, replace(QUICK, critic_hidden=(24, 16))])
+def test_what_is_resumed_ends_with_the_same_weights(tmp_path, settings):
+    whole = learner(settings=settings)
     for segment in range(2):
         save_episodes(tmp_path / str(segment), whole.learn(2))
     whole.save(tmp_path / "checkpoint.pt")
     whole.learn(2)
     torch.rand(7)  # whatever else draws from torch's generator meanwhile
-    resumed = learner(first_round=4)
+    resumed = learner(first_round=4, settings=settings)
     episodes = [load_episodes(tmp_path / str(i), POINTS.types_by_name) for i in range(2)]
     resumed.resume(tmp_path / "checkpoint.pt", episodes)
     resumed.learn(2)
@@ -120,7 +121,7 @@ def test_what_is_resumed_ends_with_the_same_weights(tmp_path):
     for one, other in zip(weights(whole).values(), weights(resumed).values(), strict=True):
         assert torch.equal(one, other)
     assert np.array_equal(whole.policy().mean(FRESH_SEEN), resumed.policy().mean(FRESH_SEEN))
-    other = learner(seed=2)
+    other = learner(seed=2, settings=settings)
     other.learn(6)
     assert not torch.equal(weights(other)["actor.mu.weight"], weights(whole)["actor.mu.weight"])
 
@@ -193,6 +194,17 @@ def test_a_skill_can_begin_with_another_ones_weights():
     large = SkillLearner(SkillVecEnv(MDP, STARTS, 8, HORIZON, (1,)), SAC_PRESETS["large"], 1)
     with pytest.raises(InvalidParameterError, match="same hidden layers"):
         large.begin_with(policy)
+
+
+def test_larger_critics_leave_the_policy_as_small_as_it_is():
+    small, one = learner(), learner(settings=replace(QUICK, critic_hidden=(24, 16)))
+    one.begin_with(small.policy())  # has the same layers
+    critics = {k: v.shape for k, v in weights(one).items() if k.startswith("critic.qf1")}
+    widths = [shape[0] for name, shape in critics.items() if name.endswith("weight")]
+    assert widths == [24, 16, 1]
+    one.learn(1)
+    shapes = [[layer.shape for layer, _ in each.policy().layers] for each in (small, one)]
+    assert shapes[0] == shapes[1]
 
 
 def test_random_actions_are_held_longer_in_each_environment():
