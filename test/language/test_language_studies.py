@@ -219,7 +219,7 @@ def test_a_page_names_the_day_and_the_recording(tmp_path: Path) -> None:
     digest = sha256(cassette.read_bytes()).hexdigest()
     assert dated.circumstances["recording_sha256"] == digest
     assert dated.circumstances["answered_on"] == read_cassette(cassette).recorded[:10]
-    write(tmp_path, dated, Provenance("pegs", "", {}))
+    write(tmp_path, dated, Provenance("pegs", "", {}), 1.0)
     assert digest in (tmp_path / "models_pegs.md").read_text()
     assert json.loads((tmp_path / "models_pegs.json").read_text())["recording_sha256"] == digest
     assert set(ModelOptions().dated(report).circumstances) == {"answered_on"}
