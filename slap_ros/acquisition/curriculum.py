@@ -81,7 +81,6 @@ class Curriculum:
         self._kept_folders = {skill.operator.name: path for path, skill in self.kept.items()}
         self._kept = {name: self.kept[path] for name, path in self._kept_folders.items()}
         least = self.settings.least_similarity
-        self._fresh_tasks = fresh_tasks(self.settings.validation)
         self._warm_starts = WarmStarts(self._kept, self.known, self.encoder, least)
 
     def run(self) -> SkillLibrary:
@@ -118,7 +117,8 @@ class Curriculum:
         self.callback.on_rollouts(iteration, rollouts)
         if over := self._why_over(rollouts, state):
             return over
-        fresh = self._roll_out(iteration, "fresh", self._fresh_tasks, state)
+        unseen = fresh_tasks(iteration, self.settings.validation)
+        fresh = self._roll_out(iteration, "fresh", unseen, state)
         selection = select_skills(rollouts, state, self.settings)
         state.not_trained = dict(selection.not_trained)
         if not selection.operators:
@@ -216,7 +216,8 @@ class Curriculum:
 
     def _library(self, ended: str, iteration: int, state: CurriculumState) -> SkillLibrary:
         """What was learned, and what was kept as it was."""
-        fresh = self._roll_out(iteration, "final", self._fresh_tasks, state)
+        unseen = fresh_tasks(iteration, self.settings.validation)
+        fresh = self._roll_out(iteration, "final", unseen, state)
         vacuity = self._vacuity(state.learned, fresh)
         skills = [skill for name, skill in self._kept.items() if name not in state.learned]
         for name in state.learned:

@@ -20,7 +20,8 @@ class AcquisitionSettings:
         dense_share: What the weighted metrics are paid by. The paper's weights pay .8 or .9 for
             being near and 1 for success: so small a margin is learned late, if at all.
         rollouts: Tasks that the plan is carried out in, new ones in each iteration.
-        validation: Tasks that skills are judged on, which training never sees.
+        validation: Tasks that an iteration judges skills on, others in each; training never sees
+            them.
         judged: States at most, from these tasks, that a checkpoint is judged from.
         segment_episodes: Episodes in each environment between two judgements.
         skill_steps: Environment steps that a skill learns for in one iteration.

@@ -91,9 +91,13 @@ def training_tasks(iteration: int, count: int) -> range:
     return range(first, first + count)
 
 
-def fresh_tasks(count: int) -> range:
-    """Indices of the tasks that skills are judged on: always the same, and never trained on."""
-    return range(VALIDATION, VALIDATION + count)
+def fresh_tasks(iteration: int, count: int) -> range:
+    """Indices of the tasks that an iteration judges skills on: others in each, none trained on.
+
+    Were they the same in each, a checkpoint that was lucky with them would stay for good.
+    """
+    first = VALIDATION + iteration * count
+    return range(first, first + count)
 
 
 @lru_cache(maxsize=64)
