@@ -128,6 +128,25 @@ def test_both_skills_are_acquired(whole):
     assert library.record["steps"] <= WHOLE.total_steps
 
 
+def test_no_task_is_used_twice(whole, finished):
+    """Neither to train on and to judge, nor in two iterations, nor for the progress in the end."""
+    folders = sorted((finished / "work").glob("iteration*"))
+    assert len(folders) >= 3
+    names = Counter(path.stem for folder in folders for path in folder.glob("*.json"))
+    assert names == {"rollouts": len(folders), "fresh": len(folders) - 1, "final": 1} | {
+        "rounds": len(folders) - 1
+    }
+    used = Counter(
+        rollout["task"]
+        for folder in folders
+        for name in ("rollouts", "fresh", "final")
+        if (folder / f"{name}.json").exists()
+        for rollout in json.loads((folder / f"{name}.json").read_text())
+    )
+    assert set(used.values()) == {1}
+    assert len(used) == 2 * WHOLE.rollouts * len(folders)  # as many to judge on
+
+
 def test_skills_are_acquired_without_anything_written_by_hand(tmp_path):
     """Operators from demonstrations, rewards from metrics."""
     shown = Demonstrations(tuple(record_traces(with_scripts(POINTS), 3)), "the demonstrator")
