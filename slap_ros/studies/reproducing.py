@@ -20,14 +20,12 @@ SLAP_DOMAINS = ("obstacle2d", "obstacle_tower", "cluttered_drawer", "cleanup_tab
 NOT_RUN, NOT_MEASURED = "not run", "not measured"
 # Minutes of one core, as measured on the machine that made the published figures.
 MINUTES: Mapping[str, int] = {
-    "table1_obstacle2d": 5,
     "table1_obstacle_tower": 10,
     "table1_cluttered_drawer": 12,
     "planning_time_cluttered_drawer": 2,
     "replanning_stack_at_target": 1,
     "replanning_stow_hammer": 6,
     "replanning_peg_in_hole": 3,
-    "replanning_make_coffee": 1,
 }
 TRAINING_MINUTES: Mapping[str, int] = {"obstacle2d": 3, "obstacle_tower": 104}
 # What was measured where it is not planning.
