@@ -319,9 +319,8 @@ def draw(figure: Figure, rows: Sequence[Row]) -> None:
         known = [dot for dot in dots if dot is not None]
         if len(known) > 1:
             axes.scatter([place] * len(known), known, color="white", edgecolors="black", s=18)
-    axes.set_xticks(
-        range(len(rows)), [f"{label(row.approach)}\n{row.preset}" for row in rows], fontsize=8
-    )
+    names = [f"{label(row.approach)} {row.preset}".replace(" ", "\n") for row in rows]
+    axes.set_xticks(range(len(rows)), names, fontsize=8)
     axes.set_ylabel("relative length; dots: libraries")
     axes.grid(visible=False, axis="x")
 
