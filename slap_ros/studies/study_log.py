@@ -68,7 +68,8 @@ class StudyLog:
             header, *entries = map(parse_json, whole.splitlines())
             self._require_same(header["command"], header.get("settings"))
             self.results = {str(entry["job"]): entry["result"] for entry in entries}
-            self.cpu_seconds = sum(float(entry["cpu_seconds"]) for entry in entries)
+            # Logs of version 0.1.0 do not have it.
+            self.cpu_seconds = sum(float(entry.get("cpu_seconds", 0.0)) for entry in entries)
         except (ValueError, LookupError, TypeError, AttributeError) as error:
             raise InvalidParameterError(
                 f"{self.path} is no log of a study ({error!r}); remove it"

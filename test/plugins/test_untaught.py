@@ -195,7 +195,8 @@ def test_study_of_demonstrations(installed, tmp_path):
     assert (other["goal"], len(other["tasks"])) == ("other", 2)
     assert training["success_rate"] == other["success_rate"] == 1.0
     assert training["success_interval"]["low"] == pytest.approx(0.4385, abs=1e-4)
-    assert data == study("demonstrations", tmp_path, *counts, "--jobs", "2")
+    again = study("demonstrations", tmp_path, *counts, "--jobs", "2")
+    assert data["found"] == again["found"]
     alone = study("demonstrations", tmp_path / "alone", *counts, "--goal", "other")
     (alone,) = alone["found"]["goals"]
     assert len(alone["tasks"]) == 3
@@ -245,7 +246,7 @@ def test_study_of_vacuity_counts_what_policies_do_without_eyes(installed, tmp_pa
             "random",
         ]
     assert not any(one["policies"][0]["successes"] for one in operators.values())
-    assert data == study("vacuity", tmp_path, "--starts", "4", "--jobs", "2")
+    assert data["found"] == study("vacuity", tmp_path, "--starts", "4", "--jobs", "2")["found"]
 
 
 def test_studies_need_a_demonstrator(tmp_path):
