@@ -87,8 +87,7 @@ class TaskSource:
 
 def training_tasks(iteration: int, count: int) -> range:
     """Indices of the tasks that an iteration carries out plans in: others in each."""
-    first = ROLLOUTS + iteration * count
-    return range(first, first + count)
+    return _tasks_of(iteration, count, ROLLOUTS)
 
 
 def fresh_tasks(iteration: int, count: int) -> range:
@@ -96,7 +95,12 @@ def fresh_tasks(iteration: int, count: int) -> range:
 
     Were they the same in each, a checkpoint that was lucky with them would stay for good.
     """
-    first = VALIDATION + iteration * count
+    return _tasks_of(iteration, count, VALIDATION)
+
+
+def _tasks_of(iteration: int, count: int, use: int) -> range:
+    """An iteration's indices, from those of a use."""
+    first = use + iteration * count
     return range(first, first + count)
 
 

@@ -32,6 +32,7 @@ from slap_ros.cli.study_report import (
     provenance,
     require_report,
 )
+from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.experiment import Experiment
@@ -40,14 +41,16 @@ from slap_ros.studies import acquisition, demonstrations, induction, replanning,
 from slap_ros.studies.planning_ablation import SEARCH, VARIANTS
 from slap_ros.studies.results import Data, describe_skills
 
+GoalNames = Annotated[
+    list[str] | None,
+    typer.Option(help="A goal's name; may be repeated. Default: all of the domain's."),
+]
+
 
 @exits
 def demonstrations_(
     domain: DomainName,
-    goal: Annotated[
-        list[str] | None,
-        typer.Option(help="A goal's name; may be repeated. Default: all of the domain's."),
-    ] = None,
+    goal: GoalNames = None,
     tasks: Annotated[int, typer.Option(min=1, help="Of the first goal.")] = 100,
     others: Annotated[int, typer.Option(min=1, help="Tasks of every other goal.")] = 50,
     seed: FreshSeed = FRESH_SEED,
@@ -57,7 +60,7 @@ def demonstrations_(
 ) -> None:
     """Whether tasks can be solved: success of the domain's demonstrator, by goal."""
     choice = _demonstrator(domain, preset, output)
-    names = goal or list(open_domain(choice).goals) or [""]
+    names = goal or _all_goals(open_domain(choice))
     counts = {name: others if i else tasks for i, name in enumerate(names)}
     settings = {"preset": choice.preset, "tasks": tasks, "others": others, "seed": seed}
     origin = provenance("demonstrations", domain, settings, goal=goal)
@@ -111,10 +114,7 @@ def acquisition_(
             help="A folder of `slap acquire`; may be repeated. Default: all that ship.",
         ),
     ] = None,
-    goal: Annotated[
-        list[str] | None,
-        typer.Option(help="A goal's name; may be repeated. Default: all of the domain's."),
-    ] = None,
+    goal: GoalNames = None,
     tasks: Annotated[int, typer.Option(min=1, help="Of each goal, for each library.")] = 100,
     seed: FreshSeed = FRESH_SEED,
     preset: Preset = None,
@@ -124,10 +124,10 @@ def acquisition_(
     """Task progress with acquired skills, by goal, without planning again."""
     require_report(output)
     folders = library or _shipped(domain)
-    preset = get_domain(domain, preset).preset
-    choices = [DomainChoice(domain, preset, str(folder)) for folder in folders]
-    names = goal or list(get_domain(domain, preset).goals) or [""]
-    settings = {"preset": preset, "tasks": tasks, "seed": seed}
+    chosen = get_domain(domain, preset)
+    choices = [DomainChoice(domain, chosen.preset, str(folder)) for folder in folders]
+    names = goal or _all_goals(chosen)
+    settings = {"preset": chosen.preset, "tasks": tasks, "seed": seed}
     make_report(
         "acquisition",
         provenance("acquisition", domain, settings, library=library, goal=goal),
@@ -148,10 +148,7 @@ def replanning_(
             "operators and rewards are hand-written.",
         ),
     ] = None,
-    goal: Annotated[
-        list[str] | None,
-        typer.Option(help="A goal's name; may be repeated. Default: all of the domain's."),
-    ] = None,
+    goal: GoalNames = None,
     tasks: Annotated[int, typer.Option(min=1, help="Of each seed, for each goal.")] = 20,
     seeds: Annotated[int, typer.Option(min=1, help="For the first library.")] = 5,
     others: Annotated[int, typer.Option(min=1, help="Seeds for every other library.")] = 1,
@@ -176,7 +173,7 @@ def replanning_(
         Experiment(one, tasks, others if i else seeds, first_seed, skills=str(folder))
         for i, (one, folder) in enumerate(zip(opened, folders, strict=True))
     ]
-    names = goal or list(get_domain(domain, chosen).goals) or [""]
+    names = goal or _all_goals(get_domain(domain, chosen))
     make_report(
         "replanning",
         provenance("replanning", domain, settings, library=library, goal=goal),
@@ -184,6 +181,11 @@ def replanning_(
         jobs,
         lambda runner: replanning.study(experiments, names, runner),
     )
+
+
+def _all_goals(domain: Domain) -> list[str]:
+    """The names of a domain's goals; where it has none, the empty one: each task's own."""
+    return list(domain.goals) or [""]
 
 
 def _shipped(domain: str) -> list[Path]:
