@@ -21,6 +21,7 @@ from typing import Any, BinaryIO
 import yaml
 
 MAX_BYTES = 64 * 2**20  # of a file that is read at once, where its reader states no other limit
+JSON_LINE = 120  # characters, beside the indentation: what fits is not broken
 MAX_YAML_NODES = 200_000  # with what is repeated by reference counted as often as it is repeated
 # What PyYAML raises where a scalar is not of the kind that its tag says, beside its own errors.
 YAML_ERRORS = (yaml.YAMLError, RecursionError, LookupError, TypeError, AttributeError)
@@ -149,23 +150,26 @@ def parse_json(text: str | bytes) -> Any:
 
 
 def pretty_json(value: Any, indent: str = "") -> str:
-    """JSON, indented down to the innermost objects and lists, which have a line each."""
+    """JSON, indented: what is nested has a line of its own where it fits into one."""
+    line = json.dumps(value, allow_nan=False, ensure_ascii=False)
+    if not _has_nested(value) or len(line) <= JSON_LINE:
+        return line
     deeper = indent + "  "
-    parts: list[str]
-    if isinstance(value, Mapping) and any(map(_is_nested, value.values())):
+    if isinstance(value, Mapping):
         parts = [f"{json.dumps(key)}: {pretty_json(part, deeper)}" for key, part in value.items()]
         opening, closing = "{", "}"
-    elif isinstance(value, list | tuple) and any(map(_is_nested, value)):
+    else:
         parts = [pretty_json(part, deeper) for part in value]
         opening, closing = "[", "]"
-    else:
-        return json.dumps(value, allow_nan=False, ensure_ascii=False)
     lines = f",\n{deeper}".join(parts)
     return f"{opening}\n{deeper}{lines}\n{indent}{closing}"
 
 
-def _is_nested(value: object) -> bool:
-    return isinstance(value, Mapping | list | tuple)
+def _has_nested(value: object) -> bool:
+    parts = list(value.values()) if isinstance(value, Mapping) else value
+    return isinstance(parts, list | tuple) and any(
+        isinstance(part, Mapping | list | tuple) for part in parts
+    )
 
 
 def parse_yaml(text: str) -> Any:
