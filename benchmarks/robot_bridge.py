@@ -4,37 +4,125 @@
 
 The whole ensemble, all nodes in this process, on tasks of Obstacle Tower: with the given skills
 alone and with the shipped shortcuts. ``--pace`` moves the mock robot faster than a real one could;
-latency stays what it is.
+latency stays what it is. ``--output`` gets a page, a picture and every run (needs
+``slap_ros[studies]``).
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
 from statistics import mean
+from time import process_time
+from typing import TYPE_CHECKING, Any
 
 from benchmarks.printing import show
 from ensemble.nodes import RunSettings
 from ensemble.run import RunRequest, run
+from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode, SlapError
+from slap_ros.evaluation.statistics import wilson_interval
 from slap_ros.robot.worlds import MOCK
+from slap_ros.shortcuts.library import load_library
+from slap_ros.shortcuts.shipped import NONE, shipped_library
+from slap_ros.studies.comparison import format_spread, spread_of
+from slap_ros.studies.figures import APPROACH_STYLES, require_matplotlib
+from slap_ros.studies.results import (
+    MarkdownTable,
+    Provenance,
+    StudyReport,
+    describe_library,
+    require_replaceable,
+    write,
+)
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+STUDY, DOMAIN = "robot_bridge", "obstacle_tower"
 DETECTION_RATE = 30.0  # Hz, at the pace of a real robot
 PATIENCE = 10.0  # s, for sensors and controllers: all nodes share one process, planning too
+APPROACHES = {"pure_planning": NONE, "slap": ""}  # and the library that each is given
+MEASURED = """\
+Every task is solved by the whole ensemble through the bridge to a real robot, in place of which
+there is a mock robot: simulated, with latency, noise and a controller that moves as fast as its
+limits allow. When messages arrive decides what is measured, hence another run of the same command
+may give other steps and replans. Steps are the mean over solved tasks, with the sample standard
+deviation; replans are all that there were; success has Wilson's 95 % interval."""
 
 
-def solve(seed: int, shortcuts: str, arguments: argparse.Namespace) -> tuple[ErrorCode, int, int]:
-    """Error code, environment steps and replans of one task."""
-    mock = {
-        "pace": arguments.pace,
-        "rate": min(DETECTION_RATE * arguments.pace, 200.0),
-        "latency": arguments.latency,
-        "pose_noise": arguments.pose_noise,
-        "dropout": arguments.dropout,
-        "noise_seed": seed,
-    }
+@dataclass(frozen=True)
+class BridgeTrial:
+    """A task, as it ended.
+
+    Args:
+        seed: Of the task.
+        success: Whether the goal was reached.
+        steps: Of the environment.
+        replans: Plans that were made after the first.
+        error_code: Why it was not.
+    """
+
+    seed: int
+    success: bool
+    steps: int
+    replans: int
+    error_code: str
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Which tasks, and what the mock robot is like.
+
+    Args:
+        tasks: Number of tasks.
+        first_seed: Of the first task; each has a seed of its own.
+        pace: How often faster than a real robot.
+        latency: Of messages, s.
+        pose_noise: Standard deviation of measured positions, m.
+        dropout: Share of detections that are lost.
+    """
+
+    tasks: int
+    first_seed: int
+    pace: float
+    latency: float
+    pose_noise: float
+    dropout: float
+
+    @property
+    def command(self) -> str:
+        """That measures the same again."""
+        options = " ".join(
+            f"--{name.replace('_', '-')} {value:g}" for name, value in asdict(self).items()
+        )
+        return f"python -m benchmarks.{STUDY} {options}"
+
+    def mock(self, seed: int) -> dict[str, Any]:
+        """Parameters of the mock robot in a task."""
+        return {
+            "pace": self.pace,
+            "rate": min(DETECTION_RATE * self.pace, 200.0),
+            "latency": self.latency,
+            "pose_noise": self.pose_noise,
+            "dropout": self.dropout,
+            "noise_seed": seed,
+        }
+
+
+def solve(seed: int, shortcuts: str, conditions: Conditions) -> BridgeTrial:
+    """Solve one task.
+
+    Args:
+        seed: Of the task.
+        shortcuts: Library.
+        conditions: What the mock robot is like.
+    """
     settings = RunSettings(
-        "obstacle_tower",
+        DOMAIN,
         "fair",
         seed,
         0,
@@ -42,7 +130,7 @@ def solve(seed: int, shortcuts: str, arguments: argparse.Namespace) -> tuple[Err
         None,
         shortcuts=shortcuts,
         world=MOCK,
-        mock=mock,
+        mock=conditions.mock(seed),
         bridge={
             "joint_timeout": PATIENCE,
             "detection_timeout": PATIENCE,
@@ -53,36 +141,115 @@ def solve(seed: int, shortcuts: str, arguments: argparse.Namespace) -> tuple[Err
         metrics = run(RunRequest(settings, in_process=True), lambda _type, _message: None)
     except SlapError as error:
         print(f"seed {seed}: {error}", file=sys.stderr)
-        return error.code, 0, 0
+        return BridgeTrial(seed, False, 0, 0, error.code.name)
     if not metrics.success:
         print(f"seed {seed}: {metrics.error_msg}", file=sys.stderr)
-    return ErrorCode(metrics.error_code), metrics.plan_length, metrics.replans
+    code = ErrorCode(metrics.error_code).name
+    return BridgeTrial(seed, metrics.success, metrics.plan_length, metrics.replans, code)
+
+
+Found = Mapping[str, list[BridgeTrial]]  # by approach
+
+
+def summary(found: Found) -> dict[str, dict[str, float]]:
+    """Figures of each approach."""
+    figures = {}
+    for approach, trials in found.items():
+        steps = [trial.steps for trial in trials if trial.success]
+        figures[approach] = {
+            "tasks": len(trials),
+            "solved": len(steps),
+            "mean_steps": mean(steps) if steps else 0.0,
+            "replans": sum(trial.replans for trial in trials),
+        }
+    return figures
+
+
+def table(found: Found) -> MarkdownTable:
+    """A row an approach."""
+    rows = []
+    for approach, trials in found.items():
+        steps = [float(trial.steps) for trial in trials if trial.success]
+        interval = wilson_interval(len(steps), len(trials))
+        rows.append(
+            [
+                APPROACH_STYLES[approach].label,
+                f"{len(steps)} of {len(trials)} [{interval.low:.0%}, {interval.high:.0%}]",
+                format_spread(spread_of(steps), 1),
+                str(sum(trial.replans for trial in trials)),
+            ]
+        )
+    return MarkdownTable(("approach", "solved [95 %]", "steps", "replans"), rows)
+
+
+def draw(figure: Figure, found: Found) -> None:
+    """Steps of each task."""
+    axes = figure.subplots()
+    for approach, trials in found.items():
+        style, solved = APPROACH_STYLES[approach], [trial for trial in trials if trial.success]
+        axes.scatter(
+            [trial.seed for trial in solved],
+            [trial.steps for trial in solved],
+            color=style.colour,
+            marker=style.marker,
+            s=20,
+            label=style.label,
+        )
+    axes.set_ylim(bottom=0)
+    axes.set_xlabel("seed of the task")
+    axes.set_ylabel("steps")
+    axes.locator_params(axis="x", integer=True)
+    figure.legend(loc="outside upper center", ncols=2)
+
+
+def report(found: Found) -> StudyReport:
+    """The page, the picture and every run."""
+    return StudyReport(
+        study=STUDY,
+        source="",
+        title="Tasks through the bridge, on a mock robot: Obstacle Tower",
+        measured=MEASURED,
+        table=table(found),
+        found={name: [asdict(trial) for trial in trials] for name, trials in found.items()},
+        draw=lambda figure: draw(figure, found),
+        size=(6.4, 3.0),
+    )
+
+
+def origin(conditions: Conditions) -> Provenance:
+    """From what it is made: tasks, mock robot, and the shortcuts that ship."""
+    path = shipped_library(DOMAIN)
+    assert path is not None
+    library = describe_library(f"models/{DOMAIN}", load_library(path, get_domain(DOMAIN)))
+    return Provenance(DOMAIN, conditions.command, {**asdict(conditions), "library": library})
 
 
 def main() -> None:
     """Print the figures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--tasks", type=int, default=20)
-    parser.add_argument("--first", type=int, default=0, help="seed of the first task")
+    parser.add_argument("--first-seed", type=int, default=500, help="of the first task")
     parser.add_argument("--pace", type=float, default=20.0)
     parser.add_argument("--latency", type=float, default=0.02, help="s")
     parser.add_argument("--pose-noise", type=float, default=0.002, help="m")
     parser.add_argument("--dropout", type=float, default=0.0)
-    parser.add_argument("--shortcuts", nargs="+", default=["none", ""], help="libraries")
+    parser.add_argument("--output", type=Path, help="folder for page, picture and runs")
     parser.add_argument("--json", action="store_true")
-    arguments = parser.parse_args()
-    figures = {}
-    for shortcuts in arguments.shortcuts:
-        seeds = range(arguments.first, arguments.first + arguments.tasks)
-        found = {seed: solve(seed, shortcuts, arguments) for seed in seeds}
-        solved = [(steps, replans) for code, steps, replans in found.values() if not code]
-        figures[shortcuts or "shipped"] = {
-            "tasks": len(found),
-            "solved": len(solved),
-            "mean_steps": mean(steps for steps, _ in solved) if solved else 0.0,
-            "replans": sum(replans for *_, replans in found.values()),
-        }
-    show(figures, arguments.json)
+    given = vars(parser.parse_args())
+    folder, as_json = given.pop("output"), given.pop("json")
+    conditions = Conditions(**given)
+    source = origin(conditions)
+    if folder is not None:
+        require_matplotlib()
+        require_replaceable(folder, STUDY, source)
+    seeds = range(conditions.first_seed, conditions.first_seed + conditions.tasks)
+    found = {
+        approach: [solve(seed, shortcuts, conditions) for seed in seeds]
+        for approach, shortcuts in APPROACHES.items()
+    }
+    if folder is not None:
+        write(folder, report(found), source, process_time())
+    show(summary(found), as_json)
 
 
 if __name__ == "__main__":

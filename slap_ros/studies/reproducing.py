@@ -306,10 +306,12 @@ def _seconds(found: Any) -> Iterator[float]:
 
 
 def published(results: Path) -> dict[str, PublishedFigure]:
-    """Every figure of a folder that has a command, by name."""
+    """Every figure of a folder that a study makes, by name; benchmarks make others."""
     found = {path.stem: parse_json(read_text(path)) for path in sorted(results.glob("*.json"))}
     return {
-        name: PublishedFigure(name, data) for name, data in found.items() if data.get("command")
+        name: PublishedFigure(name, data)
+        for name, data in found.items()
+        if str(data.get("command", "")).startswith("slap study ")
     }
 
 
