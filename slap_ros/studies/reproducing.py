@@ -21,7 +21,6 @@ NOT_RUN, NOT_MEASURED = "not run", "not measured"
 # Minutes of one core, as measured on the machine that made the published figures.
 MINUTES: Mapping[str, int] = {
     "table1_obstacle_tower": 10,
-    "table1_cluttered_drawer": 12,
     "planning_time_cluttered_drawer": 2,
     "replanning_stack_at_target": 1,
     "replanning_stow_hammer": 6,

@@ -26,7 +26,6 @@ PAGES = [ROOT / "README.md", *ROOT.glob("docs/**/*.md")]
 OF_TRAININGS = {"dynamics_obstacle_tower", "pruning_obstacle_tower"}
 LOOKED_AT = {  # of tasks that were seen in development
     "generalisation_obstacle_tower",
-    "goals_obstacle_tower",
     "perception_obstacle_tower",
     "planning_time_cluttered_drawer",
 }
