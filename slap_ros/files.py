@@ -21,7 +21,7 @@ from typing import Any, BinaryIO
 import yaml
 
 MAX_BYTES = 64 * 2**20  # of a file that is read at once, where its reader states no other limit
-JSON_LINE = 120  # characters, beside the indentation: what fits is not broken
+JSON_LINE = 1000  # characters, beside the indentation: what fits, as most trials do, is not broken
 MAX_YAML_NODES = 200_000  # with what is repeated by reference counted as often as it is repeated
 # What PyYAML raises where a scalar is not of the kind that its tag says, beside its own errors.
 YAML_ERRORS = (yaml.YAMLError, RecursionError, LookupError, TypeError, AttributeError)

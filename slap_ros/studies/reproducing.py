@@ -21,7 +21,6 @@ NOT_RUN, NOT_MEASURED = "not run", "not measured"
 # Minutes of one core, as measured on the machine that made the published figures.
 MINUTES: Mapping[str, int] = {
     "table1_obstacle_tower": 10,
-    "planning_time_cluttered_drawer": 2,
     "replanning_stack_at_target": 1,
     "replanning_stow_hammer": 6,
     "replanning_peg_in_hole": 3,
@@ -36,9 +35,7 @@ MOST_OF_THE_TIME: Mapping[str, str] = {
 TASKS = 20
 PLANS = 25  # of a language model
 CUT: Mapping[str, str] = {
-    "generalisation_obstacle_tower": "20 tasks would take about 0.3 core-hours",
     "perception_obstacle_tower": "fewer than 20 to save time",
-    "planning_time_cluttered_drawer": "20 tasks would take 4 core-minutes",
 }
 
 
