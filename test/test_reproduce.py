@@ -2,10 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every published figure has a command that makes it again, under its own name."""
 
+import json
 import shlex
+from dataclasses import fields
 
 import pytest
 
+from benchmarks.robot_bridge import Conditions
 from slap_ros.domains import get_domain
 from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.shipped import shipped_library
@@ -21,6 +24,12 @@ def test_every_figure_has_its_command():
         program, group, study, domain, *_ = shlex.split(figure.command)
         assert (program, group) == ("slap", "study")
         assert figure.name == f"{study}_{domain}"
+
+
+def test_the_page_of_the_mock_robot_names_the_command_that_made_it():
+    data = json.loads((PUBLISHED / "robot_bridge_obstacle_tower.json").read_text(encoding="utf-8"))
+    conditions = Conditions(**{field.name: data[field.name] for field in fields(Conditions)})
+    assert conditions.command == data["command"]
 
 
 def test_the_page_has_the_commands_that_are_run():
