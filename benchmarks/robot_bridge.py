@@ -29,7 +29,7 @@ from slap_ros.robot.worlds import MOCK
 from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.shipped import NONE, shipped_library
 from slap_ros.studies.comparison import format_spread, spread_of
-from slap_ros.studies.figures import APPROACH_STYLES, require_matplotlib
+from slap_ros.studies.figures import APPROACH_STYLES, label, require_matplotlib
 from slap_ros.studies.results import (
     MarkdownTable,
     Provenance,
@@ -173,7 +173,7 @@ def table(found: Found) -> MarkdownTable:
         interval = wilson_interval(len(steps), len(trials))
         rows.append(
             [
-                APPROACH_STYLES[approach].label,
+                label(approach),
                 f"{len(steps)} of {len(trials)} [{interval.low:.0%}, {interval.high:.0%}]",
                 format_spread(spread_of(steps), 1),
                 str(sum(trial.replans for trial in trials)),
@@ -193,7 +193,7 @@ def draw(figure: Figure, found: Found) -> None:
             color=style.colour,
             marker=style.marker,
             s=20,
-            label=style.label,
+            label=label(approach),
         )
     axes.set_ylim(bottom=0)
     axes.set_xlabel("seed of the task")

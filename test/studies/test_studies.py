@@ -513,10 +513,10 @@ def test_published_data_can_be_made_again_by_its_command(name):
     """The command line still has every option that the recorded command gives."""
     data = json.loads((PUBLISHED / f"{name}.json").read_text(encoding="utf-8"))
     assert {"study", "source", "domain", "command", "versions", "found"} <= set(data)
-    slap, study, name, *arguments = shlex.split(data["command"])
-    assert (slap, study, name) == ("slap", "study", data["study"])
-    command = get_command(app).commands[study].commands[name]
-    given = command.make_context(name, arguments).params
+    slap, group, study, *arguments = shlex.split(data["command"])
+    assert (slap, group, study) == ("slap", "study", data["study"])
+    command = get_command(app).commands[group].commands[study]
+    given = command.make_context(study, arguments).params
     assert given["domain"] == data["domain"]
     for setting in ("preset", "tasks", "seeds", "first_seed", "samples"):
         if setting in data:
