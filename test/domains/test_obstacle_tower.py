@@ -17,9 +17,10 @@ from slap_ros.domains.obstacle_tower.tasks import (
     RandomTowerTasks,
     TowerArrangement,
 )
+from slap_ros.domains.tabletop.state_access import pose_of
 from slap_ros.errors import ErrorCode, InvalidStateError, UnsolvableError
 from slap_ros.physics.panda import MAX_STEP
-from slap_ros.physics.scene import Material
+from slap_ros.physics.scene import CUBE_EDGE, Material
 from slap_ros.planning.model import Model
 from slap_ros.planning.planner import GraphPlanner, Problem, make_planner
 from slap_ros.planning.search import search_exhaustively, search_lazily
@@ -142,6 +143,19 @@ def test_without_obstacles_it_is_pick_and_place():
     episode = solve(task)
     assert episode.success
     assert episode.plan_length < 40
+
+
+@pytest.mark.parametrize("gap", [0.001, 0.004])
+def test_a_block_that_stands_close_to_the_target_need_not_be_taken_away(gap):
+    beside = 0.5 + CUBE_EDGE + gap
+    task = TowerArrangement((0.5, 0.0, 0.0), (0.4, 0.2, 0.0), ((beside, 0.0, 0.0),)).task()
+    episode = solve(task)
+    assert episode.success
+    assert episode.plan_length < 50  # it is picked and placed, no more
+    before, after = task.initial_state, episode.states[-1]
+    stood = pose_of(before, before.layout.object("block2")).position
+    stands = pose_of(after, after.layout.object("block2")).position
+    assert stands == pytest.approx(stood, abs=0.005)
 
 
 def test_a_single_obstacle_and_six_can_be_sampled():

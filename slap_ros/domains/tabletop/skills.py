@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,6 +71,9 @@ class TrajectoryFollower:
 class TransitSkill:
     """Follow the first transit that can be planned; then grip or let go; then lift.
 
+    Where none has a goal that can be reached, they are tried with a higher approach: a shortcut may
+    leave a block so close to a place that another, held over it, would touch the top of the first.
+
     Args:
         name: The operator's.
         timing: How fast.
@@ -95,7 +98,7 @@ class TransitSkill:
     def lower_bound(self, state: State, objects: tuple[Object, ...]) -> int:
         """The bound of the shortest transit that may be followed, and what comes after it."""
         least, before = math.inf, None
-        for transit in self.transits(state, objects):
+        for transit in self._ways(state, objects):
             if before is not None and before.is_open:
                 break
             least, before = min(least, transit.least_steps(self.timing)), transit
@@ -108,7 +111,7 @@ class TransitSkill:
         Raises:
             SkillNotApplicableError: None of the transits can be planned.
         """
-        for transit in self.transits(state, objects):
+        for transit in self._ways(state, objects):
             try:
                 return TrajectoryFollower(self._trajectory(transit), self.timing.max_step)
             except SkillNotApplicableError:
@@ -118,6 +121,16 @@ class TransitSkill:
     @property
     def _after(self) -> int:
         return 2 if self.lift > 0.0 else 1
+
+    def _ways(self, state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:
+        """The transits, in the order in which they are tried."""
+        tried = []
+        for transit in self.transits(state, objects):
+            tried.append(transit)
+            yield transit
+        if not any(transit.is_reachable for transit in tried):
+            for transit in tried:
+                yield transit.from_higher()
 
     def _trajectory(self, transit: Transit) -> Trajectory:
         paths = transit.paths()

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import ParamSpec, TypeVar, cast
 
@@ -37,6 +37,7 @@ from slap_ros.physics.panda import grasp_pose
 from slap_ros.relational import Object, State
 
 CLEARANCE = 0.05  # m, over a place before the approach and after the retreat
+HIGHER = 2.0 * CLEARANCE  # m, where things as high as what is held stand close to the place
 SEED = 0  # of motion plans: a plan is a function of the state alone
 ATTEMPTS = 2  # random paths for a motion that needs them; more shorten it by little
 PLANS = PlanCache(attempts=ATTEMPTS)
@@ -69,12 +70,18 @@ class Transit:
         state: Where it begins.
         goals: Poses of the grasp point, any of which will do.
         touched: What the arm or its body may touch during the approach.
+        clearance: Between a goal and where the crossing to it ends, m.
     """
 
     scene: PlanningScene
     state: State
     goals: Sequence[Pose]
     touched: tuple[Object, ...]
+    clearance: float = CLEARANCE
+
+    def from_higher(self) -> Transit:
+        """The same, with an approach that begins twice as high."""
+        return replace(self, clearance=HIGHER)
 
     def paths(self) -> list[Path]:
         """Retreat, crossing and approach to the nearest goal that can be reached.
@@ -136,6 +143,11 @@ class Transit:
         return PLANS.plan_path(start, above, self.free, seed=SEED)
 
     @property
+    def is_reachable(self) -> bool:
+        """Whether one of the goals is, from over it: there may be no crossing to there."""
+        return any(candidate.approach is not None for candidate in self.candidates)
+
+    @property
     def is_open(self) -> bool:
         """Whether one of the goals is reached by a direct crossing, and so surely."""
         return any(
@@ -160,7 +172,7 @@ class Transit:
         retreat, found = _retreat(self.scene, self.state), []
         if retreat is None:
             return []
-        over = [shifted(goal, (0.0, 0.0, CLEARANCE)) for goal in self.goals]
+        over = [shifted(goal, (0.0, 0.0, self.clearance)) for goal in self.goals]
         nearest = nearest_configurations(over, retreat[-1], free=self.free)
         for goal, above in zip(self.goals, nearest, strict=True):
             if above is not None:
@@ -196,7 +208,7 @@ def _retreat(scene: PlanningScene, state: State) -> Path | None:
     low = _up(q, CLEARANCE)
     if low is None or _free(scene, state)(low[-1:])[0]:
         return low
-    high = _up(q, 2.0 * CLEARANCE)
+    high = _up(q, HIGHER)
     return high if high is not None and _free(scene, state)(high[-1:])[0] else low
 
 
