@@ -14,6 +14,7 @@ import argparse
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -314,12 +315,12 @@ def main() -> None:
     arguments = parser.parse_args()
     count: int = arguments.count
     table: dict[str, Callable[[], Mapping[str, float]]] = {
-        **{f"grasp {name}": lambda name=name: grasps(name, count) for name in GRASPABLE},
-        "drawer": lambda: drawers(count),
-        "lid": lambda: lids(count),
-        **{f"insert {c} mm": lambda c=c: insertions(c, count) for c in CLEARANCES_MM},
+        **{f"grasp {name}": partial(grasps, name, count) for name in GRASPABLE},
+        "drawer": partial(drawers, count),
+        "lid": partial(lids, count),
+        **{f"insert {c} mm": partial(insertions, c, count) for c in CLEARANCES_MM},
         **{
-            f"{domain}: grasp {n}": lambda n=n: grasps(n, count)
+            f"{domain}: grasp {n}": partial(grasps, n, count)
             for domain, things in OF_DOMAINS.items()
             for n in things
         },

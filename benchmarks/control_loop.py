@@ -15,6 +15,7 @@ from itertools import pairwise
 from pathlib import Path
 from statistics import median, quantiles
 from time import perf_counter
+from typing import Any
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -88,7 +89,8 @@ def ensemble() -> list[float]:
                 RunRequest(RunSettings("obstacle2d", "fair", seed, 0, "lazy", bag)),
                 lambda _type, _message: None,
             )
-            stamps = [stamp_ns(m.header) for _, kind, _, m in read_bag(bag) if kind == STATE_TYPE]
+            states: list[Any] = [m for _, kind, _, m in read_bag(bag) if kind == STATE_TYPE]
+            stamps = [stamp_ns(state.header) for state in states]
             gaps += [(b - a) / 1e6 for a, b in pairwise(stamps[1:])]
     return gaps
 

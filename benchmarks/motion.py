@@ -80,7 +80,8 @@ def scenes(count: int) -> Iterator[Scene]:
         tower = rng.uniform((0.42, -0.12), (0.58, 0.12))
         offset = rng.uniform((-0.08, 0.13), (0.08, 0.2)) * rng.choice((-1.0, 1.0))
         (x, y), (px, py) = (tower + offset).tolist(), (tower - offset).tolist()
-        blocks = [block(*tower.tolist(), ON_TABLE + 0.05 * i) for i in range(3)]
+        foot_x, foot_y = tower.tolist()
+        blocks = [block(foot_x, foot_y, ON_TABLE + 0.05 * i) for i in range(3)]
         yield Scene(blocks, block(x, y), (px, py))
         count -= 1
 
@@ -98,8 +99,8 @@ def measure_inverse_kinematics(queries: int) -> dict[str, float]:
     rng = np.random.default_rng(1)
     times, found = [], 0
     for _ in range(queries):
-        position = rng.uniform((0.3, -0.35, 0.1), (0.7, 0.35, 0.5))
-        pose = top_down(*position.tolist(), rng.uniform(-math.pi, math.pi))
+        x, y, z = rng.uniform((0.3, -0.35, 0.1), (0.7, 0.35, 0.5)).tolist()
+        pose = top_down(x, y, z, rng.uniform(-math.pi, math.pi))
         start = perf_counter()
         found += inverse_kinematics(pose, START) is not None
         times.append(perf_counter() - start)

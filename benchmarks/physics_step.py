@@ -424,7 +424,7 @@ def draw(moved: dict[str, Array], figures: dict[str, float], folder: Path) -> No
         figures: What :func:`truth` gives.
         folder: Where the plot is written.
     """
-    from matplotlib import pyplot  # type: ignore  # only to make the picture
+    from matplotlib import pyplot  # only to make the picture
 
     figure, panels = pyplot.subplots(1, 2, figsize=(8, 4.2), sharex=True, sharey=True)
     for panel, name in zip(panels, ("plain", "ours"), strict=True):

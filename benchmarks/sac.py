@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 from statistics import median
 from time import process_time
-from typing import Any
+from typing import Any, TypeVar
 
 import gymnasium as gym
 import numpy as np
@@ -27,6 +27,8 @@ from slap_ros.acquisition.sac_update import LeanSac
 
 ACTIONS = 5  # x, y, z, yaw, gripper
 ROUNDS = 8
+
+Learner = TypeVar("Learner", bound=SAC)
 
 
 class Noise(gym.Env[Any, Any]):
@@ -52,7 +54,7 @@ class Noise(gym.Env[Any, Any]):
         return self._rng.uniform(-1.0, 1.0, SIZE).astype(np.float32)
 
 
-def make(kind: type[SAC], **settings: Any) -> SAC:
+def make(kind: type[Learner], **settings: Any) -> Learner:
     """A learner with a full buffer."""
     learner = kind(
         "MlpPolicy", Noise(), learning_starts=600, buffer_size=600, seed=0, device="cpu", **settings
@@ -73,14 +75,14 @@ def main() -> None:
         "batch_size": SMALL.batch_size,
         "policy_kwargs": {"net_arch": list(SMALL.hidden), "optimizer_kwargs": {"fused": True}},
     }
-    learners = {
+    as_skills_learn = make(LeanSac, **fused)
+    as_skills_learn.normalise_critics()
+    learners: dict[str, SAC] = {
         "stable-baselines3, its defaults ([256, 256], batch 256)": make(SAC),
         "stable-baselines3, our sizes ([64, 64], batch 128)": make(SAC, **same),
         "ours ([64, 64], batch 128)": make(LeanSac, **fused),
-        "ours, layers of the critics normalised, as skills learn": make(LeanSac, **fused),
+        "ours, layers of the critics normalised, as skills learn": as_skills_learn,
     }
-    *_, as_skills_learn = learners.values()
-    as_skills_learn.normalise_critics()
     times: dict[str, list[float]] = {name: [] for name in learners}
     for _ in range(ROUNDS):
         for name, learner in learners.items():

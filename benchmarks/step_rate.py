@@ -131,8 +131,8 @@ def with_atoms(domain: Domain, initial: State | None = None) -> float:
     initial = initial or get_domain(domain.name, "paper").task(0).initial_state
     space, world = domain.atom_space(initial), domain.make_world(initial)
     rng = np.random.default_rng(0)
-    actions = domain.learned_actions
-    high = actions.join(actions.split(np.array(actions.high))[0], 0.0)  # the gripper rests
+    learned = domain.learned_actions
+    high = learned.join(learned.split(np.array(learned.high))[0], 0.0)  # the gripper rests
     seconds = 0.0
     for _ in range(SINGLE_STEPS // EPISODE):
         world.reset(initial)

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,7 +32,7 @@ from slap_ros.contact.scene import (
 from slap_ros.contact.world import MAX_SHIFT, MAX_TURN, ContactWorld
 from slap_ros.geometry.pose import Pose, Vector, from_rotation_vector
 from slap_ros.physics.features import BODY_FEATURES, body_features
-from slap_ros.relational import State, Type
+from slap_ros.relational import Object, State, Type
 
 THING = Type("thing", BODY_FEATURES)
 DRAWER = Type("drawer", DRAWER_FEATURES)
@@ -125,13 +125,13 @@ AS_USUAL = Setting()
 
 def start(setting: Setting = AS_USUAL, scene: ContactScene = BENCH) -> State:
     """A state of a scene with cube, rod and, if it has them, drawers and lid."""
-    features: dict = {ROBOT("robot"): robot_features(setting.hand)}
+    features: dict[Object, Mapping[str, float]] = {ROBOT("robot"): robot_features(setting.hand)}
     poses = {"cube": setting.cube, "rod": setting.rod}
     for body in scene.free:
         features[THING(body.name)] = body_features(*poses[body.name])
-    for body, opening in zip(scene.jointed, setting.openings, strict=False):
-        kind = DRAWER if body.joint.kind is JointKind.SLIDE else LID
-        features[kind(body.name)] = opening_features(opening)
+    for jointed, opening in zip(scene.jointed, setting.openings, strict=False):
+        kind = DRAWER if jointed.joint.kind is JointKind.SLIDE else LID
+        features[kind(jointed.name)] = opening_features(opening)
     return State.build(features)
 
 
