@@ -31,12 +31,7 @@ MOST_OF_THE_TIME: Mapping[str, str] = {
     "ablation": "learning",
     "planning_ablation": "attempts",
 }
-# Why a figure has fewer tasks than others; TASKS are wanted for each condition.
-TASKS = 20
 PLANS = 25  # of a language model
-CUT: Mapping[str, str] = {
-    "perception_obstacle_tower": "fewer than 20 to save time",
-}
 
 
 @dataclass(frozen=True)
@@ -267,8 +262,7 @@ class PublishedFigure:
         if data["study"] == "replanning":
             return f"{counted}, {data['others']} × {data['tasks']} of other libraries"
         libraries = len(data.get("libraries", ())) or _libraries_of_skills(data)
-        cut = f": {CUT[self.name]}" if self.name in CUT else ""
-        return f"{counted} × {libraries} trained" if libraries else f"{counted}{cut}"
+        return f"{counted} × {libraries} trained" if libraries else counted
 
     @property
     def core_seconds(self) -> tuple[float | None, str]:

@@ -18,13 +18,12 @@ from slap_ros.learning.shipped_models import shipped_with_siblings
 from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.shipped import shipped_libraries, shipped_library
 from slap_ros.studies.readme import PLACE, with_tables
-from slap_ros.studies.reproducing import CUT, TASKS
 
 ROOT = Path(__file__).parent.parent.parent
 PUBLISHED = ROOT / "docs" / "results"
 PAGES = [ROOT / "README.md", *ROOT.glob("docs/**/*.md")]
 OF_TRAININGS = {"dynamics_obstacle_tower", "pruning_obstacle_tower"}
-LOOKED_AT = {"perception_obstacle_tower"}  # of tasks that were seen in development
+TASKS = 20  # for each condition, at least
 RESULTS = {path.stem: json.loads(path.read_text()) for path in PUBLISHED.glob("*.json")}
 
 
@@ -55,18 +54,15 @@ def test_every_page_on_slap_names_its_libraries():
     assert without == OF_TRAININGS
 
 
-def test_pages_have_tasks_enough_or_say_why_not():
+def test_pages_have_tasks_enough():
     per_condition = ("generalisation", "perception", "planning_time", "pruning", "dynamics")
-    few = {
+    assert not {
         name
         for name, data in RESULTS.items()
         if data.get("study") in per_condition
         and "library" in data
         and data["tasks"] * data["seeds"] < TASKS
     }
-    assert few == set(CUT)
-    page = (ROOT / "docs" / "reproducing.md").read_text(encoding="utf-8")
-    assert all(reason in page for reason in CUT.values())
 
 
 @pytest.mark.parametrize("name", sorted(n for n, data in RESULTS.items() if "libraries" in data))
@@ -77,14 +73,14 @@ def test_the_main_table_is_of_all_shipped_libraries(name):
     assert len(set(shipped)) == len(shipped)
 
 
-def test_all_other_figures_are_of_tasks_that_development_did_not_look_at():
+def test_figures_are_of_tasks_that_development_did_not_look_at():
     asked = {"planning_ablation"}  # a language model, in the one task of its own seed
     first = {
         name: data.get("first_seed", data.get("seed", FRESH_SEED))
         for name, data in RESULTS.items()
         if data.get("study") not in asked
     }
-    assert {name for name, seed in first.items() if seed < FRESH_SEED} == LOOKED_AT
+    assert not {name for name, seed in first.items() if seed < FRESH_SEED}
 
 
 @pytest.mark.parametrize("name", sorted(n for n in RESULTS if n.startswith("acquisition_")))
