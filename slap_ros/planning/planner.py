@@ -34,7 +34,16 @@ from slap_ros.planning.search import (
     search_exhaustively,
     search_lazily,
 )
-from slap_ros.relational import AtomSpace, GroundOperator, State, ground_operators, list_atoms
+from slap_ros.relational import (
+    AtomSpace,
+    GroundOperator,
+    State,
+    Target,
+    ground_operators,
+    list_atoms,
+)
+
+SIDE_EFFECTS = 3  # from which is searched on: each search may take as long as the first
 
 Search = Callable[[AbstractGraph, State, Model], Plan]
 
@@ -171,6 +180,9 @@ class GraphPlanner:
     :mod:`slap_ros.planning.search`. A plan that shortcuts make possible in a shallower graph is
     taken, though a deeper one might have a shorter plan.
 
+    Where given skills fail on every path, one of them may end in another abstract state than its
+    operator says, if the model has it reach the goal from there.
+
     Where acquired skills fail on every path, the plan may take a detour, back to an abstract state
     in which it was before: a skill that fails from one low-level state of it may well succeed from
     another. Where every detour fails too, the plan is the one that leaves the goal nearest where it
@@ -190,43 +202,101 @@ class GraphPlanner:
     max_extra_depth: int = 2
     shortcuts: ShortcutSource | None = None
 
+    def __post_init__(self) -> None:
+        if self.max_extra_depth < 0:
+            raise InvalidParameterError(f"max_extra_depth must not be negative: {self}")
+
     def plan(self, state: State, goal: int) -> PlanningResult:
         """See :class:`Planner`."""
         model = self.problem.model
-        before, start = model.executed, model.space.abstract(state)
-        for extra_depth in range(self.max_extra_depth + 1):
-            graph = self._graph(start, goal, extra_depth)
-            if self.shortcuts is not None:
-                graph.edges.extend(self.shortcuts.edges(graph))
-            try:
-                plan = self.search(graph, state, model)
-            except UnsolvableError as error:
-                if extra_depth < self.max_extra_depth:
-                    continue
-                if self.problem.exact:
-                    raise
-                detour = self._detour(state, graph)
-                rolled_out = model.executed - before
-                if detour is None:
-                    return self._despite_failures(state, goal, graph, rolled_out, error)
-                return PlanningResult(detour, len(graph.nodes), len(graph.edges), rolled_out)
-            return PlanningResult(plan, len(graph.nodes), len(graph.edges), model.executed - before)
-        raise InvalidParameterError(f"max_extra_depth must not be negative: {self}")
+        before, remark = model.executed, ""
+        try:
+            plan, graph = self._shortest(state, goal)
+        except UnsolvableError as error:
+            graph = self._graph(model.space.abstract(state), goal, self.max_extra_depth)
+            if self.problem.exact:
+                found = self._past_side_effect(state, goal, graph)
+            elif (found := self._detour(state, graph)) is None:
+                found, remark = self._despite_failures(state, goal, graph), str(error)
+            if found is None:
+                raise
+            plan = found
+        rolled_out = model.executed - before
+        return PlanningResult(plan, len(graph.nodes), len(graph.edges), rolled_out, remark)
 
-    def _despite_failures(
-        self, state: State, goal: int, graph: AbstractGraph, rolled_out: int, why: UnsolvableError
-    ) -> PlanningResult:
-        """The plan that leaves the goal nearest where it fails, counted in operators.
+    def _shortest(self, state: State, goal: int) -> tuple[Plan, AbstractGraph]:
+        """The plan that the search finds, and the shallowest graph in which there is one.
+
+        Args:
+            state: Where to start.
+            goal: Mask of atoms that must hold.
+
+        Raises:
+            UnsolvableError: No path through the deepest graph can be executed.
+        """
+        model = self.problem.model
+        start = model.space.abstract(state)
+        for extra_depth in range(self.max_extra_depth):
+            graph = self._graph(start, goal, extra_depth)
+            with suppress(UnsolvableError):
+                return self.search(graph, state, model), graph
+        graph = self._graph(start, goal, self.max_extra_depth)
+        return self.search(graph, state, model), graph
+
+    def _past_side_effect(self, state: State, goal: int, graph: AbstractGraph) -> Plan | None:
+        """A plan in which a skill ends in another abstract state than its operator says.
+
+        A block that leans after a slap may slide off when the next one is put down: no operator
+        says so, but the model does, and from there the goal may be near, or hold.
 
         Args:
             state: Where to start.
             goal: Mask of atoms that must hold.
             graph: In which no path can be executed.
-            rolled_out: Options simulated to find that out.
-            why: What the search said.
 
-        Raises:
-            UnsolvableError: From wherever a path fails, no operators lead to the goal any more.
+        Returns:
+            The plan, exact in all its edges; None if there is none.
+        """
+        model = self.problem.model
+        for path in self._failed_paths(state, goal, graph)[:SIDE_EFFECTS]:
+            *before, last = path.plan.edges
+            there = state
+            for edge in before:
+                there = model.roll_out(edge.option, there, edge.target).final
+            target = Target.exactly(path.abstract)
+            rollout = model.roll_out(last.option, there, target)
+            if rollout.steps == 0 or not rollout.reached:
+                continue  # it does nothing, or something else by the time it gets there
+            with suppress(UnsolvableError):
+                rest, _ = self._shortest(rollout.final, goal)
+                aside = PlanEdge(last.option, target, rollout.steps)
+                return Plan((*before, aside, *rest.edges))
+        return None
+
+    def _despite_failures(self, state: State, goal: int, graph: AbstractGraph) -> Plan | None:
+        """The plan that leaves the goal nearest where it fails.
+
+        Args:
+            state: Where to start.
+            goal: Mask of atoms that must hold.
+            graph: In which no path can be executed.
+
+        Returns:
+            The plan; None if no operators lead to the goal from wherever a path fails.
+        """
+        for path in self._failed_paths(state, goal, graph):
+            symbolic = SymbolicPlanner(self.problem.model.space, self.problem.operators)
+            rest = symbolic.edges(graph.nodes[path.node], goal)
+            return Plan((*path.plan.edges, *rest))
+        return None
+
+    def _failed_paths(self, state: State, goal: int, graph: AbstractGraph) -> list[FailedPath]:
+        """The paths that fail where operators still lead to the goal, those with fewest first.
+
+        Args:
+            state: Where to start.
+            goal: Mask of atoms that must hold.
+            graph: In which no path can be executed.
         """
         symbolic = SymbolicPlanner(self.problem.model.space, self.problem.operators)
         to_go: dict[int, int] = {}
@@ -237,12 +307,7 @@ class GraphPlanner:
                     to_go[path.abstract] = len(symbolic.edges(path.abstract, goal))
                 key = to_go[path.abstract], path.plan.predicted_steps, number
                 nearest.append((*key, path))
-        if not nearest:
-            raise why
-        *_, best = min(nearest)
-        rest = symbolic.edges(graph.nodes[best.node], goal)
-        plan = Plan((*best.plan.edges, *rest))
-        return PlanningResult(plan, len(graph.nodes), len(graph.edges), rolled_out, str(why))
+        return [path for *_, path in sorted(nearest)]
 
     def _detour(self, state: State, graph: AbstractGraph) -> Plan | None:
         """A plan that comes back to an abstract state, without shortcuts; None if there is none.
@@ -264,11 +329,14 @@ class GraphPlanner:
         return None
 
     def _graph(self, start: int, goal: int, extra_depth: int) -> AbstractGraph:
-        """The top level; an error says which atoms of the goal cannot be had."""
+        """The top level with shortcuts; an error says which atoms of the goal cannot be had."""
         try:
-            return build_abstract_graph(start, goal, self.problem.operators, extra_depth)
+            graph = build_abstract_graph(start, goal, self.problem.operators, extra_depth)
         except UnsolvableError as error:
             raise UnsolvableError(f"{error}: {self.problem.why_not(start, goal)}") from error
+        if self.shortcuts is not None:
+            graph.edges.extend(self.shortcuts.edges(graph))
+        return graph
 
 
 @dataclass(frozen=True)

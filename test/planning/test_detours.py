@@ -3,7 +3,8 @@
 """Where a skill fails from every way to it, the plan may come back to where it was.
 
 There is a ball in a drawer. Each time the drawer is opened, the ball rolls on towards the front. It
-is taken there; further behind, the hand knocks it out of the drawer.
+is taken there; further behind, the hand knocks it out of the drawer. A vase on the drawer may fall
+when it is opened, which no operator says; who has the ball can raise it.
 """
 
 from dataclasses import dataclass, replace
@@ -29,7 +30,7 @@ from slap_ros.relational import (
     Variable,
 )
 
-FEATURES = ("open", "inside", "held", "opened", "front")
+FEATURES = ("open", "inside", "held", "opened", "front", "vase", "shaky")
 DRAWER = Type("drawer", tuple(Feature(name, "1") for name in FEATURES))
 D = Variable("?drawer", DRAWER)
 THE_DRAWER = DRAWER("drawer")
@@ -46,6 +47,7 @@ def predicate(name, feature, value=1.0):
 
 OPEN, CLOSED = predicate("Open", "open"), predicate("Closed", "open", 0.0)
 INSIDE, HELD = predicate("Inside", "inside"), predicate("Held", "held")
+STANDING = predicate("Standing", "vase")
 
 
 def operator(name, needs, adds, deletes):
@@ -57,6 +59,7 @@ OPERATORS = (
     operator("Pull", (CLOSED, INSIDE), (OPEN,), (CLOSED,)),
     operator("Push", (OPEN, INSIDE), (CLOSED,), (OPEN,)),
     operator("Take", (OPEN, INSIDE), (HELD,), (INSIDE,)),
+    operator("Raise", (HELD,), (STANDING,), ()),
 )
 
 
@@ -74,11 +77,14 @@ class DrawerWorld:
         pull, take = action
         if pull > 0.0:
             now["open"], now["opened"] = 1.0, now["opened"] + 1.0
+            now["vase"] *= 1.0 - now["shaky"]
         elif pull < 0.0:
             now["open"] = 0.0
         if take > 0.0:
             now["held"] = float(now["opened"] >= now["front"])
             now["inside"] = 0.0
+        elif take < 0.0:
+            now["vase"] = 1.0
         self.state = State(LAYOUT, [now[name] for name in FEATURES])
         return self.state
 
@@ -99,18 +105,23 @@ class OneAction:
         return lambda _: np.array(self.action)
 
 
-SKILLS = (OneAction("Pull", (1, 0)), OneAction("Push", (-1, 0)), OneAction("Take", (0, 1)))
+SKILLS = (
+    OneAction("Pull", (1, 0)),
+    OneAction("Push", (-1, 0)),
+    OneAction("Take", (0, 1)),
+    OneAction("Raise", (0, -1)),
+)
 
 
-def drawer(front):
+def drawer(front, shaky=False):
     """The domain, and a task whose ball comes to the front when the drawer is opened so often."""
-    state = State(LAYOUT, [0.0, 1.0, 0.0, 0.0, float(front)])
+    state = State(LAYOUT, [0.0, 1.0, 0.0, 0.0, float(front), 1.0, float(shaky)])
     task = Task(state, frozenset({HELD(THE_DRAWER)}), 20)
     domain = Domain(
         name="drawer",
         preset="default",
         types=(DRAWER,),
-        predicates=(OPEN, CLOSED, INSIDE, HELD),
+        predicates=(OPEN, CLOSED, INSIDE, HELD, STANDING),
         action_space=ACTIONS,
         sample_task=lambda rng: task,
         make_world=DrawerWorld,
@@ -173,3 +184,32 @@ def test_an_unrolled_graph_has_every_sequence_up_to_a_length():
         assert sum(ways[node] for node in graph.goal_nodes) == sequences
     with pytest.raises(UnsolvableError, match="the goal holds in none"):
         build_unrolled_graph(start, goal, operators, 1)
+
+
+@pytest.mark.parametrize("planner", ["lazy", "exhaustive"])
+@pytest.mark.parametrize(
+    ("goal", "expected"),
+    [((HELD,), ["Pull", "Take"]), ((HELD, STANDING), ["Pull", "Take", "Raise"])],
+)
+def test_a_side_effect_that_does_not_prevent_the_goal_is_planned_for(planner, goal, expected):
+    domain, task = drawer(1, shaky=True)
+    domain = replace(domain, exact=True)
+    task = replace(task, goal=frozenset(atom(THE_DRAWER) for atom in goal))
+    episode = solve(domain, task, PURE_PLANNING, planner)
+    assert episode.success and episode.replans == 0
+    assert [edge.option for edge in episode.edges] == expected
+    space = domain.atom_space(task.initial_state)
+    result = make_planner(planner, domain, task.initial_state).plan(
+        task.initial_state, space.mask(task.goal)
+    )
+    pull = result.plan.edges[0]
+    assert not result.fails and pull.target.exact
+    assert set(space.decode(pull.target.required)) == {OPEN(THE_DRAWER), INSIDE(THE_DRAWER)}
+
+
+def test_a_side_effect_that_prevents_the_goal_leaves_no_plan():
+    domain, task = drawer(1, shaky=True)
+    task = replace(task, goal=frozenset(atom(THE_DRAWER) for atom in (OPEN, INSIDE, STANDING)))
+    episode = solve(replace(domain, exact=True), task, PURE_PLANNING)
+    assert episode.error.code is ErrorCode.UNSOLVABLE
+    assert "Pull(drawer) ended after 1 steps with Standing(drawer) missing" in episode.error.reason
