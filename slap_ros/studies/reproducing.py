@@ -21,7 +21,6 @@ NOT_RUN, NOT_MEASURED = "not run", "not measured"
 # Minutes of one core, as measured on the machine that made the published figures.
 MINUTES: Mapping[str, int] = {
     "table1_obstacle_tower": 10,
-    "replanning_stack_at_target": 1,
     "replanning_stow_hammer": 6,
     "replanning_peg_in_hole": 3,
 }
