@@ -210,7 +210,8 @@ class Curriculum:
 
     def _learn(self, iteration: int, rounds: Sequence[LearningJob], left: int) -> list[Any]:
         self.callback.on_learning(iteration, [OngoingRound.of(job) for job in rounds], left)
-        return self._run("learning skills", jobs.learn, [(job,) for job in rounds])
+        each = max(1, self.workers.processes // len(rounds))
+        return self._run("learning skills", jobs.learn, [(job, each) for job in rounds])
 
     # -- the result -------------------------------------------------------------------------------
 

@@ -4,14 +4,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from slap_ros.acquisition.initiation_states import InitiationRecord, InitiationStates
+from slap_ros.acquisition.judges import (
+    Judge,
+    JudgeElsewhere,
+    JudgeHere,
+    judge_until_closed,
+)
 from slap_ros.acquisition.reward import SkillReward
 from slap_ros.acquisition.rollouts import roll_out
 from slap_ros.acquisition.settings import AcquisitionSettings
@@ -25,6 +33,7 @@ from slap_ros.acquisition.warm_start import WarmStart
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidStateError
 from slap_ros.learning.learner_interface import learner_interface
+from slap_ros.learning.linked_process import linked_process
 from slap_ros.relational import State
 
 
@@ -82,33 +91,72 @@ def carry_out(source: TaskSource, index: int, skills: Mapping[str, str]) -> dict
     return roll_out(domain, task, index, source.operators(), learned).as_json()
 
 
-def learn(job: LearningJob) -> dict[str, Any]:
+def learn(job: LearningJob, processes: int = 1) -> dict[str, Any]:
     """Learn one skill for one round.
+
+    Args:
+        job: What to learn.
+        processes: How many at most; from two on, another one judges checkpoints. The result does
+            not depend on it.
 
     Returns:
         The :class:`~slap_ros.acquisition.skill_training.Round` as JSON, with the number of start
         states that the world refused, under ``refused``.
 
     Raises:
+        ChildProcessError: The process that judged has ended.
         InvalidParameterError: The folder is damaged.
         InvalidStateError: The world refuses all states.
     """
     source, settings = job.source, job.settings
     domain = source.make_domain()
     reward = _reward(source, job.operator, domain)
-    horizon, seed = horizon_of(domain), source.seed
-    training = SkillTraining(domain, reward, horizon, settings, seed, job.folder, job.attempt)
-    starts = job.initiations.with_rehearsal(settings.rehearsal)
-    accepted, refused = _accepted(source, domain, starts)
-    judged, _ = _accepted(source, domain, job.fresh.all[: settings.judged])
+    training = SkillTraining(
+        domain, reward, horizon_of(domain), settings, source.seed, job.folder, job.attempt
+    )
+    accepted, refused = _starts(job, domain)
+    policy = job.warm_start.policy if job.warm_start is not None else None
+    with _judge(job, processes) as judge:
+        outcome = training.run(job.number, accepted, judge, policy)
+    return {**asdict(outcome), "refused": refused}
+
+
+@contextmanager
+def _judge(job: LearningJob, processes: int) -> Iterator[Judge]:
+    """Who judges the checkpoints of a round."""
+    if processes == 1:
+        yield JudgeHere(_trials(job))
+        return
+    with linked_process(_judge_until_closed, job) as link:
+        yield JudgeElsewhere(link)
+
+
+def _judge_until_closed(link: Connection, job: LearningJob) -> None:
+    judge_until_closed(link, _trials(job))
+
+
+def _trials(job: LearningJob) -> SkillTrials:
+    """From states of fresh tasks; where there are none, from those that are learned from."""
+    domain = job.source.make_domain()
+    judged, _ = _accepted(job.source, domain, job.fresh.all[: job.settings.judged])
+    reward = _reward(job.source, job.operator, domain)
+    return SkillTrials(domain, reward, judged or _starts(job, domain)[0], horizon_of(domain))
+
+
+def _starts(job: LearningJob, domain: Domain) -> tuple[list[Initiation], int]:
+    """The states to learn from that the world accepts, and how many it refuses.
+
+    Raises:
+        InvalidStateError: It refuses all.
+    """
+    starts = job.initiations.with_rehearsal(job.settings.rehearsal)
+    accepted, refused = _accepted(job.source, domain, starts)
     if not accepted:
         raise InvalidStateError(
             f"{domain.name} refuses all {len(starts)} states in which {job.operator} is to be "
             "learned"
         )
-    policy = job.warm_start.policy if job.warm_start is not None else None
-    outcome = training.run(job.number, accepted, judged or accepted, policy)
-    return {**asdict(outcome), "refused": refused}
+    return accepted, refused
 
 
 def vacuity(

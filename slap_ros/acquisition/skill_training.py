@@ -3,7 +3,8 @@
 """Learning one skill for one round of the curriculum; resumed where it was interrupted.
 
 Segment after segment: whole episodes, a checkpoint, a judgement. The best checkpoint stays, the one
-that the round began with included, since more training can destroy a good policy. A folder has::
+that the round began with included, since more training can destroy a good policy. While one is
+judged, the next segment is learned, unless the round may be over then. A folder has::
 
     episodes/000.safetensors   what happened in each segment
     003.pt, best.pt            checkpoints: after all segments so far, and the best one
@@ -23,11 +24,11 @@ from typing import TYPE_CHECKING, Any
 
 from slap_ros.acquisition.episodes import Episodes, load_episodes, save_episodes
 from slap_ros.acquisition.groundings import Groundings
+from slap_ros.acquisition.judges import Judge
 from slap_ros.acquisition.reward import SkillReward
 from slap_ros.acquisition.settings import AcquisitionSettings
 from slap_ros.acquisition.skill_env import Initiation, SkillMdp, SkillVecEnv
 from slap_ros.acquisition.skill_library import AcquiredSkill, save_skill
-from slap_ros.acquisition.validation import SkillTrials
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, read_text, write_whole
@@ -68,16 +69,21 @@ class Round:
         """The success of the checkpoint that stays."""
         return (self.initial, *self.segments)[self.best]
 
+    @property
+    def newest_is_best(self) -> bool:
+        """Whether the checkpoint that stays is the latest one."""
+        return self.best == len(self.segments)
+
     def with_segment(self, success: float) -> Round:
         """With one more segment; of equally good ones the earlier stays."""
         segments = (*self.segments, success)
         better = success > self.success
         return replace(self, segments=segments, best=len(segments) if better else self.best)
 
-    def good(self, enough: float) -> bool:
-        """Whether the latest judgements are good."""
-        latest = (self.initial, *self.segments)[-IN_A_ROW:]
-        return len(latest) == IN_A_ROW and min(latest) >= enough
+    def good(self, enough: float, judgements: int = IN_A_ROW) -> bool:
+        """Whether so many of the latest judgements are good."""
+        latest = (self.initial, *self.segments)[-judgements:]
+        return len(latest) == judgements and min(latest) >= enough
 
 
 def rounds_in(folder: Path) -> list[Round]:
@@ -127,7 +133,7 @@ class SkillTraining:
         self,
         number: int,
         initiations: Sequence[Initiation],
-        fresh: Sequence[Initiation],
+        judge: Judge,
         beginning: MlpPolicy | None = None,
     ) -> Round:
         """One round; read where it is over, gone on with where it was interrupted.
@@ -135,13 +141,14 @@ class SkillTraining:
         Args:
             number: Of the round, from 0; all before it are over.
             initiations: States that episodes begin in.
-            fresh: States that checkpoints are judged from, of other tasks.
+            judge: Of checkpoints, from states of other tasks.
             beginning: The policy of another skill that the first round begins with.
 
         Returns:
             How it went; the folder has the best policy.
 
         Raises:
+            ChildProcessError: The process that judged has ended.
             InvalidParameterError: The folder is damaged.
         """
         if not (self.folder / ROUNDS).exists():
@@ -152,15 +159,16 @@ class SkillTraining:
         done = sum(len(earlier.segments) for earlier in self._rounds[: number + 1])
         groundings = Groundings(list(dict.fromkeys(one.grounding for one in initiations)))
         mdp = SkillMdp(self.domain, self.reward, groundings, self.settings.dense_share)
-        in_round = 0 if number == len(self._rounds) else len(self._rounds[number].segments)
+        begins = number == len(self._rounds)
+        in_round = 0 if begins else len(self._rounds[number].segments)
         learner = self._learner(mdp, initiations, number, in_round)
-        trials = SkillTrials(self.domain, self.reward, fresh, self.horizon)
         self._resume(learner, number, done, beginning)
-        if number == len(self._rounds):
-            self._begin_round(learner, trials, done)
+        ahead = self._judge(learner, judge, done, None) if begins else None
         while not self._rounds[-1].over:
-            self._segment(learner, trials, done)
+            episodes = learner.learn(self.settings.segment_episodes) if ahead is None else ahead
+            save_episodes(self._episodes(done), episodes)
             done += 1
+            ahead = self._judge(learner, judge, done, self._rounds[-1])
         return self._rounds[-1]
 
     def _learner(
@@ -208,31 +216,53 @@ class SkillTraining:
         elif beginning is not None:
             learner.begin_with(beginning)
 
-    def _begin_round(self, learner: SkillLearner, trials: SkillTrials, done: int) -> None:
-        if done:  # best.pt may be another one before the first segment counts
-            learner.save(self._checkpoint(done))
-        self._rounds.append(Round(trials.success(learner.policy().mean)))
-        self._keep_best(learner)
-        self._write_rounds()
+    def _judge(
+        self, learner: SkillLearner, judge: Judge, done: int, before: Round | None
+    ) -> Episodes | None:
+        """Judge what was learned so far, and learn on meanwhile where that cannot be in vain.
 
-    def _segment(self, learner: SkillLearner, trials: SkillTrials, number: int) -> None:
-        episodes: Episodes = learner.learn(self.settings.segment_episodes)
-        save_episodes(self._episodes(number), episodes)
-        success = trials.success(learner.policy().mean)
-        now = self._rounds[-1].with_segment(success)
+        Args:
+            learner: After its latest segment.
+            judge: Of its policy.
+            done: Segments so far, of all rounds.
+            before: The round without this judgement; None where it is the round's first.
+
+        Returns:
+            The next segment's episodes; None where it was not learned yet.
+        """
+        self.folder.mkdir(parents=True, exist_ok=True)
+        learner.save(self._checkpoint(done))
+        policy = learner.policy()
+        judge.begin(policy)
+        last = before is not None and self._may_be_over(before)
+        ahead = None if last else learner.learn(self.settings.segment_episodes)
+        self._take_note(judge.verdict(), before)
+        if self._rounds[-1].newest_is_best:
+            self._keep_best(policy, done)
+        self._write_rounds()  # until here the judgement, and its segment, count for nothing
+        if before is not None:
+            self._checkpoint(done - 1).unlink(missing_ok=True)
+        return ahead
+
+    def _may_be_over(self, before: Round) -> bool:
+        """Whether a round may be over after one more judgement."""
+        last = len(before.segments) + 1 == self.settings.segments(self.horizon)
+        return last or before.good(self.settings.enough, IN_A_ROW - 1)
+
+    def _take_note(self, success: float, before: Round | None) -> None:
+        if before is None:
+            self._rounds.append(Round(success))
+            return
+        now = before.with_segment(success)
         over = len(now.segments) == self.settings.segments(self.horizon)
         self._rounds[-1] = replace(now, over=over or now.good(self.settings.enough))
-        learner.save(self._checkpoint(number + 1))
-        if now.best == len(now.segments):
-            self._keep_best(learner)
-        self._write_rounds()  # until here the segment counts for nothing
-        self._checkpoint(number).unlink(missing_ok=True)
 
-    def _keep_best(self, learner: SkillLearner) -> None:
-        self.folder.mkdir(parents=True, exist_ok=True)
-        learner.save(self.folder / "best.pt")
-        operator, template = self.reward.operator, self.reward.template
-        skill = AcquiredSkill(operator, template, learner.policy(), self.horizon)
+    def _keep_best(self, policy: MlpPolicy, done: int) -> None:
+        """Keep a policy, and the checkpoint that it is of."""
+        draft = self.folder / "best.draft"
+        shutil.copyfile(self._checkpoint(done), draft)
+        draft.rename(self.folder / "best.pt")
+        skill = AcquiredSkill(self.reward.operator, self.reward.template, policy, self.horizon)
         save_skill(self.folder / skill.folder_name, skill)
 
     def _checkpoint(self, segments: int) -> Path:

@@ -122,7 +122,7 @@ def exits(command: Callable[P, int | None]) -> Callable[P, None]:
         except BrokenPipeError as error:  # whoever read stdout has seen enough
             _silence_stdout()
             raise typer.Exit(int(ErrorCode.INPUT_OUTPUT)) from error
-        except BrokenProcessPool as error:
+        except (BrokenProcessPool, ChildProcessError) as error:
             advice = "a worker was killed; short of memory? the same command goes on"
             _fail(ErrorCode.OUT_OF_MEMORY, advice, error)
         except MemoryError as error:

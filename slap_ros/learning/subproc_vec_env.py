@@ -8,27 +8,19 @@ processes share the parts: each part draws from a generator of its own.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from dataclasses import fields
-from multiprocessing import get_context
 from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.errors import SlapError
 from slap_ros.learning.action_map import ActionMap
+from slap_ros.learning.linked_process import linked_process, receive, send
 from slap_ros.learning.vec_env import VecEnv, VecEnvStep
-from slap_ros.learning.workers import exit_with_parent
 from slap_ros.relational.state import Array
-from slap_ros.signals import signals_held_back
-
-PATIENCE_S = 5.0  # for a process to end by itself
-CLOSED = (EOFError, ConnectionError)  # raised by a pipe whose other end is closed
 
 
 class VecEnvSpec(Protocol):
@@ -82,14 +74,13 @@ class SubprocVecEnv:
             ChildProcessError: One of the processes has ended.
         """
         for link, share in zip(self._links, np.split(actions, self._bounds), strict=True):
-            with suppress(ConnectionError):  # reported when its answer is missing
-                link.send(share)
+            send(link, share)
         step = _concatenated(self._receive_all())
         self.observations = step.observations
         return step
 
     def _receive_all(self) -> list[Any]:
-        return [_receive(link) for link in self._links]
+        return [receive(link) for link in self._links]
 
 
 @contextmanager
@@ -106,55 +97,21 @@ def make_vec_env(specs: Sequence[VecEnvSpec], processes: int) -> Iterator[VecEnv
     if len(specs) == 1:
         yield specs[0].make()
         return
-    context = get_context("spawn")  # physics clients do not survive a fork
     numbers = np.array_split(np.arange(len(specs)), min(processes, len(specs)))
     shares = [[specs[i] for i in share] for share in numbers]
     with ExitStack() as stack:
-        links = []
-        for share in shares:
-            mine, theirs = context.Pipe()
-            process = context.Process(target=_step_until_closed, args=(theirs, share, os.getpid()))
-            with signals_held_back():
-                process.start()
-                stack.callback(_end, process, mine)
-            theirs.close()  # or nobody would notice its end
-            links.append(mine)
+        links = [stack.enter_context(linked_process(_step_until_closed, share)) for share in shares]
         yield SubprocVecEnv(links, shares)
 
 
-def _end(process: BaseProcess, link: Connection) -> None:
-    link.close()
-    process.join(PATIENCE_S)
-    process.kill()
-    process.join()
-
-
-def _step_until_closed(link: Connection, specs: Sequence[VecEnvSpec], parent: int) -> None:
+def _step_until_closed(link: Connection, specs: Sequence[VecEnvSpec]) -> None:
     """What such a process does, until the other end of its link is closed."""
-    exit_with_parent(parent)
-    try:
-        envs = [spec.make() for spec in specs]
-        bounds = np.cumsum([env.num_envs for env in envs])[:-1]
-        link.send(np.concatenate([env.observations for env in envs]))
-        while True:
-            parts = zip(envs, np.split(link.recv(), bounds), strict=True)
-            link.send(_concatenated([env.step(actions) for env, actions in parts]))
-    except CLOSED:
-        return
-    except SlapError as error:
-        link.send(error)
-
-
-def _receive(link: Connection) -> Any:
-    try:
-        answer = link.recv()
-    except CLOSED as error:
-        raise ChildProcessError(
-            "a process that stepped worlds ended; if it was killed for memory, use fewer --jobs"
-        ) from error
-    if isinstance(answer, SlapError):
-        raise answer
-    return answer
+    envs = [spec.make() for spec in specs]
+    bounds = np.cumsum([env.num_envs for env in envs])[:-1]
+    link.send(np.concatenate([env.observations for env in envs]))
+    while True:
+        parts = zip(envs, np.split(link.recv(), bounds), strict=True)
+        link.send(_concatenated([env.step(actions) for env, actions in parts]))
 
 
 def _concatenated(steps: Sequence[VecEnvStep]) -> VecEnvStep:

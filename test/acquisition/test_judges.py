@@ -1,0 +1,87 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Checkpoints judged in another process, while the next segment is learned."""
+
+from dataclasses import replace
+from multiprocessing import active_children
+
+import pytest
+from points import POINTS, REWARDS
+
+from slap_ros.acquisition import jobs
+from slap_ros.acquisition.initiation_states import InitiationStates
+from slap_ros.acquisition.judges import JudgeElsewhere
+from slap_ros.acquisition.rollouts import PlanRollout
+from slap_ros.acquisition.sac import SkillLearner
+from slap_ros.acquisition.sac_settings import SacSettings
+from slap_ros.acquisition.settings import AcquisitionSettings
+from slap_ros.acquisition.task_source import VALIDATION, TaskSource
+
+pytestmark = pytest.mark.usefixtures("points_installed")
+
+SOURCE = TaskSource.of(POINTS, "train", 1, POINTS.acquisition.operators, REWARDS)
+SAC = SacSettings(hidden=(16, 16), batch_size=32, random_steps=96)
+SEGMENTS = 4
+SETTINGS = AcquisitionSettings(SAC, segment_episodes=2, skill_steps=SEGMENTS * 192)
+
+
+def starts(first):
+    rollouts = [PlanRollout.from_json(jobs.carry_out(SOURCE, first + i, {})) for i in range(8)]
+    return InitiationStates.of("Pick", rollouts)
+
+
+def job(folder, settings=SETTINGS):
+    return jobs.LearningJob(SOURCE, "Pick", 0, starts(0), starts(VALIDATION), settings, folder)
+
+
+def files(folder):
+    return {p.relative_to(folder): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+@pytest.mark.parametrize(("enough", "segments"), [(0.0, 1), (2.0, SEGMENTS)])
+def test_a_round_is_the_same_whoever_judges_it(tmp_path, enough, segments):
+    """Also where two good judgements in a row end it."""
+    settings = replace(SETTINGS, enough=enough)
+    here = jobs.learn(job(tmp_path / "here", settings))
+    elsewhere = jobs.learn(job(tmp_path / "elsewhere", settings), processes=2)
+    assert len(here["segments"]) == segments
+    assert here == elsewhere
+    assert files(tmp_path / "here") == files(tmp_path / "elsewhere")
+    assert not active_children()
+
+
+def test_the_next_segment_is_learned_before_the_verdict(tmp_path, monkeypatch):
+    """But for the last one, whose verdict ends the round."""
+    order = []
+
+    def noted(kind, name):
+        original = getattr(kind, name)
+
+        def method(self, *arguments):
+            order.append(name)
+            return original(self, *arguments)
+
+        monkeypatch.setattr(kind, name, method)
+
+    noted(SkillLearner, "learn")
+    noted(JudgeElsewhere, "begin")
+    noted(JudgeElsewhere, "verdict")
+    jobs.learn(job(tmp_path, SETTINGS), processes=2)
+    assert order == [*["begin", "learn", "verdict"] * SEGMENTS, "begin", "verdict"]
+
+
+def test_a_judge_that_is_killed_is_noticed_and_the_same_job_goes_on(tmp_path, monkeypatch):
+    undisturbed = jobs.learn(job(tmp_path / "undisturbed"))
+    begin, left = JudgeElsewhere.begin, [2]
+
+    def killed(self, policy):
+        left[0] -= 1
+        if left[0] == 0:
+            active_children()[-1].kill()
+        begin(self, policy)
+
+    monkeypatch.setattr(JudgeElsewhere, "begin", killed)
+    with pytest.raises(ChildProcessError, match="a process that stepped worlds ended"):
+        jobs.learn(job(tmp_path / "disturbed"), processes=2)
+    assert jobs.learn(job(tmp_path / "disturbed"), processes=2) == undisturbed
+    assert files(tmp_path / "disturbed") == files(tmp_path / "undisturbed")
