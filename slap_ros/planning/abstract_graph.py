@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.planning.hmax import HMaxHeuristic
@@ -56,6 +57,21 @@ class AbstractGraph:
         joined = {(edge.source, edge.target) for edge in self.edges}
         count = len(self.nodes)
         return [(i, j) for i in range(count) for j in range(i + 1, count) if (i, j) not in joined]
+
+
+@dataclass(frozen=True)
+class EdgeBeyond:
+    """An edge to an abstract state that the graph may not have.
+
+    Args:
+        source: Index of a node of the graph.
+        abstract: The abstract state that it leads to.
+        make_option: Makes the option that leads there, once it is needed.
+    """
+
+    source: int
+    abstract: int
+    make_option: Callable[[], Option]
 
 
 def build_abstract_graph(
@@ -142,6 +158,28 @@ def build_unrolled_graph(
             )
         layer = following
     return _require_goal(graph)
+
+
+def add_beyond(
+    graph: AbstractGraph,
+    beyond: Sequence[EdgeBeyond],
+    operators: Sequence[tuple[GroundOperator, Option]],
+    max_nodes: int = MANY_NODES,
+) -> None:
+    """Add what lies beyond a graph and is on a way to the goal, with no more edges than it is deep.
+
+    A graph ends where operators first reach the goal. One shortcut changes as much as many
+    operators, and so leads to abstract states that are deeper than that: to a goal by a shorter
+    way, as where one slap clears a target from which a block was to be taken. Nothing of the graph
+    changes, and all that is added comes after it.
+
+    Args:
+        graph: To be added to.
+        beyond: Edges that may leave it.
+        operators: That lead on from there.
+        max_nodes: Abstract states, those of the graph included, after which no more are added.
+    """
+    _Beyond(graph, operators, max_nodes).add(beyond)
 
 
 def _build_pruned(
@@ -252,3 +290,87 @@ class _BreadthFirstSearch:
         near = to_go is not None and depth + to_go <= self._length
         self.pruned |= not near and to_go is not None
         return near
+
+
+@dataclass(frozen=True)
+class _Step:
+    """An edge that was found beyond a graph, whose option is not made yet."""
+
+    source: int
+    target: int
+    make_option: Callable[[], Option]
+
+
+class _Beyond:
+    """One run of :func:`add_beyond`. New nodes have numbers after those of the graph."""
+
+    def __init__(
+        self,
+        graph: AbstractGraph,
+        operators: Sequence[tuple[GroundOperator, Option]],
+        max_nodes: int,
+    ) -> None:
+        self._graph, self._operators, self._max_nodes = graph, operators, max_nodes
+        self._old = len(graph.nodes)
+        self._nodes, self._depth = list(graph.nodes), list(graph.depth)
+        self._index = {abstract: i for i, abstract in enumerate(graph.nodes)}
+        self._steps: list[_Step] = []
+
+    def add(self, beyond: Sequence[EdgeBeyond]) -> None:
+        """Layer by layer, as the graph was built; then what leads to no goal is dropped."""
+        deepest = self._graph.depth[-1]
+        leaving: list[list[EdgeBeyond]] = [[] for _ in range(deepest + 1)]
+        for edge in beyond:
+            leaving[self._depth[edge.source]].append(edge)
+        layer: list[int] = []
+        for depth in range(deepest):
+            found = [*self._successors(layer), *leaving[depth]]
+            reached = [self._follow(edge, depth + 1) for edge in found]
+            layer = [node for node in reached if node is not None]
+        self._add_useful()
+
+    def _successors(self, layer: Sequence[int]) -> Iterator[EdgeBeyond]:
+        for source in layer:
+            for operator, option in self._operators:
+                if operator.applicable(self._nodes[source]):
+                    successor = operator.apply(self._nodes[source])
+                    yield EdgeBeyond(source, successor, partial(_made, option))
+
+    def _follow(self, edge: EdgeBeyond, depth: int) -> int | None:
+        """Note an edge that leads to a later node; the number of that node if it is new."""
+        if self._is_goal(edge.source):
+            return None
+        target = self._index.get(edge.abstract)
+        new = target is None
+        if target is None:
+            if len(self._nodes) >= self._max_nodes:
+                return None
+            target = self._index[edge.abstract] = len(self._nodes)
+            self._nodes.append(edge.abstract)
+            self._depth.append(depth)
+        if target >= self._old and target > edge.source:
+            self._steps.append(_Step(edge.source, target, edge.make_option))
+        return target if new else None
+
+    def _add_useful(self) -> None:
+        """Add the nodes from which a goal can be reached, and the edges to them."""
+        useful = {i for i in range(self._old, len(self._nodes)) if self._is_goal(i)}
+        for step in sorted(self._steps, key=lambda step: step.source, reverse=True):
+            if step.target in useful and step.source >= self._old:
+                useful.add(step.source)
+        kept = sorted(useful)
+        number = {node: i for i, node in enumerate(kept, self._old)}
+        self._graph.nodes += [self._nodes[node] for node in kept]
+        self._graph.depth += [self._depth[node] for node in kept]
+        self._graph.edges += [
+            Edge(number.get(step.source, step.source), number[step.target], step.make_option())
+            for step in self._steps
+            if step.target in useful
+        ]
+
+    def _is_goal(self, node: int) -> bool:
+        return self._nodes[node] & self._graph.goal == self._graph.goal
+
+
+def _made(option: Option) -> Option:
+    return option

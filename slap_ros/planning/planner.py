@@ -19,6 +19,8 @@ from slap_ros.errors import (
 from slap_ros.planning.abstract_graph import (
     AbstractGraph,
     Edge,
+    EdgeBeyond,
+    add_beyond,
     build_abstract_graph,
     build_unrolled_graph,
 )
@@ -167,14 +169,19 @@ class ShortcutSource(Protocol):
         """Edges to be added to a graph."""
         ...
 
+    def beyond(self, graph: AbstractGraph) -> Sequence[EdgeBeyond]:
+        """Edges to abstract states that a graph may not have."""
+        ...
+
 
 @dataclass(frozen=True)
 class GraphPlanner:
     """The abstract planning graph, then a shortest path through it (SLAP §4.1, Alg. 2).
 
     Shortcuts are edges like others: one that fails in the model leads nowhere, and without any
-    this is pure planning. Where no path can be executed, the graph is deepened beyond the paper's:
-    by one layer at a time, up to ``max_extra_depth``.
+    this is pure planning. They may lead out of the graph
+    (:func:`~slap_ros.planning.abstract_graph.add_beyond`). Where no path can be executed, the graph
+    is deepened beyond the paper's: by one layer at a time, up to ``max_extra_depth``.
 
     In the same graph, a plan with shortcuts is never longer in the model than one without; see
     :mod:`slap_ros.planning.search`. A plan that shortcuts make possible in a shallower graph is
@@ -316,7 +323,7 @@ class GraphPlanner:
             state: Where to start.
             graph: In which no path can be executed.
         """
-        shortest = min(graph.depth[node] for node in graph.goal_nodes)
+        shortest = graph.depth[graph.goal_nodes[0]]  # by operators, which come first
         with suppress(UnsolvableError, PlanningLimitError):
             unrolled = build_unrolled_graph(
                 graph.nodes[0],
@@ -335,7 +342,9 @@ class GraphPlanner:
         except UnsolvableError as error:
             raise UnsolvableError(f"{error}: {self.problem.why_not(start, goal)}") from error
         if self.shortcuts is not None:
+            beyond = self.shortcuts.beyond(graph)
             graph.edges.extend(self.shortcuts.edges(graph))
+            add_beyond(graph, beyond, self.problem.operators)
         return graph
 
 

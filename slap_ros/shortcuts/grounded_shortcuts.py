@@ -5,10 +5,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 from slap_ros.core import Domain
 from slap_ros.learning.learner_interface import learner_interface
-from slap_ros.planning.abstract_graph import AbstractGraph, Edge
+from slap_ros.planning.abstract_graph import AbstractGraph, Edge, EdgeBeyond
 from slap_ros.planning.options import Option, OptionKind
 from slap_ros.relational import State, Target
 from slap_ros.shortcuts.ground_shortcut import GroundShortcut
@@ -16,6 +17,7 @@ from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.shortcut import DEFAULT, Sampling, Shortcut
 from slap_ros.shortcuts.shortcut_rollouts import ShortcutRollout, ShortcutRollouts
 from slap_ros.shortcuts.signature import Change, concerned
+from slap_ros.shortcuts.signature_grounder import SignatureGrounder
 from slap_ros.shortcuts.signature_matcher import SignatureMatcher
 
 
@@ -41,10 +43,10 @@ class GroundedShortcuts:
         self._domain = domain
         self._space = domain.atom_space(initial)
         self._rollouts = ShortcutRollouts(domain, initial, sampling)
-        self._matchers = [
-            SignatureMatcher(s.signature, self._space, learner_interface(domain).grasping)
-            for s in self.shortcuts
-        ]
+        grasping = learner_interface(domain).grasping
+        signatures = [shortcut.signature for shortcut in self.shortcuts]
+        self._matchers = [SignatureMatcher(one, self._space, grasping) for one in signatures]
+        self._grounders = [SignatureGrounder(one, self._space, grasping) for one in signatures]
         self._encoders: dict[tuple[str, Change], ObservationEncoder] = {}
 
     def edges(self, graph: AbstractGraph) -> list[Edge]:
@@ -57,6 +59,15 @@ class GroundedShortcuts:
                     change = Change.between(graph.nodes[i], graph.nodes[j])
                     found.append(Edge(i, j, self._option(shortcut, change)))
         return found
+
+    def beyond(self, graph: AbstractGraph) -> list[EdgeBeyond]:
+        """What each shortcut would change in each node, of as many objects as in training."""
+        return [
+            EdgeBeyond(i, change.apply(node), partial(self._option, shortcut, change))
+            for shortcut, grounder in zip(self.shortcuts, self._grounders, strict=True)
+            for i, node in enumerate(graph.nodes)
+            for change in grounder.changes(node)
+        ]
 
     def option(self, name: str, source: int, target: Target, attempt: int = 0) -> Option | None:
         """A shortcut from an abstract state to a target.

@@ -233,36 +233,3 @@ class Signature:
             else:
                 others.update(atom.objects)
         return found == self.patterns and others <= mine
-
-    def substitutions(self, change: Change, space: AtomSpace) -> Iterator[tuple[Object, ...]]:
-        """Objects for the roles such that every lifted atom is in the change (SLAP Alg. 3)."""
-        kind = kinds(space)
-        objects = concerned(change, space)
-        added = {(a.predicate.name, a.objects) for a in space.decode(change.add)}
-        deleted = {(a.predicate.name, a.objects) for a in space.decode(change.delete)}
-
-        def extend(chosen: tuple[Object, ...]) -> Iterator[tuple[Object, ...]]:
-            if len(chosen) == len(self.roles):
-                yield chosen
-                return
-            for obj in objects:
-                if kind[obj] == self.roles[len(chosen)] and obj not in chosen:
-                    longer = (*chosen, obj)
-                    if self._agrees(longer, added, deleted):
-                        yield from extend(longer)
-
-        return extend(())
-
-    def _agrees(
-        self,
-        chosen: Sequence[Object],
-        added: set[tuple[str, tuple[Object, ...]]],
-        deleted: set[tuple[str, tuple[Object, ...]]],
-    ) -> bool:
-        """Whether the atoms all of whose roles are filled are in the change."""
-        return all(
-            (predicate, tuple(chosen[i] for i in roles)) in there
-            for lifted, there in ((self.add, added), (self.delete, deleted))
-            for predicate, roles in lifted
-            if max(roles, default=0) < len(chosen)
-        )

@@ -2,14 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The top level where abstract states are many: fewer of them, and the same ways to the goal."""
 
+from functools import partial
+
 import pytest
 
 from slap_ros.domains import get_domain
 from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.planning import abstract_graph
-from slap_ros.planning.abstract_graph import build_abstract_graph
+from slap_ros.planning.abstract_graph import EdgeBeyond, add_beyond, build_abstract_graph
 from slap_ros.planning.hmax import HMaxHeuristic
 from slap_ros.planning.planner import Problem
+from slap_ros.relational import GroundOperator, LiftedOperator
 
 
 def top_level(blocks, seed=0):
@@ -76,3 +79,66 @@ def test_the_unreachable_stays_unsolvable_and_the_limit_is_kept(monkeypatch):
     picks = [(o, option) for o, option in operators if "Place" not in str(o)]
     with pytest.raises(UnsolvableError, match="none of the"):
         build_abstract_graph(start, goal, picks)
+
+
+# -- beyond the graph ------------------------------------------------------------------------------
+
+
+def bits(*numbers):
+    return sum(1 << i for i in numbers)
+
+
+def operator(name, pre, add, delete):
+    lifted = LiftedOperator(name, (), frozenset(), frozenset(), frozenset())
+    return GroundOperator(lifted, (), bits(*pre), bits(*add), bits(*delete)), name
+
+
+# Counting up: one atom after the other, each deletes the one before. The goal is atom 3.
+COUNTING = [operator(f"to{i + 1}", [i], [i + 1], [i]) for i in range(6)]
+DOWN = operator("from6", [6], [3], [6])
+
+
+def counted(*beyond, operators=(*COUNTING, DOWN), **more):
+    graph = build_abstract_graph(bits(0), bits(3), operators)
+    before = list(graph.nodes), list(graph.depth), list(graph.edges)
+    edges = [EdgeBeyond(source, state, partial(str, name)) for source, state, name in beyond]
+    add_beyond(graph, edges, operators, **more)
+    count = len(before[0])
+    assert (graph.nodes[:count], graph.depth[:count]) == before[:2]  # nothing of it changes
+    assert graph.edges[: len(before[2])] == before[2]
+    added = [(e.source, e.target, e.option) for e in graph.edges[len(before[2]) :]]
+    return graph.nodes[count:], graph.depth[count:], added
+
+
+def test_a_goal_beyond_the_graph_is_added():
+    further = bits(3, 9)
+    assert counted((0, further, "leap")) == ([further], [1], [(0, 4, "leap")])
+
+
+def test_operators_lead_on_from_beyond_the_graph():
+    """To a goal state that is there already: no edge leads back, so that paths are finite."""
+    away = bits(6)
+    assert counted((0, away, "leap")) == ([], [], [])
+    back = [*COUNTING, operator("from6", [6], [3, 9], [6])]
+    nodes, depth, edges = counted((0, away, "leap"), operators=back)
+    assert nodes == [away, bits(3, 9)]
+    assert depth == [1, 2]
+    assert edges == [(0, 4, "leap"), (4, 5, "from6")]
+
+
+def test_no_path_beyond_has_more_edges_than_the_graph_is_deep():
+    back = [*COUNTING, operator("from6", [6], [3, 9], [6])]
+    assert counted((1, bits(6), "leap"), operators=back)[0] == [bits(6), bits(3, 9)]
+    assert counted((2, bits(6), "leap"), operators=back)[0] == []
+    assert counted((2, bits(3, 9), "leap"))[0] == [bits(3, 9)]
+    assert counted((3, bits(3, 9), "leap"))[0] == []  # a goal is the end of a plan
+
+
+def test_what_leads_to_no_goal_is_left_out():
+    assert counted((0, bits(8), "in vain"), (0, bits(3, 9), "leap"))[0] == [bits(3, 9)]
+
+
+def test_no_more_is_added_than_there_may_be():
+    two = (0, bits(3, 8), "one"), (0, bits(3, 9), "other")
+    assert counted(*two, max_nodes=5)[0] == [bits(3, 8)]
+    assert counted(*two, max_nodes=6)[0] == [bits(3, 8), bits(3, 9)]

@@ -6,6 +6,7 @@ import json
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ import slap_ros
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError
 from slap_ros.evaluation.approaches import PURE_PLANNING, approaches
-from slap_ros.evaluation.experiment import Experiment, run_all
+from slap_ros.evaluation.experiment import Experiment, run_all, solve
 from slap_ros.shortcuts import shipped
 from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.shipped import chosen_library, require_usable, shipped_library
@@ -194,6 +195,7 @@ def test_a_checkout_ships_what_is_in_its_models():
 
 ROLL_OUT = """
 import sys
+from dataclasses import replace
 from pathlib import Path
 from hashlib import sha256
 from slap_ros.domains import get_domain
@@ -247,3 +249,17 @@ def test_the_shipped_shortcut_halves_what_the_drawer_takes():
     )
     assert alone.success and together.success
     assert together.plan_length < alone.plan_length / 2
+
+
+def test_a_shortcut_serves_a_goal_that_operators_reach_before_it_would_end():
+    """To clear the target, operators take three blocks off; a slap ends beyond that, and sooner."""
+    tower = get_domain("obstacle_tower")
+    task = tower.task(3)
+    cleared = frozenset({tower.atom_space(task.initial_state).atom("NothingOn", ["target"])})
+    episodes = [
+        solve(tower, replace(task, goal=cleared), approach)
+        for approach in approaches(chosen_library(None, tower), SAMPLING)
+    ]
+    pure, *_, slap = episodes
+    assert pure.success and slap.success
+    assert slap.plan_length < 0.6 * pure.plan_length

@@ -15,6 +15,7 @@ from slap_ros.domains.obstacle_tower.tasks import RandomTowerTasks
 from slap_ros.evaluation.approaches import Approach
 from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.signature import Change, Signature, concerned, context_of
+from slap_ros.shortcuts.signature_grounder import SignatureGrounder
 from slap_ros.shortcuts.signature_matcher import SignatureMatcher
 
 
@@ -127,16 +128,43 @@ def test_all_of_it_or_nothing():
     assert list(SignatureMatcher(learned, space, grasping).pairs(nodes)) == [(0, 2)]
 
 
+def grounded(learned, obstacles, extra=(), distractors=0):
+    """The changes that a signature makes at the start of a tower task, a block in the hand."""
+    space, _ = tower(obstacles, distractors=distractors)
+    domain = make("fair")
+    counts = (obstacles, obstacles), (distractors, distractors)
+    state = RandomTowerTasks(*counts).sample(np.random.default_rng(0)).initial_state
+    start = domain.atom_space(state).abstract(state) | space.mask(extra)
+    return space, list(SignatureGrounder(learned, space, ()).changes(start))
+
+
 def test_algorithm_3_wants_every_atom_of_training():
     learned = Signature.of(*reversed(tower(3)))
-    space, three = tower(3)
-    (only,) = learned.substitutions(three, space)
-    assert [obj.name for obj in only] == [obj.name for obj in concerned(three, space)]
-    assert not list(learned.substitutions(*reversed(tower(2))))
+    space, found = grounded(learned, 3, distractors=2)
+    assert found == [tower(3, distractors=2)[1]]  # of the tower, whatever else there is
+    assert not grounded(learned, 2)[1]
     # Of a higher tower, the lower three fit: they alone stood on the target.
-    space, four = tower(4)
-    found = list(learned.substitutions(four, space))
-    assert [obj.name for obj in found[0]][:3] == ["block2", "block3", "block4"]
+    space, (change,) = grounded(learned, 4)
+    fallen = {str(atom) for atom in space.decode(change.add)} & {
+        f"On(block{i}, table)" for i in "2345"
+    }
+    assert fallen == {"On(block2, table)", "On(block3, table)", "On(block4, table)"}
+
+
+def test_what_holds_already_is_not_added():
+    space, _ = tower(3)
+    there = [space.atom("NothingOn", ["block2"])]
+    assert not grounded(Signature.of(*reversed(tower(3))), 3, there)[1]
+
+
+def test_changes_are_made_only_where_the_same_is_held():
+    space, change = tower(3)
+    learned = Signature.of(change, space, frozenset({"Holding"}))
+    grasping = make("fair").learning.interface.grasping
+    grounder = SignatureGrounder(learned, space, grasping)
+    holding = space.mask([space.atom("Holding", ["robot", "block1"])])
+    assert not list(grounder.changes(change.delete))
+    assert list(grounder.changes(change.delete | holding)) == [change]
 
 
 def test_a_signature_survives_json():
