@@ -50,20 +50,21 @@ def _object_features(state: State, hand: Array, column: Column) -> Array:
 
 
 def _distance(state: State, hand: Array, column: Column) -> Array:
-    """To blocks: to where what the robot acts with would touch them from the side."""
+    """From the gripper to the middle of blocks, m."""
     if not column.objects[0].type.is_a(BLOCK):
         return np.full((*state.data.shape[:-1], len(column.objects)), np.inf)
-    x, low = hand[..., 0, None], hand[..., 2, None]
-    aside = np.abs(state.stack(column, "x") - x) - BLOCK_SIZE
-    above = low - state.stack(column, "y") - BLOCK_SIZE / 2
-    distance: Array = np.hypot(np.maximum(aside, 0.0), np.maximum(above, 0.0))
+    aside = state.stack(column, "x") - hand[..., 0, None]
+    below = state.stack(column, "y") - hand[..., 1, None]
+    distance: Array = np.hypot(aside, below)
     return distance
 
 
 def _separation(state: State, thing: Object, column: Column) -> Array:
-    """Along the table."""
-    apart: Array = np.abs(state.stack(column, "x") - state.stack(Column((thing,)), "x"))
-    return apart
+    """Between middles; fixed places lie on the table, at y = 0."""
+    aside = np.abs(state.stack(column, "x") - state.stack(Column((thing,)), "x"))
+    height = 0.0 if thing.type.is_a(SURFACE) else state.stack(Column((thing,)), "y")
+    separation: Array = np.hypot(aside, state.stack(column, "y") - height)
+    return separation
 
 
 LEARNER_INTERFACE = LearnerInterface(
@@ -87,37 +88,11 @@ def _relative_features(state: State, hand: Array, column: Column) -> Array:
     return _object_features(state, hand, column)[..., 1:]
 
 
-def _distance_to_middle(state: State, hand: Array, column: Column) -> Array:
-    """From the gripper to the middle of blocks, m."""
-    if not column.objects[0].type.is_a(BLOCK):
-        return _distance(state, hand, column)
-    aside = state.stack(column, "x") - hand[..., 0, None]
-    below = state.stack(column, "y") - hand[..., 1, None]
-    distance: Array = np.hypot(aside, below)
-    return distance
-
-
-def _straight_separation(state: State, thing: Object, column: Column) -> Array:
-    """Between middles, along a straight line; fixed places lie on the table, at y = 0."""
-    apart = _separation(state, thing, column)
-    height = 0.0 if thing.type.is_a(SURFACE) else state.stack(Column((thing,)), "y")
-    separation: Array = np.hypot(apart, state.stack(column, "y") - height)
-    return separation
-
-
 # Without one of the terms above; see docs/shortcuts.md#what-is-made-by-hand.
 ABLATIONS: Mapping[str, LearnerInterface] = {
     "reach of what is carried": replace(LEARNER_INTERFACE, hand=_gripper),
     "place on the table": replace(LEARNER_INTERFACE, objects=_relative_features),
-    "touch from the side": replace(LEARNER_INTERFACE, distance=_distance_to_middle),
-    "separation along the table": replace(LEARNER_INTERFACE, separation=_straight_separation),
-    "all of them (plain)": replace(
-        LEARNER_INTERFACE,
-        hand=_gripper,
-        objects=_relative_features,
-        distance=_distance_to_middle,
-        separation=_straight_separation,
-    ),
+    "all of them (plain)": replace(LEARNER_INTERFACE, hand=_gripper, objects=_relative_features),
 }
 # Where a training in this domain differs; see `slap train --settings`.
 _OURS: Mapping[str, SettingValue] = {
