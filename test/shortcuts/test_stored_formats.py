@@ -36,7 +36,7 @@ THEN = replace(  # as the training was started then
 )
 # They change only where a library is trained again.
 SHIPPED = {
-    "obstacle2d": "79a3f37a7569999e",
+    "obstacle2d": "08fbb4398d815697",
     "obstacle_tower": "9d0737ba67ae3d53",
     "cluttered_drawer": "acfa279422f2e792",
     "cleanup_table": "51de94fd3e2bb078",
