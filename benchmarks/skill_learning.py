@@ -4,16 +4,20 @@
 
     python -m benchmarks.skill_learning [--domain stack_at_target] [--steps 4000] [--set NAME=VALUE]
 
-The first skill of a domain's plans, on one thread, with the settings that skills are learned with.
+The first skill of a domain's plans, with the settings that skills are learned with: in one process,
+and then in two, of which one judges while the other learns on.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import process_time
+from time import perf_counter
 
 import torch
 
@@ -48,8 +52,15 @@ def rollouts_from(source: TaskSource, first: int) -> list[PlanRollout]:
     return [PlanRollout.from_json(jobs.carry_out(source, first + i, {})) for i in range(STARTS)]
 
 
+def measured(function: Callable[[], object]) -> tuple[float, float]:
+    """Seconds of the clock, and of the processor, processes that ended included."""
+    began, before = perf_counter(), os.times()[:4]
+    function()
+    return perf_counter() - began, sum(os.times()[:4]) - sum(before)
+
+
 def main() -> None:
-    """Print environment steps, seconds of the processor, and their ratio."""
+    """Print environment steps, seconds, and their ratio."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--domain", default="stack_at_target")
     parser.add_argument("--steps", type=int, default=4_000)
@@ -62,17 +73,17 @@ def main() -> None:
     settings = changed(AcquisitionSettings(), parse_changes(arguments.set, AcquisitionSettings))
     settings = replace(settings, skill_steps=arguments.steps, enough=NEVER)
     states = InitiationStates.of(operator, rollouts), InitiationStates.of(operator, fresh)
-    began = process_time()
-    with TemporaryDirectory() as folder:
-        job = jobs.LearningJob(source, operator, 0, *states, settings, Path(folder) / operator)
-        learned = jobs.learn(job)
-    seconds = process_time() - began
     horizon = jobs.horizon_of(source.make_domain())
-    steps = len(learned["segments"]) * settings.segment_steps(horizon)
-    print(
-        f"{operator} of {arguments.domain}: {steps} environment steps in {seconds:.1f} s of the "
-        f"processor, {steps / seconds:.0f} per second"
-    )
+    steps = settings.segments(horizon) * settings.segment_steps(horizon)
+    print(f"{operator} of {arguments.domain}: {steps} environment steps")
+    for processes in (1, 2):
+        with TemporaryDirectory() as folder:
+            job = jobs.LearningJob(source, operator, 0, *states, settings, Path(folder) / operator)
+            seconds, of_processor = measured(partial(jobs.learn, job, processes))
+        print(
+            f"processes: {processes}; {seconds:.1f} s, {steps / seconds:.0f} steps a second; "
+            f"{of_processor:.1f} s of the processor, {steps / of_processor:.0f} steps a second"
+        )
 
 
 if __name__ == "__main__":
