@@ -22,6 +22,7 @@ LIBRARIES = (
     "stable-baselines3",
     "matplotlib",
 )
+SOURCE = (".", ":(exclude)docs")
 
 
 @lru_cache(maxsize=1)
@@ -39,17 +40,23 @@ def versions() -> dict[str, str]:
 @lru_cache(maxsize=1)
 def revision() -> str:
     """Git revision of the source, ``-dirty`` where changed; unknown for an installed copy."""
-    root = Path(__file__).parent.parent
+    return revision_of(Path(__file__).parent.parent)
+
+
+def revision_of(root: Path) -> str:
+    """The same of a source tree, documentation aside: studies write their results there."""
     if not (root / ".git").exists():
         return "unknown"
     try:
-        described = subprocess.run(
-            ["git", "-C", str(root), "describe", "--always", "--dirty", "--abbrev=12"],
-            capture_output=True,
-            text=True,
-            timeout=5,
-            check=True,
-        )
+        described = _git(root, "describe", "--always", "--abbrev=12")
+        changed = _git(root, "status", "--porcelain", "--untracked-files=no", "--", *SOURCE)
     except (OSError, subprocess.SubprocessError):
         return "unknown"  # no git here, or not its repository
-    return described.stdout.strip()
+    return f"{described}-dirty" if changed else described
+
+
+def _git(root: Path, *arguments: str) -> str:
+    ran = subprocess.run(
+        ["git", "-C", str(root), *arguments], capture_output=True, text=True, timeout=5, check=True
+    )
+    return ran.stdout.strip()
