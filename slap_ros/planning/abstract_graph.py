@@ -52,6 +52,14 @@ class AbstractGraph:
                 outgoing[edge.source].append(edge)
         return outgoing
 
+    def on_way_to_goal(self) -> set[int]:
+        """Indices of the nodes from which forward edges lead to a goal, goals included."""
+        found = set(self.goal_nodes)
+        for edge in sorted(self.edges, key=lambda edge: edge.source, reverse=True):
+            if edge.target > edge.source and edge.target in found:
+                found.add(edge.source)
+        return found
+
     def candidates(self) -> list[tuple[int, int]]:
         """Pairs of nodes, the later one second, that no option joins (SLAP §4.2)."""
         joined = {(edge.source, edge.target) for edge in self.edges}

@@ -179,9 +179,9 @@ class GraphPlanner:
     """The abstract planning graph, then a shortest path through it (SLAP §4.1, Alg. 2).
 
     Shortcuts are edges like others: one that fails in the model leads nowhere, and without any
-    this is pure planning. They may lead out of the graph
-    (:func:`~slap_ros.planning.abstract_graph.add_beyond`). Where no path can be executed, the graph
-    is deepened beyond the paper's: by one layer at a time, up to ``max_extra_depth``.
+    this is pure planning. Where none of them is on a way to the goal, they may lead out of the
+    graph (:func:`~slap_ros.planning.abstract_graph.add_beyond`). Where no path can be executed, the
+    graph is deepened beyond the paper's: by one layer at a time, up to ``max_extra_depth``.
 
     In the same graph, a plan with shortcuts is never longer in the model than one without; see
     :mod:`slap_ros.planning.search`. A plan that shortcuts make possible in a shallower graph is
@@ -342,9 +342,10 @@ class GraphPlanner:
         except UnsolvableError as error:
             raise UnsolvableError(f"{error}: {self.problem.why_not(start, goal)}") from error
         if self.shortcuts is not None:
-            beyond = self.shortcuts.beyond(graph)
-            graph.edges.extend(self.shortcuts.edges(graph))
-            add_beyond(graph, beyond, self.problem.operators)
+            shortcuts, on_way = self.shortcuts.edges(graph), graph.on_way_to_goal()
+            if not any(edge.target in on_way for edge in shortcuts):
+                add_beyond(graph, self.shortcuts.beyond(graph), self.problem.operators)
+            graph.edges.extend(shortcuts)
         return graph
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 
-from slap_ros.relational import AtomSpace, Object, Predicate
+from slap_ros.relational import AtomSpace, GroundAtom, Object, Predicate
 from slap_ros.shortcuts.signature import Change, Kind, Signature, context_of, kinds
 
 Chosen = dict[int, Object]  # by role
@@ -31,7 +31,8 @@ class _RoleAtom:
 class SignatureGrounder:
     """Finds the changes that a signature makes in an abstract state.
 
-    Every lifted atom has to be there, as Alg. 3 asks for: so many objects as in training.
+    Every lifted atom has to be there, as Alg. 3 asks for: so many objects as in training. And all
+    of it or nothing: of a higher tower than in training, the lower blocks alone do not fall.
     """
 
     def __init__(
@@ -46,6 +47,8 @@ class SignatureGrounder:
         """
         self._signature, self._space, self._grasping = signature, space, grasping
         self._of_kind = _by_kind(kinds(space))
+        patterns = {pattern[1:] for pattern in signature.patterns if pattern[0] == "-"}
+        self._may_be_deleted = [a for a in space.atoms if _pattern(a, kinds(space)) in patterns]
         self._bits = {(a.predicate.name, a.objects): space.mask([a]) for a in space.atoms}
         roles = range(len(signature.roles))
         self._order = sorted(roles, key=lambda role: len(self._objects(role)))
@@ -59,7 +62,18 @@ class SignatureGrounder:
     def changes(self, abstract: int) -> Iterator[Change]:
         """The changes from an abstract state, a mask; each once."""
         if context_of(abstract, self._grasping, self._space) == self._signature.context:
-            yield from dict.fromkeys(self._fill(abstract, {}, Change(0, 0)))
+            found = dict.fromkeys(self._fill(abstract, {}, Change(0, 0)))
+            yield from (change for change in found if self._is_whole(abstract, change))
+
+    def _is_whole(self, abstract: int, change: Change) -> bool:
+        """Whether nothing is left to delete about the objects that it deletes something of."""
+        after = change.apply(abstract)
+        objects = {obj for atom in self._space.decode(change.delete) for obj in atom.objects}
+        return not any(
+            after & self._space.mask([atom])
+            for atom in self._may_be_deleted
+            if not objects.isdisjoint(atom.objects)
+        )
 
     def _fill(self, abstract: int, chosen: Chosen, change: Change) -> Iterator[Change]:
         """Fill the next role with each object that agrees with the abstract state."""
@@ -86,6 +100,10 @@ class SignatureGrounder:
 
     def _objects(self, role: int) -> list[Object]:
         return self._of_kind.get(self._signature.roles[role], [])
+
+
+def _pattern(atom: GroundAtom, kind: Mapping[Object, Kind]) -> tuple[str, tuple[Kind, ...]]:
+    return atom.predicate.name, tuple(kind[obj] for obj in atom.objects)
 
 
 def _by_kind(kind: Mapping[Object, Kind]) -> dict[Kind, list[Object]]:
