@@ -43,10 +43,9 @@ class GroundedShortcuts:
         self._domain = domain
         self._space = domain.atom_space(initial)
         self._rollouts = ShortcutRollouts(domain, initial, sampling)
-        grasping = learner_interface(domain).grasping
-        signatures = [shortcut.signature for shortcut in self.shortcuts]
-        self._matchers = [SignatureMatcher(one, self._space, grasping) for one in signatures]
-        self._grounders = [SignatureGrounder(one, self._space, grasping) for one in signatures]
+        about = [(s.signature, self._space, learner_interface(domain).grasping) for s in shortcuts]
+        self._matchers = [SignatureMatcher(*each) for each in about]
+        self._grounders = [SignatureGrounder(*each) for each in about]
         self._encoders: dict[tuple[str, Change], ObservationEncoder] = {}
 
     def edges(self, graph: AbstractGraph) -> list[Edge]:
