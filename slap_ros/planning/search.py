@@ -19,9 +19,9 @@ Both find the same cost *if bounds are admissible* (no option takes fewer steps 
 depends on the order of roll-outs. Tests check the bounds of given skills. The bound of a shortcut,
 half of its shortest success in training, is an assumption. Where a roll-out takes less, the lazy
 search may return a plan that is longer than the cheapest: by no more than the bounds exceed the
-steps along the cheapest path. With the shipped libraries that never happened in 190 states of 250
-tasks of the four domains (``python -m benchmarks.shortcut_bounds``), where no roll-out was even
-shorter than the shortest success in training.
+steps along the cheapest path. With the shipped libraries that never happened in 102 states of 80
+tasks of the four domains (``python -m benchmarks.shortcut_bounds``). In four of them, of Obstacle
+2D, a roll-out was shorter than the shortest success in training: by a quarter at most.
 
 In the planner's model, a plan with shortcuts is never longer than one without when both searches
 end with a plan in the same graph and the bounds of the given skills are admissible: shortcuts only

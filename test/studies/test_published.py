@@ -22,7 +22,7 @@ from slap_ros.studies.readme import PLACE, with_tables
 ROOT = Path(__file__).parent.parent.parent
 PUBLISHED = ROOT / "docs" / "results"
 PAGES = [ROOT / "README.md", *ROOT.glob("docs/**/*.md")]
-OF_TRAININGS = {"dynamics_obstacle_tower", "pruning_obstacle_tower"}
+OF_TRAININGS = {"dynamics_obstacle_tower"}
 TASKS = 20  # for each condition, at least
 RESULTS = {path.stem: json.loads(path.read_text()) for path in PUBLISHED.glob("*.json")}
 
