@@ -373,7 +373,7 @@ def draw(
         axes.set_ylabel("plan length [steps]")
     bottom = (above, *below)[-1]
     bottom.set_xscale("log")
-    bottom.set_xticks(places, [f"{place:.2g}" for place in places])
+    bottom.set_xticks(places, [f"{float(f'{place:.2g}'):g}" for place in places])
     bottom.minorticks_off()
     bottom.set_xlabel("rollouts that must succeed, K/N [%]")
     legend_above(figure, above)
