@@ -6,11 +6,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import islice
 
 from slap_ros.relational import AtomSpace, GroundAtom, Object, Predicate
 from slap_ros.shortcuts.signature import Change, Kind, Signature, context_of, kinds
 
 Chosen = dict[int, Object]  # by role
+# Of an abstract state. Roles that are alike can be filled in many ways, which come to the same.
+MOST_SUBSTITUTIONS = 1_000
 
 
 @dataclass(frozen=True)
@@ -62,7 +65,8 @@ class SignatureGrounder:
     def changes(self, abstract: int) -> Iterator[Change]:
         """The changes from an abstract state, a mask; each once."""
         if context_of(abstract, self._grasping, self._space) == self._signature.context:
-            found = dict.fromkeys(self._fill(abstract, {}, Change(0, 0)))
+            filled = self._fill(abstract, {}, Change(0, 0))
+            found = dict.fromkeys(islice(filled, MOST_SUBSTITUTIONS))
             yield from (change for change in found if self._is_whole(abstract, change))
 
     def _is_whole(self, abstract: int, change: Change) -> bool:
