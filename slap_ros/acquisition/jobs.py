@@ -116,28 +116,27 @@ def learn(job: LearningJob, processes: int = 1) -> dict[str, Any]:
     )
     accepted, refused = _starts(job, domain)
     policy = job.warm_start.policy if job.warm_start is not None else None
-    with _judge(job, processes) as judge:
+    with _judge(job, domain, processes) as judge:
         outcome = training.run(job.number, accepted, judge, policy)
     return {**asdict(outcome), "refused": refused}
 
 
 @contextmanager
-def _judge(job: LearningJob, processes: int) -> Iterator[Judge]:
+def _judge(job: LearningJob, domain: Domain, processes: int) -> Iterator[Judge]:
     """Who judges the checkpoints of a round."""
     if processes == 1:
-        yield JudgeHere(_trials(job))
+        yield JudgeHere(_trials(job, domain))
         return
     with linked_process(_judge_until_closed, job) as link:
         yield JudgeElsewhere(link)
 
 
 def _judge_until_closed(link: Connection, job: LearningJob) -> None:
-    judge_until_closed(link, _trials(job))
+    judge_until_closed(link, _trials(job, job.source.make_domain()))
 
 
-def _trials(job: LearningJob) -> SkillTrials:
+def _trials(job: LearningJob, domain: Domain) -> SkillTrials:
     """From states of fresh tasks; where there are none, from those that are learned from."""
-    domain = job.source.make_domain()
     judged, _ = _accepted(job.source, domain, job.fresh.all[: job.settings.judged])
     reward = _reward(job.source, job.operator, domain)
     return SkillTrials(domain, reward, judged or _starts(job, domain)[0], horizon_of(domain))

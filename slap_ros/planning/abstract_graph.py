@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -54,11 +54,8 @@ class AbstractGraph:
 
     def on_way_to_goal(self) -> set[int]:
         """Indices of the nodes from which forward edges lead to a goal, goals included."""
-        found = set(self.goal_nodes)
-        for edge in sorted(self.edges, key=lambda edge: edge.source, reverse=True):
-            if edge.target > edge.source and edge.target in found:
-                found.add(edge.source)
-        return found
+        forward = [(e.source, e.target) for e in self.edges if e.target > e.source]
+        return _leading_to(self.goal_nodes, forward)
 
     def candidates(self) -> list[tuple[int, int]]:
         """Pairs of nodes, the later one second, that no option joins (SLAP §4.2)."""
@@ -300,15 +297,6 @@ class _BreadthFirstSearch:
         return near
 
 
-@dataclass(frozen=True)
-class _Step:
-    """An edge that was found beyond a graph, whose option is not made yet."""
-
-    source: int
-    target: int
-    make_option: Callable[[], Option]
-
-
 class _Beyond:
     """One run of :func:`add_beyond`. New nodes have numbers after those of the graph."""
 
@@ -322,7 +310,7 @@ class _Beyond:
         self._old = len(graph.nodes)
         self._nodes, self._depth = list(graph.nodes), list(graph.depth)
         self._index = {abstract: i for i, abstract in enumerate(graph.nodes)}
-        self._steps: list[_Step] = []
+        self._found: list[tuple[EdgeBeyond, int]] = []  # edges, each with the node it leads to
 
     def add(self, beyond: Sequence[EdgeBeyond]) -> None:
         """Layer by layer, as the graph was built; then what leads to no goal is dropped."""
@@ -357,23 +345,21 @@ class _Beyond:
             self._nodes.append(edge.abstract)
             self._depth.append(depth)
         if target >= self._old and target > edge.source:
-            self._steps.append(_Step(edge.source, target, edge.make_option))
+            self._found.append((edge, target))
         return target if new else None
 
     def _add_useful(self) -> None:
         """Add the nodes from which a goal can be reached, and the edges to them."""
-        useful = {i for i in range(self._old, len(self._nodes)) if self._is_goal(i)}
-        for step in sorted(self._steps, key=lambda step: step.source, reverse=True):
-            if step.target in useful and step.source >= self._old:
-                useful.add(step.source)
-        kept = sorted(useful)
+        goals = [i for i in range(self._old, len(self._nodes)) if self._is_goal(i)]
+        useful = _leading_to(goals, [(edge.source, target) for edge, target in self._found])
+        kept = sorted(node for node in useful if node >= self._old)
         number = {node: i for i, node in enumerate(kept, self._old)}
         self._graph.nodes += [self._nodes[node] for node in kept]
         self._graph.depth += [self._depth[node] for node in kept]
         self._graph.edges += [
-            Edge(number.get(step.source, step.source), number[step.target], step.make_option())
-            for step in self._steps
-            if step.target in useful
+            Edge(number.get(edge.source, edge.source), number[target], edge.make_option())
+            for edge, target in self._found
+            if target in number
         ]
 
     def _is_goal(self, node: int) -> bool:
@@ -382,3 +368,12 @@ class _Beyond:
 
 def _made(option: Option) -> Option:
     return option
+
+
+def _leading_to(goals: Iterable[int], forward: Iterable[tuple[int, int]]) -> set[int]:
+    """The nodes from which forward edges, source and target each, lead to a goal; goals as well."""
+    found = set(goals)
+    for source, target in sorted(forward, reverse=True):
+        if target in found:
+            found.add(source)
+    return found

@@ -82,6 +82,17 @@ def _kinds(space: AtomSpace) -> Mapping[Object, Kind]:
     return {obj: f"{obj.type}({','.join(sorted(names))})" for obj, names in labels.items()}
 
 
+def instances(pattern: Pattern, space: AtomSpace) -> int:
+    """The mask of a pattern's atoms in a task."""
+    _, name, wanted = pattern
+    kind = kinds(space)
+    return space.mask(
+        atom
+        for atom in space.atoms
+        if atom.predicate.name == name and tuple(kind[obj] for obj in atom.objects) == wanted
+    )
+
+
 def concerned(change: Change, space: AtomSpace) -> tuple[Object, ...]:
     """The objects of a change, from the ground up: in order of kind, then as they stand.
 

@@ -8,8 +8,8 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice
 
-from slap_ros.relational import AtomSpace, GroundAtom, Object, Predicate
-from slap_ros.shortcuts.signature import Change, Kind, Signature, context_of, kinds
+from slap_ros.relational import AtomSpace, Object, Predicate
+from slap_ros.shortcuts.signature import Change, Kind, Signature, context_of, instances, kinds
 
 Chosen = dict[int, Object]  # by role
 # Of an abstract state. Roles that are alike can be filled in many ways, which come to the same.
@@ -50,8 +50,10 @@ class SignatureGrounder:
         """
         self._signature, self._space, self._grasping = signature, space, grasping
         self._of_kind = _by_kind(kinds(space))
-        patterns = {pattern[1:] for pattern in signature.patterns if pattern[0] == "-"}
-        self._may_be_deleted = [a for a in space.atoms if _pattern(a, kinds(space)) in patterns]
+        self._may_be_deleted = 0
+        for pattern in signature.patterns:
+            if pattern[0] == "-":
+                self._may_be_deleted |= instances(pattern, space)
         self._bits = {(a.predicate.name, a.objects): space.mask([a]) for a in space.atoms}
         roles = range(len(signature.roles))
         self._order = sorted(roles, key=lambda role: len(self._objects(role)))
@@ -71,13 +73,9 @@ class SignatureGrounder:
 
     def _is_whole(self, abstract: int, change: Change) -> bool:
         """Whether nothing is left to delete about the objects that it deletes something of."""
-        after = change.apply(abstract)
         objects = {obj for atom in self._space.decode(change.delete) for obj in atom.objects}
-        return not any(
-            after & self._space.mask([atom])
-            for atom in self._may_be_deleted
-            if not objects.isdisjoint(atom.objects)
-        )
+        left = self._space.decode(change.apply(abstract) & self._may_be_deleted)
+        return all(objects.isdisjoint(atom.objects) for atom in left)
 
     def _fill(self, abstract: int, chosen: Chosen, change: Change) -> Iterator[Change]:
         """Fill the next role with each object that agrees with the abstract state."""
@@ -104,10 +102,6 @@ class SignatureGrounder:
 
     def _objects(self, role: int) -> list[Object]:
         return self._of_kind.get(self._signature.roles[role], [])
-
-
-def _pattern(atom: GroundAtom, kind: Mapping[Object, Kind]) -> tuple[str, tuple[Kind, ...]]:
-    return atom.predicate.name, tuple(kind[obj] for obj in atom.objects)
 
 
 def _by_kind(kind: Mapping[Object, Kind]) -> dict[Kind, list[Object]]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 
 from slap_ros.relational import AtomSpace, Predicate
-from slap_ros.shortcuts.signature import Change, Pattern, Signature, context_of, kinds
+from slap_ros.shortcuts.signature import Change, Signature, context_of, instances, kinds
 
 
 class SignatureMatcher:
@@ -25,8 +25,8 @@ class SignatureMatcher:
         """
         self._signature, self._space, self._grasping = signature, space, grasping
         ordered = sorted(signature.patterns)
-        self._adds = [_instances(p, space) for p in ordered if p[0] == "+"]
-        self._deletes = [_instances(p, space) for p in ordered if p[0] == "-"]
+        self._adds = [instances(p, space) for p in ordered if p[0] == "+"]
+        self._deletes = [instances(p, space) for p in ordered if p[0] == "-"]
         kind = kinds(space)
         self._left_alone = ~space.mask(
             atom for atom in space.atoms if all(kind[o] in signature.slots for o in atom.objects)
@@ -85,14 +85,3 @@ def _is_part(change: Change, other: Change) -> bool:
     """Whether a change is a proper part of another."""
     part = not change.add & ~other.add and not change.delete & ~other.delete
     return part and change != other
-
-
-def _instances(pattern: Pattern, space: AtomSpace) -> int:
-    """The mask of a pattern's atoms in a task."""
-    _, name, wanted = pattern
-    kind = kinds(space)
-    return space.mask(
-        atom
-        for atom in space.atoms
-        if atom.predicate.name == name and tuple(kind[obj] for obj in atom.objects) == wanted
-    )

@@ -19,11 +19,14 @@ from slap_ros.shortcuts.signature_grounder import SignatureGrounder
 from slap_ros.shortcuts.signature_matcher import SignatureMatcher
 
 
+def initial_state(obstacles, seed=0, distractors=0):
+    counts = (obstacles, obstacles), (distractors, distractors)
+    return RandomTowerTasks(*counts).sample(np.random.default_rng(seed)).initial_state
+
+
 def tower(obstacles, seed=0, distractors=0):
     """The atoms of a tower task, and the change of knocking the whole tower over."""
-    counts = (obstacles, obstacles), (distractors, distractors)
-    state = RandomTowerTasks(*counts).sample(np.random.default_rng(seed)).initial_state
-    space = make("fair").atom_space(state)
+    space = make("fair").atom_space(initial_state(obstacles, seed, distractors))
     blocks = [f"block{i}" for i in range(2, obstacles + 2)]
     add = [space.atom("On", [b, "table"]) for b in blocks] + [space.atom("NothingOn", ["target"])]
     add += [space.atom("NothingOn", [b]) for b in blocks[:-1]]
@@ -130,11 +133,9 @@ def test_all_of_it_or_nothing():
 
 def grounded(learned, obstacles, extra=(), distractors=0):
     """The changes that a signature makes at the start of a tower task."""
-    space, _ = tower(obstacles, distractors=distractors)
-    domain = make("fair")
-    counts = (obstacles, obstacles), (distractors, distractors)
-    state = RandomTowerTasks(*counts).sample(np.random.default_rng(0)).initial_state
-    start = domain.atom_space(state).abstract(state) | space.mask(extra)
+    state = initial_state(obstacles, distractors=distractors)
+    space = make("fair").atom_space(state)
+    start = space.abstract(state) | space.mask(extra)
     return list(SignatureGrounder(learned, space, ()).changes(start))
 
 
