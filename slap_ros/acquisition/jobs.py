@@ -30,8 +30,9 @@ from slap_ros.acquisition.skill_training import SkillTraining
 from slap_ros.acquisition.task_source import TaskSource
 from slap_ros.acquisition.validation import SkillTrials
 from slap_ros.acquisition.warm_start import WarmStart
-from slap_ros.core import Domain
+from slap_ros.core import Domain, MakeVectorWorld
 from slap_ros.errors import InvalidStateError
+from slap_ros.learning.divided_worlds import divided_worlds
 from slap_ros.learning.learner_interface import learner_interface
 from slap_ros.learning.linked_process import linked_process
 from slap_ros.relational import State
@@ -96,27 +97,34 @@ def learn(job: LearningJob, processes: int = 1) -> dict[str, Any]:
 
     Args:
         job: What to learn.
-        processes: How many at most; from two on, another one judges checkpoints. The result does
-            not depend on it.
+        processes: How many at most; from two on, other ones judge checkpoints and step half of
+            the worlds. The result does not depend on it.
 
     Returns:
         The :class:`~slap_ros.acquisition.skill_training.Round` as JSON, with the number of start
         states that the world refused, under ``refused``.
 
     Raises:
-        ChildProcessError: The process that judged has ended.
+        ChildProcessError: One of these processes has ended.
         InvalidParameterError: The folder is damaged.
         InvalidStateError: The world refuses all states.
     """
     source, settings = job.source, job.settings
     domain = source.make_domain()
     reward = _reward(source, job.operator, domain)
-    training = SkillTraining(
-        domain, reward, horizon_of(domain), settings, source.seed, job.folder, job.attempt
-    )
     accepted, refused = _starts(job, domain)
     policy = job.warm_start.policy if job.warm_start is not None else None
-    with _judge(job, domain, processes) as judge:
+    with _judge(job, domain, processes) as judge, _worlds(job, domain, processes) as make_worlds:
+        training = SkillTraining(
+            domain,
+            reward,
+            horizon_of(domain),
+            settings,
+            source.seed,
+            job.folder,
+            job.attempt,
+            make_worlds,
+        )
         outcome = training.run(job.number, accepted, judge, policy)
     return {**asdict(outcome), "refused": refused}
 
@@ -129,6 +137,16 @@ def _judge(job: LearningJob, domain: Domain, processes: int) -> Iterator[Judge]:
         return
     with linked_process(_judge_until_closed, job) as link:
         yield JudgeElsewhere(link)
+
+
+@contextmanager
+def _worlds(job: LearningJob, domain: Domain, processes: int) -> Iterator[MakeVectorWorld]:
+    """What makes the worlds that a round is learned in."""
+    if processes == 1:
+        yield domain.make_vector_world
+        return
+    with divided_worlds(domain, job.source.make_domain) as make_worlds:
+        yield make_worlds
 
 
 def _judge_until_closed(link: Connection, job: LearningJob) -> None:

@@ -20,7 +20,7 @@ from slap_ros.acquisition.groundings import Grounding, Groundings, Indices
 from slap_ros.acquisition.observations import SIZE, SkillObserver
 from slap_ros.acquisition.reward import SkillReward
 from slap_ros.acquisition.stage_targets import StageTargets
-from slap_ros.core import Domain, VectorWorld
+from slap_ros.core import Domain, MakeVectorWorld, VectorWorld
 from slap_ros.learning.action_map import ActionMap
 from slap_ros.learning.shares import proportional_shares
 from slap_ros.learning.vec_env import VecEnvStep
@@ -123,6 +123,7 @@ class SkillVecEnv:
         horizon: int,
         seed: Sequence[int],
         first_round: int = 0,
+        make_worlds: MakeVectorWorld | None = None,
     ) -> None:
         """Begin an episode in each environment.
 
@@ -134,11 +135,13 @@ class SkillVecEnv:
             seed: Of the draws.
             first_round: Episodes that were run before in each environment: which ones are drawn
                 next depends on it and the seed alone, so that training can be resumed here.
+            make_worlds: Makes the domain's worlds; by default as the domain itself does.
         """
         self.mdp, self.num_envs, self.horizon = mdp, num_envs, horizon
         self.action_map = mdp.action_map
         self.rounds = first_round
         self._seed = tuple(seed)
+        self._make_worlds = make_worlds or mdp.domain.make_vector_world
         pools = _pools(initiations)
         shares = proportional_shares([len(pool) for pool in pools], num_envs)
         used = [(pool, share) for pool, share in zip(pools, shares, strict=True) if share]
@@ -203,7 +206,7 @@ class SkillVecEnv:
             drawn = [pool[int(rng.integers(len(pool)))] for _ in part]
             if fresh:
                 states = [initiation.state for initiation in drawn]
-                self._worlds.append(self.mdp.domain.make_vector_world(states))
+                self._worlds.append(self._make_worlds(states))
             for i, (env, initiation) in enumerate(zip(part, drawn, strict=True)):
                 if not fresh:
                     self._worlds[number].reset(i, initiation.state)

@@ -29,7 +29,7 @@ from slap_ros.acquisition.reward import SkillReward
 from slap_ros.acquisition.settings import AcquisitionSettings
 from slap_ros.acquisition.skill_env import Initiation, SkillMdp, SkillVecEnv
 from slap_ros.acquisition.skill_library import AcquiredSkill, save_skill
-from slap_ros.core import Domain
+from slap_ros.core import Domain, MakeVectorWorld
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, read_text, write_whole
 from slap_ros.learning.mlp_policy import MlpPolicy
@@ -118,6 +118,7 @@ class SkillTraining:
         seed: Of the whole curriculum.
         folder: Where everything is kept.
         attempt: How often the skill was learned from scratch before.
+        make_worlds: Makes the worlds that are learned in; by default as the domain itself does.
     """
 
     domain: Domain
@@ -127,6 +128,7 @@ class SkillTraining:
     seed: int
     folder: Path
     attempt: int = 0
+    make_worlds: MakeVectorWorld | None = None
     _rounds: list[Round] = field(default_factory=list, init=False)
 
     def run(
@@ -179,7 +181,9 @@ class SkillTraining:
         seed = self._seed(number)
         first_round = segments * self.settings.segment_episodes
         environments = self.settings.sac.environments
-        env = SkillVecEnv(mdp, initiations, environments, self.horizon, (seed,), first_round)
+        env = SkillVecEnv(
+            mdp, initiations, environments, self.horizon, (seed,), first_round, self.make_worlds
+        )
         return SkillLearner(env, self.settings.sac, seed)
 
     def _seed(self, number: int) -> int:

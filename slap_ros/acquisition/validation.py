@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from slap_ros.acquisition.groundings import Groundings
 from slap_ros.acquisition.reward import SkillReward
 from slap_ros.acquisition.skill_env import Initiation, SkillMdp
-from slap_ros.core import Domain, VectorWorld
-from slap_ros.relational import Layout
+from slap_ros.core import Domain, World
+from slap_ros.relational import Layout, State
 from slap_ros.relational.state import Array
 
-SIDE_BY_SIDE = 8  # worlds that are stepped together
+SIDE_BY_SIDE = 8  # trials that a policy acts in together
 RANDOM = "random"  # the policy's name
 RANDOM_ROUNDS = 5  # from every state, so that 30 or 40 states do not decide by chance
 # Observations, shape (n, size), to actions, shape (n, actions).
@@ -64,7 +64,7 @@ class SkillTrials:
         self._domain, self._initiations, self._horizon = domain, initiations, horizon
         groundings = list(dict.fromkeys(one.grounding for one in initiations))
         self._mdp = SkillMdp(domain, reward, Groundings(groundings))
-        self._worlds: dict[Layout, VectorWorld] = {}
+        self._worlds: dict[Layout, list[World]] = {}
 
     def success(self, act: Act) -> float:
         """Share of trials in which a policy succeeds."""
@@ -94,37 +94,32 @@ class SkillTrials:
         return best
 
     def _run(self, numbers: Sequence[int], act: Act) -> list[bool]:
-        """Run trials over the same objects side by side."""
-        worlds = self._begin(numbers)
-        which = np.array(
-            [self._mdp.groundings.number(self._initiations[i].grounding) for i in numbers]
-        )
-        n = len(numbers)  # the other worlds stand still
-        done, state = np.zeros(n, dtype=bool), worlds.states
-        begun = self._mdp.groundings.rows(state.data[:n].copy())
+        """Run trials over the same objects side by side, each until it succeeds."""
+        begun = [self._initiations[i] for i in numbers]
+        which = np.array([self._mdp.groundings.number(one.grounding) for one in begun])
+        worlds = self._worlds_in([one.state for one in begun])
+        states = np.stack([world.state.data for world in worlds])
+        rows = first = self._mdp.groundings.rows(states.copy())
+        going = np.arange(len(begun))
         for _ in range(self._horizon):
-            padded = self._mdp.groundings.rows(state.data[:n])
-            commands = np.zeros((len(state.data), len(self._domain.action_space.axes)))
-            commands[:n] = self._mdp.action_map(
-                act(self._mdp.observe(padded, which)).astype(np.float64)
-            )
-            state = worlds.step(commands)
-            padded = self._mdp.groundings.rows(state.data[:n])
-            done |= self._mdp.rewards(padded, which, begun)[1]
-            if done.all():
+            # All of them act: what random actions are drawn must not depend on who succeeds.
+            actions = self._mdp.action_map(act(self._mdp.observe(rows, which)).astype(np.float64))
+            for i in going:
+                states[i] = worlds[i].step(actions[i]).data
+            rows = self._mdp.groundings.rows(states)
+            _, done = self._mdp.rewards(rows[going], which[going], first[going])
+            going = going[~done]
+            if not going.size:
                 break
-        return list(map(bool, done))
+        return [i not in going for i in range(len(begun))]
 
-    def _begin(self, numbers: Sequence[int]) -> VectorWorld:
-        """Worlds side by side, the first of them in the states where these trials begin."""
-        states = [self._initiations[i].state for i in numbers]
-        layout = states[0].layout
-        if layout not in self._worlds:
-            spare = [states[0]] * (SIDE_BY_SIDE - len(states))
-            self._worlds[layout] = self._domain.make_vector_world([*states, *spare])
-        for i, state in enumerate(states):
-            self._worlds[layout].reset(i, state)
-        return self._worlds[layout]
+    def _worlds_in(self, states: Sequence[State]) -> list[World]:
+        """Worlds of the same objects, one in each state; those of earlier trials, set anew."""
+        worlds = self._worlds.setdefault(states[0].layout, [])
+        for world, state in zip(worlds, states, strict=False):
+            world.reset(state)
+        worlds += [self._domain.make_world(state) for state in states[len(worlds) :]]
+        return worlds[: len(states)]
 
 
 def blind_policies(actions: int, rng: np.random.Generator) -> Mapping[str, Act]:

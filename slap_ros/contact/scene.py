@@ -44,12 +44,12 @@ class BoxPart:
     pose: Pose = IDENTITY
     colour: Colour | None = None
 
-    @property
+    @cached_property
     def bounding_box(self) -> OrientedBox:
         """The smallest box around it."""
         return OrientedBox(self.pose, self.half_extents_m)
 
-    @property
+    @cached_property
     def bounding_boxes(self) -> tuple[OrientedBox, ...]:
         """Boxes around it; what is outside of one of them does not touch it."""
         return (self.bounding_box,)
@@ -87,12 +87,12 @@ class CylinderPart:
     pose: Pose = IDENTITY
     colour: Colour | None = None
 
-    @property
+    @cached_property
     def bounding_box(self) -> OrientedBox:
         """The smallest box around it."""
         return OrientedBox(self.pose, (self.radius_m, self.radius_m, 0.5 * self.length_m))
 
-    @property
+    @cached_property
     def bounding_boxes(self) -> tuple[OrientedBox, ...]:
         """Boxes around it; what is outside of one of them does not touch it.
 

@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 from slap_ros.contact.scene import ContactScene, Part
 from slap_ros.contact.snapshot import ContactSnapshot, Placement
@@ -35,13 +37,12 @@ def way_up_is_free(
     if snapshot.held is not None:
         return True
     swept = [_swept(box, margin) for box in snapshot.hand.boxes()]
-    reach = max(box.radius for box in swept) + RISE
-    near = [
-        part
-        for part in _solids(scene, snapshot, placement)
-        if part[0].near(snapshot.hand.pose.position, reach)
-    ]
-    return not any(all(box.overlaps(way) for box in part) for part in near for way in swept)
+    shaft = _Shaft.around(swept)
+    return not any(
+        all(box.overlaps(way) for box in boxes)
+        for boxes in _solids(scene, snapshot, placement, shaft)
+        for way in swept
+    )
 
 
 def _swept(box: OrientedBox, margin: float) -> OrientedBox:
@@ -52,22 +53,55 @@ def _swept(box: OrientedBox, margin: float) -> OrientedBox:
     return OrientedBox(Pose((x, y, z + 0.5 * (RISE + TIP)), turn), half)
 
 
+class _Shaft(NamedTuple):
+    """A round shaft, upwards without end, around what is passed; most parts are outside of it."""
+
+    axis: tuple[float, float]  # m
+    radius: float  # m
+    bottom: float  # m
+
+    @classmethod
+    def around(cls, boxes: Sequence[OrientedBox]) -> _Shaft:
+        """The shaft around boxes that stand upright."""
+        (x, y, _), _ = boxes[0].pose
+        aside = [math.dist((x, y), box.pose.position[:2]) for box in boxes]
+        radius = max(a + math.hypot(*box.half[:2]) for a, box in zip(aside, boxes, strict=True))
+        bottom = min(box.pose.position[2] - box.half[2] for box in boxes)
+        return cls((x, y), radius, bottom)
+
+    def may_meet(self, part: Part, pose: Pose) -> bool:
+        """Whether a ball around a part reaches into the shaft.
+
+        Args:
+            part: Of a body.
+            pose: The body's.
+        """
+        ball = part.bounding_box
+        x, y, z = pose.apply(ball.pose.position)
+        radius = ball.radius
+        if z + radius < self.bottom:
+            return False
+        u, v = self.axis
+        return math.hypot(x - u, y - v) < self.radius + radius
+
+
 def _solids(
-    scene: ContactScene, snapshot: ContactSnapshot, placement: Placement
+    scene: ContactScene, snapshot: ContactSnapshot, placement: Placement, shaft: _Shaft
 ) -> Iterator[Boxes]:
-    """What is around each part of each body."""
+    """What is around each part of each body that a shaft may meet."""
     for body, motion in zip(scene.free, snapshot.bodies, strict=True):
-        yield from _boxes(body.parts, motion.pose)
+        yield from _boxes(body.parts, motion.pose, shaft)
     for fixed, pose in zip(scene.fixed, placement.fixed, strict=True):
         if fixed.solid:
-            yield from _boxes(fixed.parts, pose)
+            yield from _boxes(fixed.parts, pose, shaft)
     for jointed, pose, opening in zip(
         scene.jointed, placement.jointed, snapshot.openings, strict=True
     ):
-        yield from _boxes(jointed.frame, pose)
-        yield from _boxes(jointed.moving, jointed.moving_pose(pose, opening.position))
+        yield from _boxes(jointed.frame, pose, shaft)
+        yield from _boxes(jointed.moving, jointed.moving_pose(pose, opening.position), shaft)
 
 
-def _boxes(parts: Sequence[Part], pose: Pose) -> Iterator[Boxes]:
+def _boxes(parts: Sequence[Part], pose: Pose, shaft: _Shaft) -> Iterator[Boxes]:
     for part in parts:
-        yield tuple(box.at(pose) for box in part.bounding_boxes)
+        if shaft.may_meet(part, pose):
+            yield tuple(box.at(pose) for box in part.bounding_boxes)
