@@ -34,6 +34,10 @@ class Judge(Protocol):
         """
         ...
 
+    def core_to_spare(self) -> bool:
+        """Whether a second core has nothing to judge just now."""
+        ...
+
 
 class JudgeHere:
     """Judges in this process, when the verdict is asked for."""
@@ -49,20 +53,31 @@ class JudgeHere:
         """See :class:`Judge`."""
         return self._trials.success(self._policy.mean)
 
+    def core_to_spare(self) -> bool:
+        """See :class:`Judge`: there is this process's own alone."""
+        return False
+
 
 class JudgeElsewhere:
     """Lets the process at the other end of a link judge, which runs :func:`judge_until_closed`."""
 
     def __init__(self, link: Connection) -> None:
-        self._link = link
+        self._link, self._asked = link, False
 
     def begin(self, policy: MlpPolicy) -> None:
         """See :class:`Judge`."""
+        self._asked = True
         send(self._link, policy)
 
     def verdict(self) -> float:
         """See :class:`Judge`."""
-        return float(receive(self._link))
+        success = float(receive(self._link))
+        self._asked = False
+        return success
+
+    def core_to_spare(self) -> bool:
+        """See :class:`Judge`."""
+        return not self._asked or self._link.poll()
 
 
 def judge_until_closed(link: Connection, trials: SkillTrials) -> None:

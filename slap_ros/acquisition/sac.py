@@ -9,7 +9,7 @@ so that one that is resumed there ends with the same weights.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,7 @@ from slap_ros.files import read_bytes
 from slap_ros.learning.mlp_policy import MlpPolicy, ObservationNormalisation
 from slap_ros.learning.stable_baselines import StableBaselinesVecEnv
 
+WORTH_A_THREAD = 128  # units of a critic's layer; with fewer, waking a second one takes longer
 MAX_CHECKPOINT_BYTES = 2**30
 ONE = np.ones(SIZE, dtype=np.float32)
 AS_OBSERVED = ObservationNormalisation(0.0 * ONE, ONE)  # clipped alone: any skill can begin another
@@ -85,17 +86,26 @@ class ExploringSac(LeanSac):
 class SkillLearner:
     """SAC on the episodes of one skill."""
 
-    def __init__(self, env: SkillVecEnv, settings: SacSettings, seed: int) -> None:
+    def __init__(
+        self,
+        env: SkillVecEnv,
+        settings: SacSettings,
+        seed: int,
+        core_to_spare: Callable[[], bool] = lambda: False,
+    ) -> None:
         """Begin with random weights and an empty buffer.
 
         Args:
             env: Of the skill.
             settings: SAC's hyper-parameters.
             seed: Of weights, noise and batches.
+            core_to_spare: Whether there is a second core to learn with just now. What is learned
+                does not depend on it.
         """
         torch.set_num_threads(1)  # tiny networks: more threads only wait for one another
         self.settings, self._env = settings, env
         actions = env.action_map.size
+        critic_hidden = list(settings.critic_hidden or settings.hidden)
         self._sac = ExploringSac(
             "MlpPolicy",
             StableBaselinesVecEnv(env, AS_OBSERVED),
@@ -112,16 +122,15 @@ class SkillLearner:
             replay_buffer_kwargs={"mdp": env.mdp, "normalisation": AS_OBSERVED, "seed": seed},
             target_entropy=settings.entropy_per_action * actions,
             policy_kwargs={
-                "net_arch": {
-                    "pi": list(settings.hidden),
-                    "qf": list(settings.critic_hidden or settings.hidden),
-                },
+                "net_arch": {"pi": list(settings.hidden), "qf": critic_hidden},
                 "optimizer_kwargs": {"fused": True},
             },
             seed=seed,
             device="cpu",
         )
         self._sac.longest_hold = settings.longest_hold
+        if max(critic_hidden, default=0) >= WORTH_A_THREAD:
+            self._sac.core_to_spare = core_to_spare
         if settings.critic_layer_norm:
             self._sac.normalise_critics()
         self._sac.set_logger(Logger(None, []))

@@ -12,7 +12,8 @@ over the parameters of the target networks; and figures for a logger.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import torch
@@ -34,6 +35,7 @@ class LeanSac(SAC):
     """
 
     averaged: dict[str, torch.Tensor]  # the actor's average, by name
+    core_to_spare: Callable[[], bool]  # whether the critics may use a second core just now
 
     def _setup_model(self) -> None:
         super()._setup_model()
@@ -47,6 +49,7 @@ class LeanSac(SAC):
         self.critic.optimizer = make(self._online.tensors, lr=rate, **settings)
         self._actor_weights = list(self.actor.parameters())
         self._hidden = [(layer.weight, layer.bias) for layer in linear_layers(self.actor.latent_pi)]
+        self.core_to_spare = lambda: False
         self.averaged = {k: v.detach().clone() for k, v in self.actor.state_dict().items()}
 
     def normalise_critics(self) -> None:
@@ -71,6 +74,18 @@ class LeanSac(SAC):
             with torch.no_grad():
                 torch._foreach_lerp_(following, online, self.tau)
         self._n_updates += gradient_steps
+
+    @contextmanager
+    def _threads(self) -> Iterator[None]:
+        """As many threads as there are cores for: one takes a critic each, the sums are the same.
+
+        Optimisers are left out: how they divide their work shows in the last digit.
+        """
+        torch.set_num_threads(2 if self.core_to_spare() else 1)
+        try:
+            yield
+        finally:
+            torch.set_num_threads(1)
 
     def _act(self, observations: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Actions drawn from the policy, and the logarithm of their density, shape (n, 1)."""
@@ -102,14 +117,15 @@ class LeanSac(SAC):
     @torch.no_grad()
     def _update_critic(self, batch: Any, entropy_weight: torch.Tensor) -> None:
         actions, log_prob = self._act(batch.next_observations)
-        one, other = self._target(batch.next_observations, actions).values
-        value = torch.minimum(one, other)
-        value -= entropy_weight * log_prob
-        wanted = batch.rewards + (1.0 - batch.dones) * self.gamma * value
-        forward = self._online(batch.observations, batch.actions)
-        # Of the mean squared error of both, which is half of the sum of their losses.
-        gradient = (forward.values - wanted).mul_(2.0 / forward.values.numel())
-        gradients = self._online.weight_gradients(forward, gradient)
+        with self._threads():
+            one, other = self._target(batch.next_observations, actions).values
+            value = torch.minimum(one, other)
+            value -= entropy_weight * log_prob
+            wanted = batch.rewards + (1.0 - batch.dones) * self.gamma * value
+            forward = self._online(batch.observations, batch.actions)
+            # Of the mean squared error of both, which is half of the sum of their losses.
+            gradient = (forward.values - wanted).mul_(2.0 / forward.values.numel())
+            gradients = self._online.weight_gradients(forward, gradient)
         _descend(self.critic.optimizer, self._online.tensors, gradients)
 
     def _update_actor(
@@ -128,7 +144,7 @@ class LeanSac(SAC):
             entropy_weight: What entropy is worth.
         """
         n, axes = actions.shape
-        with torch.no_grad():
+        with torch.no_grad(), self._threads():
             forward = self._online(observations, actions)
             by_values = _share_in_minimum(forward.values).mul_(-1.0 / n)
             by_actions = self._online.action_gradient(forward, by_values, axes)

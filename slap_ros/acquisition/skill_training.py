@@ -163,7 +163,7 @@ class SkillTraining:
         mdp = SkillMdp(self.domain, self.reward, groundings, self.settings.dense_share)
         begins = number == len(self._rounds)
         in_round = 0 if begins else len(self._rounds[number].segments)
-        learner = self._learner(mdp, initiations, number, in_round)
+        learner = self._learner(mdp, initiations, number, in_round, judge)
         self._resume(learner, number, done, beginning)
         ahead = self._judge(learner, judge, done, None) if begins else None
         while not self._rounds[-1].over:
@@ -174,7 +174,12 @@ class SkillTraining:
         return self._rounds[-1]
 
     def _learner(
-        self, mdp: SkillMdp, initiations: Sequence[Initiation], number: int, segments: int
+        self,
+        mdp: SkillMdp,
+        initiations: Sequence[Initiation],
+        number: int,
+        segments: int,
+        judge: Judge,
     ) -> SkillLearner:
         from slap_ros.acquisition.sac import SkillLearner  # torch, here alone
 
@@ -184,7 +189,7 @@ class SkillTraining:
         env = SkillVecEnv(
             mdp, initiations, environments, self.horizon, (seed,), first_round, self.make_worlds
         )
-        return SkillLearner(env, self.settings.sac, seed)
+        return SkillLearner(env, self.settings.sac, seed, judge.core_to_spare)
 
     def _seed(self, number: int) -> int:
         """Every skill, attempt and round draws from streams of its own."""

@@ -91,6 +91,27 @@ def test_gradients_of_critics_are_those_of_automatic_differentiation_to_the_bit(
         assert torch.equal(gradient, other)
 
 
+def test_a_second_core_changes_nothing_that_is_learned():
+    """Whether it is there all the time or now and then; the layers are those it is used for."""
+    settings = replace(QUICK, critic_hidden=(256, 256), batch_size=128)
+    asked = []
+
+    def now_and_then():
+        asked.append(len(asked) % 3 == 0)
+        return asked[-1]
+
+    learned = []
+    for core_to_spare in (lambda: False, lambda: True, now_and_then):
+        env = SkillVecEnv(MDP, STARTS, 8, HORIZON, (1,))
+        one = SkillLearner(env, settings, 1, core_to_spare)
+        one.learn(4)
+        learned.append(weights(one))
+    assert any(asked)
+    alone, *others = learned
+    for other in others:
+        assert all(torch.equal(alone[name], value) for name, value in other.items())
+
+
 def test_values_of_what_is_far_from_everything_tried_are_bounded_by_normalised_layers():
     """Else the actor goes after values that nothing speaks for."""
     near, actions = torch.randn(100, SIZE), torch.zeros(100, MDP.action_map.size)
