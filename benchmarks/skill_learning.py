@@ -4,8 +4,8 @@
 
     python -m benchmarks.skill_learning [--domain stack_at_target] [--steps 4000] [--set NAME=VALUE]
 
-The first skill of a domain's plans, with the settings that skills are learned with: in one process,
-and then in two, of which one judges while the other learns on.
+The first skill of a domain's plans, with the settings that skills are learned with: with one core,
+and then with two, of which the second judges, steps half of the worlds and computes one critic.
 """
 
 from __future__ import annotations
@@ -76,12 +76,12 @@ def main() -> None:
     horizon = jobs.horizon_of(source.make_domain())
     steps = settings.segments(horizon) * settings.segment_steps(horizon)
     print(f"{operator} of {arguments.domain}: {steps} environment steps")
-    for processes in (1, 2):
+    for cores in (1, 2):
         with TemporaryDirectory() as folder:
             job = jobs.LearningJob(source, operator, 0, *states, settings, Path(folder) / operator)
-            seconds, of_processor = measured(partial(jobs.learn, job, processes))
+            seconds, of_processor = measured(partial(jobs.learn, job, cores))
         print(
-            f"processes: {processes}; {seconds:.1f} s, {steps / seconds:.0f} steps a second; "
+            f"cores: {cores}; {seconds:.1f} s, {steps / seconds:.0f} steps a second; "
             f"{of_processor:.1f} s of the processor, {steps / of_processor:.0f} steps a second"
         )
 

@@ -92,13 +92,13 @@ def carry_out(source: TaskSource, index: int, skills: Mapping[str, str]) -> dict
     return roll_out(domain, task, index, source.operators(), learned).as_json()
 
 
-def learn(job: LearningJob, processes: int = 1) -> dict[str, Any]:
+def learn(job: LearningJob, cores: int = 1) -> dict[str, Any]:
     """Learn one skill for one round.
 
     Args:
         job: What to learn.
-        processes: How many at most; from two on, other ones judge checkpoints and step half of
-            the worlds. The result does not depend on it.
+        cores: How many it may use; from two on, other processes judge checkpoints and step half
+            of the worlds, and large critics are divided. The result does not depend on it.
 
     Returns:
         The :class:`~slap_ros.acquisition.skill_training.Round` as JSON, with the number of start
@@ -114,7 +114,7 @@ def learn(job: LearningJob, processes: int = 1) -> dict[str, Any]:
     reward = _reward(source, job.operator, domain)
     accepted, refused = _starts(job, domain)
     policy = job.warm_start.policy if job.warm_start is not None else None
-    with _judge(job, domain, processes) as judge, _worlds(job, domain, processes) as make_worlds:
+    with _judge(job, domain, cores) as judge, _worlds(job, domain, cores) as make_worlds:
         training = SkillTraining(
             domain,
             reward,
@@ -130,9 +130,9 @@ def learn(job: LearningJob, processes: int = 1) -> dict[str, Any]:
 
 
 @contextmanager
-def _judge(job: LearningJob, domain: Domain, processes: int) -> Iterator[Judge]:
+def _judge(job: LearningJob, domain: Domain, cores: int) -> Iterator[Judge]:
     """Who judges the checkpoints of a round."""
-    if processes == 1:
+    if cores == 1:
         yield JudgeHere(_trials(job, domain))
         return
     with linked_process(_judge_until_closed, job) as link:
@@ -140,9 +140,9 @@ def _judge(job: LearningJob, domain: Domain, processes: int) -> Iterator[Judge]:
 
 
 @contextmanager
-def _worlds(job: LearningJob, domain: Domain, processes: int) -> Iterator[MakeVectorWorld]:
+def _worlds(job: LearningJob, domain: Domain, cores: int) -> Iterator[MakeVectorWorld]:
     """What makes the worlds that a round is learned in."""
-    if processes == 1:
+    if cores == 1:
         yield domain.make_vector_world
         return
     with divided_worlds(domain, job.source.make_domain) as make_worlds:

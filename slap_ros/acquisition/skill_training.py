@@ -150,7 +150,7 @@ class SkillTraining:
             How it went; the folder has the best policy.
 
         Raises:
-            ChildProcessError: The process that judged has ended.
+            ChildProcessError: A process that judged or stepped worlds has ended.
             InvalidParameterError: The folder is damaged.
         """
         if not (self.folder / ROUNDS).exists():

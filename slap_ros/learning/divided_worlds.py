@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Worlds of which half are in another process, so that two cores step them.
 
-They are worlds like any others: the next states are the same wherever they are computed. What is
-learned from several at once (:mod:`slap_ros.learning.subproc_vec_env`) need not be divided.
+The next states are the same wherever they are computed. Whole environments in other processes are
+:mod:`slap_ros.learning.subproc_vec_env`.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ class Workers(Protocol):
 
     @property
     def processes(self) -> int:
-        """The number of processes that a job may start where it is the only one."""
+        """How many cores a job may use where it is the only one."""
         ...
 
     def run(

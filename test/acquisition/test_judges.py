@@ -43,7 +43,7 @@ def test_a_round_is_the_same_whoever_judges_it(tmp_path, enough, segments):
     """Also where two good judgements in a row end it."""
     settings = replace(SETTINGS, enough=enough)
     here = jobs.learn(job(tmp_path / "here", settings))
-    elsewhere = jobs.learn(job(tmp_path / "elsewhere", settings), processes=2)
+    elsewhere = jobs.learn(job(tmp_path / "elsewhere", settings), cores=2)
     assert len(here["segments"]) == segments
     assert here == elsewhere
     assert files(tmp_path / "here") == files(tmp_path / "elsewhere")
@@ -66,7 +66,7 @@ def test_the_next_segment_is_learned_before_the_verdict(tmp_path, monkeypatch):
     noted(SkillLearner, "learn")
     noted(JudgeElsewhere, "begin")
     noted(JudgeElsewhere, "verdict")
-    jobs.learn(job(tmp_path, SETTINGS), processes=2)
+    jobs.learn(job(tmp_path, SETTINGS), cores=2)
     assert order == [*["begin", "learn", "verdict"] * SEGMENTS, "begin", "verdict"]
 
 
@@ -82,6 +82,6 @@ def test_a_judge_that_is_killed_is_noticed_and_the_same_job_goes_on(tmp_path, mo
 
     monkeypatch.setattr(JudgeElsewhere, "begin", killed)
     with pytest.raises(ChildProcessError, match="a process that stepped worlds ended"):
-        jobs.learn(job(tmp_path / "disturbed"), processes=2)
-    assert jobs.learn(job(tmp_path / "disturbed"), processes=2) == undisturbed
+        jobs.learn(job(tmp_path / "disturbed"), cores=2)
+    assert jobs.learn(job(tmp_path / "disturbed"), cores=2) == undisturbed
     assert files(tmp_path / "disturbed") == files(tmp_path / "undisturbed")
