@@ -38,7 +38,7 @@ THEN = replace(  # as the training was started then
 SHIPPED = {
     "obstacle2d": "08fbb4398d815697",
     "obstacle_tower": "9d0737ba67ae3d53",
-    "cluttered_drawer": "acfa279422f2e792",
+    "cluttered_drawer": "abc081bc0ca7a2a3",
     "cleanup_table": "51de94fd3e2bb078",
 }
 
