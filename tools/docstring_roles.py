@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from typing import Any
 
 import griffe
@@ -20,9 +21,7 @@ class Roles(griffe.Extension):
         """See :class:`griffe.Extension`."""
         for obj in _documented(pkg):
             if obj.docstring is not None:
-                obj.docstring.value = ROLE.sub(
-                    lambda m, o=obj: _link(o, m["name"]), obj.docstring.value
-                )
+                obj.docstring.value = ROLE.sub(partial(_link, obj), obj.docstring.value)
 
 
 def _documented(obj: griffe.Object) -> list[griffe.Object]:
@@ -30,8 +29,9 @@ def _documented(obj: griffe.Object) -> list[griffe.Object]:
     return [obj, *(found for each in inner for found in _documented(each))]
 
 
-def _link(obj: griffe.Object, name: str) -> str:
+def _link(obj: griffe.Object, role: re.Match[str]) -> str:
     """A link to what a name means where it is used; the name alone if it leads out of the API."""
+    name = role["name"]
     shown = f"`{name.removeprefix(OURS)}`"
     try:
         path = name if name.startswith(OURS) else obj.resolve(name)

@@ -65,6 +65,7 @@ def _imports_of(path: Path) -> Iterator[Import]:
     }
     for node in ast.walk(tree):
         for module in _modules(node):
+            assert isinstance(node, ast.Import | ast.ImportFrom)
             where = f"{path.relative_to(ROOT)}:{node.lineno}"
             yield Import(importer, package_of(module), where, id(node) not in for_types)
 

@@ -10,13 +10,16 @@ from __future__ import annotations
 
 import sys
 from itertools import product
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from slap_ros.bags import read_bag
 from slap_ros.messages.decode import stamp_ns
+from slap_ros.relational.state import Array
 from tools.imports import ROOT
 
 OUTPUT = ROOT / "docs" / "images" / "seeing.png"
@@ -31,21 +34,23 @@ FACES = [
 LARGE = 0.4  # m
 
 
-def turned(q: object, points: np.ndarray) -> np.ndarray:
+def turned(q: Any, points: Array) -> Array:
     """Points turned by a message's quaternion."""
     v = np.array([q.x, q.y, q.z])
     t = 2.0 * np.cross(v, points)
-    return points + q.w * t + np.cross(v, t)
+    moved: Array = points + q.w * t + np.cross(v, t)
+    return moved
 
 
-def box(marker: object) -> np.ndarray:
+def box(marker: Any) -> Array:
     """A marker's corners, m, shape (8, 3)."""
     size = np.array([marker.scale.x, marker.scale.y, marker.scale.z])
     at = np.array([marker.pose.position.x, marker.pose.position.y, marker.pose.position.z])
-    return turned(marker.pose.orientation, CORNERS * size) + at
+    corners: Array = turned(marker.pose.orientation, CORNERS * size) + at
+    return corners
 
 
-def draw_scene(axes: object, markers: list[object]) -> None:
+def draw_scene(axes: Axes3D, markers: list[Any]) -> None:
     """Boxes as they are in a MarkerArray."""
     tables = [marker for marker in markers if marker.scale.x > LARGE]
     # What is large goes first: painters sort faces by their middles.
@@ -64,7 +69,7 @@ def draw_scene(axes: object, markers: list[object]) -> None:
 
 def main(bag: str) -> None:
     """Draw a bag."""
-    by_topic: dict[str, list[tuple[float, object]]] = {}
+    by_topic: dict[str, list[tuple[float, Any]]] = {}  # messages have no types
     for topic, _, stamp, message in read_bag(bag):
         by_topic.setdefault(topic, []).append((stamp * 1e-9, message))
     scenes, joints = by_topic["/slap/markers"], by_topic["/joint_states"]
