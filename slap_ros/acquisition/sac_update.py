@@ -77,9 +77,9 @@ class LeanSac(SAC):
 
     @contextmanager
     def _threads(self) -> Iterator[None]:
-        """As many threads as there are cores for: one takes a critic each, the sums are the same.
+        """Two threads where there is a core for the second: a critic each, so that no sum changes.
 
-        Optimisers are left out: how they divide their work shows in the last digit.
+        Optimisers have one: how they divide their work shows in the last digit.
         """
         torch.set_num_threads(2 if self.core_to_spare() else 1)
         try:
