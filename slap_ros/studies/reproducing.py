@@ -109,7 +109,6 @@ PAPER_FIGURES = (
             "cluttered_drawer": "65 → 275 s",
             "cleanup_table": "34 → 201 s",
         },
-        "seconds would have been measured beside other jobs",
     ),
     PaperFigure(
         "SLAP Tables 5 and 6, D.3, D.4",
