@@ -79,7 +79,8 @@ class LeanSac(SAC):
     def _threads(self) -> Iterator[None]:
         """Two threads where there is a core for the second: a critic each, so that no sum changes.
 
-        Optimisers have one: how they divide their work shows in the last digit.
+        The actor has one: a second would divide the sums of its last layer's gradient, and that
+        shows in the last digit.
         """
         torch.set_num_threads(2 if self.core_to_spare() else 1)
         try:
