@@ -122,8 +122,8 @@ def learn(job: LearningJob, cores: int = 1) -> dict[str, Any]:
             settings,
             source.seed,
             job.folder,
-            job.attempt,
             make_worlds,
+            job.attempt,
         )
         outcome = training.run(job.number, accepted, judge, policy)
     return {**asdict(outcome), "refused": refused}

@@ -117,8 +117,8 @@ class SkillTraining:
         settings: All hyper-parameters.
         seed: Of the whole curriculum.
         folder: Where everything is kept.
+        make_worlds: Makes the domain's worlds that are learned in.
         attempt: How often the skill was learned from scratch before.
-        make_worlds: Makes the worlds that are learned in; by default as the domain itself does.
     """
 
     domain: Domain
@@ -127,8 +127,8 @@ class SkillTraining:
     settings: AcquisitionSettings
     seed: int
     folder: Path
+    make_worlds: MakeVectorWorld
     attempt: int = 0
-    make_worlds: MakeVectorWorld | None = None
     _rounds: list[Round] = field(default_factory=list, init=False)
 
     def run(

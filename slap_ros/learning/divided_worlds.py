@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import count
 from multiprocessing.connection import Connection
 
 import numpy as np
@@ -29,17 +30,15 @@ def divided_worlds(domain: Domain, make_domain: Callable[[], Domain]) -> Iterato
         domain: Whose worlds.
         make_domain: Makes the same domain in the other process; importable by its name.
     """
-    made = 0
+    numbers = count()
 
     def make(states: Sequence[State]) -> VectorWorld:
-        nonlocal made
         half = (len(states) + 1) // 2
         here, there = states[:half], states[half:]
         if not there:
             return domain.make_vector_world(here)
         send(link, _Made(there))
-        made += 1
-        return _DividedWorlds(domain.make_vector_world(here), there, link, made - 1)
+        return _DividedWorlds(domain.make_vector_world(here), there, link, next(numbers))
 
     with linked_process(_serve, make_domain) as link:
         yield make
@@ -62,7 +61,7 @@ class _DividedWorlds:
         self._here, self._link, self._number = here, link, number
         self._layout = here.states.layout
         self._count = len(here.states.data)
-        self._others = State.batch(there).data.copy()
+        self._others = np.stack([state.data for state in there])
 
     @property
     def states(self) -> State:

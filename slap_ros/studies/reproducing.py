@@ -90,7 +90,6 @@ PAPER_FIGURES = (
         "pruning",
         SLAP_DOMAINS,
         {"": "K/N up to 25%: 167 to 202 steps; from 30% on: 333 to 349"},
-        "not explored again since its library was trained",
     ),
     PaperFigure(
         "SLAP Table 3",
@@ -141,7 +140,6 @@ PAPER_FIGURES = (
         "generalisation",
         SLAP_DOMAINS,
         {"": "bars"},
-        "about 0.3 core-hours with 20 tasks",
     ),
     _figure_not_made(
         "SLAP Fig. 6",
@@ -166,7 +164,6 @@ PAPER_FIGURES = (
             "peg_in_hole": "training 0.92, test1 0.59, test2 0.93",
             "stack_at_target": "1.00",
         },
-        "no library of skills ships",
     ),
     _figure_not_made(
         "LG-SAIL Table 2",

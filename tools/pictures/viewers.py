@@ -18,8 +18,8 @@ from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from slap_ros.bags import read_bag
+from slap_ros.geometry.rotations import Array, rotate_each
 from slap_ros.messages.decode import stamp_ns
-from slap_ros.relational.state import Array
 from tools.imports import ROOT
 
 OUTPUT = ROOT / "docs" / "images" / "seeing.png"
@@ -34,19 +34,13 @@ FACES = [
 LARGE = 0.4  # m
 
 
-def turned(q: Any, points: Array) -> Array:
-    """Points turned by a message's quaternion."""
-    v = np.array([q.x, q.y, q.z])
-    t = 2.0 * np.cross(v, points)
-    moved: Array = points + q.w * t + np.cross(v, t)
-    return moved
-
-
 def box(marker: Any) -> Array:
     """A marker's corners, m, shape (8, 3)."""
     size = np.array([marker.scale.x, marker.scale.y, marker.scale.z])
     at = np.array([marker.pose.position.x, marker.pose.position.y, marker.pose.position.z])
-    corners: Array = turned(marker.pose.orientation, CORNERS * size) + at
+    turn = marker.pose.orientation
+    quaternion = np.array([turn.x, turn.y, turn.z, turn.w])
+    corners: Array = rotate_each(quaternion, CORNERS * size) + at
     return corners
 
 
