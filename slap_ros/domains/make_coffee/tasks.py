@@ -53,7 +53,7 @@ class CoffeeTasks(TaskSettings):
         "holder_x": (0.47, 0.55),
         "holder_y": (-0.25, -0.1),
         "holder_turn": (-0.3, 0.3),
-        "lid": (1.6, 2.0),
+        "lid": (1.6, 2.1),
     }
 
     front_x: Range = (0.48, 0.52)
@@ -64,7 +64,7 @@ class CoffeeTasks(TaskSettings):
     holder_x: Range = (0.49, 0.53)
     holder_y: Range = (-0.19, -0.15)
     holder_turn: Range = (-0.15, 0.15)
-    lid: Range = (1.75, 2.0)
+    lid: Range = (1.9, 2.05)
 
     def sample(self, rng: np.random.Generator) -> Task:
         """A task with the training goal."""
