@@ -55,7 +55,7 @@ INSERTED = 0.006  # between the axes of pod and holder, whose walls leave 4 mm t
 INSIDE = 0.07  # from the middle of the drawer, whose walls leave a pod less
 LIFTED_OUT = 0.02  # over the drawer's floor
 UPRIGHT = math.radians(15.0)  # a pod that leans more catches on the walls of the holder
-LID_OPEN, LID_CLOSED = math.radians(60.0), math.radians(15.0)
+LID_OPEN, LID_CLOSED = math.radians(60.0), math.radians(5.0)
 
 
 # -- metrics --------------------------------------------------------------------------------------
