@@ -19,7 +19,7 @@ from slap_ros.domains.benchtop.features import jointed_features, thing_features
 from slap_ros.domains.benchtop.presets import STEP_LIMIT
 from slap_ros.domains.benchtop.tasks import Range
 from slap_ros.domains.make_coffee.model import GOALS
-from slap_ros.domains.make_coffee.scenery import BOTTOM, HOLDER, POD, POD_HALF
+from slap_ros.domains.make_coffee.scenery import BOTTOM, HOLDER, LID_HIGH, POD, POD_HALF
 from slap_ros.domains.variation import TaskSettings
 from slap_ros.geometry.pose import Pose, from_yaw
 from slap_ros.relational import Object, State
@@ -53,7 +53,7 @@ class CoffeeTasks(TaskSettings):
         "holder_x": (0.47, 0.55),
         "holder_y": (-0.25, -0.1),
         "holder_turn": (-0.3, 0.3),
-        "lid": (1.6, 2.1),
+        "lid": (1.6, LID_HIGH),
     }
 
     front_x: Range = (0.48, 0.52)
