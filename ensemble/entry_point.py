@@ -4,9 +4,9 @@
 
 from __future__ import annotations
 
-import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import rclpy
 from rclpy.exceptions import ParameterException
@@ -14,7 +14,6 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
 from ensemble.network import start_node
-from ensemble.startup import leave_quietly
 from slap_ros.errors import ErrorCode, SlapError
 from slap_ros.signals import forget_interrupt
 
@@ -25,16 +24,31 @@ def run_node(name: str, make: Callable[[], Node]) -> int:
     Returns:
         Exit code: 0 after a signal, else the error's code, whose message went to stderr.
     """
+    with _quiet_destructors():
+        try:
+            return _run(name, make)
+        finally:
+            rclpy.try_shutdown()
+
+
+@contextmanager
+def _quiet_destructors() -> Iterator[None]:
+    """Say nothing of a Ctrl-C that falls into a destructor, from which nothing can be raised.
+
+    rclpy has shut the context down by then, which ends the node as well.
+    """
+    hook = sys.unraisablehook
+    sys.unraisablehook = lambda unraisable: (
+        None if isinstance(unraisable.exc_value, KeyboardInterrupt) else hook(unraisable)
+    )
     try:
-        return _run(name, make)
+        yield
     finally:
-        rclpy.try_shutdown()
+        sys.unraisablehook = hook
 
 
 def _run(name: str, make: Callable[[], Node]) -> int:
     try:
-        if signal.getsignal(signal.SIGINT) is leave_quietly:
-            signal.signal(signal.SIGINT, signal.default_int_handler)  # for rclpy to go on with
         _spin(make)
     except (KeyboardInterrupt, ExternalShutdownException):
         forget_interrupt()

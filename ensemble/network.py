@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
@@ -17,6 +18,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from ensemble.loopback import loopback_only
+from ensemble.startup import leave_quietly
 from slap_ros.doctor import settings
 from slap_ros.errors import InvalidParameterError
 
@@ -50,6 +52,8 @@ def join_network(**options: Any) -> None:
     for fault in settings.impossible():
         raise InvalidParameterError(f"{fault.found}. {fault.advice}")
     os.environ.setdefault(DISCOVERY_RANGE, "LOCALHOST")
+    if signal.getsignal(signal.SIGINT) is leave_quietly:
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # for rclpy to go on with
     try:
         rclpy.init(**options)
     except (RCLError, UnknownROSArgsError) as error:

@@ -111,6 +111,36 @@ def test_a_node_stops_cleanly(network, tmp_path, name, stop):
     assert "Traceback" not in out + err
 
 
+INTERRUPTED_DESTRUCTOR = """
+import os, signal, sys, time
+import rclpy
+from ensemble.entry_point import run_node
+
+class Destroyed:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(1)
+
+def make():
+    Destroyed()
+    return rclpy.create_node("late")
+
+sys.exit(run_node("late", make))
+"""
+
+
+def test_ctrl_c_in_a_destructor_ends_a_node_without_a_word(network):
+    """Nothing can be raised from there: Python prints the error, and goes on."""
+    process = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED_DESTRUCTOR],
+        capture_output=True,
+        text=True,
+        timeout=LIMIT,
+    )
+    assert process.returncode == 0, process.stderr
+    assert "KeyboardInterrupt" not in process.stdout + process.stderr
+
+
 @pytest.mark.parametrize("victim", ["perception_node", "skill_server", "planner_node"])
 def test_a_node_that_comes_back_is_taken_up_again(network, victim):
     nodes = parameters()
