@@ -39,7 +39,7 @@ SHIPPED = {
     "obstacle2d": "08fbb4398d815697",
     "obstacle_tower": "9d0737ba67ae3d53",
     "cluttered_drawer": "abc081bc0ca7a2a3",
-    "cleanup_table": "51de94fd3e2bb078",
+    "cleanup_table": "2f43a9c8c75d0c79",
 }
 
 
