@@ -119,7 +119,6 @@ PAPER_FIGURES = (
             "cluttered_drawer": "thresholds in [w/2, w]: 54 → 92%, in [w, 2w]: 63 → 0%",
             "obstacle_tower": "stochastic: 84 → 92%; top block hidden: 2 → 78%",
         },
-        "hours of planning again in these domains",
     ),
     _figure_not_made(
         "SLAP Tables 7 and 8",
@@ -133,7 +132,6 @@ PAPER_FIGURES = (
         "dynamics",
         SLAP_DOMAINS,
         {"": "curves"},
-        "the work folders of these trainings were not kept",
     ),
     PaperFigure(
         "SLAP Fig. 5",
