@@ -5,8 +5,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 
 import rclpy
 from rclpy.exceptions import ParameterException
@@ -15,7 +14,7 @@ from rclpy.node import Node
 
 from ensemble.network import start_node
 from slap_ros.errors import ErrorCode, SlapError
-from slap_ros.signals import forget_interrupt
+from slap_ros.signals import forget_interrupt, interrupts_in_destructors
 
 
 def run_node(name: str, make: Callable[[], Node]) -> int:
@@ -24,27 +23,15 @@ def run_node(name: str, make: Callable[[], Node]) -> int:
     Returns:
         Exit code: 0 after a signal, else the error's code, whose message went to stderr.
     """
-    with _quiet_destructors():
+    with interrupts_in_destructors(_say_nothing):
         try:
             return _run(name, make)
         finally:
             rclpy.try_shutdown()
 
 
-@contextmanager
-def _quiet_destructors() -> Iterator[None]:
-    """Say nothing of a Ctrl-C that falls into a destructor, from which nothing can be raised.
-
-    rclpy has shut the context down by then, which ends the node as well.
-    """
-    hook = sys.unraisablehook
-    sys.unraisablehook = lambda unraisable: (
-        None if isinstance(unraisable.exc_value, KeyboardInterrupt) else hook(unraisable)
-    )
-    try:
-        yield
-    finally:
-        sys.unraisablehook = hook
+def _say_nothing(_: KeyboardInterrupt) -> None:
+    """Leave it: rclpy has shut the context down by then, which ends the node as well."""
 
 
 def _run(name: str, make: Callable[[], Node]) -> int:

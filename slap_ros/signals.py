@@ -13,7 +13,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 
@@ -59,16 +59,36 @@ def signals_raised() -> Iterator[None]:
         TerminatedError: SIGTERM arrived.
     """
     ours = [number for number in WORDS if signal.getsignal(number) is _exit_at_once]
-    hook = sys.unraisablehook
     for number in ours:
         signal.signal(number, _raise)
-    sys.unraisablehook = _send_again
+    try:
+        with interrupts_in_destructors(_send_again):
+            yield
+    finally:
+        for number in ours:
+            signal.signal(number, _exit_at_once)
+
+
+@contextmanager
+def interrupts_in_destructors(handle: Callable[[KeyboardInterrupt], None]) -> Iterator[None]:
+    """Have each KeyboardInterrupt handled that falls where nothing can be raised, not printed.
+
+    Args:
+        handle: Called with it, in the destructor or weak reference's callback that it fell into.
+    """
+    hook = sys.unraisablehook
+
+    def sort(unraisable: sys.UnraisableHookArgs) -> None:
+        if isinstance(unraisable.exc_value, KeyboardInterrupt):
+            handle(unraisable.exc_value)
+        else:
+            hook(unraisable)
+
+    sys.unraisablehook = sort
     try:
         yield
     finally:
         sys.unraisablehook = hook
-        for number in ours:
-            signal.signal(number, _exit_at_once)
 
 
 @contextmanager
@@ -110,12 +130,8 @@ def _raise(number: int, _: FrameType | None) -> None:
     raise TerminatedError if number == signal.SIGTERM else KeyboardInterrupt
 
 
-def _send_again(unraisable: sys.UnraisableHookArgs) -> None:
+def _send_again(error: KeyboardInterrupt) -> None:
     """Deliver a signal once more that arrived in a destructor, from which nothing can be raised."""
-    error = unraisable.exc_value
-    if not isinstance(error, KeyboardInterrupt):
-        sys.__unraisablehook__(unraisable)
-        return
     number = signal.SIGTERM if isinstance(error, TerminatedError) else signal.SIGINT
     timer = threading.Timer(AGAIN_S, os.kill, (os.getpid(), number))
     timer.daemon = True
