@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Perception with noise and lost sightings, and what is done about them.
 
-Poses are measured, put where physics would have them, and abstracted with thresholds that are not
-quite right; then atoms are debounced. The planner plans from the poses, not from the debounced
-atoms: its model has predicates of its own, and the two must agree where a plan begins.
+Poses are measured, those that err put where physics would have them, and abstracted with
+thresholds that are not quite right; then atoms are debounced. The planner plans from the poses, not
+from the debounced atoms: its model has predicates of its own, and the two must agree where a plan
+begins.
 """
 
 from __future__ import annotations
@@ -62,13 +63,15 @@ class NoisyPerceiver:
         return cls(domain, space, quality, rng, sensor, Debouncer(quality.debounce))
 
     def perceive(self, state: State) -> Percept:
-        """Measure a state, settle what rests, then abstract and debounce.
+        """Measure a state, settle what rests if poses err, then abstract and debounce.
 
         See :class:`~slap_ros.perception.percept.Perceiver`.
         """
         measured = self.sensor.measure(state)
         missing = self.sensor.missing
-        seen = self.domain.execution.settle(known_part(measured, missing))
+        seen = known_part(measured, missing)
+        if not self.quality.exact_poses:
+            seen = self.domain.execution.settle(seen)
         abstract = self.debouncer.add(self._abstract(seen))
         return Percept(seen, abstract, missing, self.quality.exact)
 

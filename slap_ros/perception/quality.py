@@ -66,10 +66,15 @@ class Quality:
             )
 
     @property
+    def exact_poses(self) -> bool:
+        """Whether what is seen is where it is seen."""
+        return self.position_noise_m == 0.0 and self.turn_noise_rad == 0.0
+
+    @property
     def exact(self) -> bool:
         """Whether nothing is perceived otherwise than it is."""
-        noise = self.position_noise_m, self.turn_noise_rad, self.threshold_noise, self.dropout
-        return not any(noise) and not self.hidden and self.debounce == 1
+        exact = self.exact_poses and self.threshold_noise == 0.0 and self.dropout == 0.0
+        return exact and not self.hidden and self.debounce == 1
 
     @property
     def debounce_delay_steps(self) -> int:

@@ -61,13 +61,14 @@ def levelled(pose: Pose) -> Pose | None:
 def _put_down(pose: Pose, body: Body, below: Sequence[OrientedBox]) -> Pose | None:
     """On the highest top near its bottom, if there is one."""
     x, y, z = pose.position
-    box = body.at(pose)
-    half = box.half_extent(UP)
-    tops = [other.top for other in below if _under((x, y), box, other)]
-    near = [top for top in tops if abs(z - half - top) <= FLOATING]
+    box = body.at(pose)  # whose middle need not be the body's origin
+    middle_x, middle_y, middle_z = box.pose.position
+    bottom = middle_z - box.half_extent(UP)
+    tops = [other.top for other in below if _under((middle_x, middle_y), box, other)]
+    near = [top for top in tops if abs(bottom - top) <= FLOATING]
     if not near:
         return None
-    return Pose((x, y, max(near) + half), pose.quaternion)
+    return Pose((x, y, z + max(near) - bottom), pose.quaternion)
 
 
 def _under(place: tuple[float, float], box: OrientedBox, other: OrientedBox) -> bool:

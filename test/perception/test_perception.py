@@ -105,6 +105,23 @@ def test_what_lies_still_is_seen_to_lie_on_something():
     assert positions(seen)["block1"][0] != positions(task.initial_state)["block1"][0]
 
 
+def test_toys_whose_centre_of_mass_is_not_in_their_middle_are_seen_to_lie_where_they_lie():
+    table = get_domain("cleanup_table")
+    state = table.task(1).initial_state
+    np.testing.assert_allclose(table.execution.settle(state).data, state.data, atol=1e-9)
+
+
+def test_poses_that_do_not_err_are_not_corrected():
+    tower = get_domain("obstacle_tower")
+    task = tower.task(1)
+    block = task.initial_state.layout.by_name["block1"]
+    leaning = {(block, "qx"): np.sin(0.05), (block, "qw"): np.cos(0.05)}
+    state = task.initial_state.replace(leaning)
+    assert tower.execution.settle(state) != state
+    late = perceiver(Quality(threshold_noise=0.001, debounce=2), tower, task)
+    assert late.perceive(state).state == state
+
+
 def test_blocks_of_a_row_are_not_seen_inside_one_another():
     one = perceiver(Quality(position_noise_m=0.02))
     for _ in range(200):
