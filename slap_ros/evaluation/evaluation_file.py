@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +39,7 @@ def write_evaluation(
         **origin,
         "versions": dict(versions()),
         "approaches": [
-            {**summary.as_row(), "trials": [asdict(trial) for trial in trials]}
+            {**summary.as_row(), "trials": [trial.as_json() for trial in trials]}
             for summary, trials in results
         ],
     }

@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 from slap_ros.acquisition.domain_choice import SHIPPED, DomainChoice, open_domain
@@ -15,6 +16,9 @@ from slap_ros.evaluation.approaches import PURE_PLANNING, Approach
 from slap_ros.learning.workers import local_workers
 from slap_ros.planning.execution import EpisodeResult, ExecutedEdge, Executor
 from slap_ros.relational import GroundAtom
+
+# What is true of most edges is left out of their JSON, which would be twice as large with it.
+MOST_EDGES: Mapping[str, Any] = MappingProxyType({"kind": "operator", "reached": True})
 
 
 @dataclass(frozen=True)
@@ -168,11 +172,21 @@ class Trial:
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Trial:
-        """The trial that :func:`dataclasses.asdict` made such data of."""
+        """The trial that :meth:`as_json` or :func:`dataclasses.asdict` made such data of."""
         edges = tuple(
-            ExecutedEdge(**edge | {"objects": tuple(edge["objects"])}) for edge in data["edges"]
+            ExecutedEdge(**{**MOST_EDGES, **edge, "objects": tuple(edge["objects"])})
+            for edge in data["edges"]
         )
         return cls(**{**data, "edges": edges})
+
+    def as_json(self) -> dict[str, Any]:
+        """Its fields; edges without the fields in which they are like most (`MOST_EDGES`)."""
+        data = asdict(self)
+        edges = [
+            {key: value for key, value in edge.items() if value != MOST_EDGES.get(key)}
+            for edge in data["edges"]
+        ]
+        return {**data, "edges": edges}
 
 
 def run_all(experiment: Experiment, approach: Approach, jobs: int) -> Iterator[Trial]:

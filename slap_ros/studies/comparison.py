@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, TypeVar
 
 from slap_ros.acquisition.domain_choice import DomainChoice, open_domain
@@ -71,7 +71,7 @@ class ApproachResult:
 
     def as_json(self) -> dict[str, Any]:
         """The summary and every trial, for a report's JSON."""
-        return {**self.summary.as_row(), "trials": [asdict(trial) for trial in self.trials]}
+        return {**self.summary.as_row(), "trials": [trial.as_json() for trial in self.trials]}
 
 
 @dataclass(frozen=True)

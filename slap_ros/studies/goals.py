@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
@@ -205,7 +205,7 @@ def _as_json(outcome: GoalTrials, names: Sequence[str]) -> dict[str, Any]:
     first = outcome.trials[0]
     whose = {"seed": first.seed, "index": first.index}
     trials = [
-        {key: value for key, value in asdict(trial).items() if key not in whose}
+        {key: value for key, value in trial.as_json().items() if key not in whose}
         for trial in outcome.trials
     ]
     return {**whose, "goal": _words(outcome.goal), **dict(zip(names, trials, strict=True))}

@@ -65,7 +65,7 @@ class LibraryPlans:
 
     def as_json(self) -> dict[str, Any]:
         """The summary and every trial, for the report's JSON."""
-        return {**self.summary(), "trials": [asdict(trial) for trial in self.trials]}
+        return {**self.summary(), "trials": [trial.as_json() for trial in self.trials]}
 
     def as_cells(self) -> list[str]:
         """For a row of a table."""

@@ -163,7 +163,7 @@ class Row:
                 {
                     "library": result.library or None,
                     "relative_length": _relative(result.trials, self.baseline),
-                    "trials": [asdict(trial) for trial in result.trials],
+                    "trials": [trial.as_json() for trial in result.trials],
                 }
                 for result in self.results
             ],

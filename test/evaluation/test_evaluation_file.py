@@ -4,6 +4,7 @@
 
 import json
 import shlex
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,8 @@ from typer.testing import CliRunner
 
 from ensemble.cli.application import app
 from slap_ros.errors import ErrorCode
+from slap_ros.evaluation.experiment import Trial
+from slap_ros.planning.execution import ExecutedEdge
 
 LIBRARY = Path(__file__).parent.parent / "shortcuts" / "data" / "obstacle2d"
 COMMAND = ["evaluate", "obstacle2d", "--tasks", "2", "--seeds", "2", "--first-seed", "500"]
@@ -39,7 +42,7 @@ def test_the_figures_are_those_of_the_trials(file):
         assert row["plan_length"]["mean"] == pytest.approx(sum(lengths) / len(lengths))
         for trial in trials:
             assert sum(edge["steps"] for edge in trial["edges"]) == trial["plan_length"]
-            learned = [e["steps"] for e in trial["edges"] if e["kind"] == "shortcut"]
+            learned = [e["steps"] for e in trial["edges"] if e.get("kind") == "shortcut"]
             assert sum(learned) == trial["shortcut_steps"]
     assert data["library"]["name"] == "obstacle2d"
 
@@ -63,6 +66,20 @@ def test_its_command_makes_it_again(file, tmp_path, more):
         ]
 
     assert rows(again) == rows(file)
+
+
+def test_an_edge_says_only_what_is_not_true_of_most():
+    edges = (
+        ExecutedEdge("PickUp", ("robot", "block0"), "operator", 7, True),
+        ExecutedEdge("push", ("block0", "target"), "shortcut", 5, True),
+        ExecutedEdge("PutDown", ("robot", "block0"), "operator", 3, False),
+    )
+    trial = Trial(500, 0, False, 15, 5, 0.25, 9, "stopped short", edges=edges)
+    data = trial.as_json()
+    assert [edge.get("kind", "given") for edge in data["edges"]] == ["given", "shortcut", "given"]
+    assert [edge.get("reached", "so") for edge in data["edges"]] == ["so", "so", False]
+    assert Trial.from_json(json.loads(json.dumps(data))) == trial
+    assert Trial.from_json(json.loads(json.dumps(asdict(trial)))) == trial  # of earlier versions
 
 
 def test_the_data_of_another_command_stays(file):
