@@ -59,8 +59,9 @@ def _joints_above(height: float) -> Features:
 
 def _joints_off_target(state: State, hand: Array, column: Column) -> Array:
     """Which joints push blocks away from the target."""
-    off = np.pad(_off_target(state, column), ((0, 0), (0, 0), (0, 1)))
-    return observation.joint_contributions(hand, off)
+    off = _off_target(state, column)
+    level = np.concatenate([off, np.zeros((*off.shape[:2], 1))], axis=-1)
+    return observation.joint_contributions(hand, level)
 
 
 def _off_target(state: State, column: Column) -> Array:

@@ -50,7 +50,8 @@ def hand_frame_and_velocities(state: State) -> Array:
     frame = _hand_frame(links)
     levers = frame[:, None, :3, 3] - links[:, :, :3, 3]
     moves = np.cross(links[:, :, :3, 2], levers) * np.array(MAX_STEP)[:, None]
-    beside = np.pad(moves, ((0, 0), (0, 0), (0, 1))).swapaxes(1, 2)
+    last = np.zeros((len(moves), 1, moves.shape[1]))
+    beside = np.concatenate([moves.swapaxes(1, 2), last], axis=1)
     return np.concatenate([frame, beside], axis=-1)
 
 
