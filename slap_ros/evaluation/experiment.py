@@ -180,7 +180,7 @@ class Trial:
         return cls(**{**data, "edges": edges})
 
     def as_json(self) -> dict[str, Any]:
-        """Its fields; edges without the fields in which they are like most (`MOST_EDGES`)."""
+        """Its fields; edges without the fields in which they are like most (:data:`MOST_EDGES`)."""
         data = asdict(self)
         edges = [
             {key: value for key, value in edge.items() if value != MOST_EDGES.get(key)}

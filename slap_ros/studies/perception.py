@@ -42,8 +42,9 @@ standard deviation given, and new in each step. Position noise comes with 5 mrad
 mm, where things can turn; threshold noise moves the threshold of each predicate of each atom;
 a sighting that is lost leaves an object where it was last seen; debounced atoms change once they
 were perceived as changed so many times in a row, and a skill then holds at its end for as long.
-What lies still is put where physics would have it before a plan is made of it. At each divergence,
-and where no plan can be made of what is seen, there is a new plan, up to the limit given below.
+Where poses err, what lies still is put where physics would have it before a plan is made of it. At
+each divergence, and where no plan can be made of what is seen, there is a new plan, up to the limit
+given below.
 
 A task is solved if the planner says so and its goal holds in the world. Length is the number of
 environment steps executed, mean ± sample standard deviation over solved tasks; replans are over

@@ -20,7 +20,6 @@ SLAP_DOMAINS = ("obstacle2d", "obstacle_tower", "cluttered_drawer", "cleanup_tab
 NOT_RUN, NOT_MEASURED = "not run", "not measured"
 # Minutes of one core, as measured on the machine that made the published figures.
 MINUTES: Mapping[str, int] = {
-    "table1_obstacle_tower": 10,
     "replanning_stow_hammer": 6,
     "replanning_peg_in_hole": 3,
 }

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Draws ``images/seeing.png`` from a bag: what viewers are sent, drawn without one.
 
-slap run obstacle_tower --seed 1 --record BAG
+slap run obstacle_tower --seed 1 --pace 1 --record BAG
 python -m tools.pictures.viewers BAG
 """
 
