@@ -51,6 +51,11 @@ class OrientedBox(NamedTuple):
         """Height of its highest point, m."""
         return self.pose.position[2] + self.half_extent(UP)
 
+    @property
+    def bottom(self) -> float:
+        """Height of its lowest point, m."""
+        return self.pose.position[2] - self.half_extent(UP)
+
     def corners(self) -> list[Vector]:
         """The eight corners, m, seen from outside."""
         x, y, z = self.half

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from slap_ros.geometry.oriented_box import UP, OrientedBox
+from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, Vector, multiply, normalised, rotate
 from slap_ros.physics.scene import Body
 
@@ -60,19 +60,19 @@ def levelled(pose: Pose) -> Pose | None:
 
 def _put_down(pose: Pose, body: Body, below: Sequence[OrientedBox]) -> Pose | None:
     """On the highest top near its bottom, if there is one."""
-    x, y, z = pose.position
     box = body.at(pose)  # whose middle need not be the body's origin
-    middle_x, middle_y, middle_z = box.pose.position
-    bottom = middle_z - box.half_extent(UP)
-    tops = [other.top for other in below if _under((middle_x, middle_y), box, other)]
+    bottom = box.bottom
+    tops = [other.top for other in below if _under(box, other)]
     near = [top for top in tops if abs(bottom - top) <= FLOATING]
     if not near:
         return None
+    x, y, z = pose.position
     return Pose((x, y, z + max(near) - bottom), pose.quaternion)
 
 
-def _under(place: tuple[float, float], box: OrientedBox, other: OrientedBox) -> bool:
+def _under(box: OrientedBox, other: OrientedBox) -> bool:
     """Whether a box's middle is over another one, or beside it by less than it is wide."""
-    x, y, z = other.pose.inverse().apply((*place, other.pose.position[2]))
+    middle_x, middle_y, _ = box.pose.position
+    x, y, z = other.pose.inverse().apply((middle_x, middle_y, other.pose.position[2]))
     reach = min(box.half)
     return all(abs(a) <= half + reach for a, half in zip((x, y, z), other.half, strict=True))
