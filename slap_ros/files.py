@@ -3,22 +3,26 @@
 """Reading what somebody else may have written: regular files of a stated size, bounded nesting.
 
 A name may stand for a pipe that nobody writes to, a device without end, a file that claims
-terabytes. Whatever is read goes through here, so that reading ends, and in bounded memory.
+terabytes. Whatever is read goes through here, so that reading ends, and in bounded memory. What is
+written goes through here where another process may read or write it meanwhile.
 """
 
 from __future__ import annotations
 
 import errno
+import fcntl
 import json
 import os
 import stat
 import tempfile
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import yaml
+
+from slap_ros.errors import BusyError
 
 MAX_BYTES = 64 * 2**20  # of a file that is read at once, where its reader states no other limit
 JSON_LINE = 1000  # characters, beside the indentation: what fits, as most trials do, is not broken
@@ -135,6 +139,41 @@ def write_whole(path: Path, text: str) -> None:
     finally:  # after Ctrl-C too
         with suppress(OSError):
             draft.unlink(missing_ok=True)
+
+
+def require_sole_use(descriptor: int, path: Path) -> None:
+    """Lock an open file or folder for this process, until it closes it or ends, however it ends.
+
+    Args:
+        descriptor: Of what is open.
+        path: Of the same, for the complaint.
+
+    Raises:
+        BusyError: Another process has locked it.
+    """
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise BusyError(
+            f"another process is at work on {path}: wait until it has ended, or stop it"
+        ) from None
+
+
+@contextmanager
+def sole_use(folder: Path) -> Iterator[None]:
+    """Be the only process that works in a folder; it is made where there is none.
+
+    Raises:
+        BusyError: Another one does.
+        OSError: It can be neither made nor opened.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        require_sole_use(descriptor, folder)
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def parse_json(text: str | bytes) -> Any:

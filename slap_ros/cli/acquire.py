@@ -44,7 +44,7 @@ from slap_ros.core import Domain
 from slap_ros.core.goals import task_with_goal
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
-from slap_ros.files import require_writable
+from slap_ros.files import require_writable, sole_use
 from slap_ros.language.settings import LOCAL_SCHEME, read_settings
 from slap_ros.learning.setting_changes import changed, parse_changes
 from slap_ros.learning.work_folder import WorkFolder
@@ -201,16 +201,20 @@ def acquire(options: AcquireOptions, proposers: ProposerOptions) -> int:
     require_torch()
     goal = options.goal if options.goal is not None else next(iter(domain.goals), "")
     events = AcquisitionEvents(segment_steps if options.events else None)
-    proposed = _proposed(domain, options, proposers, goal, events)
-    proposal = proposed.proposal
-    events.proposed(proposal)
-    source = TaskSource.of(domain, goal, options.seed, proposal.operators, proposal.rewards)
-    kept = _kept(options.keep, there, proposal)
-    with training_workers(options.jobs, options.ray) as workers, AcquisitionBars(events) as bars:
-        curriculum = Curriculum(
-            source, settings, options.work_folder, workers, bars, known, encoder, kept
-        )
-        library = curriculum.run()
+    with sole_use(options.work_folder):
+        proposed = _proposed(domain, options, proposers, goal, events)
+        proposal = proposed.proposal
+        events.proposed(proposal)
+        source = TaskSource.of(domain, goal, options.seed, proposal.operators, proposal.rewards)
+        kept = _kept(options.keep, there, proposal)
+        with (
+            training_workers(options.jobs, options.ray) as workers,
+            AcquisitionBars(events) as bars,
+        ):
+            curriculum = Curriculum(
+                source, settings, options.work_folder, workers, bars, known, encoder, kept
+            )
+            library = curriculum.run()
     made_by = {
         "command": options.command(proposers),
         **proposed.as_record(),

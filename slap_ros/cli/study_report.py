@@ -72,16 +72,17 @@ def make_report(
         make: Makes the report.
 
     Raises:
+        BusyError: Another process makes it.
         InvalidParameterError: What is done so far is of another study, or the data there is.
         OSError: Nothing can be written there.
     """
     require_replaceable(output, study, origin)
-    log = StudyLog(output / f".{study}_{origin.domain}.jsonl", origin)
-    with StudyBars() as bars:
-        report = make(JobRunner(log, jobs, bars))
-    paths = write(output, report, origin, log.cpu_seconds)
-    console.print(f"{report.title}: {', '.join(map(str, paths))}")
-    log.remove()
+    with StudyLog(output / f".{study}_{origin.domain}.jsonl", origin) as log:
+        with StudyBars() as bars:
+            report = make(JobRunner(log, jobs, bars))
+        paths = write(output, report, origin, log.cpu_seconds)
+        console.print(f"{report.title}: {', '.join(map(str, paths))}")
+        log.remove()
 
 
 class StudyBars:

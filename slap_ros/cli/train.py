@@ -24,7 +24,7 @@ from slap_ros.cli.options import DomainName, Json, Preset, Ray, TrainingSeed
 from slap_ros.cli.skill_choice import Skills, open_chosen
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError
-from slap_ros.files import require_writable
+from slap_ros.files import require_writable, sole_use
 from slap_ros.learning.setting_changes import changed, parse_changes
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.workers import Workers, local_workers, ray_workers
@@ -127,7 +127,11 @@ def train(options: TrainOptions) -> int:
     require_torch()
     began, folder = monotonic(), options.library_folder
     distribution = TaskDistribution(DomainChoice.of(domain, options.skills), options.seed)
-    with training_workers(options.jobs, options.ray) as workers, _TrainingBars() as bars:
+    with (
+        sole_use(options.work_folder),
+        training_workers(options.jobs, options.ray) as workers,
+        _TrainingBars() as bars,
+    ):
         library = Training(distribution, settings, options.work_folder, workers, bars).run()
     made_by: dict[str, Any] = {"command": options.command}
     if acquired := describe_skills(domain):

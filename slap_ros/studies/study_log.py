@@ -5,33 +5,51 @@
 from __future__ import annotations
 
 import json
+from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
-from slap_ros.errors import InvalidParameterError
-from slap_ros.files import parse_json, read_text
+from slap_ros.errors import BusyError, InvalidParameterError
+from slap_ros.files import parse_json, read_text, require_regular, require_sole_use
 from slap_ros.studies.results import Provenance
 
 
 class StudyLog:
-    """A file of JSON lines: which study it is, then the result of a job per line, as they end."""
+    """A file of JSON lines: which study it is, then the result of a job per line, as they end.
+
+    A context manager. There is a file from the first result on, and while it is open, no other
+    process opens it.
+    """
 
     def __init__(self, path: Path, origin: Provenance) -> None:
-        """Open the log of a study; there is a file from the first result on.
+        """Open the log of a study.
 
         Args:
             path: Of the file.
             origin: From what the study is made; a log of another one is refused.
 
         Raises:
+            BusyError: Another process has it open.
             InvalidParameterError: It is the log of another study, or none.
-            OSError: It cannot be read.
+            OSError: It cannot be read or written.
         """
         self.path = path
         self.results: dict[str, Any] = {}  # by the job's name
         self.cpu_seconds = 0.0  # of all jobs so far
         self._header = {"command": origin.command, "settings": origin.settings}
-        self._begun = path.exists() and self._read()
+        self._file: TextIO | None = None
+        if path.exists():
+            with ExitStack() as unless_refused:
+                self._file = unless_refused.enter_context(self._open())
+                self._read(self._file)
+                unless_refused.pop_all()
+
+    def __enter__(self) -> StudyLog:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._file is not None:
+            self._file.close()
 
     def add(self, job: str, result: Any, cpu_seconds: float) -> None:
         """Write what a job came to.
@@ -42,15 +60,17 @@ class StudyLog:
             cpu_seconds: Of the processor, that it took.
 
         Raises:
+            BusyError: Another process began the same study and had a result before.
             OSError: It cannot be written.
         """
-        lines = [{"job": job, "result": result, "cpu_seconds": cpu_seconds}]
-        if not self._begun:
+        if self._file is None:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            lines.insert(0, self._header)
-        with self.path.open("a" if self._begun else "w", encoding="utf-8") as file:
-            file.write("".join(map(_line, lines)))
-        self._begun = True
+            self._file = self._open()
+        if not self.results:
+            self._file.truncate(0)
+            self._file.write(_line(self._header))
+        self._file.write(_line({"job": job, "result": result, "cpu_seconds": cpu_seconds}))
+        self._file.flush()
         self.results[job] = result
         self.cpu_seconds += cpu_seconds
 
@@ -58,25 +78,35 @@ class StudyLog:
         """Remove the file, once its study is written."""
         self.path.unlink(missing_ok=True)
 
-    def _read(self) -> bool:
-        """Whether the file has more than the beginning of its first line."""
+    def _open(self) -> TextIO:
+        if self.path.exists():
+            require_regular(self.path)
+        file = self.path.open("a", encoding="utf-8")
+        try:
+            require_sole_use(file.fileno(), self.path)
+        except BusyError:
+            file.close()
+            raise
+        return file
+
+    def _read(self, file: TextIO) -> None:
+        """Read the results, and cut off what is no whole line."""
         try:
             text = read_text(self.path)
             whole = text[: text.rfind("\n") + 1]
-            if not whole and _line(self._header).startswith(text):
-                return False
-            header, *entries = map(parse_json, whole.splitlines())
-            self._require_same(header["command"], header.get("settings"))
-            self.results = {str(entry["job"]): entry["result"] for entry in entries}
-            # Logs of version 0.1.0 do not have it.
-            self.cpu_seconds = sum(float(entry.get("cpu_seconds", 0.0)) for entry in entries)
+            if whole or not _line(self._header).startswith(text):
+                header, *entries = map(parse_json, whole.splitlines())
+                self._require_same(header["command"], header.get("settings"))
+                self.results = {str(entry["job"]): entry["result"] for entry in entries}
+                # Logs of version 0.1.0 do not have it.
+                self.cpu_seconds = sum(float(entry.get("cpu_seconds", 0.0)) for entry in entries)
         except (ValueError, LookupError, TypeError, AttributeError) as error:
             raise InvalidParameterError(
                 f"{self.path} is no log of a study ({error!r}); remove it"
             ) from error
         if whole != text:  # killed as it wrote the last line
-            self.path.write_text(whole, encoding="utf-8")
-        return True
+            file.truncate(0)
+            file.write(whole)
 
     def _require_same(self, command: str, settings: Any) -> None:
         if command != self._header["command"]:

@@ -377,8 +377,8 @@ def test_without_a_library_candidates_are_counted_all_the_same(tmp_path):
 def test_tasks_of_a_training_are_explored_as_it_does(tmp_path):
     how = training_settings("ours", get_domain("obstacle2d")).exploration
     other = TaskDistribution(DomainChoice("obstacle2d", "fair"), 0)
-    log = StudyLog(tmp_path / "log", Provenance("obstacle2d", "", {}))
-    fresh = pruning.explore([other], 1, how, JobRunner(log, 1, SilentProgress()))
+    with StudyLog(tmp_path / "log", Provenance("obstacle2d", "", {})) as log:
+        fresh = pruning.explore([other], 1, how, JobRunner(log, 1, SilentProgress()))
     assert fresh[0].explored.pairs == jobs.explore(other, 0, how)["candidates"]
 
 
