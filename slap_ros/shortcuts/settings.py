@@ -84,6 +84,8 @@ class TrainingSettings:
         sampling: How shortcuts are tried out when planning.
         attempts: How often the first stage is learned at most, each time with other random
             numbers, until ``ENOUGH_SUCCESS`` is reached. The most successful attempt is polished.
+        random_goals: Share of the tasks for exploration and validation that have another goal than
+            their own.
     """
 
     exploration: ExplorationSettings = field(default_factory=ExplorationSettings)
@@ -98,6 +100,7 @@ class TrainingSettings:
     validation: int = 8
     sampling: Sampling = DEFAULT
     attempts: int = 1
+    random_goals: float = 0.0
 
     @property
     def stages(self) -> tuple[PpoSettings, ...]:
@@ -135,11 +138,13 @@ class TrainingSettings:
     def as_json(self) -> dict[str, Any]:
         """A JSON object, under the keys of :mod:`slap_ros.shortcuts.stored_keys`.
 
-        A single attempt is left out, as work folders have it from when there was no other way.
+        A single attempt and no other goals are left out, as work folders have it from when there
+        was no other way.
         """
         data = stored(self)
-        if self.attempts == 1:
-            del data["attempts"]
+        for name in ("attempts", "random_goals"):
+            if getattr(self, name) == getattr(OURS, name):
+                del data[name]
         return data
 
 

@@ -18,6 +18,7 @@ from statistics import fmean
 from typing import Any, Protocol, TypeVar
 
 from slap_ros.errors import InvalidParameterError, UnsolvableError
+from slap_ros.learning.random_goals import WithRandomGoals
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.learning.workers import Workers, run_in_order
@@ -256,6 +257,14 @@ class Training:
         self._shortcuts.append(shortcut)
         return with_it
 
+    @property
+    def _any_goal(self) -> TaskDistribution:
+        """The tasks that are explored and validated on: the same, some for another goal."""
+        share = self.settings.random_goals
+        if not share:
+            return self.distribution
+        return replace(self.distribution, domain=WithRandomGoals(self.distribution.domain, share))
+
     # -- the steps --------------------------------------------------------------------------------
 
     def _require_same_settings(self) -> None:
@@ -277,7 +286,7 @@ class Training:
 
     def _explore_what_can_be(self) -> list[Any]:
         tasks = self.settings.exploration.tasks
-        work = [(self.distribution, i, self.settings.exploration) for i in range(tasks)]
+        work = [(self._any_goal, i, self.settings.exploration) for i in range(tasks)]
         found = self._run("exploring tasks", jobs.try_to_explore, work)
         self._leave_out("exploration", jobs.EXPLORATION, found)
         return [result for result in found if not isinstance(result, str)]
@@ -376,7 +385,7 @@ class Training:
 
     def _plan(self, tasks: Sequence[int], shortcuts: tuple[Shortcut, ...]) -> list[int | str]:
         """Steps of a plan for each of these validation tasks, or why it has none."""
-        work = [(self.distribution, i, shortcuts, self.settings.sampling) for i in tasks]
+        work = [(self._any_goal, i, shortcuts, self.settings.sampling) for i in tasks]
         name = "+".join(["plans", *(shortcut.name for shortcut in shortcuts)])
         return self._work.cached(
             name,

@@ -9,21 +9,17 @@ two of the atoms that hold there and not at the start.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from slap_ros.core import Domain, Task
 from slap_ros.drawing.palette import MUTED
 from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.evaluation.experiment import Trial, solve
 from slap_ros.evaluation.summary import Summary
-from slap_ros.planning.abstract_graph import build_abstract_graph
-from slap_ros.planning.planner import Problem
-from slap_ros.relational import AtomSpace, GroundAtom
+from slap_ros.learning.random_goals import sample_goals
 from slap_ros.studies.comparison import (
     Comparison,
     PlanningSetup,
@@ -36,11 +32,9 @@ from slap_ros.studies.results import MarkdownTable, StudyReport
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Goal = tuple[GroundAtom, ...]
 NamedGoal = tuple[tuple[str, tuple[str, ...]], ...]  # a goal as names, for another process
 
 GOALS = 9  # tells the random numbers of goals from those of tasks
-MOST_ATOMS = 2  # of a goal
 DOT = 20  # area of a dot in the picture, points squared
 MEASURED = """\
 Goals are sampled for each task: a random node of its abstract graph, and of the fluent atoms that
@@ -50,52 +44,6 @@ sample standard deviation over solved goals; relative length is the mean over th
 planning, on goals that both solved, and so are the counts. The library was trained for the domain's
 own goal. A goal for which no plan is found counts as failed: an abstract state can be reached by
 operators and not in the world."""
-
-
-def sample_goals(domain: Domain, task: Task, count: int, rng: np.random.Generator) -> list[Goal]:
-    """Sample goals for a task's initial state, all different, none of which holds there.
-
-    Nodes of the abstract graph, which ends where the task's own goal first holds, are taken in
-    random order, each giving a goal that is not there yet, and again until there are ``count`` or
-    no node has another.
-
-    Args:
-        domain: The task's.
-        task: Its initial state is where goals are reached from.
-        count: How many goals at most.
-        rng: Chooses nodes and atoms.
-
-    Returns:
-        The goals, in the order in which they were found.
-
-    Raises:
-        UnsolvableError: Operators cannot reach the task's own goal.
-        PlanningLimitError: The graph is too large.
-    """
-    problem = Problem.of(domain, task.initial_state)
-    space = problem.model.space
-    start = space.abstract(task.initial_state)
-    graph = build_abstract_graph(start, space.mask(task.goal), problem.operators)
-    waiting = [_goals_of(space, node & ~start, rng) for node in graph.nodes]
-    sampled: dict[Goal, None] = {}  # a set that keeps its order
-    while waiting and len(sampled) < count:
-        rng.shuffle(waiting)
-        left = []
-        for goals in waiting:
-            new = next((goal for goal in goals if goal not in sampled), None)
-            if new is not None and len(sampled) < count:
-                sampled[new] = None
-                left.append(goals)
-        waiting = left
-    return list(sampled)
-
-
-def _goals_of(space: AtomSpace, atoms: int, rng: np.random.Generator) -> Iterator[Goal]:
-    """Every goal of one or two fluent atoms of a mask, in random order."""
-    fluent = tuple(space.decode(atoms & ~space.static))
-    goals = [goal for size in range(1, MOST_ATOMS + 1) for goal in combinations(fluent, size)]
-    order = rng.permutation(len(goals))
-    return (goals[i] for i in order)
 
 
 @dataclass(frozen=True)

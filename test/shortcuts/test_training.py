@@ -202,6 +202,19 @@ def test_another_training_in_the_same_folder_is_refused(tmp_path):
         train(tmp_path, replace(SMALL, shortcuts=0, starts=25))
 
 
+def test_other_goals_are_explored_and_validated_on(tmp_path):
+    def pure_planning(share):
+        settings = replace(SMALL, shortcuts=0, validation=6, random_goals=share)
+        library, callback = train(tmp_path / str(share), settings)
+        saved = json.loads((tmp_path / str(share) / "settings.json").read_text())
+        assert saved.get("random_goals", 0.0) == share
+        return library.record["validation"]["pure_planning"], callback.ranked
+
+    (own, for_own), (other, for_other) = pure_planning(0.0), pure_planning(1.0)
+    assert other < own  # their own goal is the farthest that the graph has
+    assert [group.savings for group in for_own] != [group.savings for group in for_other]
+
+
 def candidate(name, expected_saving, operator_path=("Pick",)):
     signature = Signature(("block",), frozenset({(name, (0,))}), frozenset())
     return ShortcutCandidate(signature, operator_path, 3, 4, 100, expected_saving)

@@ -23,7 +23,6 @@ from slap_ros.evaluation.approaches import approaches
 from slap_ros.evaluation.experiment import Experiment
 from slap_ros.files import pretty_json
 from slap_ros.learning.task_distribution import TaskDistribution
-from slap_ros.planning.planner import Problem, make_planner
 from slap_ros.shortcuts import jobs
 from slap_ros.shortcuts.explore import ExplorationResult
 from slap_ros.shortcuts.library import load_library, save_shortcut
@@ -31,7 +30,6 @@ from slap_ros.shortcuts.settings import training_settings
 from slap_ros.shortcuts.shortcut import Sampling
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 from slap_ros.studies import perception, pruning
-from slap_ros.studies.goals import sample_goals
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.reproducing import published
 from slap_ros.studies.results import Provenance
@@ -142,33 +140,6 @@ def test_a_variation_takes_the_place_of_the_setting_in_the_preset():
 
 
 # -- goals ----------------------------------------------------------------------------------------
-
-
-def goals_of(task, count, seed=0):
-    return sample_goals(DOMAIN, task, count, np.random.default_rng(seed))
-
-
-@pytest.mark.parametrize("index", range(4))
-def test_goals_are_different_not_there_yet_reachable_and_the_same_again(index):
-    task = DOMAIN.task(0, index)
-    goals = goals_of(task, 15)
-    assert len(goals) == len(set(goals)) == 15
-    assert goals == goals_of(task, 15) != goals_of(task, 15, seed=1)
-    space = Problem.of(DOMAIN, task.initial_state).model.space
-    start = space.abstract(task.initial_state)
-    planner = make_planner("lazy", DOMAIN, task.initial_state)
-    for goal in goals:
-        mask = space.mask(goal)
-        assert 1 <= len(goal) <= 2
-        assert mask & start == 0 == mask & space.static
-        assert planner.plan(task.initial_state, mask).plan.edges
-
-
-def test_where_there_are_fewer_goals_than_asked_for_all_of_them_are_taken():
-    task = DOMAIN.task(1)
-    every = goals_of(task, 1000)
-    assert 15 < len(every) == len(set(every)) < 1000
-    assert set(every) == set(goals_of(task, 1000, seed=1))
 
 
 def test_shortcuts_help_with_other_goals_and_never_harm(tmp_path):
