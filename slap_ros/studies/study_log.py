@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from slap_ros.errors import BusyError, InvalidParameterError
-from slap_ros.files import parse_json, read_text, require_regular, require_sole_use
+from slap_ros.files import parse_json, read_bytes, require_regular, require_sole_use
 from slap_ros.studies.results import Provenance
 
 
@@ -92,9 +92,9 @@ class StudyLog:
     def _read(self, file: TextIO) -> None:
         """Read the results, and cut off what is no whole line."""
         try:
-            text = read_text(self.path)
-            whole = text[: text.rfind("\n") + 1]
-            if whole or not _line(self._header).startswith(text):
+            content = read_bytes(self.path)
+            whole = content[: content.rfind(b"\n") + 1]
+            if whole or not _line(self._header).encode().startswith(content):
                 header, *entries = map(parse_json, whole.splitlines())
                 self._require_same(header["command"], header.get("settings"))
                 self.results = {str(entry["job"]): entry["result"] for entry in entries}
@@ -104,9 +104,7 @@ class StudyLog:
             raise InvalidParameterError(
                 f"{self.path} is no log of a study ({error!r}); remove it"
             ) from error
-        if whole != text:  # killed as it wrote the last line
-            file.truncate(0)
-            file.write(whole)
+        file.truncate(len(whole))  # there is more where it was killed as it wrote a line
 
     def _require_same(self, command: str, settings: Any) -> None:
         if command != self._header["command"]:
