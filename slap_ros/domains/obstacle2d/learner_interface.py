@@ -110,12 +110,15 @@ _OURS: Mapping[str, SettingValue] = {
 }
 TRAINING_SETTINGS: Mapping[str, Mapping[str, SettingValue]] = {
     "ours": _OURS,
-    # Several shortcuts that serve different tasks. A small saving shows over more tasks alone.
+    # Several shortcuts that serve different tasks and goals. A small saving shows over more tasks
+    # alone.
     "ours_several": {
         **_OURS,
-        "exploration.tasks": 12,
-        "least_saving": 0.02,
-        "validation": 24,
+        "exploration.tasks": 24,
+        "random_goals": 0.5,
+        "least_saving": 0.005,
+        "validation": 48,
+        "shortcuts": 8,
     },
     "paper": {
         "exploration.rollouts": 1000,
