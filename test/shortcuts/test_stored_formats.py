@@ -36,7 +36,7 @@ THEN = replace(  # as the training was started then
 )
 # They change only where a library is trained again.
 SHIPPED = {
-    "obstacle2d": "08fbb4398d815697",
+    "obstacle2d": "5fbcaeb53005ad68",
     "obstacle_tower": "7219a304729e2c92",
     "cluttered_drawer": "abc081bc0ca7a2a3",
     "cleanup_table": "2f43a9c8c75d0c79",
