@@ -33,6 +33,7 @@ RANGES: Mapping[str, tuple[float, float]] = {  # of fractions; all others are fi
     "least_similarity": (0.0, 1.0),
     "log_std": (-20.0, 2.0),
     "progress": (0.0, 1.0),
+    "random_goals": (0.0, 1.0),
     "rehearsal": (0.0, BELOW_1),
     "scale": (math.ulp(0.0), sys.float_info.max),
     "spread": (0.0, sys.float_info.max),

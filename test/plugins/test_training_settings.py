@@ -47,6 +47,8 @@ WRONG = [
     "polish=all",
     "__class__=1",
     "ppo.parts=3",
+    "random_goals=-0.1",
+    "random_goals=1.1",
 ]
 
 
