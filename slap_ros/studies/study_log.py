@@ -9,7 +9,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, TextIO
 
-from slap_ros.errors import BusyError, InvalidParameterError
+from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, read_bytes, require_regular, require_sole_use
 from slap_ros.studies.results import Provenance
 
@@ -39,10 +39,7 @@ class StudyLog:
         self._header = {"command": origin.command, "settings": origin.settings}
         self._file: TextIO | None = None
         if path.exists():
-            with ExitStack() as unless_refused:
-                self._file = unless_refused.enter_context(self._open())
-                self._read(self._file)
-                unless_refused.pop_all()
+            self._file = self._open()
 
     def __enter__(self) -> StudyLog:
         return self
@@ -61,6 +58,7 @@ class StudyLog:
 
         Raises:
             BusyError: Another process began the same study and had a result before.
+            InvalidParameterError: Another one did, has ended, and left the log of another study.
             OSError: It cannot be written.
         """
         if self._file is None:
@@ -79,14 +77,14 @@ class StudyLog:
         self.path.unlink(missing_ok=True)
 
     def _open(self) -> TextIO:
+        """Open the file, made where there is none, and read what it has."""
         if self.path.exists():
             require_regular(self.path)
-        file = self.path.open("a", encoding="utf-8")
-        try:
+        with ExitStack() as unless_refused:
+            file = unless_refused.enter_context(self.path.open("a", encoding="utf-8"))
             require_sole_use(file.fileno(), self.path)
-        except BusyError:
-            file.close()
-            raise
+            self._read(file)
+            unless_refused.pop_all()
         return file
 
     def _read(self, file: TextIO) -> None:
