@@ -1,10 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Other goals with the same library (SLAP Fig. 9, D.1).
-
-Goals are sampled from what can be reached: a random node of a task's abstract graph, and one or
-two of the atoms that hold there and not at the start.
-"""
+"""Other goals with the same library (SLAP Fig. 9, D.1)."""
 
 from __future__ import annotations
 
