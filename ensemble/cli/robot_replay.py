@@ -15,7 +15,8 @@ from ensemble import replay as ensemble_replay
 from ensemble.cli.replay_options import ReplayOptions
 from ensemble.parameters import parse_parameters
 from ensemble.robot_parameters import PlayerParameters, parse_mock_robot
-from slap_ros.cli.console import console, print_json, progress
+from slap_ros.cli.bars import counting_bars
+from slap_ros.cli.console import console, print_json
 from slap_ros.errors import ErrorCode, TaskCanceledError
 from slap_ros.robot.dry_run import DryRun
 from slap_ros.robot.recorded_motion import RecordedMotion, read_recorded_motion
@@ -58,7 +59,7 @@ def _execute(
 ) -> int:
     """Execute the motion; the exit code."""
     mock = parse_mock_robot(options.mock) if options.to == MOCK else None
-    with progress() as bar:
+    with counting_bars() as bar:
         watched = bar.add_task("replaying", total=len(recorded.waypoints))
         played = ensemble_replay.replay_on_robot(
             recorded, checked, parameters, mock, lambda done: bar.update(watched, completed=done)

@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How far ``slap acquire`` is: bars on a terminal, lines in a log."""
+"""How far ``slap acquire`` is."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from statistics import fmean
 
 from rich.progress import BarColumn, TaskID
@@ -25,18 +25,14 @@ class _Iteration:
     """An iteration in which skills are learned.
 
     Args:
-        number: From 0.
         progress: Task progress of its rollouts.
         rounds: Under way, one per skill.
         steps_left: Environment steps that were left as it began.
-        shown: Judgements of each skill that are on the terminal already.
     """
 
-    number: int
     progress: float
     rounds: Sequence[OngoingRound]
     steps_left: int
-    shown: dict[str, int] = field(default_factory=dict)
 
 
 class AcquisitionBars(LearningBars):
@@ -85,7 +81,7 @@ class AcquisitionBars(LearningBars):
             steps_left: Environment steps that all skills together may still learn for.
         """
         self.unfollow()
-        followed = _Iteration(iteration, self._progress, rounds, steps_left)
+        followed = _Iteration(self._progress, rounds, steps_left)
         whole = self.bars.add_task(
             f"iteration {iteration}", total=sum(one.steps for one in rounds), detail=""
         )
@@ -127,13 +123,9 @@ class AcquisitionBars(LearningBars):
         self.bars.update(whole, completed=learned, detail=overall)
         for one in iteration.rounds:
             judged = found[one.skill]
-            if judged is None or iteration.shown.get(one.skill) == len(judged.segments):
-                continue
-            iteration.shown[one.skill] = len(judged.segments)
-            detail = _judgement(one, judged)
-            self.bars.update(bars[one.skill], completed=_steps(one, judged), detail=detail)
-            if not console.is_terminal:
-                console.print(f"iteration {iteration.number}, {one.skill}: {detail}, {overall}")
+            if judged is not None:
+                detail = _judgement(one, judged)
+                self.bars.update(bars[one.skill], completed=_steps(one, judged), detail=detail)
 
 
 def _judgement(one: OngoingRound, judged: Round) -> str:

@@ -12,8 +12,9 @@ import typer
 from rich.table import Table
 
 from slap_ros.acquisition.domain_choice import SHIPPED
+from slap_ros.cli.bars import counting_bars
 from slap_ros.cli.command_line import command_line
-from slap_ros.cli.console import console, print_json, progress
+from slap_ros.cli.console import console, print_json
 from slap_ros.cli.options import DomainName, Goal, Jobs, Json, Planner, Preset
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose, sampling
 from slap_ros.cli.skill_choice import Skills, open_chosen
@@ -132,7 +133,7 @@ def _run(
     """Approach by approach, pure planning first."""
     results: list[tuple[Summary, list[Trial]]] = []
     yardstick: list[Trial] = []
-    with progress() as bar:
+    with counting_bars() as bar:
         watched = bar.add_task(experiment.domain.name, total=len(experiment) * len(compared))
         for approach in compared:
             trials = []

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Bars on a terminal while something is learned in other processes."""
+"""What is shown while something is learned in other processes."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from collections.abc import Callable, Sequence
 from threading import Event, Thread
 from typing import Self
 
-from rich.progress import Progress, ProgressColumn, TaskID, TextColumn
+from rich.progress import ProgressColumn, TaskID, TextColumn
 
-from slap_ros.cli.console import console
+from slap_ros.cli.bars import Bars
 
 REFRESH_S = 1.0
 
@@ -25,13 +25,11 @@ class LearningBars:
             bar: What the bar itself looks like.
             after: What stands behind the text in which a bar says more, its field ``detail``.
         """
-        self.bars = Progress(
+        self.bars = Bars(
             TextColumn("{task.description}", markup=False),
             bar,
             TextColumn("{task.fields[detail]}", markup=False),
             *after,
-            console=console,
-            transient=True,
         )
         self._counting: dict[str, TaskID] = {}
         self._following: tuple[Event, Thread] | None = None

@@ -11,7 +11,8 @@ from typing import Annotated
 
 import typer
 
-from slap_ros.cli.console import console, progress
+from slap_ros.cli.bars import counting_bars
+from slap_ros.cli.console import console
 from slap_ros.core import Animate, Domain, PictureSize
 from slap_ros.drawing.body_pictures import SIZE, visible, write_body_animation
 from slap_ros.errors import InvalidParameterError, StorageFullError
@@ -83,7 +84,7 @@ def render(
     Raises:
         StorageFullError: It cannot be written.
     """
-    with progress() as bar:
+    with counting_bars() as bar:
         task = bar.add_task("rendering", total=len(states))
         try:
             _animation(domain)(path, states, size, lambda done: bar.update(task, completed=done))

@@ -11,8 +11,9 @@ from typing import Annotated, Any
 import typer
 from rich.progress import TaskID
 
+from slap_ros.cli.bars import counting_bars
 from slap_ros.cli.command_line import command_line
-from slap_ros.cli.console import console, progress
+from slap_ros.cli.console import console
 from slap_ros.cli.options import MAX_SEED
 from slap_ros.files import require_writable
 from slap_ros.studies.figures import require_matplotlib
@@ -86,10 +87,10 @@ def make_report(
 
 
 class StudyBars:
-    """Progress on the terminal, one bar per kind of jobs."""
+    """How far a study is, one bar per kind of jobs."""
 
     def __init__(self) -> None:
-        self._bars = progress()
+        self._bars = counting_bars()
         self._bar: TaskID | None = None
 
     def __enter__(self) -> StudyBars:

@@ -1,0 +1,78 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How far something is: bars on a terminal, lines in a log."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TaskID,
+    TextColumn,
+    TimeRemainingColumn,
+)
+
+from slap_ros.cli.console import console
+
+LOG_PERIOD_S = 60.0
+
+
+class Bars(Progress):
+    """Bars that go away when they are done; where stderr is no terminal, a line each, at times."""
+
+    def __init__(
+        self, *columns: ProgressColumn, on: Console = console, log_period_s: float = LOG_PERIOD_S
+    ) -> None:
+        """Show nothing yet.
+
+        Args:
+            columns: Of each bar.
+            on: Where they are shown.
+            log_period_s: Time between two lines about a bar, at least.
+        """
+        super().__init__(*columns, console=on, transient=True)
+        self._log_period_s = log_period_s
+        self._logged_at: dict[TaskID, float] = {}
+
+    def update(self, task_id: TaskID, **changes: Any) -> None:
+        """See :meth:`rich.progress.Progress.update`."""
+        super().update(task_id, **changes)
+        self._log(task_id)
+
+    def advance(self, task_id: TaskID, advance: float = 1) -> None:
+        """See :meth:`rich.progress.Progress.advance`."""
+        super().advance(task_id, advance)
+        self._log(task_id)
+
+    def _log(self, task_id: TaskID) -> None:
+        if self.console.is_terminal:
+            return
+        now = self.get_time()
+        for task in self.tasks:
+            if task.id != task_id or task.start_time is None:
+                continue
+            if now - self._logged_at.get(task_id, task.start_time) >= self._log_period_s:
+                self._logged_at[task_id] = now
+                self.console.print(_line(task))
+
+
+def _line(task: Task) -> str:
+    """How far a bar is, and what it says more, in words."""
+    detail = task.fields.get("detail") or f"{task.completed:.0f} of {task.total or 0:.0f}"
+    return f"{task.description.strip()}: {task.percentage:.0f}%, {detail}"
+
+
+def counting_bars() -> Bars:
+    """Bars of things that are counted as they are done."""
+    return Bars(
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+    )
