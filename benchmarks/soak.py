@@ -30,7 +30,7 @@ from ensemble.interfaces import RESET_TASK
 from ensemble.launcher import ProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.spinner import Spinner, temporary_node
-from slap_ros.cli.console import progress
+from slap_ros.cli.bars import counting_bars
 from slap_ros.domains import get_domain
 from slap_ros.evaluation.run_log import RunLog
 from slap_ros.files import pretty_json
@@ -205,7 +205,7 @@ def soak(tasks: int, every: int) -> Soaked:
         processes["slap_run"] = psutil.Process()
         read: dict[str, list[Sample]] = {name: [] for name in processes}
         after, failures, start = [], [], monotonic()
-        with progress() as bar:
+        with counting_bars() as bar:
             line = bar.add_task("soaking", total=tasks)
             for number in range(1, tasks + 1):
                 if failure := bench.solve(number - 1):
