@@ -38,7 +38,7 @@ class Bars(Progress):
         """
         super().__init__(*columns, console=on, transient=True)
         self._log_period_s = log_period_s
-        self._logged_at: dict[TaskID, float] = {}
+        self._logged_s: dict[TaskID, float] = {}  # elapsed as a line was printed
 
     def update(self, task_id: TaskID, **changes: Any) -> None:
         """See :meth:`rich.progress.Progress.update`."""
@@ -53,12 +53,11 @@ class Bars(Progress):
     def _log(self, task_id: TaskID) -> None:
         if self.console.is_terminal:
             return
-        now = self.get_time()
         for task in self.tasks:
-            if task.id != task_id or task.start_time is None:
-                continue
-            if now - self._logged_at.get(task_id, task.start_time) >= self._log_period_s:
-                self._logged_at[task_id] = now
+            elapsed_s = task.elapsed or 0.0
+            logged_s = self._logged_s.get(task_id, 0.0)
+            if task.id == task_id and elapsed_s - logged_s >= self._log_period_s:
+                self._logged_s[task_id] = elapsed_s
                 self.console.print(_line(task))
 
 
