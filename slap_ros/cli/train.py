@@ -49,7 +49,11 @@ class TrainOptions:
     skills: Skills = SHIPPED
     seed: TrainingSeed = 0
     settings: Annotated[
-        str, typer.Option(help="ours, paper (the paper's hyper-parameters), or the domain's own.")
+        str,
+        typer.Option(
+            help="ours, ours_several (more shortcuts, for random goals too), paper (the paper's "
+            "hyper-parameters), or the domain's own."
+        ),
     ] = "ours"
     set: Annotated[
         list[str] | None,

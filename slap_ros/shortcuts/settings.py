@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from slap_ros.core import Domain
+from slap_ros.core import Domain, SettingValue
 from slap_ros.errors import InvalidDomainError, InvalidParameterError
 from slap_ros.learning.setting_changes import changed
 from slap_ros.shortcuts.ppo_settings import PpoSettings
@@ -170,15 +170,27 @@ _PAPER = replace(
     horizon=100,
     sampling=PAPER,
 )
-GENERAL: Mapping[str, TrainingSettings] = {"ours": OURS, "paper": _PAPER}
+SEVERAL = "ours_several"  # shortcuts, that serve different tasks and goals
+_SEVERAL: Mapping[str, SettingValue] = {
+    "exploration.tasks": 24,
+    "random_goals": 0.5,
+    "least_saving": 0.005,
+    "validation": 48,  # over fewer tasks, a small saving does not show
+    "shortcuts": 8,
+}
+GENERAL: Mapping[str, TrainingSettings] = {
+    "ours": OURS,
+    SEVERAL: changed(OURS, _SEVERAL),
+    "paper": _PAPER,
+}
 
 
 def training_settings(name: str, domain: Domain) -> TrainingSettings:
     """Settings by name, as they are in a domain.
 
     Args:
-        name: One of ``GENERAL``, or of the domain's own; those begin with ``ours``.
-        domain: Its ``Learning.settings`` say what differs.
+        name: One of ``GENERAL``, or of the domain's own, which differ from the general ``ours``.
+        domain: Its ``Learning.settings`` say what differs. For ``SEVERAL``, its ``ours`` do too.
 
     Raises:
         InvalidParameterError: There are none of that name.
@@ -188,8 +200,11 @@ def training_settings(name: str, domain: Domain) -> TrainingSettings:
     if name not in GENERAL and name not in own:
         known = ", ".join(dict.fromkeys([*GENERAL, *own]))
         raise InvalidParameterError(f"unknown settings {name!r}; there are {known}")
+    changes = own.get(name, {})
+    if name == SEVERAL:
+        changes = {**own.get("ours", {}), **_SEVERAL, **changes}
     try:
-        return changed(GENERAL.get(name, OURS), own.get(name, {}))
+        return changed(GENERAL.get(name, OURS), changes)
     except InvalidParameterError as error:
         raise InvalidDomainError(
             f"domain {domain.name}, Learning.settings[{name!r}]: {error}"

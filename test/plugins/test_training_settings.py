@@ -101,7 +101,10 @@ def test_a_domains_own_settings_are_used_and_changed():
     )
     assert training_settings("paper", PATCHY) == GENERAL["paper"]
     assert training_settings("quick", PATCHY).ppo.hidden == (8,)
-    with pytest.raises(InvalidParameterError, match="there are ours, paper, quick"):
+    several = training_settings("ours_several", PATCHY)
+    assert several.exploration == replace(OURS.exploration, tasks=24, rollouts=32)
+    assert (several.polish, several.shortcuts, several.random_goals) == (None, 8, 0.5)
+    with pytest.raises(InvalidParameterError, match="there are ours, ours_several, paper, quick"):
         training_settings("slow", PATCHY)
 
 

@@ -95,30 +95,19 @@ ABLATIONS: Mapping[str, LearnerInterface] = {
     "all of them (plain)": replace(LEARNER_INTERFACE, hand=_gripper, objects=_relative_features),
 }
 # Where a training in this domain differs; see `slap train --settings`.
-_OURS: Mapping[str, SettingValue] = {
-    # Its worlds are stepped together, so that many cost little.
-    "exploration.tasks": 6,
-    "exploration.rollouts": 6000,
-    "exploration.length": 16,
-    "exploration.action_repeat": 4,
-    "ppo.environments": 128,
-    "ppo.rollout_steps": 32,
-    "ppo.batch_size": 512,
-    "ppo.total_steps": 400_000,
-    "polish": None,
-    "horizon": 30,
-}
 TRAINING_SETTINGS: Mapping[str, Mapping[str, SettingValue]] = {
-    "ours": _OURS,
-    # Several shortcuts that serve different tasks and goals. A small saving shows over more tasks
-    # alone.
-    "ours_several": {
-        **_OURS,
-        "exploration.tasks": 24,
-        "random_goals": 0.5,
-        "least_saving": 0.005,
-        "validation": 48,
-        "shortcuts": 8,
+    "ours": {
+        # Its worlds are stepped together, so that many cost little.
+        "exploration.tasks": 6,
+        "exploration.rollouts": 6000,
+        "exploration.length": 16,
+        "exploration.action_repeat": 4,
+        "ppo.environments": 128,
+        "ppo.rollout_steps": 32,
+        "ppo.batch_size": 512,
+        "ppo.total_steps": 400_000,
+        "polish": None,
+        "horizon": 30,
     },
     "paper": {
         "exploration.rollouts": 1000,

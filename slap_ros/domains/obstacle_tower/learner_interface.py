@@ -179,4 +179,6 @@ TRAINING_SETTINGS: Mapping[str, Mapping[str, SettingValue]] = {
         "starts": 4000,
         "shortcuts": 1,  # all that is found is the slap, from the one or the other state
     },
+    # With search in the model, plans are as short after the first stage as after the second.
+    "ours_several": {"polish": None, "shortcuts": 4},
 }
