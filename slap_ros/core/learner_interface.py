@@ -95,8 +95,8 @@ class Learning:
         make_vector_world: Makes worlds that are stepped together, where that is faster than one
             after the other.
         settings: What a training's settings are in this domain, where they differ: by the name of
-            ``slap train --settings`` (``ours``, ``paper``, or a new one), then by dotted name, as
-            ``slap train --set`` has it.
+            ``slap train --settings`` (``ours``, ``ours_several``, which differs from ``ours``,
+            ``paper``, or a new one), then by dotted name, as ``slap train --set`` has it.
         ablations: The interface without one of the terms that were made by hand for this domain,
             by what is left out, and a plain one: what ``slap study ablation`` compares.
     """

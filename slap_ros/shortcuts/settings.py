@@ -200,11 +200,11 @@ def training_settings(name: str, domain: Domain) -> TrainingSettings:
     if name not in GENERAL and name not in own:
         known = ", ".join(dict.fromkeys([*GENERAL, *own]))
         raise InvalidParameterError(f"unknown settings {name!r}; there are {known}")
-    changes = own.get(name, {})
+    base, changes = GENERAL.get(name, OURS), own.get(name, {})
     if name == SEVERAL:
-        changes = {**own.get("ours", {}), **_SEVERAL, **changes}
+        base, changes = training_settings("ours", domain), {**_SEVERAL, **changes}
     try:
-        return changed(GENERAL.get(name, OURS), changes)
+        return changed(base, changes)
     except InvalidParameterError as error:
         raise InvalidDomainError(
             f"domain {domain.name}, Learning.settings[{name!r}]: {error}"
