@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Protocol
@@ -169,8 +169,13 @@ class ShortcutSource(Protocol):
         """Edges to be added to a graph."""
         ...
 
-    def beyond(self, graph: AbstractGraph) -> Sequence[EdgeBeyond]:
-        """Edges to abstract states that a graph may not have."""
+    def beyond(self, graph: AbstractGraph, within: Collection[str]) -> Sequence[EdgeBeyond]:
+        """Edges to abstract states that a graph may not have.
+
+        Args:
+            graph: Where they begin.
+            within: Names of the shortcuts that stay in it.
+        """
         ...
 
 
@@ -179,8 +184,8 @@ class GraphPlanner:
     """The abstract planning graph, then a shortest path through it (SLAP §4.1, Alg. 2).
 
     Shortcuts are edges like others: one that fails in the model leads nowhere, and without any
-    this is pure planning. Where none of them is on a way to the goal, they may lead out of the
-    graph (:func:`~slap_ros.planning.abstract_graph.add_beyond`). Where no path can be executed, the
+    this is pure planning. One of which no edge is on a way to the goal may lead out of the graph
+    (:func:`~slap_ros.planning.abstract_graph.add_beyond`). Where no path can be executed, the
     graph is deepened beyond the paper's: by one layer at a time, up to ``max_extra_depth``.
 
     In the same graph, a plan with shortcuts is never longer in the model than one without; see
@@ -343,8 +348,8 @@ class GraphPlanner:
             raise UnsolvableError(f"{error}: {self.problem.why_not(start, goal)}") from error
         if self.shortcuts is not None:
             shortcuts, on_way = self.shortcuts.edges(graph), graph.on_way_to_goal()
-            if not any(edge.target in on_way for edge in shortcuts):
-                add_beyond(graph, self.shortcuts.beyond(graph), self.problem.operators)
+            within = {edge.option.skill.name for edge in shortcuts if edge.target in on_way}
+            add_beyond(graph, self.shortcuts.beyond(graph, within), self.problem.operators)
             graph.edges.extend(shortcuts)
         return graph
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from functools import partial
 
 from slap_ros.core import Domain
@@ -59,11 +59,12 @@ class GroundedShortcuts:
                     found.append(Edge(i, j, self._option(shortcut, change)))
         return found
 
-    def beyond(self, graph: AbstractGraph) -> list[EdgeBeyond]:
-        """What each shortcut would change in each node, of as many objects as in training."""
+    def beyond(self, graph: AbstractGraph, within: Collection[str]) -> list[EdgeBeyond]:
+        """What each other shortcut would change in each node, of as many objects as in training."""
         return [
             EdgeBeyond(i, change.apply(node), partial(self._option, shortcut, change))
             for shortcut, grounder in zip(self.shortcuts, self._grounders, strict=True)
+            if shortcut.name not in within
             for i, node in enumerate(graph.nodes)
             for change in grounder.changes(node)
         ]

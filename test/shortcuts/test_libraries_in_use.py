@@ -254,10 +254,10 @@ def test_the_shipped_shortcut_halves_what_the_drawer_takes():
 TOWER = get_domain("obstacle_tower")
 
 
-def results(task):
-    """Of pure planning, and of planning with the shipped library."""
+def results(task, library=None):
+    """Of pure planning, and of planning with a library, by default the shipped one."""
     goal = TOWER.atom_space(task.initial_state).mask(task.goal)
-    pure, *_, slap = approaches(chosen_library(None, TOWER), SAMPLING)
+    pure, *_, slap = approaches(library or chosen_library(None, TOWER), SAMPLING)
     for approach in pure, slap:
         yield approach.planner("lazy", TOWER, task.initial_state).plan(task.initial_state, goal)
 
@@ -275,3 +275,16 @@ def test_the_goal_of_training_needs_nothing_beyond_the_graph():
     pure, slap = results(TOWER.task(3))
     assert slap.graph_nodes == pure.graph_nodes
     assert slap.plan.predicted_steps < 0.6 * pure.plan.predicted_steps
+
+
+def test_a_shortcut_leads_beyond_the_graph_whatever_another_does_within():
+    """To stack the lowest block on the highest, one may let a single block fall, or slap all."""
+    task = TOWER.task(3)
+    stacked = frozenset({TOWER.atom_space(task.initial_state).atom("On", ["block1", "block3"])})
+    task, slap = replace(task, goal=stacked), chosen_library(None, TOWER)
+    fall = load_library(DATA.with_name("obstacle_tower"), TOWER)
+    both = replace(slap, shortcuts=slap.shortcuts + fall.shortcuts)
+    pure, alone = results(task)
+    _, together = results(task, both)
+    assert alone.plan.predicted_steps < pure.plan.predicted_steps
+    assert together.plan.predicted_steps <= alone.plan.predicted_steps
