@@ -4,6 +4,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 TORCH := torch==2.13.0  # pinned: another version trains other policies from the same seed
+TESTS_AT_ONCE := 3  # on two cores: many wait for nodes, networks and clocks
 METADATA := pyproject.toml setup.py setup.cfg embedded_ros/pyproject.toml
 
 .PHONY: help install demo test test-ros faults reproduce lint format docs clean
@@ -49,8 +50,8 @@ demo: install  ## Run the whole ensemble, record bags, replay them, measure, rep
 	echo "bag: $$bag   abstract graph: $$bag-plan/graph.svg   animation: $$bag-tower.gif   report: $$bag.html"
 
 test: $(VENV)/.tested lint  ## Run every test
-	$(BIN)/pytest -q -n 2 --dist worksteal
-	cd embedded_ros && $(abspath $(BIN))/pytest -q -n 2 --dist worksteal
+	$(BIN)/pytest -q -n $(TESTS_AT_ONCE) --dist worksteal
+	cd embedded_ros && $(abspath $(BIN))/pytest -q -n $(TESTS_AT_ONCE) --dist worksteal
 
 test-ros: $(VENV)/.installed  ## Run the tests that face ROS 2 on a sourced Jazzy
 	EMBEDDED_PYTHON=$(abspath $(BIN))/python test/ros/run
