@@ -6,6 +6,8 @@ BIN := $(VENV)/bin
 TORCH := torch==2.13.0  # pinned: another version trains other policies from the same seed
 TESTS_AT_ONCE := 3  # on two cores: many wait for nodes, networks and clocks
 METADATA := pyproject.toml setup.py setup.cfg embedded_ros/pyproject.toml
+# Images set it. Tests start hundreds of processes, and each would compile all that it imports.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: help install demo test test-ros faults reproduce lint format docs clean
 
