@@ -184,7 +184,8 @@ def add_beyond(
         operators: That lead on from there.
         max_nodes: Abstract states, those of the graph included, after which no more are added.
     """
-    _Beyond(graph, operators, max_nodes).add(beyond)
+    if beyond:  # else the graph would be copied for nothing
+        _Beyond(graph, operators, max_nodes).add(beyond)
 
 
 def _build_pruned(

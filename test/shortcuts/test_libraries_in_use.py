@@ -254,11 +254,10 @@ def test_the_shipped_shortcut_halves_what_the_drawer_takes():
 TOWER = get_domain("obstacle_tower")
 
 
-def results(task, library=None):
-    """Of pure planning, and of planning with a library, by default the shipped one."""
+def results(task, *libraries):
+    """Of pure planning, and of planning with each of these libraries."""
     goal = TOWER.atom_space(task.initial_state).mask(task.goal)
-    pure, *_, slap = approaches(library or chosen_library(None, TOWER), SAMPLING)
-    for approach in pure, slap:
+    for approach in PURE_PLANNING, *(approaches(one, SAMPLING)[-1] for one in libraries):
         yield approach.planner("lazy", TOWER, task.initial_state).plan(task.initial_state, goal)
 
 
@@ -266,13 +265,13 @@ def test_a_shortcut_serves_a_goal_that_operators_reach_before_it_would_end():
     """To clear the target, operators take three blocks off; a slap ends beyond that, and sooner."""
     task = TOWER.task(3)
     cleared = frozenset({TOWER.atom_space(task.initial_state).atom("NothingOn", ["target"])})
-    pure, slap = results(replace(task, goal=cleared))
+    pure, slap = results(replace(task, goal=cleared), chosen_library(None, TOWER))
     assert slap.graph_nodes > pure.graph_nodes
     assert slap.plan.predicted_steps < 0.6 * pure.plan.predicted_steps
 
 
 def test_the_goal_of_training_needs_nothing_beyond_the_graph():
-    pure, slap = results(TOWER.task(3))
+    pure, slap = results(TOWER.task(3), chosen_library(None, TOWER))
     assert slap.graph_nodes == pure.graph_nodes
     assert slap.plan.predicted_steps < 0.6 * pure.plan.predicted_steps
 
@@ -284,7 +283,6 @@ def test_a_shortcut_leads_beyond_the_graph_whatever_another_does_within():
     task, slap = replace(task, goal=stacked), chosen_library(None, TOWER)
     fall = load_library(DATA.with_name("obstacle_tower"), TOWER)
     both = replace(slap, shortcuts=slap.shortcuts + fall.shortcuts)
-    pure, alone = results(task)
-    _, together = results(task, both)
+    pure, alone, together = results(task, slap, both)
     assert alone.plan.predicted_steps < pure.plan.predicted_steps
     assert together.plan.predicted_steps <= alone.plan.predicted_steps
