@@ -19,6 +19,7 @@ from slap_ros.core import Domain
 from slap_ros.errors import InvalidDomainError
 from slap_ros.geometry.rotations import inverse_each, rotate_each, x_axes
 from slap_ros.learning.learner_interface import learner_interface
+from slap_ros.learning.portable_math import on_grid
 from slap_ros.relational import Column
 from slap_ros.relational.state import Array
 
@@ -65,7 +66,7 @@ class SkillObserver:
                 at = RELATIONS + number * RELATION_FEATURES
                 relation = self._relation(states, slots[one], slots[other])
                 observed[:, at : at + relation.shape[-1]] = relation
-        return observed.astype(np.float32)
+        return on_grid(observed).astype(np.float32)
 
     def _slots(self, states: GroundedStates) -> list[Column]:
         slots = [

@@ -1,21 +1,31 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Policies in numpy: what is learned with torch is executed without it."""
+"""Policies in numpy: what is learned with torch is executed without it.
+
+A policy is a function on a grid: its inputs and outputs are multiples of
+:data:`~slap_ros.learning.portable_math.RESOLUTION`, its sums are exact, and its other functions are
+defined to the bit. So a state has the same action on every processor.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from slap_ros.learning.exact_layer import ExactLayer
+from slap_ros.learning.portable_math import exp, on_grid, tanh
+
 LEAST_DEVIATION = 0.3  # features are of magnitude 1 or so
 # Observations at once. OpenBLAS spreads larger products over threads, which wait for one another
-# where cores are busy, and whose number changes the order of summation.
+# where cores are busy.
 MAX_BATCH = 64
 Weights = NDArray[np.float32]
+Values = NDArray[np.float64]
 
 # From a step and observations, shape (n, size), to actions, shape (n, actions).
 ActionSampler = Callable[[int, Weights], Weights]
@@ -40,15 +50,27 @@ class SampledPolicy(Protocol):
         ...
 
 
-def _tanh(values: Weights) -> Weights:
-    return np.tanh(values)
+def _relu(values: Values) -> Values:
+    return np.maximum(values, 0.0)
 
 
-def _relu(values: Weights) -> Weights:
-    return np.maximum(values, np.float32(0.0))
+@dataclass(frozen=True)
+class Activation:
+    """What is between two layers.
+
+    Args:
+        apply: The function of each value.
+        largest: The function of the largest magnitude of values: that of its results.
+    """
+
+    apply: Callable[[Values], Values]
+    largest: Callable[[float], float]
 
 
-ACTIVATIONS: Mapping[str, Callable[[Weights], Weights]] = {"tanh": _tanh, "relu": _relu}
+ACTIVATIONS: Mapping[str, Activation] = {
+    "tanh": Activation(tanh, lambda _: 1.0),
+    "relu": Activation(_relu, lambda bound: bound),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,18 +116,28 @@ class MlpPolicy:
     activation: str = "tanh"
     squashed: bool = False
 
+    @cached_property
+    def _exact_layers(self) -> tuple[ExactLayer, ...]:
+        """The layers, each of which can take what the one before it gives."""
+        bound, exact = self.normalisation.clip, []
+        for weights, bias in self.layers:
+            exact.append(ExactLayer.of(weights, bias, bound))
+            bound = ACTIVATIONS[self.activation].largest(exact[-1].bound)
+        return tuple(exact)
+
     def mean(self, observations: Weights) -> Weights:
         """The most likely actions, shape (n, actions), not yet clipped to [-1, 1]."""
         rows = range(0, max(len(observations), 1), MAX_BATCH)
         return np.concatenate([self._mean(observations[i : i + MAX_BATCH]) for i in rows])
 
     def _mean(self, observations: Weights) -> Weights:
-        hidden, activate = self.normalisation(observations), ACTIVATIONS[self.activation]
-        for weights, bias in self.layers[:-1]:
-            hidden = activate(hidden @ weights.T + bias)
-        weights, bias = self.layers[-1]
-        actions: Weights = hidden @ weights.T + bias
-        return np.tanh(actions) if self.squashed else actions
+        activate = ACTIVATIONS[self.activation].apply
+        *hidden, last = self._exact_layers
+        values = on_grid(self.normalisation(observations).astype(np.float64))
+        for layer in hidden:
+            values = on_grid(activate(layer(values)))
+        actions = last(values)
+        return on_grid(tanh(actions) if self.squashed else actions).astype(np.float32)
 
     def sample(
         self, observations: Weights, rng: np.random.Generator, temperature: float | Weights = 1.0
@@ -122,8 +154,13 @@ class MlpPolicy:
         """
         mean = self.mean(observations)
         noise = rng.standard_normal(mean.shape, dtype=np.float32)
-        actions = mean + temperature * np.exp(self.log_std) * noise
-        return actions.astype(np.float32)
+        actions = mean + temperature * self._deviation * noise
+        return on_grid(actions.astype(np.float32))
+
+    @cached_property
+    def _deviation(self) -> Weights:
+        """Standard deviation of the noise on each action, shape (actions,)."""
+        return exp(self.log_std.astype(np.float64)).astype(np.float32)
 
     def sampler(
         self, rng: np.random.Generator, temperature: float | Weights = 1.0

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from slap_ros.core import Domain
 from slap_ros.learning.action_map import ActionMap
 from slap_ros.learning.learner_interface import learner_interface
+from slap_ros.learning.portable_math import on_grid
 from slap_ros.relational import AtomSpace, Column, GroundAtom, Object, State
 from slap_ros.relational.predicates import Bools, Predicate
 from slap_ros.relational.state import Array
@@ -268,7 +269,7 @@ class ObservationEncoder:
                 [present, object_deficits[:, numbers, None], features], axis=-1
             )
             parts.append(_into_slots(features, slots).reshape(len(features), -1))
-        return np.concatenate(parts, axis=-1).astype(np.float32)
+        return on_grid(np.concatenate(parts, axis=-1)).astype(np.float32)
 
 
 def _robot_columns(domain: Domain, space: AtomSpace) -> NDArray[np.intp]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from slap_ros.core import Domain, VectorWorld
 from slap_ros.learning.mlp_policy import ActionSampler, SampledPolicy, Weights
+from slap_ros.learning.portable_math import on_grid
 from slap_ros.relational import State
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.shortcut import Sampling, Shortcut
@@ -169,7 +170,8 @@ class ShortcutRollouts:
         middle = np.clip(np.array(best.all[0].actions), -1.0, 1.0)[:, None]
         shape = (len(middle), self._at_once, middle.shape[-1])
         for _ in range(0, self._count + 1, self._at_once):
-            script = _scripted(middle + spread * rng.standard_normal(shape, dtype=np.float32))
+            noise = rng.standard_normal(shape, dtype=np.float32)
+            script = _scripted(on_grid(middle + np.float32(spread) * noise))
             limit = best.limit(len(middle))
             best.add(self._roll_out(self._worlds, encoder, state, script, limit))
 
