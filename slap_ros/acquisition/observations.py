@@ -19,7 +19,7 @@ from slap_ros.core import Domain
 from slap_ros.errors import InvalidDomainError
 from slap_ros.geometry.rotations import inverse_each, rotate_each, x_axes
 from slap_ros.learning.learner_interface import learner_interface
-from slap_ros.learning.portable_math import on_grid
+from slap_ros.portable_math import on_grid
 from slap_ros.relational import Column
 from slap_ros.relational.state import Array
 

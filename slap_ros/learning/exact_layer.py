@@ -4,7 +4,7 @@
 
 A BLAS library chooses in which order it sums up a matrix product: by the processor, the number of
 threads, and the number of rows. In floating point, another order gives another last bit. Here
-inputs are multiples of :data:`~slap_ros.learning.portable_math.RESOLUTION`, and weights are
+inputs are multiples of :data:`~slap_ros.portable_math.RESOLUTION`, and weights are
 multiples of a power of two as well. Both are so coarse that every partial sum fits in the 53 bits
 of a float. Nothing is rounded, in any order, with fused multiply-add or without.
 """
@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.learning.portable_math import RESOLUTION
+from slap_ros.portable_math import RESOLUTION
 
 MANTISSA_BITS = 53  # of a 64-bit float
 

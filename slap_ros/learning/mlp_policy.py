@@ -3,7 +3,7 @@
 """Policies in numpy: what is learned with torch is executed without it.
 
 A policy is a function on a grid: its inputs and outputs are multiples of
-:data:`~slap_ros.learning.portable_math.RESOLUTION`, its sums are exact, and its other functions are
+:data:`~slap_ros.portable_math.RESOLUTION`, its sums are exact, and its other functions are
 defined to the bit. So a state has the same action on every processor.
 """
 
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slap_ros.learning.exact_layer import ExactLayer
-from slap_ros.learning.portable_math import exp, on_grid, tanh
+from slap_ros.portable_math import exp, on_grid, tanh
 
 LEAST_DEVIATION = 0.3  # features are of magnitude 1 or so
 # Observations at once. OpenBLAS spreads larger products over threads, which wait for one another

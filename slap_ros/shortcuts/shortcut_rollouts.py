@@ -13,7 +13,7 @@ import numpy as np
 
 from slap_ros.core import Domain, VectorWorld
 from slap_ros.learning.mlp_policy import ActionSampler, SampledPolicy, Weights
-from slap_ros.learning.portable_math import on_grid
+from slap_ros.portable_math import on_grid
 from slap_ros.relational import State
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.shortcut import Sampling, Shortcut
@@ -115,8 +115,9 @@ class ShortcutRollouts:
         if key not in self._cache and self.given_up(shortcut):
             return ()
         if key not in self._cache:
-            # The seed is a hash of the text of name and change, which must not be worded otherwise.
-            seed = sha256(repr(key[:2]).encode() + state.key).digest()[:8]
+            # The seed is a hash of the text of name and change, which must not be worded otherwise,
+            # and of the state as far as it is the same on every processor.
+            seed = sha256(repr(key[:2]).encode() + on_grid(state.data).tobytes()).digest()[:8]
             rng = np.random.default_rng(int.from_bytes(seed, "little"))
             self._cache[key] = self._sample(shortcut.policy, encoder, state, rng)
             self._failures[shortcut.name] += -MAX_NET_FAILURES if self._cache[key] else 1

@@ -15,6 +15,7 @@ from slap_ros.contact.world import MAX_SHIFT, MAX_TURN
 from slap_ros.core import Action
 from slap_ros.domains.benchtop.state_access import hand_position, hand_target, hand_yaw
 from slap_ros.geometry.pose import Vector
+from slap_ros.portable_math import on_grid
 from slap_ros.relational import State
 
 OPEN, KEEP, CLOSE = -1.0, 0.0, 1.0  # gripper commands
@@ -67,10 +68,10 @@ def action_towards(
         Within the limits of the action space.
     """
     target, yaw = hand_target(state)
-    way = np.subtract(goal.position, target)
-    shift = way * min(1.0, fastest / max(float(np.abs(way).max()), fastest))
-    turn = min(max(goal.yaw - yaw, -MAX_TURN), MAX_TURN)
-    return np.array([*shift, turn, gripper])
+    # Sines and angles differ in their last bit between processors. Contact amplifies that.
+    *way, turn = on_grid(np.subtract((*goal.position, goal.yaw), (*target, yaw)))
+    shift = np.array(way) * min(1.0, fastest / max(float(np.abs(way).max()), fastest))
+    return np.array([*shift, min(max(turn, -MAX_TURN), MAX_TURN), gripper])
 
 
 def nearest_turn(yaw: float, symmetry: float = 2.0 * math.pi) -> float:

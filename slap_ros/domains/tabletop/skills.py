@@ -18,6 +18,7 @@ from slap_ros.domains.tabletop.transit import Transit
 from slap_ros.errors import SkillNotApplicableError
 from slap_ros.motion import Joints, linear_motion, shifted
 from slap_ros.physics.panda import grasp_pose
+from slap_ros.portable_math import on_grid
 from slap_ros.relational import Object, State
 
 STEP_LIMIT = 100  # environment steps
@@ -41,7 +42,8 @@ class TrajectoryFollower:
 
     def __init__(self, trajectory: Trajectory, max_step: Sequence[float]) -> None:
         """``trajectory``: see :data:`Trajectory`; ``max_step``: of each joint in a step, rad."""
-        self._trajectory = deque(trajectory)
+        # Motion planning rounds its last bit as the processor does. Contact amplifies that.
+        self._trajectory = deque((on_grid(position), grip) for position, grip in trajectory)
         self._max_step = np.array(max_step)
         self._tries = TRIES
 

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 Float = TypeVar("Float", np.float32, np.float64)
 
-# A power of two, so that the products and quotients of rounding are exact. Of a joint's or a hand's
-# motion in one step it is less than a micrometre, far below what contact amplifies or sensors see.
-RESOLUTION = 2.0**-16
+# In rad, m, or parts of an action's range. Four micrometres are far below what a robot's joints
+# repeat. A power of two, so that products and quotients with it are exact.
+RESOLUTION = 2.0**-18
 LN_2 = 0.6931471805599453
 LOG2_E = 1.4426950408889634
 LARGEST_EXPONENT = 700.0  # exp of it is still finite
@@ -32,10 +32,10 @@ SATURATED = 20.0  # where tanh differs from 1 by 1e-17
 def on_grid(values: NDArray[Float]) -> NDArray[Float]:
     """Values rounded to the nearest multiple of ``RESOLUTION``, of the same shape and type.
 
-    Values that differ in their last bits become equal, except where a multiple of half the
-    resolution lies between them: one pair in 10^11 of 64-bit values near 1.
+    Values that differ in their last bits become equal, except where an odd multiple of half the
+    resolution lies between them: about one pair in 10^10 of 64-bit values near 1. Zero has no sign.
     """
-    rounded: NDArray[Float] = np.rint(values / RESOLUTION) * RESOLUTION
+    rounded: NDArray[Float] = np.rint(values / RESOLUTION) * RESOLUTION + 0.0
     return rounded.astype(values.dtype, copy=False)
 
 
