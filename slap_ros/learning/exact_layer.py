@@ -4,9 +4,10 @@
 
 A BLAS library chooses in which order it sums up a matrix product: by the processor, the number of
 threads, and the number of rows. In floating point, another order gives another last bit. Here
-inputs are multiples of :data:`~slap_ros.portable_math.RESOLUTION`, and weights are
-multiples of a power of two as well. Both are so coarse that every partial sum fits in the 53 bits
-of a float. Nothing is rounded, in any order, with fused multiply-add or without.
+inputs are multiples of :data:`~slap_ros.portable_math.RESOLUTION`, and weights are the sum of two
+parts, each of which has multiples of a power of two alone. Both powers are so large that every
+partial sum fits in the 53 bits of a float. Nothing in a product with a part is rounded, in any
+order, with fused multiply-add or without.
 """
 
 from __future__ import annotations
@@ -19,56 +20,67 @@ from numpy.typing import NDArray
 
 from slap_ros.portable_math import RESOLUTION
 
+Values = NDArray[np.float64]
 MANTISSA_BITS = 53  # of a 64-bit float
+PARTS = 2  # of the weights: with the second, the sums are as good as those of 64-bit floats
 
 
 @dataclass(frozen=True, eq=False)
 class ExactLayer:
-    """A linear map of rows, ``inputs @ weights + bias``, without rounding.
+    """A linear map of rows, ``inputs @ weights + bias``, the same in any order of summation.
 
     Args:
-        weights: Shape (in, out).
+        parts: Parts of the weights, the coarse one first, each of shape (in, out).
         bias: Shape (out,).
         bound: Largest magnitude that an output can have.
     """
 
-    weights: NDArray[np.float64]
-    bias: NDArray[np.float64]
+    parts: tuple[Values, ...]
+    bias: Values
     bound: float
 
     @classmethod
     def of(
         cls, weights: NDArray[np.float32], bias: NDArray[np.float32], input_bound: float
     ) -> ExactLayer:
-        """Round the weights as little as exact sums allow.
+        """Split weights into parts whose sums are exact.
 
         Args:
             weights: Shape (out, in), finite.
             bias: Shape (out,), finite.
             input_bound: Largest magnitude of an input.
         """
-        rows = np.abs(weights.astype(np.float64)).tolist()
-        limits = np.abs(bias.astype(np.float64)).tolist()
-        bound = max(
-            input_bound * math.fsum(row) + limit for row, limit in zip(rows, limits, strict=True)
-        )
-        # Twice the bound leaves room for weights that are rounded up.
-        _, exponent = math.frexp(2.0 * bound + RESOLUTION)
-        product_step = math.ldexp(1.0, exponent - MANTISSA_BITS)
-        return cls(
-            _rounded(weights.T, product_step / RESOLUTION), _rounded(bias, product_step), bound
-        )
+        rest, offsets = weights.T.astype(np.float64), bias.astype(np.float64)
+        bound = input_bound * _largest_sum(rest) + float(np.abs(offsets).max())
+        parts = []
+        for _ in range(PARTS):
+            parts.append(_coarsened(rest, input_bound * _largest_sum(rest)))
+            rest = rest - parts[-1]
+        return cls(tuple(parts), offsets, bound)
 
-    def __call__(self, inputs: NDArray[np.float64]) -> NDArray[np.float64]:
+    def __call__(self, inputs: Values) -> Values:
         """Outputs of the layer, shape (n, out).
 
         Args:
             inputs: Multiples of ``RESOLUTION`` within the bound, shape (n, in).
         """
-        outputs: NDArray[np.float64] = inputs @ self.weights + self.bias
+        coarse, fine = (inputs @ part for part in self.parts)
+        outputs: Values = coarse + fine + self.bias
         return outputs
 
 
-def _rounded(values: NDArray[np.float32], step: float) -> NDArray[np.float64]:
-    """The nearest multiples of a power of two."""
-    return np.ascontiguousarray(np.rint(values.astype(np.float64) / step) * step)
+def _largest_sum(weights: Values) -> float:
+    """Largest sum of magnitudes of the weights of an output, from shape (in, out)."""
+    return max(math.fsum(column) for column in np.abs(weights.T).tolist())
+
+
+def _coarsened(weights: Values, bound: float) -> Values:
+    """The nearest weights whose sums are exact.
+
+    Args:
+        weights: Shape (in, out).
+        bound: Largest magnitude of a sum of products with inputs.
+    """
+    _, exponent = math.frexp(2.0 * bound)  # twice, as weights may be rounded up
+    step = math.ldexp(1.0 / RESOLUTION, exponent - MANTISSA_BITS)
+    return np.ascontiguousarray(np.rint(weights / step) * step)
