@@ -29,7 +29,7 @@ FLOORS = (
     ("contact", "motion", "physics"),
     ("core",),
     ("relational", "meshes", "geometry"),
-    ("files", "signals", "versions", "errors", "slap_ros"),
+    ("files", "signals", "versions", "portable_math", "errors", "slap_ros"),
 )
 ORDER = [package for floor in FLOORS for package in floor]
 ROS = re.compile(r"rclpy|embedded_ros|cyclonedds|launch(_ros)?|rosidl_.*|\w+_(msgs|interfaces)$")

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slap_ros.learning.exact_layer import ExactLayer
-from slap_ros.portable_math import exp, on_grid, tanh
+from slap_ros.portable_math import RESOLUTION, exp, on_grid, tanh
 
 LEAST_DEVIATION = 0.3  # features are of magnitude 1 or so
 # Observations at once. OpenBLAS spreads larger products over threads, which wait for one another
@@ -54,23 +54,8 @@ def _relu(values: Values) -> Values:
     return np.maximum(values, 0.0)
 
 
-@dataclass(frozen=True)
-class Activation:
-    """What is between two layers.
-
-    Args:
-        apply: The function of each value.
-        largest: The function of the largest magnitude of values: that of its results.
-    """
-
-    apply: Callable[[Values], Values]
-    largest: Callable[[float], float]
-
-
-ACTIVATIONS: Mapping[str, Activation] = {
-    "tanh": Activation(tanh, lambda _: 1.0),
-    "relu": Activation(_relu, lambda bound: bound),
-}
+# Each rises with its argument, so that the largest argument gives the largest result.
+ACTIVATIONS: Mapping[str, Callable[[Values], Values]] = {"tanh": tanh, "relu": _relu}
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,8 +106,8 @@ class MlpPolicy:
         """The layers, each of which can take what the one before it gives."""
         bound, exact = self.normalisation.clip, []
         for weights, bias in self.layers:
-            exact.append(ExactLayer.of(weights, bias, bound))
-            bound = ACTIVATIONS[self.activation].largest(exact[-1].bound)
+            exact.append(ExactLayer.of(weights, bias, bound + RESOLUTION))
+            bound = float(ACTIVATIONS[self.activation](np.array(exact[-1].bound)))
         return tuple(exact)
 
     def mean(self, observations: Weights) -> Weights:
@@ -131,7 +116,7 @@ class MlpPolicy:
         return np.concatenate([self._mean(observations[i : i + MAX_BATCH]) for i in rows])
 
     def _mean(self, observations: Weights) -> Weights:
-        activate = ACTIVATIONS[self.activation].apply
+        activate = ACTIVATIONS[self.activation]
         *hidden, last = self._exact_layers
         values = on_grid(self.normalisation(observations).astype(np.float64))
         for layer in hidden:

@@ -90,6 +90,48 @@ def main_table(results: Path) -> MarkdownTable:
     )
 
 
+def front_table(results: Path) -> MarkdownTable:
+    """One row per domain of ``slap study table1``, under the preset ``fair``.
+
+    Raises:
+        InvalidParameterError: There is no data for a domain.
+    """
+    return MarkdownTable(
+        ("", "pure planning [steps]", "SLAP [steps]", "relative [95 %]", "the paper's [steps]"),
+        [[name, *_compared(results / f"table1_{key}.json", key)] for key, name in DOMAINS.items()],
+    )
+
+
+def _compared(path: Path, domain: str) -> list[str]:
+    if not path.exists():
+        raise InvalidParameterError(
+            f"no data in {path.parent}; make it with `slap study table1 {domain}`"
+        )
+    fair = {
+        row["approach"]: row
+        for row in parse_json(read_text(path))["found"]["rows"]
+        if row["preset"] == "fair"
+    }
+    pure, slap = fair["pure_planning"], fair["slap"]
+    papers = THE_PAPERS[domain]
+    mean = {approach: length.split(" ")[0] for approach, length in papers.items()}
+    return [
+        f"{pure['plan_length']['mean']:.1f}",
+        f"{slap['plan_length']['mean']:.1f}",
+        _with_interval(slap["relative_length"], slap["relative_interval"]),
+        f"{mean['pure_planning']} → {mean['slap_1_sample']}",
+    ]
+
+
+def front_skill_table(results: Path) -> MarkdownTable:
+    """Task progress by goal of ``slap study acquisition``, and the paper's, a row per domain."""
+    data = [parse_json(read_text(path)) for path in sorted(results.glob("acquisition_*.json"))]
+    return MarkdownTable(
+        ("", "task progress, by goal", "LG-SAIL's"),
+        [[f"`{one['domain']}`", *_of_skills(one)[2:4]] for one in data],
+    )
+
+
 def preset_table(results: Path) -> MarkdownTable:
     """How plans with all samples compare with pure planning under the preset ``paper``."""
     return MarkdownTable(
@@ -234,6 +276,8 @@ def _with_interval(value: float | None, interval: Mapping[str, float] | None) ->
 
 
 TABLES: Mapping[str, Callable[[Path], MarkdownTable]] = {
+    "slap": front_table,
+    "lg_sail": front_skill_table,
     "table1": main_table,
     "presets": preset_table,
     "skills": skill_table,

@@ -33,12 +33,12 @@ EXECUTABLES = (
 NODES = EXECUTABLES[:4]
 
 
-def test_the_executables_of_the_readme_are_there():
+def test_the_executables_of_the_page_are_there():
     listed = ros2("pkg", "executables", "slap_ros").split()
-    readme = (ROOT / "README.md").read_text()
+    page = (ROOT / "docs" / "ros2.md").read_text()
     for name in (*EXECUTABLES, "slap"):
         assert name in listed
-        assert f"ros2 run slap_ros {name}" in readme
+        assert f"ros2 run slap_ros {name}" in page
 
 
 @pytest.mark.parametrize(
