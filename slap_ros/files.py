@@ -18,17 +18,18 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, BinaryIO
-
-import yaml
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from slap_ros.errors import BusyError
+
+if TYPE_CHECKING:
+    import yaml
 
 MAX_BYTES = 64 * 2**20  # of a file that is read at once, where its reader states no other limit
 JSON_LINE = 1000  # characters, beside the indentation: what fits, as most trials do, is not broken
 MAX_YAML_NODES = 200_000  # with what is repeated by reference counted as often as it is repeated
 # What PyYAML raises where a scalar is not of the kind that its tag says, beside its own errors.
-YAML_ERRORS = (yaml.YAMLError, RecursionError, LookupError, TypeError, AttributeError)
+SCALAR_ERRORS = (RecursionError, LookupError, TypeError, AttributeError)
 KINDS = {
     stat.S_IFDIR: "a folder",
     stat.S_IFIFO: "a pipe",
@@ -217,6 +218,8 @@ def parse_yaml(text: str) -> Any:
     Raises:
         ValueError: It is none, is nested too deep, or grows without bounds by references.
     """
+    import yaml  # few files are read as YAML, and all are read by this module
+
     try:
         loader = yaml.SafeLoader(text)
         try:
@@ -228,7 +231,7 @@ def parse_yaml(text: str) -> Any:
             return loader.construct_document(node)
         finally:
             loader.dispose()
-    except YAML_ERRORS as error:
+    except (yaml.YAMLError, *SCALAR_ERRORS) as error:
         raise ValueError(f"no YAML: {' '.join(str(error).split())[:200]}") from error
 
 
@@ -236,7 +239,7 @@ def _expanded_size(node: yaml.Node, known: dict[yaml.Node, int]) -> int:
     """The number of values below a node if each reference were written out."""
     if node not in known:
         known[node] = MAX_YAML_NODES + 1  # what a reference from within itself finds here
-        below = node.value if isinstance(node, yaml.CollectionNode) else ()
+        below = node.value if isinstance(node.value, list) else ()  # a scalar has a text
         known[node] = 1 + sum(
             _expanded_size(child, known)
             for item in below

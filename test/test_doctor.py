@@ -16,7 +16,9 @@ from pathlib import Path
 import psutil
 import pytest
 
-from slap_ros.doctor import Check, dds, diagnose, libraries, machine, ros
+from slap_ros.doctor import dds, libraries, machine, ros
+from slap_ros.doctor.check import Check
+from slap_ros.doctor.diagnosis import diagnose
 from slap_ros.doctor.processes import PROBE, run_python
 
 ROOT = Path(__file__).parents[1]

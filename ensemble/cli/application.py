@@ -4,15 +4,24 @@
 
 from __future__ import annotations
 
-from ensemble.cli import commands
-from slap_ros.cli import app
-from slap_ros.cli.bag import app as bag_app
-from slap_ros.cli.console import exits, open_closed_streams
-from slap_ros.cli.options import flat_options
+from dataclasses import replace
 
-app.command("run")(exits(flat_options(commands.run)))
-app.registered_commands.sort(key=lambda command: command.name != "run")  # the first in --help
-bag_app.command("replay")(exits(flat_options(commands.replay)))
+from slap_ros import cli
+from slap_ros.cli.lazy_commands import CommandEntry
+from slap_ros.cli.streams import open_closed_streams
+
+RUN = CommandEntry(
+    "run",
+    "ensemble.cli.run:run",
+    "Run the whole ensemble on one task: simulator, perception, planner, skills, recorder.",
+)
+WITH_REPLAY = {"bag": "ensemble.cli.replay:bag_app"}  # in the place of the core's
+COMMANDS = (
+    RUN,
+    *(replace(one, source=WITH_REPLAY.get(one.name, one.source)) for one in cli.COMMANDS),
+)
+
+app = cli.command_app(COMMANDS)
 
 
 def run() -> None:

@@ -11,15 +11,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from slap_ros.acquisition.acquired_domain import acquired_domain
-from slap_ros.acquisition.skill_library import SkillLibrary, load_skill_library
-from slap_ros.core import Domain
-from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError, SkillsChangedError
-from slap_ros.learning.scripted_skill import with_scripts
 from slap_ros.learning.shipped_models import shipped_folder
-from slap_ros.messages.protocols import DomainInfoMessage
+
+if TYPE_CHECKING:  # a choice is named wherever options are read, and costs no import there
+    from slap_ros.acquisition.skill_library import SkillLibrary
+    from slap_ros.core import Domain
+    from slap_ros.messages.protocols import DomainInfoMessage
 
 SHIPPED = ""  # the library that ships for the domain, if there is one; else its own skills
 NO_SKILLS = "none"
@@ -163,9 +163,11 @@ def open_domain(choice: DomainChoice) -> Domain:
         InvalidLibraryError: The folder has no library of this domain that can be read.
         SkillsChangedError: It has another library than the one that is meant.
     """
-    domain = get_domain(choice.name, choice.preset or None)
+    domain = _with_own_skills(choice)
     library = _library(choice, domain)
     if library is not None:
+        from slap_ros.acquisition.acquired_domain import acquired_domain
+
         choice.require_digest(library.digest)
         folder = choice.library_folder
         assert folder is not None
@@ -173,6 +175,8 @@ def open_domain(choice: DomainChoice) -> Domain:
         return _configured(acquired_domain(domain, library), said)
     choice.require_digest("")
     if choice.skills == DEMONSTRATOR:
+        from slap_ros.learning.scripted_skill import with_scripts
+
         return _configured(with_scripts(domain), {SKILLS_KEY: DEMONSTRATOR})
     if choice.skills == NO_SKILLS:
         bare = replace(domain, operators=(), skills={}, static=domain.static_predicates)
@@ -186,13 +190,21 @@ def chosen_skills(choice: DomainChoice) -> SkillLibrary | None:
     Raises:
         SlapError: As :func:`open_domain`.
     """
-    return _library(choice, get_domain(choice.name, choice.preset or None))
+    return _library(choice, _with_own_skills(choice))
+
+
+def _with_own_skills(choice: DomainChoice) -> Domain:
+    from slap_ros.domains import get_domain
+
+    return get_domain(choice.name, choice.preset or None)
 
 
 def _library(choice: DomainChoice, domain: Domain) -> SkillLibrary | None:
     folder = choice.library_folder
     if folder is None:
         return None
+    from slap_ros.acquisition.skill_library import load_skill_library
+
     library = load_skill_library(folder, domain)
     if not library.skills:
         reasons = "; ".join(map(str, library.refused)) or "it has none"

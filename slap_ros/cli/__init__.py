@@ -4,49 +4,102 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import typer
 
 from slap_ros import __version__
-from slap_ros.cli import (
-    acquire,
-    bag,
-    check,
-    domains,
-    evaluate,
-    plan,
-    propose,
-    report,
-    skills,
-    study,
-    train,
-)
-from slap_ros.cli import doctor as doctor_command
-from slap_ros.cli.console import exits
-from slap_ros.cli.options import flat_options
+from slap_ros.cli.lazy_commands import CommandEntry, lazy_group
 
-app = typer.Typer(
-    name="slap",
-    help="Task-and-motion planning with learned shortcuts: run it, measure it, look into it.",
-    epilog=(
-        "Exit codes: 0 done, 2 wrong usage, 130 interrupted, 143 terminated; any other is an error "
-        "code of slap_msgs/ErrorCode. With --json, stdout has JSON and nothing else."
+COMMANDS = (
+    CommandEntry(
+        "plan",
+        "slap_ros.cli.plan:plan",
+        "Plan one task without executing it; write its PDDL and draw its abstract graph.",
     ),
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    CommandEntry(
+        "propose",
+        "slap_ros.cli.propose:propose",
+        "Propose operators and rewards for a task, check them, and plan with them.",
+    ),
+    CommandEntry(
+        "evaluate",
+        "slap_ros.cli.evaluate:evaluate",
+        "Plan and execute many tasks in the world and sum up: success, plan length, planning time.",
+    ),
+    CommandEntry(
+        "report",
+        "slap_ros.cli.report:report",
+        "Report a run, or compare several, on one page that opens in any browser.",
+    ),
+    CommandEntry(
+        "train",
+        "slap_ros.cli.train:train",
+        "Discover and learn shortcuts: explore, rank, train, keep what makes plans shorter.",
+    ),
+    CommandEntry(
+        "acquire",
+        "slap_ros.cli.acquire:acquire",
+        "Acquire skills: carry out plans, train what fails from where it fails, and again.",
+    ),
+    CommandEntry(
+        "skills",
+        "slap_ros.cli.skills:skills",
+        "Show a library of skills: operators, rewards, success, and what each began from.",
+    ),
+    CommandEntry(
+        "check",
+        "slap_ros.cli.check:check",
+        "Check whether a domain keeps to the contract: Markov states, margins, bounds, tasks.",
+    ),
+    CommandEntry(
+        "domains",
+        "slap_ros.cli.domains:domains",
+        "List the domains that are installed; of one, its predicates, metrics, goals and "
+        "operators.",
+    ),
+    CommandEntry(
+        "doctor",
+        "slap_ros.cli.doctor:doctor",
+        "Check ROS 2, DDS on this network, libraries and disk, and say what to do.",
+    ),
+    CommandEntry(
+        "study",
+        "slap_ros.cli.study:app",
+        "Make a figure of the papers again: data, a picture and a page. Stopped while it solves "
+        "tasks, learns or asks a model, a study goes on where it was with the same command.",
+    ),
+    CommandEntry(
+        "bag",
+        "slap_ros.cli.bag:app",
+        "Look into recorded runs: info, evaluate, replay, render.",
+    ),
 )
-app.command("plan")(exits(flat_options(plan.plan)))
-app.command("propose")(exits(flat_options(propose.propose)))
-app.command("evaluate")(exits(flat_options(evaluate.evaluate)))
-app.command("report")(exits(report.report))
-app.command("train")(exits(flat_options(train.train)))
-app.command("acquire")(exits(flat_options(acquire.acquire)))
-app.command("skills")(exits(skills.skills))
-app.add_typer(study.app, name="study")
-app.add_typer(bag.app, name="bag")
-app.command("check")(exits(flat_options(check.check)))
-app.command("domains")(exits(domains.domains))
-app.command("doctor")(exits(doctor_command.doctor))
+
+
+def command_app(commands: Sequence[CommandEntry]) -> typer.Typer:
+    """The command line ``slap`` with these commands.
+
+    Args:
+        commands: Every command, in the order in which help lists them.
+
+    Returns:
+        The application, to be called.
+    """
+    app = typer.Typer(
+        name="slap",
+        cls=lazy_group(commands),
+        help="Task-and-motion planning with learned shortcuts: run it, measure it, look into it.",
+        epilog=(
+            "Exit codes: 0 done, 2 wrong usage, 130 interrupted, 143 terminated; any other is an "
+            "error code of slap_msgs/ErrorCode. With --json, stdout has JSON and nothing else."
+        ),
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    app.callback()(_root)
+    return app
 
 
 def _show_version(wanted: bool) -> None:
@@ -55,10 +108,12 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def _root(
     version: bool = typer.Option(
         False, "--version", callback=_show_version, is_eager=True, help="Show the version."
     ),
 ) -> None:
     del version
+
+
+app = command_app(COMMANDS)

@@ -15,7 +15,7 @@ import tempfile
 import traceback
 import unicodedata
 from collections.abc import Callable, Iterable
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import BrokenExecutor
 from functools import wraps
 from pathlib import Path
 from typing import Any, NoReturn, ParamSpec
@@ -85,18 +85,6 @@ def styled(label: str, style: str, rest: str = "") -> Text:
     return Text.assemble((visible(label), style), visible(rest))
 
 
-def open_closed_streams() -> None:
-    """Give a process that was started without stdout or stderr something in their place.
-
-    Python has None there, which every library trips over. What is written to a closed stdout
-    fails as on a full disk; what is said to a closed stderr is for nobody.
-    """
-    if sys.stdout is None:
-        sys.stdout = os.fdopen(os.open("/dev/full", os.O_WRONLY), "w", encoding="utf-8")
-    if sys.stderr is None:
-        sys.stderr = os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8")
-
-
 def exits(command: Callable[P, int | None]) -> Callable[P, None]:
     """Turn a command's return value into its exit code, and its errors into one line and a code."""
 
@@ -115,7 +103,7 @@ def exits(command: Callable[P, int | None]) -> Callable[P, None]:
         except BrokenPipeError as error:  # whoever read stdout has seen enough
             _silence_stdout()
             raise typer.Exit(int(ErrorCode.INPUT_OUTPUT)) from error
-        except (BrokenProcessPool, ChildProcessError) as error:
+        except (BrokenExecutor, ChildProcessError) as error:
             advice = "a worker was killed; short of memory? the same command goes on"
             _fail(ErrorCode.OUT_OF_MEMORY, advice, error)
         except MemoryError as error:

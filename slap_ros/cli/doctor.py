@@ -10,7 +10,7 @@ from rich.table import Table
 
 from slap_ros.cli.console import console, print_json, styled
 from slap_ros.cli.options import Json
-from slap_ros.doctor import diagnose
+from slap_ros.doctor.diagnosis import diagnose
 from slap_ros.errors import ErrorCode
 
 STYLE = {"ok": "green", "warning": "yellow", "problem": "bold red"}

@@ -5,15 +5,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from slap_ros.cli.console import console, styled
-from slap_ros.core import Domain
-from slap_ros.shortcuts.library import Library
-from slap_ros.shortcuts.shipped import chosen_library
 from slap_ros.shortcuts.shortcut import DEFAULT, Sampling
+
+if TYPE_CHECKING:
+    from slap_ros.core import Domain
+    from slap_ros.shortcuts.library import Library
 
 SAMPLES = DEFAULT.samples
 
@@ -41,6 +42,8 @@ def choose(choice: str | None, domain: Domain, planner: str) -> Library | None:
         InvalidLibraryError: It cannot be used as a whole.
         InvalidParameterError: The planner cannot use it.
     """
+    from slap_ros.shortcuts.shipped import chosen_library  # only where there is a domain
+
     library = chosen_library(choice, domain, planner)
     for reason in library.refused if library is not None else ():
         console.print(styled("warning", "yellow", f" a shortcut is left out: {reason}"))

@@ -4,13 +4,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from slap_ros.acquisition.domain_choice import DomainChoice, chosen_skills, open_domain
 from slap_ros.cli.console import console, styled
-from slap_ros.core import Domain
+
+if TYPE_CHECKING:
+    from slap_ros.core import Domain
 
 Skills = Annotated[
     str,

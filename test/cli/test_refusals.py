@@ -12,7 +12,7 @@ from typing import get_args
 import pytest
 from typer.testing import CliRunner
 
-from ensemble.cli.application import app
+from ensemble.cli.application import COMMANDS, app
 from ensemble.nodes import node_class
 from ensemble.parameters import _require_within, parse_parameters
 from ensemble.robot_parameters import MockRobotParameters, PlayerParameters, RobotBridgeParameters
@@ -82,15 +82,15 @@ def test_what_is_within_the_limits_is_a_task_or_an_error(name, monkeypatch):
 # -- options and parameters -----------------------------------------------------------------------
 
 
-def options_of(kind, group=app, path=()):
+def options_of(kind, commands=None, path=()):
     """Every command with its options that are of a kind, such as float."""
-    for command in group.registered_commands:
-        name = command.name or command.callback.__name__
+    for name, command in (commands or {one.name: one.load() for one in COMMANDS}).items():
+        if hasattr(command, "commands"):
+            yield from options_of(kind, command.commands, (*path, name))
+            continue
         for option, parameter in signature(command.callback).parameters.items():
             if kind in kinds_in(parameter.annotation):
                 yield (*path, name), f"--{option.replace('_', '-')}"
-    for sub in group.registered_groups:
-        yield from options_of(kind, sub.typer_instance, (*path, sub.name))
 
 
 def kinds_in(annotation):

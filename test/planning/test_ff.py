@@ -278,15 +278,15 @@ def plan_files(tmp_path, texts, *options):
     ids=["hanoi", "operator", "predicate", "atoms"],
 )
 def test_planning_without_end_is_given_up_and_says_what_helps(tmp_path, monkeypatch, texts, advice):
-    monkeypatch.setattr("slap_ros.cli.plan.MAX_TESTS", 400_000)  # else ten seconds, or four
-    monkeypatch.setattr("slap_ros.cli.plan.MAX_BINDINGS", 20_000)
+    monkeypatch.setattr("slap_ros.cli.plan_pddl.MAX_TESTS", 400_000)  # else ten seconds, or four
+    monkeypatch.setattr("slap_ros.cli.plan_pddl.MAX_BINDINGS", 20_000)
     result = plan_files(tmp_path, texts)
     assert result.exit_code == ErrorCode.PLANNING_LIMIT, result.stderr
     assert advice in result.stderr
 
 
 def test_more_effort_goes_further(tmp_path, monkeypatch):
-    monkeypatch.setattr("slap_ros.cli.plan.MAX_TESTS", 1_000)
+    monkeypatch.setattr("slap_ros.cli.plan_pddl.MAX_TESTS", 1_000)
     assert plan_files(tmp_path, hanoi(4)).exit_code == ErrorCode.PLANNING_LIMIT
     result = plan_files(tmp_path, hanoi(4), "--effort", "100")
     assert result.exit_code == 0

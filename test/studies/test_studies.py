@@ -12,10 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from study_helpers import without_seconds
-from typer.main import get_command
 from typer.testing import CliRunner
 
-from ensemble.cli.application import app
+from ensemble.cli.application import COMMANDS, app
 from slap_ros.acquisition.domain_choice import DomainChoice
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
@@ -486,7 +485,8 @@ def test_published_data_can_be_made_again_by_its_command(name):
     assert {"study", "source", "domain", "command", "versions", "found"} <= set(data)
     slap, group, study, *arguments = shlex.split(data["command"])
     assert (slap, group, study) == ("slap", "study", data["study"])
-    command = get_command(app).commands[group].commands[study]
+    (entry,) = (one for one in COMMANDS if one.name == group)
+    command = entry.load().commands[study]
     given = command.make_context(study, arguments).params
     assert given["domain"] == data["domain"]
     for setting in ("preset", "tasks", "seeds", "first_seed", "samples"):

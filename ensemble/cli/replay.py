@@ -1,21 +1,19 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The commands that bring nodes up. They import ROS when they run: all others work without it."""
+"""``slap bag``, with ``replay``, which may also move a robot; it imports ROS only then."""
 
 from __future__ import annotations
 
 from ensemble.cli.replay_options import WORLD, ReplayOptions
-from ensemble.cli.run_options import RunOptions
+from slap_ros.cli.bag import app as bag_app
 from slap_ros.cli.bag import replay_in_world
+from slap_ros.cli.console import exits
+from slap_ros.cli.options import flat_options
 
 
-def run(options: RunOptions) -> int:
-    """Run the whole ensemble on one task: simulator, perception, planner, skills, recorder."""
-    from ensemble.cli.run_task import run_task
-
-    return run_task(options)
-
-
+@bag_app.command("replay")
+@exits
+@flat_options
 def replay(options: ReplayOptions) -> int:
     """Feed the recorded commands to a fresh world and compare every state, bit for bit.
 

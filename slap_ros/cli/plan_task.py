@@ -1,0 +1,155 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``slap plan`` for a task of a domain."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from slap_ros.cli.console import console, print_json
+from slap_ros.cli.shortcuts import sampling
+from slap_ros.core import Domain, Task
+from slap_ros.drawing import draw_abstract_graph
+from slap_ros.errors import StorageFullError
+from slap_ros.evaluation.approaches import approaches
+from slap_ros.files import write_whole
+from slap_ros.planning.abstract_graph import AbstractGraph, build_abstract_graph
+from slap_ros.planning.plan import PlanningResult
+from slap_ros.planning.planner import Problem, plan_symbolically
+from slap_ros.relational import AtomSpace, LiftedOperator, ground_operators
+from slap_ros.relational.pddl import write_domain, write_problem
+from slap_ros.shortcuts.library import Library
+from slap_ros.versions import versions
+
+
+def plan_task(
+    domain: Domain,
+    task: Task,
+    planner: str,
+    library: Library | None,
+    samples: int,
+    output: Path | None,
+    json: bool,
+) -> None:
+    """Plan a task and print the plan; write its PDDL and draw its abstract graph.
+
+    Args:
+        domain: Domain of the task. Without skills, its hand-written operators are planned with.
+        task: Start and goal.
+        planner: Name of the planner.
+        library: Shortcuts to plan with, if any.
+        samples: Attempts of a shortcut in the model.
+        output: Folder for domain.pddl, problem.pddl and graph.svg, if they are wanted.
+        json: Whether stdout gets JSON.
+
+    Raises:
+        SlapError: There is no plan, or it cannot be written.
+    """
+    if not domain.operators and domain.acquisition and domain.acquisition.operators:
+        _plan_by_hand(domain, domain.acquisition.operators, task, output, json)
+        return
+    space = domain.atom_space(task.initial_state)
+    approach = approaches(library, sampling(samples))[-1]
+    result = approach.planner(planner, domain, task.initial_state).plan(
+        task.initial_state, space.mask(task.goal)
+    )
+    _show(result, json)
+    if output is not None:
+        graph = draw_abstract_graph(
+            _graph(domain, task, space), space, result.plan, f"{domain.name}: plan"
+        )
+        _write(output, _pddl(domain, domain.operators, task) | {"graph.svg": graph})
+
+
+def _plan_by_hand(
+    domain: Domain,
+    operators: Sequence[LiftedOperator],
+    task: Task,
+    output: Path | None,
+    json: bool,
+) -> None:
+    """Plan without skills: a shortest sequence of operators that people wrote.
+
+    Args:
+        domain: Without operators of its own.
+        operators: Written by hand.
+        task: What to plan.
+        output: Folder for domain.pddl and problem.pddl, if they are wanted.
+        json: Whether stdout gets JSON.
+    """
+    space = domain.atom_space(task.initial_state)
+    grounds = ground_operators(operators, space)
+    start = space.abstract(task.initial_state)
+    sequence = plan_symbolically(space, start, space.mask(task.goal), grounds)
+    names = [str(grounds[number]) for number in sequence]
+    if json:
+        print_json(
+            {
+                "plan": [{"operator": name} for name in names],
+                "operators": "hand-written",
+                "versions": versions(),
+            }
+        )
+    else:
+        for name in names:
+            console.print(name)
+        console.print(
+            f"{len(names)} operators, the fewest; they are the domain's hand-written ones, as "
+            f"{domain.name} has no skills yet: steps are not predicted"
+        )
+    if output is not None:
+        _write(output, _pddl(domain, operators, task))
+
+
+def _show(result: PlanningResult, json: bool) -> None:
+    edges = [(str(edge), edge.predicted_steps) for edge in result.plan.edges]
+    if json:
+        print_json(
+            {
+                "plan": [{"option": option, "predicted_steps": steps} for option, steps in edges],
+                "predicted_steps": result.plan.predicted_steps,
+                "graph_nodes": result.graph_nodes,
+                "graph_edges": result.graph_edges,
+                "edges_rolled_out": result.edges_rolled_out,
+                "versions": versions(),
+            }
+            | ({"fails": result.fails} if result.fails else {})
+        )
+        return
+    for option, steps in edges:
+        console.print(f"{steps:5d}  {option}")
+    if result.fails:
+        console.print(f"this plan fails in the model, near the goal: {result.fails}")
+    console.print(
+        f"{result.plan.predicted_steps:5d}  steps predicted; {result.graph_nodes} abstract states, "
+        f"{result.graph_edges} edges, {result.edges_rolled_out} rolled out",
+    )
+
+
+def _pddl(domain: Domain, operators: Sequence[LiftedOperator], task: Task) -> dict[str, str]:
+    """Domain and problem as files."""
+    space = domain.atom_space(task.initial_state)
+    init = tuple(space.decode(space.abstract(task.initial_state)))
+    objects = space.layout.objects
+    return {
+        "domain.pddl": write_domain(domain.name, domain.types, domain.predicates, operators),
+        "problem.pddl": write_problem("task", domain.name, objects, init, task.goal),
+    }
+
+
+def _write(folder: Path, files: Mapping[str, str]) -> None:
+    """Write texts by file name."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, text in files.items():
+            write_whole(folder / name, text)
+            console.print(f"wrote {folder / name}")
+    except OSError as error:
+        raise StorageFullError(f"cannot write to {folder}: {error.strerror}") from error
+
+
+def _graph(domain: Domain, task: Task, space: AtomSpace) -> AbstractGraph:
+    operators = Problem.of(domain, task.initial_state).operators
+    start = space.abstract(task.initial_state)
+    return build_abstract_graph(start, space.mask(task.goal), operators)
