@@ -11,11 +11,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slap_ros.bags.evaluate import BagContents, read_runs
+from slap_ros.bags.reader import Bag
 from slap_ros.bags.recording import RecordedEpisode, initial_state
 from slap_ros.bags.taken_commands import taken_commands
 from slap_ros.core import Action, Domain
@@ -34,6 +36,8 @@ class EpisodeArrays:
     """An episode of a bag: a row per recorded state, with what was done in that state.
 
     Args:
+        bag: Name of the bag's folder or file.
+        metadata: What the run was made with, as the bag states it.
         number: Number of the reset that the episode followed, from 1; several runs may share it.
         domain: Name of the domain.
         preset: Preset of the domain.
@@ -42,6 +46,7 @@ class EpisodeArrays:
         metrics: Metrics of the run; None where nothing was planned.
         state_names: Name of each column of ``states``, as ``block1.x``.
         state_units: Unit of each column of ``states``; ``1`` for a pure number.
+        of_robot: Whether each column of ``states`` is of the robot itself, shape (features,).
         action_names: Name of each column of ``actions``.
         action_units: Unit of each column of ``actions``.
         atom_names: Name of each column of ``atoms``, as ``On(block1, target)``.
@@ -60,6 +65,8 @@ class EpisodeArrays:
         option_kinds: Kind of that option, shape (n,): operator, shortcut or unknown.
     """
 
+    bag: str
+    metadata: Mapping[str, str]
     number: int
     domain: str
     preset: str
@@ -68,6 +75,7 @@ class EpisodeArrays:
     metrics: RunMetrics | None
     state_names: tuple[str, ...]
     state_units: tuple[str, ...]
+    of_robot: NDArray[np.bool_]
     action_names: tuple[str, ...]
     action_units: tuple[str, ...]
     atom_names: tuple[str, ...]
@@ -84,6 +92,19 @@ class EpisodeArrays:
     def __len__(self) -> int:
         """The number of rows."""
         return len(self.steps)
+
+    def about(self) -> dict[str, Any]:
+        """What there is to say of the episode beside its arrays, as JSON has it."""
+        return {
+            "bag": self.bag,
+            "number": self.number,
+            "domain": self.domain,
+            "preset": self.preset,
+            "control_period_s": self.control_period_s,
+            "goal": None if self.goal is None else list(self.goal),
+            "run": None if self.metrics is None else self.metrics.as_json(),
+            "metadata": dict(self.metadata),
+        }
 
     def __repr__(self) -> str:
         return (
@@ -132,7 +153,7 @@ def episode_arrays(contents: BagContents) -> list[EpisodeArrays]:
         parts = [_run_part(trace, episode) for trace in own]
         parts = parts or [_whole_part(contents.log.executed_in(number), episode)]
         if any(part.steps for part in parts):
-            reader = _EpisodeReader(domain, number, episode)
+            reader = _EpisodeReader(contents.bag, domain, number, episode)
             found += [reader.arrays(part) for part in parts if part.steps]
     if not found:
         raise DamagedBagError(f"{contents.bag.path} has no states")
@@ -187,11 +208,11 @@ def _whole_part(executed: Iterable[ExecutedOption], episode: RecordedEpisode) ->
 class _EpisodeReader:
     """Makes the arrays of a recorded episode, whose states all have the same objects."""
 
-    def __init__(self, domain: Domain, number: int, episode: RecordedEpisode) -> None:
+    def __init__(self, bag: Bag, domain: Domain, number: int, episode: RecordedEpisode) -> None:
         start = initial_state(episode, domain)
         if start is None:  # no part of it has states
             raise DamagedBagError(f"episode {number} has no states")
-        self._domain, self._number, self._episode = domain, number, episode
+        self._bag, self._domain, self._number, self._episode = bag, domain, number, episode
         self._space = domain.atom_space(start[1])
         self._columns = {
             (atom.predicate.name, tuple(obj.name for obj in atom.objects)): column
@@ -206,6 +227,8 @@ class _EpisodeReader:
         atoms, perceived = self._atoms(states)
         options, kinds = _options(part)
         return EpisodeArrays(
+            bag=self._bag.path.name,
+            metadata=self._bag.metadata,
             number=self._number,
             domain=domain.name,
             preset=domain.preset,
@@ -214,6 +237,7 @@ class _EpisodeReader:
             metrics=part.metrics,
             state_names=tuple(f"{obj.name}.{feature.name}" for obj, feature in features),
             state_units=tuple(feature.unit for _, feature in features),
+            of_robot=np.array([obj.type in domain.robot_types for obj, _ in features]),
             action_names=tuple(axis.name for axis in domain.action_space.axes),
             action_units=tuple(axis.unit for axis in domain.action_space.axes),
             atom_names=tuple(_text(*names) for names in self._columns),

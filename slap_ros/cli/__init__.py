@@ -46,6 +46,7 @@ app.add_typer(study.app, name="study")
 app.add_typer(bag.app, name="bag")
 app.command("check")(exits(flat_options(check.check)))
 app.command("domains")(exits(domains.domains))
+app.command("list", hidden=True)(exits(domains.domains))  # what people type first
 app.command("doctor")(exits(doctor_command.doctor))
 
 

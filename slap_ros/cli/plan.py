@@ -12,7 +12,17 @@ import typer
 
 from slap_ros.acquisition.domain_choice import SHIPPED
 from slap_ros.cli.console import console, print_json
-from slap_ros.cli.options import Goal, Index, Json, Planner, Preset, Seed
+from slap_ros.cli.options import (
+    ChosenSeed,
+    DomainOrFile,
+    Goal,
+    Index,
+    Json,
+    Planner,
+    Preset,
+    say_default_seed,
+    seed_or_default,
+)
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose, sampling
 from slap_ros.cli.skill_choice import Skills, open_chosen
 from slap_ros.core import Domain, Task, task_with_goal
@@ -38,11 +48,11 @@ from slap_ros.versions import versions
 
 
 def plan(
-    domain: Annotated[str, typer.Argument(help="One of `slap domains`, or a PDDL domain file.")],
+    domain: DomainOrFile,
     problem: Annotated[
         Path | None, typer.Argument(help="With a PDDL domain file: the PDDL problem file.")
     ] = None,
-    seed: Seed = 0,
+    seed: ChosenSeed = None,
     index: Index = 0,
     preset: Preset = None,
     goal: Goal = None,
@@ -72,9 +82,10 @@ def plan(
     if output is not None:
         require_writable(output)
     chosen = open_chosen(domain, preset, skills)
-    task = task_with_goal(chosen, seed, index, goal)
+    task = task_with_goal(chosen, seed_or_default(seed), index, goal)
     if not chosen.operators and chosen.acquisition and chosen.acquisition.operators:
         _plan_by_hand(chosen, chosen.acquisition.operators, task, output, json)
+        say_default_seed(seed)
         return
     space = chosen.atom_space(task.initial_state)
     approach = approaches(choose(shortcuts, chosen, planner), sampling(samples))[-1]
@@ -82,6 +93,7 @@ def plan(
         task.initial_state, space.mask(task.goal)
     )
     _show(result, json)
+    say_default_seed(seed)
     if output is not None:
         graph = draw_abstract_graph(
             _graph(chosen, task, space), space, result.plan, f"{chosen.name}: plan"
