@@ -3,31 +3,24 @@
 """What is said of a seed that nobody gave, other names of commands, and completion in a shell."""
 
 import json
-import os
-import subprocess
-import sys
 
 import pytest
+from typer.testing import CliRunner
+
+from ensemble.cli.application import app
 
 SEED_LINE = "seed 0 (the default; --seed N for another task)"
 
 
 def slap(*arguments, **environment):
-    code = "import sys; sys.argv[0] = 'slap'; from ensemble.cli import main; main()"
-    return subprocess.run(
-        [sys.executable, "-c", code, *arguments],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        env=os.environ | environment,
-    )
+    return CliRunner().invoke(app, arguments, env=environment, prog_name="slap")
 
 
 @pytest.mark.parametrize("command", [["plan"], ["run", "--in-process"]])
-def test_a_seed_that_nobody_gave_is_said_beside_json(command):
+def test_a_seed_that_nobody_gave_is_said_beside_json(command, network):
     arguments = [command[0], "obstacle2d", *command[1:], "--shortcuts", "none", "--json"]
     without, with_seed = slap(*arguments), slap(*arguments, "--seed", "0")
-    assert without.returncode == with_seed.returncode == 0, without.stderr
+    assert without.exit_code == with_seed.exit_code == 0, without.stderr
     assert SEED_LINE in without.stderr.splitlines()
     assert SEED_LINE not in with_seed.stderr.splitlines()
     seconds = "planning_seconds"
@@ -36,9 +29,9 @@ def test_a_seed_that_nobody_gave_is_said_beside_json(command):
 
 
 def test_list_is_domains():
-    ran = slap("list", "--json")
-    assert ran.returncode == 0, ran.stderr
-    assert ran.stdout == slap("domains", "--json").stdout
+    ran = slap("list", "obstacle2d", "--json")
+    assert ran.exit_code == 0, ran.stderr
+    assert ran.stdout == slap("domains", "obstacle2d", "--json").stdout
 
 
 @pytest.mark.parametrize(
@@ -58,5 +51,5 @@ def test_bash_completes_commands_options_and_domains(words, found):
         COMP_WORDS=" ".join(words),
         COMP_CWORD=str(len(words) - 1),
     )
-    assert ran.returncode == 0, ran.stderr
+    assert ran.exit_code == 0, ran.stderr
     assert ran.stdout.split() == found

@@ -20,7 +20,7 @@ from slap_ros.files import draft_beside, require_writable
 
 @dataclass(frozen=True)
 class ExportFormat:
-    """A format.
+    """A format of other tools, and what writes it.
 
     Args:
         name: Name of the format.
