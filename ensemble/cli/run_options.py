@@ -19,7 +19,17 @@ from slap_ros.acquisition.proposal_request import (
     require_known,
 )
 from slap_ros.bags.writer import require_new
-from slap_ros.cli.options import MAX_INDEX, DomainName, Goal, Index, Json, Planner, Preset, Seed
+from slap_ros.cli.options import (
+    MAX_INDEX,
+    ChosenSeed,
+    DomainName,
+    Goal,
+    Index,
+    Json,
+    Planner,
+    Preset,
+    seed_or_default,
+)
 from slap_ros.cli.render import Size, picture_size
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts
 from slap_ros.cli.skill_choice import Skills
@@ -41,7 +51,7 @@ class RunOptions:
     """
 
     domain: DomainName
-    seed: Seed = 0
+    seed: ChosenSeed = None
     index: Index = 0
     preset: Preset = None
     goal: Goal = None
@@ -164,6 +174,11 @@ class RunOptions:
         said = self.acquisition or (self.proposer, self.rewarder) != (MANUAL, MANUAL)
         if said and not self.acquire:
             raise InvalidParameterError("--acquisition, --proposer and --rewarder: for --acquire")
+
+    @property
+    def task_seed(self) -> int:
+        """Seed of the task."""
+        return seed_or_default(self.seed)
 
     @property
     def foxglove_is_optional(self) -> bool:

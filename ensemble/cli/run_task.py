@@ -27,6 +27,7 @@ from ensemble.run import RunRequest
 from ensemble.run import run as run_ensemble
 from ensemble.skill_request import SkillRequest
 from slap_ros.cli.console import console, print_json, styled
+from slap_ros.cli.options import say_default_seed
 from slap_ros.cli.render import check_renderable, picture_size
 from slap_ros.cli.render import render as write_animation
 from slap_ros.cli.report import write_report
@@ -55,7 +56,7 @@ def run_task(options: RunOptions) -> int:
     began = monotonic()
     domain = open_chosen(options.domain, options.preset, options.skills)
     imported_s = monotonic() - began
-    task = task_with_goal(domain, options.seed, options.index, options.goal)
+    task = task_with_goal(domain, options.task_seed, options.index, options.goal)
     request = replace(_request(options, domain, task), import_s=imported_s)
     states: list[StateMessage] = []
 
@@ -63,6 +64,7 @@ def run_task(options: RunOptions) -> int:
         if type_name == STATE and options.render is not None:
             states.append(message)
 
+    say_default_seed(options.seed)
     with _bag(options) as bag:
         settings = replace(request.settings, record=bag)
         metrics = _run(replace(request, settings=settings), options, keep_states)
@@ -96,7 +98,7 @@ def _request(options: RunOptions, domain: Domain, task: Task) -> RunRequest:
     settings = RunSettings(
         options.domain,
         domain.preset,
-        options.seed,
+        options.task_seed,
         options.index,
         options.planner,
         record=None,
@@ -151,7 +153,7 @@ def _bag(options: RunOptions) -> Iterator[Path | None]:
         yield options.record
         return
     with TemporaryDirectory(prefix="slap-") as folder:
-        yield Path(folder) / f"{options.domain}-{options.seed}"
+        yield Path(folder) / f"{options.domain}-{options.task_seed}"
 
 
 def _run(request: RunRequest, options: RunOptions, keep_states: OnMessage) -> RunMetrics:

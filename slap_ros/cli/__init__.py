@@ -59,6 +59,13 @@ COMMANDS = (
         "operators.",
     ),
     CommandEntry(
+        "list",  # what people type first
+        "slap_ros.cli.domains:domains",
+        "List the domains that are installed; of one, its predicates, metrics, goals and "
+        "operators.",
+        hidden=True,
+    ),
+    CommandEntry(
         "doctor",
         "slap_ros.cli.doctor:doctor",
         "Check ROS 2, DDS on this network, libraries and disk, and say what to do.",
@@ -72,7 +79,7 @@ COMMANDS = (
     CommandEntry(
         "bag",
         "slap_ros.cli.bag:app",
-        "Look into recorded runs: info, evaluate, replay, render.",
+        "Look into recorded runs: info, evaluate, replay, render, export.",
     ),
 )
 

@@ -14,7 +14,15 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from slap_ros.bags import BagEvaluation, bag_info, evaluate_bag, read_bag, replay_bag
+from slap_ros.bags import (
+    BagEvaluation,
+    bag_info,
+    evaluate_bag,
+    read_bag,
+    read_episodes,
+    replay_bag,
+)
+from slap_ros.bags.export import choose_format, export_episodes, require_exportable
 from slap_ros.bags.recording import Recording
 from slap_ros.cli.console import console, exits, print_json, styled
 from slap_ros.cli.options import Json
@@ -25,7 +33,7 @@ from slap_ros.evaluation.metrics import RunMetrics, known
 from slap_ros.messages.decode import decode_state
 
 app = typer.Typer(
-    help="Look into recorded runs: info, evaluate, replay, render.", no_args_is_help=True
+    help="Look into recorded runs: info, evaluate, replay, render, export.", no_args_is_help=True
 )
 
 BagPath = Annotated[Path, typer.Argument(help="A bag's folder, or one .mcap or .db3 file.")]
@@ -122,6 +130,32 @@ def render(
     check_renderable(domain, states[0], output)
     write_animation(domain, states, output, pixels)
     return _warn(found.damage)
+
+
+@app.command("export")
+@exits
+def export(
+    bags: Annotated[
+        list[Path],
+        typer.Argument(metavar="BAG", help="Folders of bags, or single .mcap or .db3 files."),
+    ],
+    output: Annotated[Path, typer.Option(help="File or folder to write; it must not exist.")],
+    form: Annotated[
+        str | None,
+        typer.Option(
+            "--format",
+            help="npz, csv, parquet, or lerobot (a data set for LeRobot, in a folder). Default: as "
+            "the ending of the output says.",
+        ),
+    ] = None,
+) -> None:
+    """Write states, commands, atoms and rewards of every episode for numpy, pandas or LeRobot."""
+    chosen = choose_format(form, output)
+    require_exportable(chosen, output)
+    episodes = [episode for bag in bags for episode in read_episodes(bag)]
+    export_episodes(episodes, output, chosen)
+    states = sum(len(episode) for episode in episodes)
+    console.print(f"{chosen.name}: {output}, episodes: {len(episodes)}, states: {states}")
 
 
 def replay_in_world(bag: Path, json: bool) -> int:

@@ -13,7 +13,7 @@ from rich.table import Table
 from slap_ros.acquisition.domain_choice import DomainChoice, open_domain
 from slap_ros.acquisition.problem import metrics_of
 from slap_ros.cli.console import console, print_json
-from slap_ros.cli.options import Json, Preset
+from slap_ros.cli.options import Json, Preset, matching_domains
 from slap_ros.core import Domain
 from slap_ros.domains import domain_names, preset_names
 from slap_ros.errors import InvalidDomainError, InvalidParameterError, UnknownObjectError
@@ -25,7 +25,10 @@ GOAL_SEED = 0  # of the task in which named goals are shown
 
 def domains(
     domain: Annotated[
-        str | None, typer.Argument(help="Show one domain in detail instead of all.")
+        str | None,
+        typer.Argument(
+            help="Show one domain in detail instead of all.", autocompletion=matching_domains
+        ),
     ] = None,
     preset: Preset = None,
     json: Json = False,

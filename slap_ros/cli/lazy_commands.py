@@ -27,15 +27,17 @@ class CommandEntry:
         source: Where it is, as ``module:name``: a function that gives an exit code or nothing, or
             a :class:`typer.Typer` of several commands.
         help: First paragraph of its help, as the module itself has it; a test compares them.
+        hidden: Whether lists of commands leave it out.
     """
 
     name: str
     source: str
     help: str
+    hidden: bool = False
 
     def summary(self) -> Any:
         """A command with name and help alone, for lists of commands."""
-        return TyperCommand(self.name, help=self.help)
+        return TyperCommand(self.name, help=self.help, hidden=self.hidden)
 
     def load(self) -> Any:
         """Import the command.

@@ -14,12 +14,30 @@ from typing import Annotated, Any, TypeVar, get_type_hints
 import typer
 
 from slap_ros.cli.command_line import option_of
+from slap_ros.cli.console import console
 from slap_ros.errors import InvalidParameterError
 
 R = TypeVar("R")
 MAX_SEED, MAX_INDEX = 2**63 - 1, 2**32 - 1  # as messages and bags have room for them
+DEFAULT_SEED = 0
 
-DomainName = Annotated[str, typer.Argument(help="One of `slap domains`.")]
+
+def matching_domains(incomplete: str) -> list[str]:
+    """The domains that a shell may complete a name to."""
+    from slap_ros.domains import domain_names
+
+    return [name for name in domain_names() if name.startswith(incomplete)]
+
+
+DomainName = Annotated[
+    str, typer.Argument(help="One of `slap domains`.", autocompletion=matching_domains)
+]
+DomainOrFile = Annotated[
+    str,
+    typer.Argument(
+        help="One of `slap domains`, or a PDDL domain file.", autocompletion=matching_domains
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
 Preset = Annotated[
     str | None,
@@ -36,6 +54,10 @@ Planner = Annotated[
     ),
 ]
 Seed = Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Samples the task.")]
+ChosenSeed = Annotated[  # of the commands that say which one they took
+    int | None,
+    typer.Option(min=0, max=MAX_SEED, show_default=str(DEFAULT_SEED), help="Samples the task."),
+]
 Index = Annotated[int, typer.Option(min=0, max=MAX_INDEX, help="Which of the seed's tasks.")]
 Goal = Annotated[
     str | None,
@@ -49,6 +71,17 @@ Ray = Annotated[
     str | None, typer.Option(help="Address of a Ray cluster to run on instead, or local.")
 ]
 Jobs = Annotated[int, typer.Option(min=1, help="Processes; the results are the same.")]
+
+
+def seed_or_default(seed: int | None) -> int:
+    """The seed that an option states, or the default one."""
+    return DEFAULT_SEED if seed is None else seed
+
+
+def say_default_seed(seed: int | None) -> None:
+    """Say which seed was taken where none was given."""
+    if seed is None:
+        console.print(f"seed {DEFAULT_SEED} (the default; --seed N for another task)")
 
 
 def flat_options(command: Callable[..., R]) -> Callable[..., R]:

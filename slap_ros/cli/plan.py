@@ -10,18 +10,28 @@ from typing import Annotated
 import typer
 
 from slap_ros.acquisition.domain_choice import SHIPPED
-from slap_ros.cli.options import Goal, Index, Json, Planner, Preset, Seed
+from slap_ros.cli.options import (
+    ChosenSeed,
+    DomainOrFile,
+    Goal,
+    Index,
+    Json,
+    Planner,
+    Preset,
+    say_default_seed,
+    seed_or_default,
+)
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose
 from slap_ros.cli.skill_choice import Skills, open_chosen
 from slap_ros.files import require_writable
 
 
 def plan(
-    domain: Annotated[str, typer.Argument(help="One of `slap domains`, or a PDDL domain file.")],
+    domain: DomainOrFile,
     problem: Annotated[
         Path | None, typer.Argument(help="With a PDDL domain file: the PDDL problem file.")
     ] = None,
-    seed: Seed = 0,
+    seed: ChosenSeed = None,
     index: Index = 0,
     preset: Preset = None,
     goal: Goal = None,
@@ -57,5 +67,6 @@ def plan(
     if output is not None:
         require_writable(output)
     chosen = open_chosen(domain, preset, skills)
-    task = task_with_goal(chosen, seed, index, goal)
+    task = task_with_goal(chosen, seed_or_default(seed), index, goal)
     plan_task(chosen, task, planner, choose(shortcuts, chosen, planner), samples, output, json)
+    say_default_seed(seed)

@@ -24,7 +24,7 @@ from slap_ros.acquisition.proposal_request import (
     require_known,
 )
 from slap_ros.cli.console import console, print_json
-from slap_ros.cli.options import Goal, Index, Json, Preset, Seed
+from slap_ros.cli.options import DomainOrFile, Goal, Index, Json, Preset, Seed
 from slap_ros.cli.proposer_options import ProposerOptions
 from slap_ros.core import task_with_goal
 from slap_ros.domains import get_domain
@@ -41,7 +41,7 @@ class ProposeOptions:
         InvalidParameterError: There is no such rewarder.
     """
 
-    domain: Annotated[str, typer.Argument(help="One of `slap domains`, or a PDDL domain file.")]
+    domain: DomainOrFile
     problem: Annotated[
         Path | None, typer.Argument(help="With a PDDL domain file: the PDDL problem file.")
     ] = None

@@ -73,11 +73,16 @@ class RunLog:
         options = options_by_run(executed_options(self._skill_events.messages), runs)
         return [RunTrace.of(run, own) for run, own in zip(runs, options, strict=True)]
 
+    def executed_in(self, episode: int) -> list[ExecutedOption]:
+        """Every option that was executed in an episode, in order, those of no run among them."""
+        options = executed_options(self._skill_events.messages)
+        return [option for option in options if option.start.episode == episode]
+
     @property
     def complete(self) -> bool:
         """Whether the newest run has ended and all that its events refer to is here as well."""
         runs = self._recorded()
-        return bool(runs) and is_complete(runs[-1], self._executed_in(runs[-1].events.episode))
+        return bool(runs) and is_complete(runs[-1], self.executed_in(runs[-1].events.episode))
 
     def gaps(self) -> list[str]:
         """What is missing of the runs so far, or there twice, in words; empty for a whole log.
@@ -89,7 +94,7 @@ class RunLog:
         for run in runs:
             episode = run.events.episode
             where = f"episode {episode}: " if len(runs) > 1 else ""
-            found += [where + gap for gap in gaps_of(run, self._executed_in(episode))]
+            found += [where + gap for gap in gaps_of(run, self.executed_in(episode))]
         if before := count_without_start(self._plan_events.messages):
             found.append(f"{before} plan events belong to a run whose start is missing")
         if repeated := self._plan_events.repeated + self._skill_events.repeated:
@@ -115,10 +120,6 @@ class RunLog:
 
     def _episode(self, number: int) -> EpisodeLog:
         return self._episodes.get(number, EpisodeLog())
-
-    def _executed_in(self, episode: int) -> list[ExecutedOption]:
-        options = executed_options(self._skill_events.messages)
-        return [option for option in options if option.start.episode == episode]
 
     def _add_domain(self, msg: DomainInfoMessage) -> None:
         self._presets[msg.name] = msg.preset

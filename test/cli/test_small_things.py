@@ -1,0 +1,55 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What is said of a seed that nobody gave, other names of commands, and completion in a shell."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from ensemble.cli.application import app
+
+SEED_LINE = "seed 0 (the default; --seed N for another task)"
+
+
+def slap(*arguments, **environment):
+    return CliRunner().invoke(app, arguments, env=environment, prog_name="slap")
+
+
+@pytest.mark.parametrize("command", [["plan"], ["run", "--in-process"]])
+def test_a_seed_that_nobody_gave_is_said_beside_json(command, network):
+    arguments = [command[0], "obstacle2d", *command[1:], "--shortcuts", "none", "--json"]
+    without, with_seed = slap(*arguments), slap(*arguments, "--seed", "0")
+    assert without.exit_code == with_seed.exit_code == 0, without.stderr
+    assert SEED_LINE in without.stderr.splitlines()
+    assert SEED_LINE not in with_seed.stderr.splitlines()
+    seconds = "planning_seconds"
+    first, second = (json.loads(ran.stdout) | {seconds: 0} for ran in (without, with_seed))
+    assert first == second
+
+
+def test_list_is_domains():
+    ran = slap("list", "obstacle2d", "--json")
+    assert ran.exit_code == 0, ran.stderr
+    assert ran.stdout == slap("domains", "obstacle2d", "--json").stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [
+        (("slap", "pla"), ["plan"]),
+        (("slap", "bag", "exp"), ["export"]),
+        (("slap", "run", "obstacle2d", "--wor"), ["--world"]),
+        (("slap", "evaluate", "obstacle"), ["obstacle2d", "obstacle_tower"]),
+        (("slap", "plan", "obstacle_"), ["obstacle_tower"]),
+        (("slap", "domains", "cleanup"), ["cleanup_table"]),
+    ],
+)
+def test_bash_completes_commands_options_and_domains(words, found):
+    ran = slap(
+        _SLAP_COMPLETE="complete_bash",
+        COMP_WORDS=" ".join(words),
+        COMP_CWORD=str(len(words) - 1),
+    )
+    assert ran.exit_code == 0, ran.stderr
+    assert ran.stdout.split() == found
