@@ -10,16 +10,16 @@ from slap_ros.cli.bag import replay_in_world
 
 
 def run(options: RunOptions) -> int:
-    """Run the whole ensemble on one task: simulator, perception, planner, skills, recorder."""
+    """Run all nodes on one task: simulator, perception, planner, skills, recorder."""
     from ensemble.cli.run_task import run_task
 
     return run_task(options)
 
 
 def replay(options: ReplayOptions) -> int:
-    """Feed the recorded commands to a fresh world and compare every state, bit for bit.
+    """Repeat the recorded commands in a new world and compare every state, bit for bit.
 
-    Or, with --to robot, execute the recorded motion on a robot, open loop: begin with --dry-run.
+    With --to robot, execute the recorded motion on a robot, open loop; try --dry-run first.
     """
     if options.to == WORLD:
         return replay_in_world(options.bag, options.json)

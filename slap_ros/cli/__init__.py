@@ -26,7 +26,8 @@ from slap_ros.cli.options import flat_options
 
 app = typer.Typer(
     name="slap",
-    help="Task-and-motion planning with learned shortcuts: run it, measure it, look into it.",
+    help="Task-and-motion planning with learned shortcuts: run tasks, measure plans, look into "
+    "runs.",
     epilog=(
         "Exit codes: 0 done, 2 wrong usage, 130 interrupted, 143 terminated; any other is an error "
         "code of slap_msgs/ErrorCode. With --json, stdout has JSON and nothing else."

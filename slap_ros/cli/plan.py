@@ -38,9 +38,12 @@ from slap_ros.versions import versions
 
 
 def plan(
-    domain: Annotated[str, typer.Argument(help="One of `slap domains`, or a PDDL domain file.")],
+    domain: Annotated[
+        str,
+        typer.Argument(help="Name of a domain (`slap domains` lists them), or a PDDL domain file."),
+    ],
     problem: Annotated[
-        Path | None, typer.Argument(help="With a PDDL domain file: the PDDL problem file.")
+        Path | None, typer.Argument(help="PDDL problem file. Give it with a PDDL domain file.")
     ] = None,
     seed: Seed = 0,
     index: Index = 0,
@@ -56,15 +59,17 @@ def plan(
     effort: Annotated[
         int,
         typer.Option(
-            min=1, max=10**6, help="With PDDL files: multiplies the limits of planning, time too."
+            min=1,
+            max=10**6,
+            help="With PDDL files: factor of all limits of planning, and so of its time.",
         ),
     ] = 1,
     json: Json = False,
 ) -> None:
     """Plan one task without executing it; write its PDDL and draw its abstract graph.
 
-    In a domain without skills: plan with its hand-written operators alone. With two PDDL files:
-    plan symbolically, with the FF heuristic.
+    A domain without skills is planned with its hand-written operators alone. Two PDDL files are
+    planned symbolically, with the FF heuristic.
     """
     if problem is not None:
         _plan_pddl(Path(domain), problem, effort, json)
