@@ -47,11 +47,11 @@ DETECTION_RATE = 30.0  # Hz, at the pace of a real robot
 PATIENCE = 10.0  # s, for sensors and controllers: all nodes share one process, planning too
 APPROACHES = {"pure_planning": NONE, "slap": ""}  # and the library that each is given
 MEASURED = """\
-Every task is solved by the whole ensemble through the bridge to a real robot, in place of which
-there is a mock robot: simulated, with latency, noise and a controller that moves as fast as its
-limits allow. When messages arrive decides what is measured, hence another run of the same command
-may give other steps and replans. Steps are the mean over solved tasks, with the sample standard
-deviation; replans are all that there were; success has Wilson's 95 % interval."""
+All nodes together solve each task through the bridge to a real robot. In place of the robot there
+is a mock: a simulation with latency, noise, and a controller that moves as fast as its limits
+allow. The results depend on when messages arrive, so another run of the same command may have other
+steps and replans. Steps are the mean over solved tasks, with the sample standard deviation. Replans
+are counted over all tasks. Success has Wilson's 95 % interval."""
 
 
 @dataclass(frozen=True)
