@@ -228,10 +228,10 @@ def main() -> None:
     """Print the figures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--tasks", type=int, default=20)
-    parser.add_argument("--first-seed", type=int, default=500, help="of the first task")
+    parser.add_argument("--first-seed", type=int, default=500, help="seed of the first task")
     parser.add_argument("--pace", type=float, default=20.0)
-    parser.add_argument("--latency", type=float, default=0.02, help="s")
-    parser.add_argument("--pose-noise", type=float, default=0.002, help="m")
+    parser.add_argument("--latency", type=float, default=0.02, help="latency of the robot, s")
+    parser.add_argument("--pose-noise", type=float, default=0.002, help="noise of detections, m")
     parser.add_argument("--dropout", type=float, default=0.0)
     parser.add_argument("--output", type=Path, help="folder for page, picture and runs")
     parser.add_argument("--json", action="store_true")
