@@ -309,9 +309,13 @@ def insertions(clearance_mm: float, count: int) -> Mapping[str, float]:
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=200, metavar="N", help="of each")
+    parser.add_argument(
+        "--count", type=int, default=200, metavar="N", help="repetitions of each skill"
+    )
     parser.add_argument("--json", action="store_true")
-    parser.add_argument("--only", default="", metavar="TEXT", help="rows with this in their name")
+    parser.add_argument(
+        "--only", default="", metavar="TEXT", help="run only rows with this text in their name"
+    )
     arguments = parser.parse_args()
     count: int = arguments.count
     table: dict[str, Callable[[], Mapping[str, float]]] = {

@@ -487,9 +487,14 @@ def purity(count: int) -> dict[str, float]:
 def main() -> None:
     """Measure and print the figures."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--pushes", type=int, default=0, metavar="N", help="compare N pushes too")
+    parser.add_argument("--pushes", type=int, default=0, metavar="N", help="also compare N pushes")
     parser.add_argument("--json", action="store_true")
-    parser.add_argument("--plot", type=Path, metavar="FOLDER", help="and draw them (matplotlib)")
+    parser.add_argument(
+        "--plot",
+        type=Path,
+        metavar="FOLDER",
+        help="folder for a plot of the pushes (needs matplotlib)",
+    )
     arguments = parser.parse_args()
     figures = speed()
     if arguments.pushes:

@@ -47,11 +47,11 @@ DETECTION_RATE = 30.0  # Hz, at the pace of a real robot
 PATIENCE = 10.0  # s, for sensors and controllers: all nodes share one process, planning too
 APPROACHES = {"pure_planning": NONE, "slap": ""}  # and the library that each is given
 MEASURED = """\
-Every task is solved by the whole ensemble through the bridge to a real robot, in place of which
-there is a mock robot: simulated, with latency, noise and a controller that moves as fast as its
-limits allow. When messages arrive decides what is measured, hence another run of the same command
-may give other steps and replans. Steps are the mean over solved tasks, with the sample standard
-deviation; replans are all that there were; success has Wilson's 95 % interval."""
+All nodes together solve each task through the bridge to a real robot. In place of the robot there
+is a mock: a simulation with latency, noise, and a controller that moves as fast as its limits
+allow. The results depend on when messages arrive, so another run of the same command may have other
+steps and replans. Steps are the mean over solved tasks, with the sample standard deviation. Replans
+are counted over all tasks. Success has Wilson's 95 % interval."""
 
 
 @dataclass(frozen=True)
@@ -228,10 +228,10 @@ def main() -> None:
     """Print the figures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--tasks", type=int, default=20)
-    parser.add_argument("--first-seed", type=int, default=500, help="of the first task")
+    parser.add_argument("--first-seed", type=int, default=500, help="seed of the first task")
     parser.add_argument("--pace", type=float, default=20.0)
-    parser.add_argument("--latency", type=float, default=0.02, help="s")
-    parser.add_argument("--pose-noise", type=float, default=0.002, help="m")
+    parser.add_argument("--latency", type=float, default=0.02, help="latency of the robot, s")
+    parser.add_argument("--pose-noise", type=float, default=0.002, help="noise of detections, m")
     parser.add_argument("--dropout", type=float, default=0.0)
     parser.add_argument("--output", type=Path, help="folder for page, picture and runs")
     parser.add_argument("--json", action="store_true")

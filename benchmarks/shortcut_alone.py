@@ -84,7 +84,7 @@ def main() -> None:
     """Print the figures: a row for each shortcut and seed."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("domain")
-    parser.add_argument("--library", help="its folder; default: the shipped one")
+    parser.add_argument("--library", help="folder of a library; default: the one that ships")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--starts", type=int, default=256)
     parser.add_argument("--json", action="store_true")

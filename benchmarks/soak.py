@@ -52,10 +52,11 @@ PANELS = {"memory_mib": "resident memory [MiB]", "threads": "threads", "descript
 PAGE = """\
 # Soak: many tasks in one ensemble
 
-{tasks} tasks of {domain}, {solved} of them solved, one after the other in one ensemble: every node
-a process that lives from the first task to the last, with the shipped shortcuts, and a recorder
-that writes all of it into one bag. Between tasks resident memory, threads and open descriptors of
-each process are read. It took {minutes:.0f} minutes on a machine shared with other work.
+One ensemble solved {solved} of {tasks} tasks of {domain}, one after the other. Every node is a
+process that lives from the first task to the last. The ensemble uses the shipped shortcuts, and a
+recorder writes everything into one bag. Between tasks, resident memory, threads and open
+descriptors of each process are read. The tasks took {minutes:.0f} minutes on a machine shared with
+other work.
 
 ![Memory, threads and descriptors of each process over the tasks](soak.svg)
 
@@ -63,38 +64,38 @@ each process are read. It took {minutes:.0f} minutes on a machine shared with ot
 
 Growth is what a task adds in the second half: the median slope over all pairs of samples.
 
-What it is, followed up with CPython 3.11, CycloneDDS 11.0.1 and glibc:
+These are its causes, with CPython 3.11, CycloneDDS 11.0.1 and glibc:
 
-- **Histories.** Publishers keep an episode's worth of messages for whoever comes late, up to 1000 a
-  topic: full after some 50 tasks for states, after some hundred for events.
-- **Receive buffers.** CycloneDDS puts what other processes announce of themselves into buffers of
-  1 MiB each and touches them page by page. A process that does nothing grew by 1.1 to 1.3 KiB a
-  second with no byte more allocated, per time and not per task, until a buffer was full and another
-  took its place. That was most of the 1.6 to 2.2 KiB a task which this page used to report.
-  embedded_ros now sets 256 KiB, with which an idle ensemble stops growing after four minutes.
+- **Histories.** Publishers keep the messages of an episode for late subscribers, up to 1000 per
+  topic. These are full after about 50 tasks for states, and after about a hundred for events.
+- **Receive buffers.** CycloneDDS puts the announcements of other processes into buffers of 1 MiB
+  each, and touches them page by page. An idle process grew by 1.1 to 1.3 KiB per second without
+  allocating a byte, until a buffer was full and another took its place: per time, not per task.
+  That was most of the 1.6 to 2.2 KiB per task that this page used to report. embedded_ros now sets
+  256 KiB, with which an idle ensemble stops growing after four minutes.
   `python embedded_ros/benchmarks/receive_buffer.py` shows both sizes, with CycloneDDS alone.
-- **A leak.** CycloneDDS's Python layer never frees its copy of an endpoint's user data: 97 bytes
-  each time that a node asked who publishes a topic, which skill server and planner do for every
-  skill and task. embedded_ros now asks once an endpoint.
-- **Free lists.** CPython keeps freed tuples for later, up to 2000 of each length below 20, in all
-  4 MiB at the very most, and `tuple(generator)` adds one each time; a full garbage collection,
-  which is rare, gives them back. Python's memory of `perception_node` grew by 32 blocks a task
-  without one, and not at all with one every five seconds.
-- **The recorder's index** has an entry for every message of its bag's current 64 KiB, and one for
-  each 64 KiB before, because a closed bag ends in an index: about a tenth of a KiB a task, for as
-  long as it records.
+- **A leak.** CycloneDDS's Python layer never frees its copy of an endpoint's user data. This lost
+  97 bytes each time that a node asked who publishes a topic; skill server and planner ask for every
+  skill and task. embedded_ros now asks once per endpoint.
+- **Free lists.** CPython keeps freed tuples for later, up to 2000 of each length below 20, and
+  4 MiB at most in all. `tuple(generator)` adds one each time. A full garbage collection, which is
+  rare, gives them back. Python's memory of `perception_node` grew by 32 blocks per task without
+  one, and not at all with one every five seconds.
+- **The recorder's index** has an entry for every message in the current 64 KiB of its bag, and one
+  for each 64 KiB before, because a closed bag ends with an index. It grows by about a tenth of a
+  KiB per task, as long as the recorder runs.
 
-`slap_run` is the process that asks for the tasks. Nothing is lost in it either: with a full garbage
+`slap_run` is the process that asks for the tasks. It does not leak either: with a full garbage
 collection and `malloc_trim` after every 40 tasks it had 69.6 MiB after 40 and after 160 tasks, of
-which 14.0 MiB allocated by C code; another run had as many Python objects after 60 tasks as after
-220. Left to themselves, collector and allocator take their time. Where that ends is not known:
+which C code had allocated 14.0 MiB. Another run had as many Python objects after 60 tasks as after
+220. Without this, collector and allocator free memory late. It is not known where the growth ends:
 1000 tasks were not enough to see it.
 
 ## How to make it again
 
     python -m benchmarks.soak --tasks {tasks} --output docs/results
 
-Every number: [soak.json](soak.json). The library's digest is `{digest}`.
+All numbers: [soak.json](soak.json). The library's digest is `{digest}`.
 """
 
 
@@ -250,7 +251,7 @@ def table(soaked: Soaked) -> MarkdownTable:
             "memory after 1 task [MiB]",
             "half-way",
             "at the end",
-            "growth [KiB a task]",
+            "growth [KiB per task]",
             "threads",
             "descriptors",
         ],

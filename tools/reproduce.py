@@ -174,8 +174,10 @@ def _made_again(figure: Figure) -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Make figures again; 1 if one differs."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("names", nargs="*", metavar="NAME", help="default: all")
-    parser.add_argument("--list", action="store_true", help="say what would be done, and end")
+    parser.add_argument(
+        "names", nargs="*", metavar="NAME", help="figure to make again; default: all"
+    )
+    parser.add_argument("--list", action="store_true", help="only list what would be done")
     options = parser.parse_args(arguments)
     chosen = figures(options.names)
     for figure in chosen:

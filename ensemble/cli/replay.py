@@ -15,9 +15,9 @@ from slap_ros.cli.options import flat_options
 @exits
 @flat_options
 def replay(options: ReplayOptions) -> int:
-    """Feed the recorded commands to a fresh world and compare every state, bit for bit.
+    """Repeat the recorded commands in a new world and compare every state, bit for bit.
 
-    Or, with --to robot, execute the recorded motion on a robot, open loop: begin with --dry-run.
+    With --to robot, execute the recorded motion on a robot, open loop; try --dry-run first.
     """
     if options.to == WORLD:
         return replay_in_world(options.bag, options.json)

@@ -27,16 +27,23 @@ class ReplayOptions:
 
     bag: BagPath
     to: Annotated[
-        str, typer.Option(help="world: a fresh one; robot (see docs/real-robot.md), or mock.")
+        str,
+        typer.Option(
+            help="Where to replay: world (a new simulated one), robot (see "
+            "docs/real-robot.md), or mock (a simulated robot)."
+        ),
     ] = WORLD
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Check the motion against the robot's limits only.")
+        bool,
+        typer.Option(
+            "--dry-run", help="Check the motion against the robot's limits; move nothing."
+        ),
     ] = False
     robot: Annotated[
-        str, typer.Option(help="The robot's parameters, as arm=fr3,speed=0.1: robot_bridge's.")
+        str, typer.Option(help="Parameters of robot_bridge, such as arm=fr3,speed=0.1.")
     ] = ""
     mock: Annotated[
-        str, typer.Option(help="The mock robot's parameters, as latency=0.05,pace=5.")
+        str, typer.Option(help="Parameters of the mock robot, such as latency=0.05,pace=5.")
     ] = ""
     yes: Annotated[bool, typer.Option("--yes", help="Move the robot without asking.")] = False
     json: Json = False

@@ -60,84 +60,89 @@ class RunOptions:
     planner: Planner = "lazy"
     skills: Skills = SHIPPED
     max_replans: Annotated[
-        int, typer.Option(min=0, max=MAX_INDEX, help="Plans after the first.")
+        int, typer.Option(min=0, max=MAX_INDEX, help="Maximum number of plans after the first.")
     ] = MAX_REPLANS
-    record: Annotated[
-        Path | None, typer.Option(help="Record a bag as a new folder with this name.")
-    ] = None
-    in_process: Annotated[bool, typer.Option("--in-process", help="All nodes in this process.")] = (
-        False
-    )
+    record: Annotated[Path | None, typer.Option(help="New folder in which to record a bag.")] = None
+    in_process: Annotated[
+        bool, typer.Option("--in-process", help="Run all nodes in this process.")
+    ] = False
     pace: Annotated[
         float,
-        typer.Option(min=0.0, max=1e6, help="Steps per second, for watching; 0: at full speed."),
+        typer.Option(min=0.0, max=1e6, help="Steps per second, to watch a run; 0 is full speed."),
     ] = 0.0
     timeout: Annotated[
-        float, typer.Option(min=0.1, max=1e9, help="Give up after so many seconds.")
+        float, typer.Option(min=0.1, max=1e9, help="Seconds after which to give up.")
     ] = 600.0
     patience: Annotated[
         float,
         typer.Option(
             min=IMPATIENT,
             max=PATIENT,
-            help="Factor of every deadline but --timeout, for slow domains and machines.",
+            help="Factor of all deadlines except --timeout, for slow domains and machines.",
         ),
     ] = 1.0
     render: Annotated[
-        Path | None, typer.Option(help="Write an animation of the run: a .gif or .mp4.")
+        Path | None, typer.Option(help=".gif or .mp4 file for an animation of the run.")
     ] = None
     size: Size = None
     report: Annotated[
-        Path | None, typer.Option(help="Report the run on a page, as `slap report` does: a .html.")
+        Path | None,
+        typer.Option(help=".html file for a report of the run, as `slap report` writes it."),
     ] = None
     live: Annotated[
         bool,
         typer.Option(
             "--live",
-            help="Show plan and progress in place on a terminal, and everything to Foxglove.",
+            help="Show plan and progress on the terminal, and everything in Foxglove.",
         ),
     ] = False
     live_port: Annotated[
         int | None,
         typer.Option(
-            min=0, max=65535, help="Of the WebSocket for Foxglove. Default: 8765, or a free one."
+            min=0,
+            max=65535,
+            help="Port of the WebSocket for Foxglove. Default: 8765, or a free port.",
         ),
     ] = None
     watched: Annotated[
         bool,
-        typer.Option("--watched", help="With --live: begin once somebody watches; end with them."),
+        typer.Option(
+            "--watched", help="With --live: wait until somebody watches, and end when nobody does."
+        ),
     ] = False
     world: Annotated[
         str,
         typer.Option(
-            help="sim, robot (see docs/real-robot.md), or mock: a robot that is not there."
+            help="World to act in: sim, robot (see docs/real-robot.md), or mock (a simulated "
+            "robot)."
         ),
     ] = SIM
     scene: Annotated[
-        Path | None, typer.Option(help="What stands around the robot: a scene file.")
+        Path | None, typer.Option(help="Scene file: what stands around the robot.")
     ] = None
     mock: Annotated[
-        str, typer.Option(help="The mock robot's parameters, as latency=0.05,pose_noise=0.003.")
+        str,
+        typer.Option(help="Parameters of the mock robot, such as latency=0.05,pose_noise=0.003."),
     ] = ""
     acquire: Annotated[
         bool,
         typer.Option(
             "--acquire",
-            help="Where a plan or a skill is lacking, or fails again: acquire skills, and solve "
-            "the task with them. Give --timeout the time that this takes.",
+            help="Acquire skills where a plan or a skill is missing or fails again, and solve the "
+            "task with them. --timeout must leave time for this.",
         ),
     ] = False
     proposer: Annotated[
-        str, typer.Option(help="With --acquire, of operators: manual, induced or language.")
+        str, typer.Option(help="With --acquire: source of operators: manual, induced or language.")
     ] = MANUAL
     rewarder: Annotated[
-        str, typer.Option(help="With --acquire, of rewards: manual, composed or language.")
+        str, typer.Option(help="With --acquire: source of rewards: manual, composed or language.")
     ] = MANUAL
     acquisition: Annotated[
-        str, typer.Option(help="Parameters of acquisition_node, as steps=20000,jobs=2.")
+        str, typer.Option(help="Parameters of acquisition_node, such as steps=20000,jobs=2.")
     ] = ""
     perception: Annotated[
-        str, typer.Option(help="Noise of perception, as position_noise=0.002,debounce=3.")
+        str, typer.Option(help="Noise of perception, such as position_noise=0.002,debounce=3.")
     ] = ""
     json: Json = False
 

@@ -25,7 +25,7 @@ COMMANDS = (
     CommandEntry(
         "evaluate",
         "slap_ros.cli.evaluate:evaluate",
-        "Plan and execute many tasks in the world and sum up: success, plan length, planning time.",
+        "Plan and execute many tasks; print success, plan length and planning time.",
     ),
     CommandEntry(
         "report",
@@ -35,34 +35,32 @@ COMMANDS = (
     CommandEntry(
         "train",
         "slap_ros.cli.train:train",
-        "Discover and learn shortcuts: explore, rank, train, keep what makes plans shorter.",
+        "Find and learn shortcuts: explore, rank, train, keep what makes plans shorter.",
     ),
     CommandEntry(
         "acquire",
         "slap_ros.cli.acquire:acquire",
-        "Acquire skills: carry out plans, train what fails from where it fails, and again.",
+        "Acquire skills: execute plans, train each skill that fails from where it fails, repeat.",
     ),
     CommandEntry(
         "skills",
         "slap_ros.cli.skills:skills",
-        "Show a library of skills: operators, rewards, success, and what each began from.",
+        "Show a library of skills: operators, rewards, success, and which skills each began from.",
     ),
     CommandEntry(
         "check",
         "slap_ros.cli.check:check",
-        "Check whether a domain keeps to the contract: Markov states, margins, bounds, tasks.",
+        "Check that a domain keeps its contract: Markov states, margins, bounds, tasks.",
     ),
     CommandEntry(
         "domains",
         "slap_ros.cli.domains:domains",
-        "List the domains that are installed; of one, its predicates, metrics, goals and "
-        "operators.",
+        "List the installed domains, or the predicates, metrics, goals and operators of one.",
     ),
     CommandEntry(
         "list",  # what people type first
         "slap_ros.cli.domains:domains",
-        "List the domains that are installed; of one, its predicates, metrics, goals and "
-        "operators.",
+        "List the installed domains, or the predicates, metrics, goals and operators of one.",
         hidden=True,
     ),
     CommandEntry(
@@ -73,13 +71,13 @@ COMMANDS = (
     CommandEntry(
         "study",
         "slap_ros.cli.study:app",
-        "Make a figure of the papers again: data, a picture and a page. Stopped while it solves "
-        "tasks, learns or asks a model, a study goes on where it was with the same command.",
+        "Make a figure of the papers again: data, a picture and a page. After an interruption, "
+        "the same command goes on where the study stopped.",
     ),
     CommandEntry(
         "bag",
         "slap_ros.cli.bag:app",
-        "Look into recorded runs: info, evaluate, replay, render, export.",
+        "Look into recorded runs: list, evaluate, replay, render or export them.",
     ),
 )
 
@@ -96,7 +94,8 @@ def command_app(commands: Sequence[CommandEntry]) -> typer.Typer:
     app = typer.Typer(
         name="slap",
         cls=lazy_group(commands),
-        help="Task-and-motion planning with learned shortcuts: run it, measure it, look into it.",
+        help="Task-and-motion planning with learned shortcuts: run tasks, measure plans, look into "
+        "runs.",
         epilog=(
             "Exit codes: 0 done, 2 wrong usage, 130 interrupted, 143 terminated; any other is an "
             "error code of slap_msgs/ErrorCode. With --json, stdout has JSON and nothing else."

@@ -56,7 +56,7 @@ class AcquireOptions:
 
     domain: DomainName
     output: Annotated[
-        Path | None, typer.Option(help="The library's folder. Default: runs/skills/DOMAIN.")
+        Path | None, typer.Option(help="Folder of the new library. Default: runs/skills/DOMAIN.")
     ] = None
     preset: Preset = None
     goal: Goal = None
@@ -64,25 +64,28 @@ class AcquireOptions:
     rewarder: Annotated[
         str,
         typer.Option(
-            help="Of rewards: manual (hand-written), composed (from metrics), or language."
+            help="Source of rewards: manual (hand-written), composed (from metrics), or language "
+            "(from a language model)."
         ),
     ] = MANUAL
     begin: Annotated[
         list[Path] | None,
-        typer.Option("--from", help="A skill library to begin with; may be repeated."),
+        typer.Option(
+            "--from", help="Skill library whose skills training may begin from. May be repeated."
+        ),
     ] = None
     encoder: Annotated[
         str | None,
         typer.Option(
-            help="With --from: an embedding model at --base-url that says which skills are alike. "
-            "Default: the metrics behind their operators, without any model."
+            help="With --from: embedding model at --base-url that finds similar skills. Default: "
+            "no model; compare the metrics behind the operators."
         ),
     ] = None
     keep: Annotated[
         Path | None,
         typer.Option(
-            help="A skill library whose skills are there already: what it lacks is learned, and "
-            "what fails is learned further."
+            help="Skill library to keep: learn the skills that it lacks, and train further those "
+            "that fail."
         ),
     ] = None
     settings: Annotated[
@@ -92,23 +95,25 @@ class AcquireOptions:
         list[str] | None,
         typer.Option(
             metavar="NAME=VALUE",
-            help="Change one of the settings, as sac.discount=0.99; may be repeated. A wrong name "
-            "lists all.",
+            help="Change one of the settings, such as sac.discount=0.99. May be repeated. A wrong "
+            "name lists all names.",
         ),
     ] = None
     steps: Annotated[
         int | None,
-        typer.Option(min=1, help="Environment steps that all skills together learn for."),
+        typer.Option(min=1, help="Environment steps of training, all skills together."),
     ] = None
     jobs: Jobs = 2
     ray: Ray = None
     work: Annotated[
         Path | None,
-        typer.Option(help="Folder for checkpoints and results; the same one again goes on."),
+        typer.Option(
+            help="Folder for checkpoints and results. With the same folder again, training goes on."
+        ),
     ] = None
     events: Annotated[
         bool,
-        typer.Option("--events", help="Print what happens on stdout, each event a line of JSON."),
+        typer.Option("--events", help="Print every event on stdout, as one line of JSON."),
     ] = False
     json: Json = False
 
@@ -185,9 +190,9 @@ def _shareable(folder: Path) -> str:
 
 
 def acquire(options: AcquireOptions, proposers: ProposerOptions) -> int:
-    """Acquire skills: carry out plans, train what fails from where it fails, and again.
+    """Acquire skills: execute plans, train each skill that fails from where it fails, repeat.
 
-    Interrupted, it goes on where it was when the same command is given again.
+    After an interruption, the same command goes on where it stopped.
     """
     domain = _acquirable(options)
     options = replace(options, preset=domain.preset)

@@ -43,7 +43,7 @@ from slap_ros.studies.results import Data, describe_skills
 
 GoalNames = Annotated[
     list[str] | None,
-    typer.Option(help="A goal's name; may be repeated. Default: all of the domain's."),
+    typer.Option(help="Name of a goal. May be repeated. Default: all goals of the domain."),
 ]
 
 
@@ -51,14 +51,14 @@ GoalNames = Annotated[
 def demonstrations_(
     domain: DomainName,
     goal: GoalNames = None,
-    tasks: Annotated[int, typer.Option(min=1, help="Of the first goal.")] = 100,
-    others: Annotated[int, typer.Option(min=1, help="Tasks of every other goal.")] = 50,
+    tasks: Annotated[int, typer.Option(min=1, help="Number of tasks of the first goal.")] = 100,
+    others: Annotated[int, typer.Option(min=1, help="Number of tasks of every other goal.")] = 50,
     seed: FreshSeed = FRESH_SEED,
     preset: Preset = None,
     jobs: Jobs = 1,
     output: Output = RESULTS,
 ) -> None:
-    """Whether tasks can be solved: success of the domain's demonstrator, by goal."""
+    """Whether tasks can be solved: success of the domain's demonstrator, per goal."""
     choice = _demonstrator(domain, preset, output)
     names = goal or _all_goals(open_domain(choice))
     counts = {name: others if i else tasks for i, name in enumerate(names)}
@@ -76,17 +76,17 @@ def demonstrations_(
 @exits
 def vacuity_(
     domain: DomainName,
-    starts: Annotated[int, typer.Option(min=1, help="Of each operator.")] = 200,
+    starts: Annotated[int, typer.Option(min=1, help="Number of start states per operator.")] = 200,
     seed: FreshSeed = FRESH_SEED,
     preset: Preset = None,
     skills: Annotated[
         Path | None,
-        typer.Option(help="A folder that `slap acquire` made: judge its skills as well."),
+        typer.Option(help="Folder that `slap acquire` made. Its skills are judged as well."),
     ] = None,
     jobs: Jobs = 1,
     output: Output = RESULTS,
 ) -> None:
-    """Whether there is anything to learn: policies that see nothing, from where skills begin."""
+    """Whether there is anything to learn: success of blind policies from where skills begin."""
     choice = _demonstrator(domain, preset, output)
     settings: dict[str, Any] = {"preset": choice.preset, "starts": starts, "seed": seed}
     given, learned = {}, None
@@ -111,17 +111,17 @@ def acquisition_(
         list[Path] | None,
         typer.Option(
             metavar="FOLDER",
-            help="A folder of `slap acquire`; may be repeated. Default: all that ship.",
+            help="Folder that `slap acquire` made. May be repeated. Default: all that ship.",
         ),
     ] = None,
     goal: GoalNames = None,
-    tasks: Annotated[int, typer.Option(min=1, help="Of each goal, for each library.")] = 100,
+    tasks: Annotated[int, typer.Option(min=1, help="Number of tasks per goal and library.")] = 100,
     seed: FreshSeed = FRESH_SEED,
     preset: Preset = None,
     jobs: Jobs = 1,
     output: Output = RESULTS,
 ) -> None:
-    """Task progress with acquired skills, by goal, without planning again."""
+    """Task progress with acquired skills, per goal, without planning again."""
     require_report(output)
     folders = library or _shipped(domain)
     chosen = get_domain(domain, preset)
@@ -144,20 +144,22 @@ def replanning_(
         list[Path] | None,
         typer.Option(
             metavar="FOLDER",
-            help="A folder of `slap acquire`; may be repeated. Default: all that ship and whose "
-            "operators and rewards are hand-written.",
+            help="Folder that `slap acquire` made. May be repeated. Default: all that ship with "
+            "hand-written operators and rewards.",
         ),
     ] = None,
     goal: GoalNames = None,
-    tasks: Annotated[int, typer.Option(min=1, help="Of each seed, for each goal.")] = 20,
-    seeds: Annotated[int, typer.Option(min=1, help="For the first library.")] = 5,
-    others: Annotated[int, typer.Option(min=1, help="Seeds for every other library.")] = 1,
+    tasks: Annotated[int, typer.Option(min=1, help="Number of tasks per seed and goal.")] = 20,
+    seeds: Annotated[int, typer.Option(min=1, help="Number of seeds for the first library.")] = 5,
+    others: Annotated[
+        int, typer.Option(min=1, help="Number of seeds for every other library.")
+    ] = 1,
     first_seed: FreshSeed = FRESH_SEED,
     preset: Preset = None,
     jobs: Jobs = 1,
     output: Output = RESULTS,
 ) -> None:
-    """Success with acquired skills, by goal, where plans that fail are made again."""
+    """Success with acquired skills, per goal, with a new plan after each failure."""
     require_report(output)
     folders = library or _hand_written(_shipped(domain))
     opened = [open_chosen(domain, preset, str(folder)) for folder in folders]
@@ -217,15 +219,16 @@ def _hand_written(folders: Sequence[Path]) -> list[Path]:
 def induction_(
     domain: DomainName,
     demonstrations: Annotated[
-        list[int] | None, typer.Option(help="How many; may be repeated. Default: 1, 3 and 10.")
+        list[int] | None,
+        typer.Option(help="Number of demonstrations. May be repeated. Default: 1, 3 and 10."),
     ] = None,
-    tasks: Annotated[int, typer.Option(min=1, help="To plan for, of each goal.")] = 20,
+    tasks: Annotated[int, typer.Option(min=1, help="Number of tasks to plan per goal.")] = 20,
     seed: FreshSeed = FRESH_SEED,
     preset: Preset = None,
     jobs: Jobs = 1,
     output: Output = RESULTS,
 ) -> None:
-    """Operators from so many demonstrations: whether A* finds plans as short for every goal."""
+    """Operators from demonstrations: whether A* finds equally short plans for every goal."""
     choice = _demonstrator(domain, preset, output)
     counts = demonstrations or [1, 3, 10]
     settings = {
@@ -256,15 +259,20 @@ def _demonstrator(domain: str, preset: str | None, output: Path) -> DomainChoice
 def planning_ablation_(
     domain: DomainName,
     variants: Annotated[
-        str, typer.Option(help="language+search, language, one_shot; separated by commas.")
+        str,
+        typer.Option(
+            help="Ways to plan, separated by commas: language+search, language, one_shot."
+        ),
     ] = ",".join(VARIANTS),
-    plans: Annotated[int, typer.Option(min=1, help="Tasks to plan for.")] = 25,
-    attempts: Annotated[int, typer.Option(min=1, help="At operators, for one plan.")] = 10,
+    plans: Annotated[int, typer.Option(min=1, help="Number of tasks to plan.")] = 25,
+    attempts: Annotated[
+        int, typer.Option(min=1, help="Maximum number of attempts at operators, per plan.")
+    ] = 10,
     output: Output = RESULTS,
     *,
     options: ModelOptions,
 ) -> None:
-    """LG-SAIL Table 2: operators of a language model, planned with by A* or by the model."""
+    """LG-SAIL Table 2: operators of a language model; A* or the model plans with them."""
     require_report(output)
     settings, make = language_study.planning(domain, variants, plans, attempts, options)
     _ask("planning_ablation", domain, settings, output, make)
@@ -274,13 +282,15 @@ def planning_ablation_(
 @flat_options
 def models_(
     domain: DomainName,
-    plans: Annotated[int, typer.Option(min=1, help="Tasks to plan for.")] = 100,
-    attempts: Annotated[int, typer.Option(min=1, help="At operators, for one plan.")] = 10,
+    plans: Annotated[int, typer.Option(min=1, help="Number of tasks to plan.")] = 100,
+    attempts: Annotated[
+        int, typer.Option(min=1, help="Maximum number of attempts at operators, per plan.")
+    ] = 10,
     output: Output = RESULTS,
     *,
     options: ModelOptions,
 ) -> None:
-    """LG-SAIL Tables 5 and 6: operators of several language models, planned with by A*."""
+    """LG-SAIL Tables 5 and 6: operators of several language models; A* plans with them."""
     require_report(output)
     settings, make = language_study.planning(domain, SEARCH, plans, attempts, options)
     _ask("models", domain, settings, output, lambda runner: replace(make(runner), study="models"))
@@ -291,14 +301,19 @@ def models_(
 def reward_ablation_(
     domain: DomainName,
     metrics: Annotated[
-        str, typer.Option(help="full, headers: what the model sees of them; by commas.")
+        str,
+        typer.Option(
+            help="What the model sees of the metrics, separated by commas: full, headers."
+        ),
     ] = "full,headers",
-    trials: Annotated[int, typer.Option(min=1, help="Of each.")] = 25,
+    trials: Annotated[
+        int, typer.Option(min=1, help="Number of trials per choice of --metrics.")
+    ] = 25,
     output: Output = RESULTS,
     *,
     options: ModelOptions,
 ) -> None:
-    """LG-SAIL Table 3, Fig. 7: rewards of a language model, and what is wrong with them."""
+    """LG-SAIL Table 3, Fig. 7: rewards of a language model, and their errors."""
     require_report(output)
     settings, make = language_study.rewards(domain, metrics, trials, options)
     _ask("reward_ablation", domain, settings, output, make)

@@ -33,16 +33,17 @@ from slap_ros.evaluation.metrics import RunMetrics, known
 from slap_ros.messages.decode import decode_state
 
 app = typer.Typer(
-    help="Look into recorded runs: info, evaluate, replay, render, export.", no_args_is_help=True
+    help="Look into recorded runs: list, evaluate, replay, render or export them.",
+    no_args_is_help=True,
 )
 
-BagPath = Annotated[Path, typer.Argument(help="A bag's folder, or one .mcap or .db3 file.")]
+BagPath = Annotated[Path, typer.Argument(help="Folder of a bag, or one .mcap or .db3 file.")]
 
 
 @app.command("info")
 @exits
 def info(bag: BagPath, json: Json = False) -> int:
-    """Say what a bag holds."""
+    """List the topics and messages of a bag."""
     found = bag_info(bag)
     if json:
         print_json(asdict(found))
@@ -59,7 +60,7 @@ def info(bag: BagPath, json: Json = False) -> int:
 @app.command("evaluate")
 @exits
 def evaluate(bag: BagPath, json: Json = False) -> int:
-    """Recompute every number of a run, and the atoms of every state."""
+    """Compute every number of a run again, and the atoms of every state."""
     found = evaluate_bag(bag)
     for mismatch in found.mismatches:
         console.print(
@@ -113,7 +114,7 @@ def _table(run: RunMetrics) -> Table:
 @exits
 def render(
     bag: BagPath,
-    output: Annotated[Path, typer.Option(help="The .gif or .mp4 to write.")],
+    output: Annotated[Path, typer.Option(help=".gif or .mp4 file to write.")],
     size: Size = None,
 ) -> int:
     """Write an animation of the recorded states."""

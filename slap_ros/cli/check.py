@@ -22,14 +22,14 @@ def check(
     preset: Preset = None,
     seed: Seed = 0,
     tasks: Annotated[
-        int, typer.Option(min=1, max=10**6, help="Tasks that are planned and executed.")
+        int, typer.Option(min=1, max=10**6, help="Number of tasks to plan and execute.")
     ] = 50,
     states: Annotated[
-        int, typer.Option(min=10, help="States that are reset to and stepped from again.")
+        int, typer.Option(min=10, help="Number of states to reset to and to step from again.")
     ] = 200,
     json: Json = False,
 ) -> int:
-    """Check whether a domain keeps to the contract: Markov states, margins, bounds, tasks."""
+    """Check that a domain keeps its contract: Markov states, margins, bounds, tasks."""
     findings = []
     with console.status(f"checking {domain}") as status:
         for found in check_domain(get_domain(domain, preset), seed, tasks, states):

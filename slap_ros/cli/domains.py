@@ -27,13 +27,14 @@ def domains(
     domain: Annotated[
         str | None,
         typer.Argument(
-            help="Show one domain in detail instead of all.", autocompletion=matching_domains
+            help="Name of a domain to show in detail. Default: list all.",
+            autocompletion=matching_domains,
         ),
     ] = None,
     preset: Preset = None,
     json: Json = False,
 ) -> None:
-    """List the domains that are installed; of one, its predicates, metrics, goals and operators."""
+    """List the installed domains, or the predicates, metrics, goals and operators of one."""
     if domain is not None:
         one = open_domain(DomainChoice(domain, preset or ""))
         if json:

@@ -35,12 +35,12 @@ from slap_ros.versions import versions
 def evaluate(
     domain: DomainName,
     tasks: Annotated[int, typer.Option(min=1, max=10**6, help="Tasks per seed.")] = 10,
-    seeds: Annotated[int, typer.Option(min=1, max=10**6, help="How many seeds.")] = 5,
+    seeds: Annotated[int, typer.Option(min=1, max=10**6, help="Number of seeds.")] = 5,
     first_seed: Annotated[
         int,
         typer.Option(
             min=0,
-            help="Test seeds are those from 0 on; training draws its tasks from seed 1000000 on.",
+            help="First seed of the tasks. Training samples its tasks from seed 1000000 on.",
         ),
     ] = 0,
     preset: Preset = None,
@@ -52,21 +52,21 @@ def evaluate(
         bool,
         typer.Option(
             "--shooting",
-            help="Compare with a search that makes as many rollouts of random actions as SLAP of "
-            "its policies: what learning is worth.",
+            help="Show what learning is worth: compare with a search that tries random actions as "
+            "often as SLAP tries its policies.",
         ),
     ] = False,
     planner: Planner = "lazy",
     jobs: Jobs = 1,
     output: Annotated[
-        Path | None, typer.Option(help="JSON file for every trial and what it was made from.")
+        Path | None, typer.Option(help="JSON file for all trials, with settings and libraries.")
     ] = None,
     json: Json = False,
 ) -> int:
-    """Plan and execute many tasks in the world and sum up: success, plan length, planning time.
+    """Plan and execute many tasks; print success, plan length and planning time.
 
-    With a shortcut library: pure planning, SLAP as the paper evaluates it (one sample) and SLAP
-    with --samples, on the same tasks. Spreads are mean ± sample standard deviation over all tasks.
+    A shortcut library adds two rows for the same tasks: SLAP as the paper evaluates it (one
+    sample), and SLAP with --samples. Spreads are mean ± sample standard deviation over all tasks.
     """
     chosen = open_chosen(domain, preset, skills)
     settings = {

@@ -35,22 +35,28 @@ class ModelOptions:
     model: Annotated[
         list[str] | None,
         typer.Option(
-            help="As the server names it; `models` takes several. Default: SLAP_LANGUAGE_MODEL."
+            help="Name of the language model at the server; `models` takes several. Default: "
+            "SLAP_LANGUAGE_MODEL."
         ),
     ] = None
     base_url: Annotated[
-        str | None, typer.Option(help="Of the server. Default: SLAP_LANGUAGE_BASE_URL.")
+        str | None, typer.Option(help="URL of the server. Default: SLAP_LANGUAGE_BASE_URL.")
     ] = None
-    language_settings: Annotated[Path | None, typer.Option(help="JSON; see docs/language.md.")] = (
-        None
-    )
+    language_settings: Annotated[
+        Path | None,
+        typer.Option(help="JSON file of settings for the language model; see docs/language.md."),
+    ] = None
     cassette: Annotated[
-        str, typer.Option(help="live, record:FILE, or replay:FILE of a recording from a model.")
+        str,
+        typer.Option(
+            help="How to get answers: live, record:FILE (ask and record), or "
+            "replay:FILE (repeat what a model answered)."
+        ),
     ] = "live"
     goal: Annotated[
-        str | None, typer.Option(help="A goal's name. Default: the first of the domain's.")
+        str | None, typer.Option(help="Name of a goal. Default: the domain's first.")
     ] = None
-    seed: Annotated[int, typer.Option(min=0, help="Of the tasks.")] = 0
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the tasks.")] = 0
     preset: Preset = None
 
     def models(self) -> dict[str, LanguageModel]:

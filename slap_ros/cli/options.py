@@ -30,47 +30,62 @@ def matching_domains(incomplete: str) -> list[str]:
 
 
 DomainName = Annotated[
-    str, typer.Argument(help="One of `slap domains`.", autocompletion=matching_domains)
+    str,
+    typer.Argument(
+        help="Name of a domain; `slap domains` lists them.", autocompletion=matching_domains
+    ),
 ]
 DomainOrFile = Annotated[
     str,
     typer.Argument(
-        help="One of `slap domains`, or a PDDL domain file.", autocompletion=matching_domains
+        help="Name of a domain (`slap domains` lists them), or a PDDL domain file.",
+        autocompletion=matching_domains,
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
 Preset = Annotated[
     str | None,
     typer.Option(
-        help="One of the domain's, see `slap domains`; default: its first. Of ours, fair: random "
-        "tasks; paper: the start states of the paper's code."
+        help="Preset of the domain; `slap domains` lists them. Default: the first. In our "
+        "domains, fair has random tasks, and paper the start states of the paper's code."
     ),
 ]
 Planner = Annotated[
     str,
     typer.Option(
-        help="lazy, exhaustive (the paper's), ff (greedy best-first, SLAP D.2) or astar (fewest "
-        "operators, none of them tried in the model)."
+        help="Planner: lazy, exhaustive (the paper's), ff (greedy best-first search, SLAP D.2) or "
+        "astar (fewest operators; tries none in the model)."
     ),
 ]
-Seed = Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Samples the task.")]
+Seed = Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Seed from which tasks are sampled.")]
 ChosenSeed = Annotated[  # of the commands that say which one they took
     int | None,
-    typer.Option(min=0, max=MAX_SEED, show_default=str(DEFAULT_SEED), help="Samples the task."),
+    typer.Option(
+        min=0,
+        max=MAX_SEED,
+        show_default=str(DEFAULT_SEED),
+        help="Seed from which tasks are sampled.",
+    ),
 ]
-Index = Annotated[int, typer.Option(min=0, max=MAX_INDEX, help="Which of the seed's tasks.")]
+Index = Annotated[
+    int,
+    typer.Option(min=0, max=MAX_INDEX, help="Number of the task among the seed's tasks, from 0."),
+]
 Goal = Annotated[
     str | None,
     typer.Option(
-        help="Another goal: a name that `slap domains DOMAIN` lists, or atoms, e.g. "
-        "'(and (On block2 target) (GripperEmpty robot))'."
+        help="Goal instead of the task's own: a name that `slap domains DOMAIN` lists, or atoms "
+        "such as '(and (On block2 target) (GripperEmpty robot))'."
     ),
 ]
-TrainingSeed = Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Of everything.")]
+TrainingSeed = Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Seed of all random numbers.")]
 Ray = Annotated[
-    str | None, typer.Option(help="Address of a Ray cluster to run on instead, or local.")
+    str | None,
+    typer.Option(help="Run on Ray instead of in processes: a cluster's address, or local."),
 ]
-Jobs = Annotated[int, typer.Option(min=1, help="Processes; the results are the same.")]
+Jobs = Annotated[
+    int, typer.Option(min=1, help="Number of processes. It does not change the results.")
+]
 
 
 def seed_or_default(seed: int | None) -> int:

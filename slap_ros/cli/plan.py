@@ -29,7 +29,7 @@ from slap_ros.files import require_writable
 def plan(
     domain: DomainOrFile,
     problem: Annotated[
-        Path | None, typer.Argument(help="With a PDDL domain file: the PDDL problem file.")
+        Path | None, typer.Argument(help="PDDL problem file. Give it with a PDDL domain file.")
     ] = None,
     seed: ChosenSeed = None,
     index: Index = 0,
@@ -45,15 +45,17 @@ def plan(
     effort: Annotated[
         int,
         typer.Option(
-            min=1, max=10**6, help="With PDDL files: multiplies the limits of planning, time too."
+            min=1,
+            max=10**6,
+            help="With PDDL files: factor of all limits of planning, and so of its time.",
         ),
     ] = 1,
     json: Json = False,
 ) -> None:
     """Plan one task without executing it; write its PDDL and draw its abstract graph.
 
-    In a domain without skills: plan with its hand-written operators alone. With two PDDL files:
-    plan symbolically, with the FF heuristic.
+    A domain without skills is planned with its hand-written operators alone. Two PDDL files are
+    planned symbolically, with the FF heuristic.
     """
     if problem is not None:
         from slap_ros.cli.plan_pddl import plan_pddl

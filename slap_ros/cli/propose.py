@@ -43,17 +43,18 @@ class ProposeOptions:
 
     domain: DomainOrFile
     problem: Annotated[
-        Path | None, typer.Argument(help="With a PDDL domain file: the PDDL problem file.")
+        Path | None, typer.Argument(help="PDDL problem file. Give it with a PDDL domain file.")
     ] = None
     rewarder: Annotated[
         str,
         typer.Option(
-            help="Of rewards: none, manual (written by hand), composed (from metrics), or language."
+            help="Source of rewards: none, manual (hand-written), composed (from metrics), or "
+            "language (from a language model)."
         ),
     ] = NO_REWARDER
     operators: Annotated[
         Path | None,
-        typer.Option(help="Check these operators instead: PDDL, a proposal's JSON, or text."),
+        typer.Option(help="File of operators to check instead: PDDL, a proposal's JSON, or text."),
     ] = None
     seed: Seed = 0
     index: Index = 0
@@ -72,8 +73,8 @@ class ProposeOptions:
 def propose(options: ProposeOptions, proposers: ProposerOptions) -> None:
     """Propose operators and rewards for a task, check them, and plan with them.
 
-    With two PDDL files: for the symbolic problem that they state; the domain file's own actions
-    are what the proposer manual takes, and are shown to no model.
+    Two PDDL files state a symbolic problem. Then the proposer manual takes the actions of the
+    domain file; no model sees these actions.
     """
     if options.output is not None:
         require_writable(options.output)

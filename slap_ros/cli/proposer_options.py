@@ -44,7 +44,7 @@ class ProposerOptions:
     proposer: Annotated[
         str,
         typer.Option(
-            help="Of operators: manual (the domain's own, or those written by hand for it), "
+            help="Source of operators: manual (the domain's own, or those hand-written for it), "
             "induced (from demonstrations), or language (from a language model)."
         ),
     ] = MANUAL
@@ -57,28 +57,39 @@ class ProposerOptions:
         ),
     ] = None
     model: Annotated[
-        str | None, typer.Option(help="Default: SLAP_LANGUAGE_MODEL, or the settings' own.")
+        str | None,
+        typer.Option(
+            help="Name of the language model. Default: SLAP_LANGUAGE_MODEL, "
+            "else as in the settings."
+        ),
     ] = None
     base_url: Annotated[
         str | None,
         typer.Option(
-            help="Of a server with the OpenAI-compatible interface. Default: "
-            "SLAP_LANGUAGE_BASE_URL, or the settings' own. The key is OPENAI_API_KEY's."
+            help="URL of a server with the OpenAI-compatible interface. Its key is in "
+            "OPENAI_API_KEY. Default: SLAP_LANGUAGE_BASE_URL, else as in the settings."
         ),
     ] = None
-    language_settings: Annotated[Path | None, typer.Option(help="JSON; see docs/language.md.")] = (
-        None
-    )
+    language_settings: Annotated[
+        Path | None,
+        typer.Option(help="JSON file of settings for the language model; see docs/language.md."),
+    ] = None
     cassette: Annotated[
-        str, typer.Option(help="live, record:FILE, replay:FILE, or off: ask no model.")
+        str,
+        typer.Option(
+            help="How to get answers: live, record:FILE (ask and record), "
+            "replay:FILE (repeat a recording), or off (ask no model)."
+        ),
     ] = "live"
-    attempts: Annotated[int, typer.Option(min=1, help="Answers to ask for at most.")] = (
+    attempts: Annotated[int, typer.Option(min=1, help="Maximum number of answers to ask for.")] = (
         BudgetLimits.attempts
     )
-    tokens: Annotated[int, typer.Option(min=1, help="To spend at most.")] = BudgetLimits.tokens
-    seconds: Annotated[float, typer.Option(help="To wait for answers at most.")] = (
-        BudgetLimits.seconds
+    tokens: Annotated[int, typer.Option(min=1, help="Maximum number of tokens to spend.")] = (
+        BudgetLimits.tokens
     )
+    seconds: Annotated[
+        float, typer.Option(help="Maximum time to wait for all answers, in seconds.")
+    ] = BudgetLimits.seconds
 
     def __post_init__(self) -> None:
         require_known("--proposer", self.proposer, PROPOSERS)

@@ -22,7 +22,10 @@ from slap_ros.relational import State
 
 LARGEST = PictureSize(3840, 2160)
 Size = Annotated[
-    str | None, typer.Option(help="Of the animation, as 960x720 pixels. Default: the domain's own.")
+    str | None,
+    typer.Option(
+        help="Size of the animation in pixels, such as 960x720. Default: the domain's own."
+    ),
 ]
 
 

@@ -18,9 +18,9 @@ from slap_ros.report import check_output, read_report, render, write_page
 def report(
     bags: Annotated[
         list[Path],
-        typer.Argument(metavar="BAG", help="Bags' folders, or single .mcap or .db3 files."),
+        typer.Argument(metavar="BAG", help="Folders of bags, or single .mcap or .db3 files."),
     ],
-    output: Annotated[Path, typer.Option(help="The .html to write.")],
+    output: Annotated[Path, typer.Option(help=".html file to write.")],
 ) -> int:
     """Report a run, or compare several, on one page that opens in any browser."""
     check_output(output)

@@ -20,12 +20,17 @@ SAMPLES = DEFAULT.samples
 
 Shortcuts = Annotated[
     str | None,
-    typer.Option(help="A shortcut library, or none. Default: the shipped one, if there is."),
+    typer.Option(
+        help="Folder of a shortcut library, or none. Default: the library that ships, if "
+        "there is one."
+    ),
 ]
 Samples = Annotated[
     int,
     typer.Option(
-        min=1, max=10**6, help="Attempts of a shortcut in the model; the shortest is used."
+        min=1,
+        max=10**6,
+        help="Times that a shortcut is tried in the model; the shortest try is used.",
     ),
 ]
 

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 Skills = Annotated[
     str,
     typer.Option(
-        help="Whose: a folder that `slap acquire` made; none; or demonstrator (hand-written "
-        "operators, and scripts that show how tasks are solved). Default: what ships, else the "
-        "domain's own."
+        help="Skills to use: a folder that `slap acquire` made, none, or demonstrator "
+        "(hand-written operators and scripts that solve tasks). Default: those that ship, "
+        "else the domain's own."
     ),
 ]
 

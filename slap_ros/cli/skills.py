@@ -24,10 +24,10 @@ from slap_ros.domains import get_domain
 
 
 def skills(
-    library: Annotated[Path, typer.Argument(help="A folder that `slap acquire` made.")],
+    library: Annotated[Path, typer.Argument(help="Folder that `slap acquire` made.")],
     json: Json = False,
 ) -> None:
-    """Show a library of skills: operators, rewards, success, and what each began from."""
+    """Show a library of skills: operators, rewards, success, and which skills each began from."""
     about = read_library_record(library)
     read = load_skill_library(library, get_domain(about["domain"], about.get("preset")))
     if json:

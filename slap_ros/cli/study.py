@@ -58,23 +58,26 @@ TABLES_IN = ("README.md", "docs/presets.md", "docs/reproducing.md", "docs/skills
 PAGES = [Path(page) for page in TABLES_IN]  # with tables made of results
 
 app = typer.Typer(
-    help="Make a figure of the papers again: data, a picture and a page. Stopped while it solves "
-    "tasks, learns or asks a model, a study goes on where it was with the same command.",
+    help="Make a figure of the papers again: data, a picture and a page. After an interruption, "
+    "the same command goes on where the study stopped.",
     no_args_is_help=True,
 )
 
 Tasks = Annotated[int, typer.Option(min=1, help="Tasks per seed.")]
-Seeds = Annotated[int, typer.Option(min=1, help="How many task seeds.")]
-FirstSeed = Annotated[int, typer.Option(min=0, help="The first of them.")]
+Seeds = Annotated[int, typer.Option(min=1, help="Number of task seeds.")]
+FirstSeed = Annotated[int, typer.Option(min=0, help="First task seed.")]
 Vary = Annotated[
     list[str] | None,
-    typer.Option(help="setting=value,value,...: vary this instead of the usual; may be repeated."),
+    typer.Option(
+        help="Setting to vary and its values, as setting=value,value,... May be "
+        "repeated. Default: the usual settings."
+    ),
 ]
 Work = Annotated[
     list[Path],
     typer.Option(
         metavar="FOLDER",
-        help="Work folder of a `slap train`; may be repeated, one folder per seed.",
+        help="Work folder of a `slap train`. May be repeated, one folder per seed.",
     ),
 ]
 
@@ -114,7 +117,7 @@ class GoalOptions(ComparisonOptions):
 @exits
 @flat_options
 def dynamics_(domain: DomainName, work: Work, *, options: ComparisonOptions) -> None:
-    """SLAP Fig. 4: learning curves, and plans with what was learned so far, from work folders."""
+    """SLAP Fig. 4: learning curves from work folders, and plans with what was learned so far."""
     folders = [TrainingFolder(folder) for folder in work]
     compared = _Compared.of(domain, options, _trainings(folders), needs_library=False)
     compared.make("dynamics", lambda it: dynamics.study(folders, it), work=work)
@@ -135,7 +138,9 @@ def generalisation_(domain: DomainName, vary: Vary = None, *, options: Compariso
 @flat_options
 def goals_(
     domain: DomainName,
-    goals: Annotated[int, typer.Option(min=1, help="Goals per task, fewer if it has fewer.")] = 15,
+    goals: Annotated[
+        int, typer.Option(min=1, help="Goals per task, or all if the task has fewer.")
+    ] = 15,
     *,
     options: GoalOptions,
 ) -> None:
@@ -153,16 +158,16 @@ def pruning_(
         list[Path] | None,
         typer.Option(
             metavar="FOLDER",
-            help="Work folder of a `slap train` that has explored; may be repeated.",
+            help="Work folder of a `slap train` that has explored. May be repeated.",
         ),
     ] = None,
     settings: Annotated[
-        str, typer.Option(help="ours, or paper: how to explore, without --work.")
+        str, typer.Option(help="Settings of exploration where --work is not given: ours or paper.")
     ] = "ours",
     *,
     options: ComparisonOptions,
 ) -> None:
-    """SLAP Table 2: how many candidates random rollouts leave over, and what plans are without."""
+    """SLAP Table 2: candidates that random rollouts keep, and plan length without the others."""
     folders = [TrainingFolder(folder) for folder in work or ()]
     sampled_from = _trainings(folders) if folders else {"settings": settings}
     compared = _Compared.of(domain, options, sampled_from, needs_library=False)
@@ -183,11 +188,13 @@ def pruning_(
 @flat_options
 def perception_(
     domain: DomainName,
-    max_replans: Annotated[int, typer.Option(min=0, help="Plans after the first.")] = 10,
+    max_replans: Annotated[
+        int, typer.Option(min=0, help="Maximum number of plans after the first.")
+    ] = 10,
     *,
     options: ComparisonOptions,
 ) -> None:
-    """SLAP D.3, D.4: success, length and replans while perception errs in several ways."""
+    """SLAP D.3, D.4: success, length and replans under several errors of perception."""
     compared = _Compared.of(domain, options, {"max_replans": max_replans}).ends()
     compared.make("perception", lambda it: perception.study(it, max_replans))
 
@@ -199,7 +206,10 @@ def planning_time_(
     domain: DomainName,
     vary: Annotated[
         str | None,
-        typer.Option(help="setting=value,value,...; default: the number of obstacles."),
+        typer.Option(
+            help="Setting to vary and its values, as setting=value,value,... Default: "
+            "the number of obstacles."
+        ),
     ] = None,
     *,
     options: ComparisonOptions,
@@ -223,14 +233,16 @@ def table1_(
         typer.Option(
             "--library",
             metavar="FOLDER",
-            help="A library's folder, one per training seed; may be repeated. Default: what ships.",
+            help="Folder of a library, one per training seed. May be repeated. Default: all that "
+            "ship.",
         ),
     ] = None,
     tasks: Tasks = 10,
     seeds: Seeds = 5,
     first_seed: FirstSeed = FRESH_SEED,
     presets: Annotated[
-        list[str] | None, typer.Option("--preset", help="May be repeated. Default: all.")
+        list[str] | None,
+        typer.Option("--preset", help="Preset of the domain. May be repeated. Default: all."),
     ] = None,
     samples: Samples = SAMPLES,
     jobs: Jobs = 1,
@@ -265,21 +277,29 @@ def ablation_(
     domain: DomainName,
     term: Annotated[
         list[str] | None,
-        typer.Option(help="What to leave out; may be repeated. Default: each, and all of them."),
+        typer.Option(
+            help="Term to leave out. May be repeated. Default: each term, and all together."
+        ),
     ] = None,
-    trainings: Annotated[int, typer.Option(min=1, help="Of each, with seeds from 0 on.")] = 3,
+    trainings: Annotated[
+        int, typer.Option(min=1, help="Number of trainings per term, with seeds from 0 on.")
+    ] = 3,
     steps: Annotated[
         int | None,
-        typer.Option(min=1, help="Environment steps of a training. Default: the domain's."),
+        typer.Option(
+            min=1, help="Environment steps of a training. Default: as in the domain's settings."
+        ),
     ] = None,
-    tasks: Annotated[int, typer.Option(min=1, help="To plan for with what was learned.")] = 20,
+    tasks: Annotated[
+        int, typer.Option(min=1, help="Number of tasks to plan with what was learned.")
+    ] = 20,
     seed: FreshSeed = FRESH_SEED,
     samples: Samples = SAMPLES,
     preset: Preset = None,
     jobs: Jobs = 1,
     output: Output = RESULTS,
 ) -> None:
-    """What is made by hand for a domain: learn without each term, and with a plain interface."""
+    """What a domain's hand-made terms are worth: learn without each, and without all."""
     require_report(output)
     require_torch()
     preset = get_domain(domain, preset).preset
@@ -310,11 +330,13 @@ def ablation_(
 def readme_(
     pages: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="PAGE", help="Markdown pages. Default: all with tables."),
+        typer.Argument(
+            metavar="PAGE", help="Markdown pages to update. Default: all pages with tables."
+        ),
     ] = None,
     results: Annotated[Path, typer.Option(help="Folder of the studies' data.")] = RESULTS,
 ) -> None:
-    """Write the tables of pages again from the data of studies."""
+    """Update the tables of pages from the data of studies."""
     for page in pages or PAGES:
         text = read_text(page)
         written = readme.with_tables(text, results)

@@ -24,8 +24,8 @@ from slap_ros.studies.study_log import StudyLog
 RESULTS = Path("docs/results")
 FRESH_SEED = 500  # development looks at no task seed from here on
 
-FreshSeed = Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Of the tasks.")]
-Output = Annotated[Path, typer.Option(help="Folder for NAME_DOMAIN.json, .svg and .md.")]
+FreshSeed = Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Seed of the tasks.")]
+Output = Annotated[Path, typer.Option(help="Folder for the files STUDY_DOMAIN.json, .svg and .md.")]
 
 
 def require_report(output: Path) -> None:

@@ -43,7 +43,7 @@ class TrainOptions:
 
     domain: DomainName
     output: Annotated[
-        Path | None, typer.Option(help="The library's folder. Default: runs/models/DOMAIN.")
+        Path | None, typer.Option(help="Folder of the new library. Default: runs/models/DOMAIN.")
     ] = None
     preset: Preset = None
     skills: Skills = SHIPPED
@@ -51,29 +51,33 @@ class TrainOptions:
     settings: Annotated[
         str,
         typer.Option(
-            help="ours, ours_several (more shortcuts, for random goals too), paper (the paper's "
-            "hyper-parameters), or the domain's own."
+            help="Hyper-parameters: ours, ours_several (more shortcuts, also for random goals), "
+            "paper (the paper's), or the name of the domain's own."
         ),
     ] = "ours"
     set: Annotated[
         list[str] | None,
         typer.Option(
             metavar="NAME=VALUE",
-            help="Change one of the settings, as exploration.rollouts=16; may be repeated. A wrong "
-            "name lists all.",
+            help="Change one of the settings, such as exploration.rollouts=16. May be repeated. A "
+            "wrong name lists all names.",
         ),
     ] = None
     steps: Annotated[
         int | None,
         typer.Option(
-            min=1, help="Environment steps per shortcut, all stages together; default: settings'."
+            min=1,
+            help="Environment steps per shortcut, all stages together. Default: as in the "
+            "settings.",
         ),
     ] = None
-    jobs: Annotated[int, typer.Option(min=1, help="Processes.")] = 2
+    jobs: Annotated[int, typer.Option(min=1, help="Number of processes.")] = 2
     ray: Ray = None
     work: Annotated[
         Path | None,
-        typer.Option(help="Folder for checkpoints and logs; the same one again goes on."),
+        typer.Option(
+            help="Folder for checkpoints and logs. With the same folder again, training goes on."
+        ),
     ] = None
     json: Json = False
 
@@ -117,10 +121,10 @@ class TrainOptions:
 
 
 def train(options: TrainOptions) -> int:
-    """Discover and learn shortcuts: explore, rank, train, keep what makes plans shorter.
+    """Find and learn shortcuts: explore, rank, train, keep what makes plans shorter.
 
-    Interrupted, it goes on where it was when the same command is given again. Progress for
-    TensorBoard is in the work folder.
+    After an interruption, the same command goes on where it stopped. The work folder has logs for
+    TensorBoard.
     """
     domain = open_chosen(options.domain, options.preset, options.skills)
     require_skills(domain)

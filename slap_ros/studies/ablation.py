@@ -42,18 +42,19 @@ SETTINGS = "training settings"  # of the domain are left out: the general ones i
 PURE = "pure planning"
 SHOWN = ("slap_1_sample", "slap")
 MEASURED = """\
-Each row leaves out what it names, and nothing else; the terms are described in [What is made by
-hand](../shortcuts.md#what-is-made-by-hand). The training settings are those of every domain instead
-of this one's. For each of {trainings} seeds, the most promising shortcut is looked for once, and
-learned in every row from the same starts, with {steps} environment steps. Success is the share of
-the last {recent} episodes of training that reached the target, with the noise of the policy, and
-steps are those of successful ones. Length is that of plans that are executed, relative to pure
-planning on the same {tasks} tasks; a task that was not solved counts in its own column alone. With
-all samples, search in the planner's model makes up for much of what a policy has not learned, so
-what a term is worth for learning shows with 1 sample.
-Means ± sample standard deviations are over the seeds of training: with so few, a difference of
-less than two of them says nothing. One domain and one budget of steps: a term that is worth nothing
-here may be worth much elsewhere."""
+Each row leaves out the terms that it names, and nothing else. [What is made by
+hand](../shortcuts.md#what-is-made-by-hand) describes the terms. Without the *training settings* of
+this domain, those of every domain are used. For each of {trainings} seeds, the most promising
+shortcut is found once. Every row learns it from the same starts, with {steps} environment steps.
+Success is the share of the last {recent} episodes of training that reached the target, with the
+noise of the policy. Steps are those of successful episodes. Length is the length of executed plans
+relative to pure planning on the same {tasks} tasks. A task that was not solved counts only in the
+column *solved*. With all samples, search in the planner's model makes up for much that a policy has
+not learned. So the column for 1 sample shows best what a term is worth for learning.
+
+Means ± sample standard deviations are over the seeds of training. With so few seeds, a difference
+of less than two standard deviations says nothing. This is one domain and one budget of steps: a
+term that is worth nothing here may be worth much elsewhere."""
 
 
 @dataclass(frozen=True)

@@ -26,14 +26,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MEASURED = """\
-A plan of acquired operators (A*, shortest in operators) is carried out with the learned skills,
-approach and policy, and never planned again. Task progress is the share of its stages that were
-done in order. A stage is done once all atoms that are expected hold and none that its operator
-deletes. Tasks are of seeds that no training and no judgement used. Task progress is the mean over
-tasks, mean ± sample standard deviation over libraries whose operators are from the same proposer
-and whose rewards are from the same rewarder; solved are tasks whose stages were all done,
-of these libraries together, with Wilson's 95 % interval; the paper's figures are LG-SAIL's, in a
-simulator of its own."""
+A* makes a plan of acquired operators, with as few operators as possible. The learned skills carry
+it out, approach and policy, and nothing is planned again. Task progress is the share of the plan's
+stages that were done in order. A stage is done once all expected atoms hold, and none that its
+operator deletes. The seeds of these tasks were used neither to train skills nor to judge them. A
+row is of all libraries whose operators are from the same proposer and whose rewards are from the
+same rewarder. Task progress is the mean over tasks, then the mean ± sample standard deviation over
+libraries. *Solved* is the share of tasks whose stages were all done, of these libraries together,
+with Wilson's 95 % interval. The paper's figures are LG-SAIL's, in a simulator of its own."""
 # Task progress that LG-SAIL's Table 1 has, by domain and goal.
 PAPER: Mapping[tuple[str, str], float] = {
     ("stack_at_target", "training"): 1.00,

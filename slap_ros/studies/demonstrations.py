@@ -23,13 +23,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MEASURED = """\
-The demonstrator plans with A* over the domain's hand-written operators, runs a script for each in
-the world, closed loop and knowing all of the state, and plans again from wherever a script has left
-the robot, up to five times. It is no skill and is learned by none: it shows that the tasks can be
-solved. Success is that all atoms of the goal hold within the domain's step limit, with Wilson's
-95 % interval. Steps are environment steps of solved tasks, mean ± sample standard deviation.
-Options that failed are counted by operator, of how many were begun; a task in which one failed may
-still be solved."""
+The demonstrator plans with A* over the domain's hand-written operators. It runs a script for
+each operator in the world, closed loop and with knowledge of the whole state. Then it plans
+again from wherever the script has left the robot, up to five times. The demonstrator is not a
+skill, and no skill learns from it: it shows that the tasks can be solved. Success means that all
+atoms of the goal hold within the domain's step limit. The interval is Wilson's, with 95 %. Steps
+are environment steps of solved tasks, mean ± sample standard deviation. For each operator, the
+last column has how many of its options failed, of how many began. A task in which an option
+failed may still be solved."""
 
 
 @dataclass(frozen=True)

@@ -25,18 +25,18 @@ if TYPE_CHECKING:
 ROWS = 6  # of the table, per shortcut: the first time, the last, and some between
 THOUSAND = 1000.0
 MEASURED = """\
-What training writes down while it learns a shortcut: the part of recent episodes that ended in
-success, and the number of environment steps of those. Both are with the noise of exploration and
-from the starts of training, so they are not what planning with the shortcut comes to. Stages of a
-training follow one another along the axis, dotted lines part them. Several trainings (seeds) of
-the same shortcut are averaged where they have numbers for the same step count; mean ± sample
+The curves are what training records while it learns a shortcut: the share of recent episodes that
+succeeded, and the number of environment steps of those. Both have the noise of exploration, and
+episodes begin at the starts of training. So they are not the results of planning with the shortcut.
+Stages of a training follow one another along the axis; dotted lines separate them. Several
+trainings (seeds) of the same shortcut are averaged at step counts that they share: mean ± sample
 standard deviation."""
 PLANNED = """
 
-Plan length is that of plans that are executed on the same {tasks} tasks of evaluation, with the
-shortcuts of the library that is named below as they were after so many environment steps of
-learning each; mean ± sample standard deviation, and relative to pure planning. A shortcut counts as
-used if it is in one of these plans at least and reaches its target there."""
+Plan length is the length of executed plans on the same {tasks} tasks of evaluation. They use the
+shortcuts of the library named below, as they were after so many environment steps of learning each.
+Length is the mean ± sample standard deviation, and relative to pure planning. A shortcut counts as
+used if it is in at least one of these plans and reaches its target there."""
 
 
 @dataclass(frozen=True)

@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 
 UNCHANGED = "unchanged"
 MEASURED = """\
-Pure planning and SLAP solve the same tasks, planned and executed in the world, while one setting
-varies and all others stay as in the preset; under *unchanged*, all do. The library is always the
-same one and nothing is trained again. Length is the number of environment steps executed, mean ±
-sample standard deviation over the solved tasks; relative length is the mean over that of pure
-planning, on tasks that both solved. A task for which no plan is found counts as failed."""
+Pure planning and SLAP plan and execute the same tasks while one setting varies. All other settings
+stay as in the preset; in the rows *unchanged*, every setting does. The library is always the same,
+and nothing is trained again. Length is the number of environment steps executed, mean ± sample
+standard deviation over solved tasks. Relative length is the mean over that of pure planning, on
+tasks that both solved. A task for which no plan is found counts as failed."""
 
 
 @dataclass(frozen=True)

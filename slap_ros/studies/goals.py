@@ -33,13 +33,13 @@ NamedGoal = tuple[tuple[str, tuple[str, ...]], ...]  # a goal as names, for anot
 GOALS = 9  # tells the random numbers of goals from those of tasks
 DOT = 20  # area of a dot in the picture, points squared
 MEASURED = """\
-Goals are sampled for each task: a random node of its abstract graph, and of the fluent atoms that
-hold there and not at the start one or two; no goal twice for a task. Pure planning and SLAP solve
-each, planned and executed in the world. Length is the number of environment steps executed, mean ±
-sample standard deviation over solved goals; relative length is the mean over that of pure
-planning, on goals that both solved, and so are the counts. The library was trained for the domain's
-own goal. A goal for which no plan is found counts as failed: an abstract state can be reached by
-operators and not in the world."""
+Goals are sampled for each task. Each goal is one or two of the fluent atoms that hold in a random
+node of the task's abstract graph, and not at the start. No goal is sampled twice for a task. Pure
+planning and SLAP plan and execute each goal. Length is the number of environment steps executed,
+mean ± sample standard deviation over solved goals. Relative length is the mean over that of pure
+planning, on goals that both solved. The counts below are on these goals, too. The library was
+trained for the domain's own goal. A goal for which no plan is found counts as failed: operators can
+reach some abstract states that cannot be reached in the world."""
 
 
 @dataclass(frozen=True)
@@ -165,8 +165,8 @@ def _compared(outcomes: Sequence[GoalTrials]) -> str:
     shorter = sum(slap < pure for pure, slap in pairs)
     longer = sum(slap > pure for pure, slap in pairs)
     return (
-        f"Of {len(outcomes)} goals both solved {len(pairs)}; SLAP was shorter for {shorter}, as "
-        f"long for {len(pairs) - shorter - longer} and longer for {longer}."
+        f"Both solved {len(pairs)} of {len(outcomes)} goals. SLAP was shorter for {shorter}, "
+        f"equally long for {len(pairs) - shorter - longer} and longer for {longer}."
     )
 
 

@@ -29,14 +29,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MEASURED = """\
-Demonstrations are recorded by the domain's demonstrator, on tasks of the training goal ({training})
-that neither this page nor training uses elsewhere. Operators are induced from the atoms that hold
-in each step, and from nothing else: no name, no objects and no end of a script is shown. A change
-counts where atoms stay for {hold_steps} environment steps, and where some are added. With the
-operators A* plans for {tasks} fresh tasks of each goal. A task counts where the plan has as few
-operators as the shortest plan with the hand-written operators, which is of the paper's length.
-Tasks for which these have no plan are left out. Preconditions are too many that the hand-written
-operator with the same effects does not have."""
+The domain's demonstrator records demonstrations of the training goal ({training}), on tasks that
+neither this page nor training uses elsewhere. Operators are induced only from the atoms that hold
+in each step, without names, objects or the ends of scripts. A change counts if some atoms are
+added, and if atoms then stay for {hold_steps} environment steps. A* plans with these operators for
+{tasks} fresh tasks of each goal. A task counts if its plan has as few operators as the shortest
+plan with the hand-written operators, which has the paper's length. Tasks without a plan by the
+hand-written operators are left out. *Extra preconditions* are those that the hand-written operator
+with the same effects does not have."""
 
 
 @dataclass(frozen=True)
@@ -265,7 +265,7 @@ def _report(choice: DomainChoice, found: Sequence[Induction], tasks: int) -> Stu
             training=_training_goal(domain) or "the tasks' own", tasks=tasks, hold_steps=hold_steps
         ),
         table=MarkdownTable(
-            ["demonstrations", "operators", *goals, "preconditions too many"],
+            ["demonstrations", "operators", *goals, "extra preconditions"],
             [one.as_row() for one in found],
         ),
         found={"inductions": [one.as_json() for one in found]},

@@ -37,18 +37,18 @@ if TYPE_CHECKING:
 EXACT = "exact"
 TURN_FOR_POSITION = 5.0  # rad/m: a detector that is 2 mm off is 10 mrad off
 MEASURED = """\
-Pure planning and SLAP solve the same tasks while perception errs: noise is normal, with the
-standard deviation given, and new in each step. Position noise comes with 5 mrad of turn for each
-mm, where things can turn; threshold noise moves the threshold of each predicate of each atom;
-a sighting that is lost leaves an object where it was last seen; debounced atoms change once they
-were perceived as changed so many times in a row, and a skill then holds at its end for as long.
-Where poses err, what lies still is put where physics would have it before a plan is made of it. At
-each divergence, and where no plan can be made of what is seen, there is a new plan, up to the limit
-given below.
+Pure planning and SLAP solve the same tasks while perception has errors. Noise is normal, with the
+given standard deviation, and new in each step. Each mm of position noise comes with 5 mrad of
+rotation noise, where things can turn. Threshold noise moves the threshold of each predicate of each
+atom. A lost sighting leaves an object where it was last seen. A debounced atom changes once
+perception has seen the change so many times in a row; a skill then holds at its end for as long.
+Where poses have errors, objects at rest are put where physics would have them before planning. The
+planner plans again after each divergence, and where it finds no plan for what it sees, up to the
+limit given below.
 
 A task is solved if the planner says so and its goal holds in the world. Length is the number of
-environment steps executed, mean ± sample standard deviation over solved tasks; replans are over
-all tasks."""
+environment steps executed, mean ± sample standard deviation over solved tasks. Replans are the mean
+over all tasks."""
 
 
 @dataclass(frozen=True)

@@ -37,21 +37,22 @@ PAPER = {
 }
 COSTS = ("tokens", "seconds", "processor_seconds")  # of an attempt
 MEASURED = """\
-Each plan is a task of its own. An attempt asks the model once for the actions of the task and once
-for the operator of each, and ends with the first answer that does not pass its checks; *operators*
-is the share of attempts in which all pass and A* finds a plan with them. *Planning* is the share of
-plans that reach the goal, of those attempted with such operators: A* by construction, or the model
-asked once. *Overall* is the share of tasks with a plan within {attempts} attempts, or in the only
-attempt of one_shot. *Attempts* is their mean number for each plan that was found. No answer is
-asked for again with what was wrong with it, so that attempts are alike. The attempt's number is the
-seed of the model's sampling. *Seconds* are those that an attempt waited for answers, however busy
-the machine, and those that the processor worked for it in this process: next to none where a server
-answers. Shares have Wilson's 95 % interval. In brackets, and as lines in the picture: the paper's,
-of its own model and tasks."""
+Each plan is for a task of its own. An attempt asks the model once for the actions of the task, and
+once for the operator of each action. It ends with the first answer that does not pass its checks.
+*Operators* is the share of attempts in which all answers pass and A* finds a plan with them.
+*Planning* is the share of plans that reach the goal, among attempts with such operators. A* always
+reaches it, by construction; the model is asked once. *Overall* is the share of tasks with a plan
+within {attempts} attempts, or in the only attempt of one_shot. *Attempts* is the mean number of
+attempts for each plan that was found. No question says what was wrong with an earlier answer, so
+all attempts are alike. The number of the attempt is the seed of the model's sampling. *Seconds* are
+the time that an attempt waited for answers, on a machine that may have been busy, and the time of
+the processor in this process: almost none where a server answers. Shares have Wilson's 95 %
+interval. Numbers in brackets, and lines in the picture, are the paper's, for its own model and
+tasks."""
 FEW = """
 
-**Plans: {plans}; wanted: {wanted}.** The interval of *overall* says how little so few
-tell. The same command with `--plans {wanted}` makes all of them."""
+**Plans: {plans}; wanted: {wanted}.** The interval of *overall* shows how little so few plans say.
+The same command with `--plans {wanted}` makes all of them."""
 
 
 @dataclass(frozen=True)

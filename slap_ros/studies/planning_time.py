@@ -30,15 +30,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MEASURED = """\
-Every task is planned once, with given skills alone and with shortcuts, and not executed. Seconds
-are of the whole of planning (graph, shortcut edges, search with all the rolling out in the model)
-on one core, of whatever machine made this page; they also depend on what else it was doing. An
-edge is rolled out at most once from a state; with more than one sample a shortcut edge is tried
-so often then. Nodes are abstract states, edges are options and
-shortcuts between them. Mean ± sample standard deviation over tasks; seconds are over all tasks,
-the rest over those for which a plan was found.
+Every task is planned once with the given skills alone and once with shortcuts, and is not executed.
+Seconds are for the whole of planning (graph, shortcut edges, search with all rollouts in the
+model), on one core of the machine that made this page. They also depend on what else that machine
+did. An edge is rolled out at most once from a state; with more than one sample, a shortcut edge is
+tried so often each time. Nodes are abstract states; edges are options and shortcuts between them.
+Numbers are the mean ± sample standard deviation over tasks: seconds over all tasks, the others over
+tasks for which a plan was found.
 
-The paper's figures, of its machine and start states: 15.2 s with shortcuts and 18.4 s without in
+The paper's figures, for its machine and start states: 15.2 s with shortcuts and 18.4 s without in
 Obstacle Tower."""
 
 

@@ -30,23 +30,23 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MEASURED = """\
-Candidates are the pairs of abstract states of a task's graph, the later one second, that no option
-joins. Of N random rollouts from a state at least K must end up in the other one, or the pair is
-pruned. Here rollouts are made only from the abstract states that are cheapest to reach, and a pair
-remains only if its shortcut would also make the plan of the task shorter, so that more is pruned
-than in the paper. What remains of all tasks is then, up to objects, far fewer different things to
+Candidates are pairs of abstract states of a task's graph, the later one second, that no option
+joins. Of N random rollouts from the first state, at least K must end in the second; otherwise the
+pair is pruned. Here, rollouts begin only in the abstract states that are cheapest to reach. A pair
+remains only if its shortcut would also make the plan of the task shorter. So more is pruned than in
+the paper. Up to objects, the pairs that remain in all tasks are far fewer different things to
 learn. Tasks are those of training. Spread is the sample standard deviation over tasks.
 
 {settings} {overall}
 
-In the paper, K/N of 5 to 25 % gives plans of 167 to 202 steps, 30 % and more 333 to 349: whatever
-is pruned too eagerly is missing from the plans."""
+In the paper, K/N of 5 to 25 % gives plans of 167 to 202 steps, and 30 % and more gives 333 to 349:
+shortcuts that are pruned too eagerly are missing from the plans."""
 PLANNED = """
 
-Plan length is that of plans that are executed, with the library that is named below but without
-its shortcuts all of whose candidates have fewer than K hits, on the same {tasks} tasks of
-evaluation; mean ± sample standard deviation, and relative to pure planning. Nothing is trained
-again, so what a training would have learned instead of a pruned shortcut is not in it."""
+Plan length is the length of executed plans on the same {tasks} tasks of evaluation. They use the
+library named below, but not those of its shortcuts whose candidates all have fewer than K hits.
+Length is the mean ± sample standard deviation, and relative to pure planning. Nothing is trained
+again, so the numbers leave out what a training would have learned instead of a pruned shortcut."""
 
 
 @dataclass(frozen=True)
@@ -211,10 +211,7 @@ def _overall(pruned: Sequence[PrunedCandidates], settings: ExplorationSettings) 
     candidates = sum(one.explored.pairs for one in pruned)
     remaining = sum(one.remaining(settings.hits) for one in pruned)
     part = 100.0 * remaining / max(1, candidates)
-    return (
-        f"Of {candidates:,} candidates in {len(pruned)} tasks {remaining} remain, {part:.1f} % of "
-        "them all."
-    )
+    return f"In {len(pruned)} tasks, {remaining} of {candidates:,} candidates remain: {part:.1f} %."
 
 
 def _thresholds(settings: ExplorationSettings) -> list[int]:

@@ -80,7 +80,7 @@ def main_table(results: Path) -> MarkdownTable:
             "tasks × libraries",
             "",
             "success",
-            "at limit",
+            "out of steps",
             "plan length [steps]",
             "± over libraries",
             "relative",

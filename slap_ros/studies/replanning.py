@@ -26,15 +26,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MEASURED = f"""\
-Each task is planned and executed as `slap evaluate` does it: the planner tries the skills in its
-model, and where a skill fails in the world, it plans again from there, {MAX_REPLANS} times at most.
-A task is solved where the goal holds within the domain's step limit. Success has Wilson's 95 %
-interval, over the tasks of all libraries of a row. Replans are the mean over tasks, steps that over
-solved tasks, both ± sample standard deviation. Failures are counted by the error code that ended
-the task: `UNSOLVABLE` where no plan was left, `REPLANS_EXHAUSTED`, `STEP_LIMIT`. Tasks are of seeds
-that no training and no judgement used. The library that ships solves the tasks of all seeds, those
-that other seeds trained the tasks of the first ones, as many as `others` says. The data has the
-options of every task in order, each with its environment steps."""
+Each task is planned and executed as in `slap evaluate`: the planner tries the skills in its
+model. Where a skill fails in the world, the planner plans again from there, {MAX_REPLANS} times
+at most. A task is solved if the goal holds within the domain's step limit. Success has Wilson's
+95 % interval, over the tasks of all libraries of a row. Replans are the mean over tasks; steps
+are the mean over solved tasks; both are ± sample standard deviation. Failures are counted by the
+error code that ended the task: `UNSOLVABLE` (no plan was left), `REPLANS_EXHAUSTED`,
+`STEP_LIMIT`. The seeds of these tasks were used neither to train skills nor to judge them. The
+library that ships solves the tasks of all seeds. Libraries that other seeds trained solve the
+tasks of the first seeds, as many as `others` says. The data has the options of every task in
+order, each with its environment steps."""
 
 
 FIGURES = ("success", "replans", "steps", "failures")

@@ -96,7 +96,7 @@ PAPER_FIGURES = (
         "other algorithms that learn shortcuts",
         domains=("cleanup_table",),
         found={"": "PPO 113.7, SAC 160.2, SAC+HER 131.0 steps; pure planning 446"},
-        not_run="shortcuts are learned by PPO alone",
+        not_run="only PPO learns shortcuts here",
     ),
     PaperFigure(
         "SLAP Table 4",
@@ -123,7 +123,7 @@ PAPER_FIGURES = (
         "SLAP Tables 7 and 8",
         "another physics than in planning",
         "65 → 78%, trained again 86%",
-        "no study perturbs the world and not the planner's model",
+        "no study perturbs the world without the planner's model",
     ),
     PaperFigure(
         "SLAP Fig. 4",
@@ -143,7 +143,7 @@ PAPER_FIGURES = (
         "SLAP Fig. 6",
         "independent policies against one for all",
         "independent policies are better",
-        "there are independent policies alone",
+        "this project has independent policies only",
     ),
     PaperFigure(
         "SLAP Fig. 9",
@@ -188,7 +188,7 @@ PAPER_FIGURES = (
         "LG-SAIL Table 7",
         "imitation with and without planning",
         "Stack 1.00, Peg 0.95, Peg goal 2 0.90",
-        "there is no learning by imitation here",
+        "this project has no learning by imitation",
     ),
     _figure_not_made(
         "LG-SAIL Fig. 4",
@@ -203,10 +203,10 @@ PAPER_FIGURES = (
         "LG-SAIL Fig. 6",
         "skills of another domain to begin with",
         "curves",
-        "no pair of trainings with and without was made",
+        "no trainings with and without them were compared",
     ),
     _figure_not_made(
-        "LG-SAIL Fig. 8", "a real robot", "0.8 and 1.0 of 10 trials", "no robot was at hand"
+        "LG-SAIL Fig. 8", "a real robot", "0.8 and 1.0 of 10 trials", "no robot was available"
     ),
 )
 

@@ -173,11 +173,11 @@ def _page(name: str, report: StudyReport, origin: Provenance) -> str:
     data = f"[{name}.json]({name}.json)"
     named = {**origin.settings, **report.circumstances}
     settings = [f"- {key}: {_said(value)}" for key, value in named.items()]
-    listed = "\n".join([*settings, f"- versions and every number: {data}"])
+    listed = "\n".join([*settings, f"- versions and all numbers: {data}"])
     after = (
-        f"After {report.source}. Numbers are this system's unless they are said to be the paper's."
+        f"After {report.source}. Numbers are this system's, except where the paper's are named."
         if report.source
-        else "No paper has these figures: all numbers are this system's."
+        else "No paper has these figures. All numbers are this system's."
     )
     return f"""\
 # {report.title}

@@ -31,13 +31,13 @@ METRICS = (FULL, HEADERS)  # what of the metrics is shown
 PAPER_TASK = {FULL: 0.92, HEADERS: 0.20}  # LG-SAIL Table 3: all rewards of a task are right
 PAPER_ERRORS = {FULL: 0.08, HEADERS: 0.80}  # Figure 7: tasks with an error
 MEASURED = """\
-In each trial the model is asked once for the reward of every operator; the operators are those
-written by hand. With *full*, the question quotes the source of every metric; with *headers*, names
-and types alone. A reward is right where it passes all checks: known metrics, arguments of their
-types, weights from 0 to 1, and at least one metric that an added atom rests on. *All* is the share
-of trials in which every reward is right, with Wilson's 95 % interval and the paper's share in
-brackets; the paper judges by people whether a reward is right. Errors are grouped into the paper's
-four classes; a trial can have several. The trial's number is the seed of the model's sampling."""
+In each trial the model is asked once for the reward of every hand-written operator. With *full*,
+the question quotes the source of every metric; with *headers*, only names and types. A reward is
+right if it passes all checks: known metrics, arguments of their types, weights from 0 to 1, and at
+least one metric that an added atom rests on. *All* is the share of trials in which every reward is
+right, with Wilson's 95 % interval and the paper's share in brackets. In the paper, people judge
+whether a reward is right. Errors are grouped into the paper's four classes; a trial can have
+several. The number of the trial is the seed of the model's sampling."""
 
 
 @dataclass(frozen=True)

@@ -35,21 +35,21 @@ BATCH = 20  # tasks that are demonstrated before it is asked whether there are e
 MOST_TASKS = 5  # as many times the wanted starts, of tasks, until there are enough
 RANDOM = 7_000_000  # tells the random numbers of policies from those of tasks
 MEASURED = """\
-Each start is a state in which the demonstrator was about to begin an operator, brought by the
-domain's approach to where a skill begins. From there each policy acts for the horizon of a learned
-skill ({horizon} environment steps): *nothing* is the action of zeros, *open* and *close* command
-the gripper and move nothing, *down* lowers the hand as fast as it can, *random* draws every axis
-uniformly in each step. A policy succeeds where, at the start or after any step, all atoms of the
-operator's EFF+ hold and none of its EFF-. So what is looked for is any moment of success; a skill
-has to end in one. The share of starts is given, with Wilson's 95 % interval in the data. An
-operator of which a policy succeeds in more than {allowed:.0%} of starts is vacuous. Approaches that
-did not arrive within {limit} steps, or after which the operator's preconditions did not hold any
-more, are no starts; they are counted."""
+Each start is a state in which the demonstrator was about to begin an operator; the domain's
+approach has then moved to where a skill begins. From there, each policy acts for the horizon of a
+learned skill ({horizon} environment steps): *nothing* is the action of zeros, *open* and *close*
+command the gripper and move nothing, *down* lowers the hand as fast as it can, *random* draws every
+axis uniformly in each step. A policy succeeds if, at the start or after any step, all atoms of the
+operator's EFF+ hold and none of its EFF-. So any moment of success counts here; a skill has to end
+in one. The table has the share of starts; the data has Wilson's 95 % interval. An operator is
+vacuous if a policy succeeds in more than {allowed:.0%} of starts. An approach that did not arrive
+within {limit} steps, or after which the operator's preconditions no longer held, is not a start;
+such approaches are counted."""
 LEARNED = "learned"
 JUDGED = """
 
-*learned* is the policy of the skill in the library {digest}, from the same starts and judged in the
-same way."""
+*learned* is the policy of the skill in the library {digest}, judged in the same way from the same
+starts."""
 
 Blind = Callable[[np.random.Generator], Action]  # a policy that sees nothing
 Tried = Callable[[np.random.Generator, State], Action]

@@ -4,7 +4,9 @@
 
 import json
 import re
+from importlib import import_module
 from pathlib import Path
+from string import Formatter
 
 import pytest
 from typer.testing import CliRunner
@@ -39,6 +41,15 @@ def test_tables_of_pages_are_those_of_the_data():
     for page in PAGES:
         text = page.read_text(encoding="utf-8")
         assert with_tables(text, PUBLISHED) == text, f"slap study readme {page}"
+
+
+@pytest.mark.parametrize("name", sorted(n for n, data in RESULTS.items() if "study" in data))
+def test_pages_explain_their_numbers_in_the_words_of_their_study(name):
+    home = "benchmarks" if RESULTS[name]["study"] == "robot_bridge" else "slap_ros.studies"
+    words = import_module(f"{home}.{RESULTS[name]['study']}").MEASURED
+    parts = [re.escape(literal) for literal, *_ in Formatter().parse(words)]
+    page = (PUBLISHED / f"{name}.md").read_text(encoding="utf-8")
+    assert re.search(".+?".join(parts), page, re.DOTALL), f"{home}: MEASURED"
 
 
 @pytest.mark.parametrize("name", sorted(n for n, data in RESULTS.items() if "library" in data))
