@@ -119,7 +119,9 @@ def test_bad_input_is_refused(tmp_path, arguments, reason):
     assert not (tmp_path / "library").exists()
 
 
-def test_a_command_that_was_corrected_finds_no_other_training_in_its_folder(tmp_path, in_this_process):
+def test_a_command_that_was_corrected_finds_no_other_training_in_its_folder(
+    tmp_path, in_this_process
+):
     """Libraries are read before anything is proposed, which may cost a model's time."""
     asked = ("acquire", "points", "--output", tmp_path / "library", "--json", *BUDGET)
     assert "no such folder" in slap(*asked, "--from", tmp_path / "nowhere").stderr
