@@ -48,6 +48,7 @@ def children_of(launcher, name):
     return [int(word) for word in found.stdout.split()]
 
 
+@pytest.mark.timeout(180)  # learns both skills
 def test_skills_are_acquired_announced_and_recorded(network, tmp_path):
     bag, output = tmp_path / "bag", tmp_path / "skills"
     parameters = {"output": str(output), "changes": LEARNED, "steps": 30_000}
@@ -81,7 +82,8 @@ def slap(*arguments):
     return subprocess.run(command, capture_output=True, text=True, timeout=300)
 
 
-@pytest.mark.parametrize("begun", [False, True])
+@pytest.mark.timeout(300)  # starts an ensemble, learns with it, and starts it again
+@pytest.mark.parametrize("begun", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_a_run_acquires_what_it_lacks_and_one_bag_tells_it_all(network, tmp_path, begun):
     """Without any skill, and with a library that lacks one of two, which keeps the other one."""
     bag, changes = tmp_path / "bag", LEARNED.replace("sac.hidden=32,32 ", "")
@@ -119,6 +121,7 @@ def begin(asker, spinner):
     return handle
 
 
+@pytest.mark.timeout(180)  # a node and three trainings, each of which imports torch
 def test_a_training_that_was_killed_and_canceled_goes_on_with_the_same_goal(network, tmp_path):
     """Killed, it is reported; canceled, its process ends; what was learned before is read."""
     with asking(output=str(tmp_path), **BRIEF) as (asker, spinner, launcher):
@@ -162,6 +165,8 @@ def small_files(pid, limit=40_000):
         resource.prlimit(pid, resource.RLIMIT_FSIZE, before)
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(180)  # a node and two trainings, each of which imports torch
 def test_a_full_disk_is_reported_and_the_same_goal_goes_on(network, tmp_path):
     with asking(output=str(tmp_path), **BRIEF) as (asker, spinner, launcher):
         with small_files(launcher.processes["acquisition_node"].pid):
@@ -171,6 +176,8 @@ def test_a_full_disk_is_reported_and_the_same_goal_goes_on(network, tmp_path):
         assert acquire(asker, spinner).success
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(180)  # learns both skills
 def test_a_planner_that_goes_away_meanwhile_takes_the_skills_on_when_it_is_back(network, tmp_path):
     """Training does not need it; what is latched reaches it, and with the next episode it acts."""
     parameters = {"output": str(tmp_path), "changes": LEARNED, "steps": 30_000}
@@ -189,6 +196,7 @@ def test_a_planner_that_goes_away_meanwhile_takes_the_skills_on_when_it_is_back(
             assert solved.success, solved.error_msg
 
 
+@pytest.mark.timeout(180)  # a node and two trainings, each of which imports torch
 def test_what_cannot_be_acquired_is_said(network, tmp_path):
     """Each with the code of its cause; the node serves the next goal."""
     file = tmp_path / "file"

@@ -159,6 +159,8 @@ def test_skills_are_acquired_without_anything_written_by_hand(tmp_path):
     assert library.record["progress_on_fresh_tasks"] >= 0.95
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(300)  # learns two skills, several times each
 def test_a_skill_that_never_succeeds_is_learned_from_scratch_and_so_is_what_comes_before(tmp_path):
     """What is put down is to be still in the hand: no policy does that."""
     impossible = replace(PUT, delete_effects=frozenset())

@@ -18,7 +18,7 @@ from slap_msgs.srv import ListSkills, ResetTask
 from benchmarks.control_loop import state_command_state
 from ensemble.client import RunClient
 from ensemble.interfaces import COMMAND, LIST_SKILLS, RESET_TASK
-from ensemble.launcher import ProcessLauncher
+from ensemble.launcher import InProcessLauncher, ProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.spinner import temporary_node
 from ensemble.state_synchronizer import StateSynchronizer
@@ -30,6 +30,11 @@ LIBRARY = Path(__file__).parent.parent / "shortcuts" / "data" / "obstacle2d"
 ALL = ("sim_node", "perception_node", "skill_server", "planner_node", "recorder_node")
 PATIENTLY = ("--patience", "10")  # for a loaded machine
 LIMIT = 120.0  # s, far more than anything here takes: a loaded machine takes its time
+
+
+def slow(*values):
+    """The same as parameters of tests that `make test-all` runs alone."""
+    return [pytest.param(value, marks=pytest.mark.slow) for value in values]
 
 
 class Listener(RunClient):
@@ -77,7 +82,13 @@ def states(client):
     return [message for type_name, message in client.heard if type_name == STATE]
 
 
-@pytest.mark.parametrize("order", [ALL, ALL[::-1]], ids=["sim first", "recorder first"])
+@pytest.mark.parametrize(
+    "order",
+    [
+        pytest.param(ALL, id="sim first", marks=pytest.mark.slow),
+        pytest.param(ALL[::-1], id="recorder first"),
+    ],
+)
 def test_any_order_of_start_gives_the_same_complete_bag(network, tmp_path, order):
     nodes = parameters(tmp_path / "bag")
     with temporary_node(Listener) as (client, spinner):
@@ -98,7 +109,9 @@ def test_any_order_of_start_gives_the_same_complete_bag(network, tmp_path, order
 
 
 @pytest.mark.parametrize("name", ALL)
-@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "stop", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)]
+)
 def test_a_node_stops_cleanly(network, tmp_path, name, stop):
     bag = ["-p", f"bag:={tmp_path / 'bag'}"] if name == "recorder_node" else []
     with started(name, *bag) as process:
@@ -141,7 +154,7 @@ def test_ctrl_c_in_a_destructor_ends_a_node_without_a_word(network):
     assert "KeyboardInterrupt" not in process.stdout + process.stderr
 
 
-@pytest.mark.parametrize("victim", ["perception_node", "skill_server", "planner_node"])
+@pytest.mark.parametrize("victim", [*slow("perception_node", "skill_server"), "planner_node"])
 def test_a_node_that_comes_back_is_taken_up_again(network, victim):
     nodes = parameters()
     others = {name: p for name, p in nodes.items() if name != victim}
@@ -198,7 +211,10 @@ def reset(client, spinner, **request):
 
 
 def test_a_task_is_solved_in_the_episode_that_was_asked_for(network):
-    with temporary_node(Listener) as (client, spinner), ProcessLauncher(parameters()):
+    with (
+        temporary_node(Listener) as (client, spinner),
+        InProcessLauncher(parameters(), spinner.executor),
+    ):
         assert spinner.spin_until(lambda: client.ready(False), LIMIT)
         for episode in (2, 3):  # at once: before the planner can have heard of it
             assert reset(client, spinner, seed=episode).episode == episode
@@ -210,7 +226,7 @@ def test_a_task_is_solved_in_the_episode_that_was_asked_for(network):
 
 def test_commands_that_are_stale_or_impossible_move_nothing(network):
     only = {"sim_node": parameters()["sim_node"]}
-    with temporary_node(Listener) as (client, spinner), ProcessLauncher(only):
+    with temporary_node(Listener) as (client, spinner), InProcessLauncher(only, spinner.executor):
         assert spinner.spin_until(lambda: states(client), LIMIT)
         publisher = client.create_publisher(COMMAND.type, COMMAND.name, COMMAND.qos)
         assert spinner.spin_until(lambda: publisher.get_subscription_count() == 1, LIMIT)
@@ -234,7 +250,7 @@ def test_commands_that_are_stale_or_impossible_move_nothing(network):
 
 def test_resets_are_checked_at_the_door(network):
     only = {"sim_node": parameters()["sim_node"]}
-    with temporary_node(Listener) as (client, spinner), ProcessLauncher(only):
+    with temporary_node(Listener) as (client, spinner), InProcessLauncher(only, spinner.executor):
         assert spinner.spin_until(lambda: states(client), LIMIT)
         explicit = states(client)[0]
         answer = reset(client, spinner, seed=9)
@@ -249,7 +265,10 @@ def test_resets_are_checked_at_the_door(network):
 
 
 def test_cancelling_makes_the_robot_hold(network):
-    with temporary_node(Listener) as (client, spinner), ProcessLauncher(parameters(pace=5.0)):
+    with (
+        temporary_node(Listener) as (client, spinner),
+        InProcessLauncher(parameters(pace=5.0), spinner.executor),
+    ):
         assert spinner.spin_until(lambda: client.ready(False), LIMIT)
         sent = client.send((), 0, 5)
         assert spinner.spin_until(sent.done, LIMIT)
@@ -273,7 +292,10 @@ def holds(told):
 
 
 def test_skills_are_listed_with_their_signatures(network):
-    with temporary_node(Listener) as (client, spinner), ProcessLauncher(parameters()):
+    with (
+        temporary_node(Listener) as (client, spinner),
+        InProcessLauncher(parameters(), spinner.executor),
+    ):
         service = client.create_client(LIST_SKILLS.type, LIST_SKILLS.name)
         assert spinner.spin_until(service.service_is_ready, LIMIT)
 
@@ -288,7 +310,7 @@ def test_skills_are_listed_with_their_signatures(network):
         assert len(skills) == 4
 
 
-@pytest.mark.parametrize("victim", ALL)
+@pytest.mark.parametrize("victim", [*slow(*ALL[:-1]), "recorder_node"])
 def test_a_killed_node_ends_the_run_with_a_code_and_a_readable_bag(network, tmp_path, victim):
     bag = tmp_path / "bag"
     runner = subprocess.Popen(
@@ -374,7 +396,10 @@ def test_a_wrong_parameter_is_refused_in_one_line(network, arguments, code, word
 
 
 def test_parameters_can_be_read_from_outside(network):
-    with temporary_node(Listener) as (client, spinner), ProcessLauncher(parameters()):
+    with (
+        temporary_node(Listener) as (client, spinner),
+        InProcessLauncher(parameters(), spinner.executor),
+    ):
         service = client.create_client(GetParameters, "planner_node/get_parameters")
         assert spinner.spin_until(service.service_is_ready, LIMIT)
         answer = service.call_async(GetParameters.Request(names=["planner", "server_timeout"]))
@@ -391,11 +416,10 @@ def test_a_thousand_steps_are_answered_one_by_one(network):
 
 def test_states_of_an_episode_that_is_over_are_ignored(network):
     """A message of the old episode that comes late must not look like news."""
+    only = {name: parameters()[name] for name in ("sim_node", "perception_node")}
     with (
         temporary_node(Listener) as (client, spinner),
-        ProcessLauncher(
-            {name: p for name, p in parameters().items() if name in ("sim_node", "perception_node")}
-        ),
+        InProcessLauncher(only, spinner.executor),
     ):
         observations = []
         synchronizer = StateSynchronizer(client, observations.append)
