@@ -23,6 +23,7 @@ from asking import (
     send,
     solve,
 )
+from marks import slow
 from points import POINTS
 from slap_msgs.msg import AcquisitionEvent, GroundAtom
 from steady_skills import PICKING, write_library
@@ -83,7 +84,7 @@ def slap(*arguments):
 
 
 @pytest.mark.timeout(300)  # starts an ensemble, learns with it, and starts it again
-@pytest.mark.parametrize("begun", [pytest.param(False, marks=pytest.mark.slow), True])
+@pytest.mark.parametrize("begun", [*slow(False), True])
 def test_a_run_acquires_what_it_lacks_and_one_bag_tells_it_all(network, tmp_path, begun):
     """Without any skill, and with a library that lacks one of two, which keeps the other one."""
     bag, changes = tmp_path / "bag", LEARNED.replace("sac.hidden=32,32 ", "")

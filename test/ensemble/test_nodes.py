@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from marks import slow
 from rcl_interfaces.srv import GetParameters
 from slap_msgs.msg import RobotCommand
 from slap_msgs.srv import ListSkills, ResetTask
@@ -30,11 +31,6 @@ LIBRARY = Path(__file__).parent.parent / "shortcuts" / "data" / "obstacle2d"
 ALL = ("sim_node", "perception_node", "skill_server", "planner_node", "recorder_node")
 PATIENTLY = ("--patience", "10")  # for a loaded machine
 LIMIT = 120.0  # s, far more than anything here takes: a loaded machine takes its time
-
-
-def slow(*values):
-    """The same as parameters of tests that `make test-all` runs alone."""
-    return [pytest.param(value, marks=pytest.mark.slow) for value in values]
 
 
 class Listener(RunClient):
@@ -109,9 +105,7 @@ def test_any_order_of_start_gives_the_same_complete_bag(network, tmp_path, order
 
 
 @pytest.mark.parametrize("name", ALL)
-@pytest.mark.parametrize(
-    "stop", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("stop", [signal.SIGINT, *slow(signal.SIGTERM)])
 def test_a_node_stops_cleanly(network, tmp_path, name, stop):
     bag = ["-p", f"bag:={tmp_path / 'bag'}"] if name == "recorder_node" else []
     with started(name, *bag) as process:
