@@ -1,0 +1,12 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Which cases of a test are slow: `make test-all` runs all, `make test` one that is like them."""
+
+from typing import Any
+
+import pytest
+
+
+def slow(*values: Any) -> list[Any]:
+    """The values of a parameter with which a test is slow."""
+    return [pytest.param(value, marks=pytest.mark.slow) for value in values]
