@@ -8,5 +8,8 @@ import pytest
 
 
 def slow(*values: Any) -> list[Any]:
-    """The values of a parameter with which a test is slow."""
-    return [pytest.param(value, marks=pytest.mark.slow) for value in values]
+    """The values of a parameter, or of several in a tuple, with which a test is slow."""
+    return [
+        pytest.param(*(value if isinstance(value, tuple) else (value,)), marks=pytest.mark.slow)
+        for value in values
+    ]
