@@ -147,6 +147,7 @@ def test_no_task_is_used_twice(whole, finished):
     assert len(used) == 2 * WHOLE.rollouts * len(folders)  # as many to judge on
 
 
+@pytest.mark.slow
 def test_skills_are_acquired_without_anything_written_by_hand(tmp_path):
     """Operators from demonstrations, rewards from metrics."""
     shown = Demonstrations(tuple(record_traces(with_scripts(POINTS), 3)), "the demonstrator")

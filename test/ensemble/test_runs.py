@@ -237,6 +237,8 @@ def test_10_runs_leave_no_thread_no_file_and_no_process(network, tmp_path):
     assert set(psutil.Process().children()) <= children
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(180)  # starts an ensemble, each node a process, and plans for a tower
 def test_a_tower_is_taken_apart_by_the_ensemble_and_replayed_bit_for_bit(network, tmp_path):
     settings = RunSettings(
         "obstacle_tower",

@@ -154,6 +154,7 @@ t.train(Path({work!r}))
 """
 
 
+@pytest.mark.slow
 def test_a_killed_training_resumes_from_its_checkpoint(tmp_path):
     work, tests = tmp_path / "work", str(Path(__file__).parent)
     code = KILLED.format(tests=tests, work=str(work))
@@ -168,6 +169,8 @@ def test_a_killed_training_resumes_from_its_checkpoint(tmp_path):
     assert len(library.shortcuts) == 1
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(180)  # three trainings
 def test_what_hardly_succeeds_is_learned_again_and_the_best_attempt_counts(tmp_path, monkeypatch):
     brief = replace(BRIEF, polish=BRIEF_POLISH)
     once, _ = train(tmp_path / "once", brief)
@@ -187,6 +190,7 @@ def test_what_hardly_succeeds_is_learned_again_and_the_best_attempt_counts(tmp_p
     assert [folder.finished.exists() for folder in folders] == [i == best for i in range(2)]
 
 
+@pytest.mark.slow
 def test_steps_of_attempts_in_vain_are_counted(tmp_path, monkeypatch):
     monkeypatch.setattr(training, "ENOUGH_SUCCESS", 1.1)
     plain = replace(BRIEF, least_saving=0.0, polish=None)
