@@ -148,6 +148,7 @@ def test_ctrl_c_in_a_destructor_ends_a_node_without_a_word(network):
     assert "KeyboardInterrupt" not in process.stdout + process.stderr
 
 
+@pytest.mark.timeout(180)  # starts an ensemble, each node a process, and waits for a dead one
 @pytest.mark.parametrize("victim", [*slow("perception_node", "skill_server"), "planner_node"])
 def test_a_node_that_comes_back_is_taken_up_again(network, victim):
     nodes = parameters()
@@ -182,6 +183,7 @@ def test_a_skill_server_that_comes_after_the_plan_is_waited_for(network):
             assert result.result().result.success
 
 
+@pytest.mark.timeout(180)  # starts an ensemble, each node a process, and waits for a dead one
 def test_a_simulator_that_comes_back_opens_a_new_episode(network):
     nodes = parameters()
     others = {name: p for name, p in nodes.items() if name != "sim_node"}
@@ -304,6 +306,7 @@ def test_skills_are_listed_with_their_signatures(network):
         assert len(skills) == 4
 
 
+@pytest.mark.timeout(180)  # starts an ensemble, each node a process, and waits for a dead one
 @pytest.mark.parametrize("victim", [*slow(*ALL[:-1]), "recorder_node"])
 def test_a_killed_node_ends_the_run_with_a_code_and_a_readable_bag(network, tmp_path, victim):
     bag = tmp_path / "bag"
@@ -337,6 +340,7 @@ def victim_of(runner, victim, bag):
     raise AssertionError("the run did not get under way")
 
 
+@pytest.mark.timeout(180)  # starts an ensemble, each node a process
 def test_a_full_disk_ends_the_run_and_keeps_what_was_recorded(network, tmp_path):
     import resource
 

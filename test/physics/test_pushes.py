@@ -33,6 +33,7 @@ def box_of(row) -> OrientedBox:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(180)  # a reference in much finer steps
 def test_pushes_agree_with_the_fine_reference_at_least_as_often_as_plain_stepping():
     figures = truth(PUSHES)
     assert figures["ours_agrees"] >= figures["plain_agrees"]

@@ -177,6 +177,7 @@ def test_exhaustive_search_finds_the_best_of_all_paths(graph):
     assert cost_or_none(search_exhaustively, graph) == brute_force(graph, MadeUpModel())
 
 
+@pytest.mark.timeout(300)  # the slow one plans for 450 tasks twice
 @pytest.mark.parametrize(
     "indices", [range(50), pytest.param(range(50, 500), marks=pytest.mark.slow)], ids=len
 )
