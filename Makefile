@@ -9,7 +9,7 @@ METADATA := pyproject.toml setup.py setup.cfg embedded_ros/pyproject.toml
 # Images set it. Tests start hundreds of processes, and each would compile all that it imports.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help install demo test test-ros faults reproduce lint format docs clean
+.PHONY: help install demo test test-all test-ros faults reproduce lint format docs clean
 
 help:  ## Show what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -51,9 +51,15 @@ demo: install  ## Run the whole ensemble, record bags, replay them, measure, rep
 	slap report $$bag-tower-pure $$bag-tower --output $$bag.html; \
 	echo "bag: $$bag   abstract graph: $$bag-plan/graph.svg   animation: $$bag-tower.gif   report: $$bag.html"
 
-test: $(VENV)/.tested lint  ## Run every test
-	$(BIN)/pytest -q -n $(TESTS_AT_ONCE) --dist worksteal
-	cd embedded_ros && $(abspath $(BIN))/pytest -q -n $(TESTS_AT_ONCE) --dist worksteal
+PYTEST := $(abspath $(BIN))/pytest -q -n $(TESTS_AT_ONCE) --dist worksteal
+
+test: $(VENV)/.tested lint  ## Check style and types, and run the tests, in ten minutes
+	$(PYTEST) -m "not slow"
+	cd embedded_ros && $(PYTEST)
+
+test-all: $(VENV)/.tested lint  ## The same with the slow tests, as CI does
+	$(PYTEST)
+	cd embedded_ros && $(PYTEST)
 
 test-ros: $(VENV)/.installed  ## Run the tests that face ROS 2 on a sourced Jazzy
 	EMBEDDED_PYTHON=$(abspath $(BIN))/python test/ros/run

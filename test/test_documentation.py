@@ -96,3 +96,11 @@ def test_the_results_name_the_pybullet_of_their_figures():
     )
     results = [json.loads(path.read_text()) for path in ROOT.glob("docs/results/*.json")]
     assert {result["versions"]["pybullet"] for result in results} == {named}
+
+
+def test_no_picture_is_left_over():
+    docs = ROOT / "docs"
+    pages = (*docs.rglob("*.md"), ROOT / "README.md")
+    text = "".join(path.read_text(encoding="utf-8") for path in pages)
+    unused = [path.name for path in (docs / "images").iterdir() if path.name not in text]
+    assert not unused

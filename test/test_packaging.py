@@ -66,6 +66,8 @@ def test_colcon_sees_both_packages_with_their_build_types(checkout):
     assert kinds == {"slap_ros": "(ros.ament_python)", "slap_msgs": "(ros.ament_cmake)"}
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(180)  # builds a package
 @pytest.mark.parametrize("options", [[], ["--symlink-install"]], ids=["plain", "symlinks"])
 def test_colcon_builds_executables_where_ros2_run_looks_for_them(
     checkout, network, options, tmp_path
@@ -131,6 +133,8 @@ def install(names, folder):
                 (folder / top).symlink_to(distribution.locate_file(top))
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(300)  # builds two distributions, and starts an ensemble from them
 def test_the_published_wheels_run_in_an_empty_environment(checkout, tmp_path, network):
     """With what they require and no more, away from any checkout, shipped shortcuts included."""
     shutil.rmtree(checkout / "models")

@@ -11,11 +11,12 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import pytest
+from made_once import made_once
 
 pytest.importorskip("material")
 pytest.importorskip("mkdocstrings")
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]  # the first builds the site
 ROOT = Path(__file__).parents[1]
-DOCS = ROOT / "docs"
 INTERFACES = sorted(
     path for kind in ("msg", "srv", "action") for path in (ROOT / "msg_schemas" / kind).iterdir()
 )
@@ -41,7 +42,10 @@ class Page(HTMLParser):
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("site")
+    return made_once(tmp_path_factory, "site", build)
+
+
+def build(folder):
     # Without --quiet, which hides the warnings before --strict counts them.
     command = [sys.executable, "-m", "mkdocs", "build", "--strict"]
     told = subprocess.run(
@@ -53,7 +57,6 @@ def site(tmp_path_factory):
         timeout=250,
     )
     assert told.returncode == 0, told.stderr
-    return folder
 
 
 @pytest.fixture(scope="module")
@@ -99,14 +102,6 @@ def test_nothing_is_fetched_from_elsewhere(site, pages):
             r"(?:url\(|@import)\s*[\"']?(https?:[^)\"']+|//[^)\"']+)", sheet.read_text()
         )
         assert not loaded, (sheet, loaded)
-
-
-def test_no_picture_is_left_over():
-    text = "".join(
-        path.read_text(encoding="utf-8") for path in (*DOCS.rglob("*.md"), ROOT / "README.md")
-    )
-    unused = [path.name for path in (DOCS / "images").iterdir() if path.name not in text]
-    assert not unused
 
 
 def test_the_reference_has_every_field_of_every_interface(site):

@@ -8,6 +8,7 @@ import shlex
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 from math import isnan
 from os.path import relpath
 from pathlib import Path
@@ -164,15 +165,17 @@ def training_workers(jobs: int, ray: str | None) -> AbstractContextManager[Worke
 def require_torch() -> None:
     """Refuse to train without what training needs.
 
+    It is looked for and not imported: jobs import it, and this process would for seconds.
+
     Raises:
         InvalidParameterError: It is not installed.
     """
-    try:
-        import stable_baselines3  # noqa: F401
-    except ImportError as error:
+    missing = [name for name in ("torch", "stable_baselines3") if find_spec(name) is None]
+    if missing:
         raise InvalidParameterError(
-            f"training needs torch and stable-baselines3 ({error}): pip install 'slap_ros[train]'"
-        ) from error
+            f"training needs torch and stable-baselines3, and there is no {missing[0]}: "
+            "pip install 'slap_ros[train]'"
+        )
 
 
 class _TrainingBars(LearningBars):

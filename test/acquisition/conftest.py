@@ -7,11 +7,14 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
 
+from slap_ros.cli import acquire
 from slap_ros.domains import forget_domains
+from slap_ros.learning.workers import SequentialWorkers
 
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent / "language")]
@@ -41,3 +44,9 @@ def points_installed(
     forget_domains()
     yield
     forget_domains()
+
+
+@pytest.fixture
+def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`slap acquire` trains here: a process takes longer to import torch than what it does here."""
+    monkeypatch.setattr(acquire, "training_workers", lambda *_: nullcontext(SequentialWorkers()))

@@ -3,8 +3,6 @@
 """``slap acquire`` and ``slap skills``, with a budget that is too small to learn anything."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,8 +10,10 @@ import pytest
 from model_answers import good_script
 from points import PICK, POINTS, PUT
 from scripted_server import serving
+from typer.testing import CliRunner
 
 from slap_ros.acquisition.problem import AcquisitionProblem
+from slap_ros.cli import app
 from slap_ros.cli.acquire import why_left
 from slap_ros.errors import ErrorCode
 
@@ -27,13 +27,13 @@ BUDGET = [*(word for change in SMALL for word in ("--set", change)), "--steps", 
 
 
 def slap(*arguments):
-    command = [sys.executable, "-m", "ensemble.cli", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=600)
+    """In this process, so that torch is imported once for all of these tests."""
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 def test_a_library_is_acquired_shown_and_begun_with(tmp_path):
     made = slap("acquire", "points", "--output", tmp_path / "one", "--json", *BUDGET)
-    assert made.returncode == 0, made.stderr
+    assert made.exit_code == 0, made.stderr
     record = json.loads(made.stdout)
     assert (record["ended"], record["goal"]) == ("the budget is spent", "train")
     assert record["command"].startswith("slap acquire points --preset two")
@@ -51,12 +51,12 @@ def test_a_library_is_acquired_shown_and_begun_with(tmp_path):
     assert "(similarity 1.00, success" in slap("skills", tmp_path / "two").stderr
 
 
-def test_operators_and_rewards_come_from_whoever_is_named(tmp_path):
+def test_operators_and_rewards_come_from_whoever_is_named(tmp_path, in_this_process):
     """From demonstrations and metrics; and the same training is not mistaken for another."""
     asked = ("acquire", "points", "--output", tmp_path / "library", "--json", *BUDGET)
     by = ("--proposer", "induced", "--demonstrations", 2, "--rewarder", "composed")
     made = slap(*asked, *by)
-    assert made.returncode == 0, made.stderr
+    assert made.exit_code == 0, made.stderr
     record = json.loads(made.stdout)
     assert (record["proposer"], record["rewarder"]) == ("induced", "composed")
     assert record["provenance"]["source"] == "demonstrations: 2, from the domain's demonstrator"
@@ -70,7 +70,7 @@ def test_operators_and_rewards_come_from_whoever_is_named(tmp_path):
     assert "proposer and rewarder: induced and composed" in shown
 
 
-def test_what_a_script_said_is_never_taken_for_a_models(tmp_path):
+def test_what_a_script_said_is_never_taken_for_a_models(tmp_path, in_this_process):
     """Recorded, and replayed: both libraries say that no model answered, or not now."""
     problem = AcquisitionProblem.of_task(POINTS, POINTS.task(0))
     printed = SimpleNamespace(problem=problem, operators=(PICK, PUT))
@@ -81,7 +81,7 @@ def test_what_a_script_said_is_never_taken_for_a_models(tmp_path):
             *by, "--output", tmp_path / "recorded", "--cassette", f"record:{recording}",
             "--base-url", server.url, "--model", "scripted", *BUDGET,
         )  # fmt: skip
-    assert made.returncode == 0, made.stderr
+    assert made.exit_code == 0, made.stderr
     recorded = json.loads(made.stdout)
     assert recorded["answered_by"]["scripted"]
     assert recorded["answered_by"]["replayed_cassette"] == ""
@@ -114,21 +114,23 @@ def test_what_a_script_said_is_never_taken_for_a_models(tmp_path):
 )
 def test_bad_input_is_refused(tmp_path, arguments, reason):
     answer = slap("acquire", *arguments, "--output", tmp_path / "library")
-    assert answer.returncode not in (0, 1)
+    assert answer.exit_code not in (0, 1)
     assert reason in " ".join(answer.stderr.split())
     assert not (tmp_path / "library").exists()
 
 
-def test_a_command_that_was_corrected_finds_no_other_training_in_its_folder(tmp_path):
+def test_a_command_that_was_corrected_finds_no_other_training_in_its_folder(
+    tmp_path, in_this_process
+):
     """Libraries are read before anything is proposed, which may cost a model's time."""
     asked = ("acquire", "points", "--output", tmp_path / "library", "--json", *BUDGET)
     assert "no such folder" in slap(*asked, "--from", tmp_path / "nowhere").stderr
-    assert slap(*asked).returncode == 0
+    assert slap(*asked).exit_code == 0
 
 
 def test_a_library_of_shortcuts_is_not_shown_as_one_of_skills():
     shown = slap("skills", SHORTCUTS)
-    assert shown.returncode == ErrorCode.INVALID_LIBRARY
+    assert shown.exit_code == ErrorCode.INVALID_LIBRARY
     assert "a library of shortcuts, not of skills" in " ".join(shown.stderr.split())
 
 

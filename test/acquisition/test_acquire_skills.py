@@ -12,7 +12,18 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from asking import LEARNED, LIMIT, acquire, asking, begin_again, planner_parameters, send, solve
+from asking import (
+    BRIEF,
+    LEARNED,
+    LIMIT,
+    acquire,
+    asking,
+    begin_again,
+    planner_parameters,
+    send,
+    solve,
+)
+from marks import slow
 from points import POINTS
 from slap_msgs.msg import AcquisitionEvent, GroundAtom
 from steady_skills import PICKING, write_library
@@ -38,6 +49,7 @@ def children_of(launcher, name):
     return [int(word) for word in found.stdout.split()]
 
 
+@pytest.mark.timeout(180)  # learns both skills
 def test_skills_are_acquired_announced_and_recorded(network, tmp_path):
     bag, output = tmp_path / "bag", tmp_path / "skills"
     parameters = {"output": str(output), "changes": LEARNED, "steps": 30_000}
@@ -71,7 +83,8 @@ def slap(*arguments):
     return subprocess.run(command, capture_output=True, text=True, timeout=300)
 
 
-@pytest.mark.parametrize("begun", [False, True])
+@pytest.mark.timeout(300)  # starts an ensemble, learns with it, and starts it again
+@pytest.mark.parametrize("begun", [*slow(False), True])
 def test_a_run_acquires_what_it_lacks_and_one_bag_tells_it_all(network, tmp_path, begun):
     """Without any skill, and with a library that lacks one of two, which keeps the other one."""
     bag, changes = tmp_path / "bag", LEARNED.replace("sac.hidden=32,32 ", "")
@@ -101,32 +114,19 @@ def test_a_run_acquires_what_it_lacks_and_one_bag_tells_it_all(network, tmp_path
     assert "proposal 1: accepted" in page and "proposal 2" not in page
 
 
-def test_canceling_ends_the_process_and_the_same_goal_goes_on(network, tmp_path):
-    parameters = {"output": str(tmp_path), "changes": LEARNED, "steps": 30_000}
-    with asking(**parameters) as (asker, spinner, launcher):
-        handle = send(asker, spinner)
-        assert spinner.spin_until(lambda: any(one.skill for one in asker.feedback), LIMIT)
-        (trainer,) = children_of(launcher, "acquisition_node")
-        assert acquire(asker, spinner).error_code == ErrorCode.BUSY
-        handle.cancel_goal_async()
-        ended = handle.get_result_async()
-        assert spinner.spin_until(ended.done, LIMIT)
-        assert ended.result().result.error_code == ErrorCode.GOAL_CANCELED
-        assert not Path(f"/proc/{trainer}").exists()
-        begun = len(asker.events)
-        result = acquire(asker, spinner)
-        assert result.success, result.error_msg
-        assert [e.kind for e in asker.events].count(AcquisitionEvent.CANCELED) == 1
-        judged = [e for e in asker.events[:begun] if e.kind == AcquisitionEvent.JUDGED]
-        again = [e for e in asker.events[begun:] if e.kind == AcquisitionEvent.JUDGED]
-        assert list(again[0].success) == list(judged[0].success)  # read, not learned again
+def begin(asker, spinner):
+    """A goal that was sent and of which something was learned since."""
+    told = len(asker.feedback)
+    handle = send(asker, spinner)
+    assert spinner.spin_until(lambda: any(one.skill for one in asker.feedback[told:]), LIMIT)
+    return handle
 
 
-def test_a_killed_trainer_is_reported_and_the_same_goal_goes_on(network, tmp_path):
-    parameters = {"output": str(tmp_path), "changes": LEARNED, "steps": 30_000}
-    with asking(**parameters) as (asker, spinner, launcher):
-        ended = send(asker, spinner).get_result_async()
-        assert spinner.spin_until(lambda: any(one.skill for one in asker.feedback), LIMIT)
+@pytest.mark.timeout(180)  # a node and three trainings, each of which imports torch
+def test_a_training_that_was_killed_and_canceled_goes_on_with_the_same_goal(network, tmp_path):
+    """Killed, it is reported; canceled, its process ends; what was learned before is read."""
+    with asking(output=str(tmp_path), **BRIEF) as (asker, spinner, launcher):
+        ended = begin(asker, spinner).get_result_async()
         for process in children_of(launcher, "acquisition_node"):
             os.kill(process, signal.SIGKILL)
         assert spinner.spin_until(ended.done, LIMIT)
@@ -134,7 +134,26 @@ def test_a_killed_trainer_is_reported_and_the_same_goal_goes_on(network, tmp_pat
         assert result.error_code == ErrorCode.TRAINER_DIED
         assert "killed by SIGKILL" in result.error_msg
         assert asker.events[-1].kind == AcquisitionEvent.FAILED
-        assert acquire(asker, spinner).success
+
+        begun = len(asker.events)
+        handle = begin(asker, spinner)
+        (trainer,) = children_of(launcher, "acquisition_node")
+        assert acquire(asker, spinner).error_code == ErrorCode.BUSY
+        handle.cancel_goal_async()
+        ended = handle.get_result_async()
+        assert spinner.spin_until(ended.done, LIMIT)
+        assert ended.result().result.error_code == ErrorCode.GOAL_CANCELED
+        assert not Path(f"/proc/{trainer}").exists()
+
+        canceled = len(asker.events)
+        result = acquire(asker, spinner)
+        assert result.success, result.error_msg
+        assert [e.kind for e in asker.events].count(AcquisitionEvent.CANCELED) == 1
+        first, second, third = (
+            next(list(e.success) for e in events if e.kind == AcquisitionEvent.JUDGED)
+            for events in (asker.events, asker.events[begun:], asker.events[canceled:])
+        )
+        assert first == second == third  # read, not learned again
 
 
 @contextmanager
@@ -147,9 +166,10 @@ def small_files(pid, limit=40_000):
         resource.prlimit(pid, resource.RLIMIT_FSIZE, before)
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(180)  # a node and two trainings, each of which imports torch
 def test_a_full_disk_is_reported_and_the_same_goal_goes_on(network, tmp_path):
-    parameters = {"output": str(tmp_path), "changes": LEARNED, "steps": 30_000}
-    with asking(**parameters) as (asker, spinner, launcher):
+    with asking(output=str(tmp_path), **BRIEF) as (asker, spinner, launcher):
         with small_files(launcher.processes["acquisition_node"].pid):
             result = acquire(asker, spinner)
         assert result.error_code in (ErrorCode.INPUT_OUTPUT, ErrorCode.STORAGE_FULL)
@@ -157,6 +177,8 @@ def test_a_full_disk_is_reported_and_the_same_goal_goes_on(network, tmp_path):
         assert acquire(asker, spinner).success
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(180)  # learns both skills
 def test_a_planner_that_goes_away_meanwhile_takes_the_skills_on_when_it_is_back(network, tmp_path):
     """Training does not need it; what is latched reaches it, and with the next episode it acts."""
     parameters = {"output": str(tmp_path), "changes": LEARNED, "steps": 30_000}
@@ -175,6 +197,7 @@ def test_a_planner_that_goes_away_meanwhile_takes_the_skills_on_when_it_is_back(
             assert solved.success, solved.error_msg
 
 
+@pytest.mark.timeout(180)  # a node and two trainings, each of which imports torch
 def test_what_cannot_be_acquired_is_said(network, tmp_path):
     """Each with the code of its cause; the node serves the next goal."""
     file = tmp_path / "file"

@@ -147,6 +147,7 @@ def test_no_task_is_used_twice(whole, finished):
     assert len(used) == 2 * WHOLE.rollouts * len(folders)  # as many to judge on
 
 
+@pytest.mark.slow
 def test_skills_are_acquired_without_anything_written_by_hand(tmp_path):
     """Operators from demonstrations, rewards from metrics."""
     shown = Demonstrations(tuple(record_traces(with_scripts(POINTS), 3)), "the demonstrator")
@@ -159,6 +160,8 @@ def test_skills_are_acquired_without_anything_written_by_hand(tmp_path):
     assert library.record["progress_on_fresh_tasks"] >= 0.95
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(300)  # learns two skills, several times each
 def test_a_skill_that_never_succeeds_is_learned_from_scratch_and_so_is_what_comes_before(tmp_path):
     """What is put down is to be still in the hand: no policy does that."""
     impossible = replace(PUT, delete_effects=frozenset())

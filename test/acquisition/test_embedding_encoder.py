@@ -3,8 +3,6 @@
 """Skills retrieved by the embeddings of a server, which here counts words."""
 
 import json
-import subprocess
-import sys
 import threading
 import zlib
 from contextlib import contextmanager
@@ -13,9 +11,11 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import pytest
 from points import PICK, PUT
 from steady_skills import PICKING, PUTTING, write_library
+from typer.testing import CliRunner
 
 from slap_ros.acquisition.embedding_encoder import EmbeddingEncoder, operator_sentence
 from slap_ros.acquisition.retrieval import nearest
+from slap_ros.cli import app
 from slap_ros.errors import (
     ErrorCode,
     InvalidParameterError,
@@ -143,12 +143,13 @@ def test_a_vector_that_was_damaged_is_named(tmp_path):
 
 
 def slap(*arguments):
-    command = [sys.executable, "-m", "ensemble.cli", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=600)
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 @pytest.mark.usefixtures("points_installed")
-def test_new_skills_begin_with_those_that_the_server_finds_alike(tmp_path, monkeypatch):
+def test_new_skills_begin_with_those_that_the_server_finds_alike(
+    tmp_path, monkeypatch, in_this_process
+):
     monkeypatch.setenv(KEY_VARIABLE, KEY)
     known = write_library(tmp_path / "known", PUTTING, PICKING)
     changes = [
@@ -162,7 +163,7 @@ def test_new_skills_begin_with_those_that_the_server_finds_alike(tmp_path, monke
             *(word for change in changes for word in ("--set", change)),
         )  # fmt: skip
         made = slap(*asked)
-        assert made.returncode == 0, made.stderr
+        assert made.exit_code == 0, made.stderr
     record = json.loads(made.stdout)
     assert record["encoder"] == f"words at {server.url}"
     (pick,) = json.loads(slap("skills", tmp_path / "library", "--json").stdout)["skills"]
@@ -185,5 +186,5 @@ def test_new_skills_begin_with_those_that_the_server_finds_alike(tmp_path, monke
 )
 def test_an_encoder_without_use_or_server_is_refused(tmp_path, options, reason):
     answered = slap("acquire", "points", *options, "--output", tmp_path / "library")
-    assert answered.returncode == ErrorCode.INVALID_PARAMETER
+    assert answered.exit_code == ErrorCode.INVALID_PARAMETER
     assert reason in " ".join(answered.stderr.split())

@@ -11,6 +11,7 @@ import domain_transitions
 import numpy as np
 import pytest
 from domain_transitions import differing, orders, record, save
+from marks import slow
 
 from slap_ros.contact.features import ROBOT
 from slap_ros.domains import get_domain
@@ -21,7 +22,7 @@ COUNT = 120  # steps; ``domain_transitions`` is a command for more
 ALONE = 10  # of them, of which one is taken in a world of its own
 
 
-@pytest.fixture(scope="module", params=DOMAINS)
+@pytest.fixture(scope="module", params=[*DOMAINS[:1], *slow(*DOMAINS[1:])])
 def recorded(request):
     return request.param, record(request.param, COUNT)
 

@@ -126,6 +126,8 @@ def test_the_example_is_solved_by_planning(seed):
     assert episode.replans == 0
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(180)  # builds a distribution, and installs it
 def test_once_installed_the_example_is_a_domain_like_others(tmp_path):
     """By its entry point alone, in a process that never heard of it."""
     command = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]

@@ -124,6 +124,7 @@ def test_an_inhabited_domain_is_left_to_who_is_there(nested, tmp_path, network, 
     assert f"domain {other_network}" in told
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not is_embedded(), reason="test/ros has a sourced ROS 2 beside it anyway")
 def test_a_run_beside_another_ensemble_on_the_default_domain(network, monkeypatch):
     """The neighbours' simulator stands at the first state of its own first task all the while."""

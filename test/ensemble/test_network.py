@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import rclpy
+from marks import slow
 
 from ensemble.network import DISCOVERY_RANGE, is_embedded, join_network
 from slap_ros.errors import ErrorCode, InvalidParameterError
@@ -25,7 +26,7 @@ def two_hosts_possible():
 
 
 @pytest.mark.skipif(not two_hosts_possible(), reason="no network namespaces for this user")
-@pytest.mark.parametrize(("reach", "open_to_all"), [(None, False), ("SUBNET", True)])
+@pytest.mark.parametrize(("reach", "open_to_all"), [(None, False), *slow(("SUBNET", True))])
 def test_another_host_is_heard_only_where_that_was_asked_for(network, tmp_path, reach, open_to_all):
     """The other host knows the address and asks for it; nobody has to be discovered."""
     environment = {key: value for key, value in os.environ.items() if key != DISCOVERY_RANGE}

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from marks import slow
 from rcl_interfaces.srv import GetParameters
 from slap_msgs.msg import RobotCommand
 from slap_msgs.srv import ListSkills, ResetTask
@@ -18,7 +19,7 @@ from slap_msgs.srv import ListSkills, ResetTask
 from benchmarks.control_loop import state_command_state
 from ensemble.client import RunClient
 from ensemble.interfaces import COMMAND, LIST_SKILLS, RESET_TASK
-from ensemble.launcher import ProcessLauncher
+from ensemble.launcher import InProcessLauncher, ProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.spinner import temporary_node
 from ensemble.state_synchronizer import StateSynchronizer
@@ -77,7 +78,13 @@ def states(client):
     return [message for type_name, message in client.heard if type_name == STATE]
 
 
-@pytest.mark.parametrize("order", [ALL, ALL[::-1]], ids=["sim first", "recorder first"])
+@pytest.mark.parametrize(
+    "order",
+    [
+        pytest.param(ALL, id="sim first", marks=pytest.mark.slow),
+        pytest.param(ALL[::-1], id="recorder first"),
+    ],
+)
 def test_any_order_of_start_gives_the_same_complete_bag(network, tmp_path, order):
     nodes = parameters(tmp_path / "bag")
     with temporary_node(Listener) as (client, spinner):
@@ -98,7 +105,7 @@ def test_any_order_of_start_gives_the_same_complete_bag(network, tmp_path, order
 
 
 @pytest.mark.parametrize("name", ALL)
-@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("stop", [signal.SIGINT, *slow(signal.SIGTERM)])
 def test_a_node_stops_cleanly(network, tmp_path, name, stop):
     bag = ["-p", f"bag:={tmp_path / 'bag'}"] if name == "recorder_node" else []
     with started(name, *bag) as process:
@@ -141,7 +148,8 @@ def test_ctrl_c_in_a_destructor_ends_a_node_without_a_word(network):
     assert "KeyboardInterrupt" not in process.stdout + process.stderr
 
 
-@pytest.mark.parametrize("victim", ["perception_node", "skill_server", "planner_node"])
+@pytest.mark.timeout(180)  # starts an ensemble, each node a process, and waits for a dead one
+@pytest.mark.parametrize("victim", [*slow("perception_node", "skill_server"), "planner_node"])
 def test_a_node_that_comes_back_is_taken_up_again(network, victim):
     nodes = parameters()
     others = {name: p for name, p in nodes.items() if name != victim}
@@ -175,6 +183,7 @@ def test_a_skill_server_that_comes_after_the_plan_is_waited_for(network):
             assert result.result().result.success
 
 
+@pytest.mark.timeout(180)  # starts an ensemble, each node a process, and waits for a dead one
 def test_a_simulator_that_comes_back_opens_a_new_episode(network):
     nodes = parameters()
     others = {name: p for name, p in nodes.items() if name != "sim_node"}
@@ -198,7 +207,10 @@ def reset(client, spinner, **request):
 
 
 def test_a_task_is_solved_in_the_episode_that_was_asked_for(network):
-    with temporary_node(Listener) as (client, spinner), ProcessLauncher(parameters()):
+    with (
+        temporary_node(Listener) as (client, spinner),
+        InProcessLauncher(parameters(), spinner.executor),
+    ):
         assert spinner.spin_until(lambda: client.ready(False), LIMIT)
         for episode in (2, 3):  # at once: before the planner can have heard of it
             assert reset(client, spinner, seed=episode).episode == episode
@@ -210,7 +222,7 @@ def test_a_task_is_solved_in_the_episode_that_was_asked_for(network):
 
 def test_commands_that_are_stale_or_impossible_move_nothing(network):
     only = {"sim_node": parameters()["sim_node"]}
-    with temporary_node(Listener) as (client, spinner), ProcessLauncher(only):
+    with temporary_node(Listener) as (client, spinner), InProcessLauncher(only, spinner.executor):
         assert spinner.spin_until(lambda: states(client), LIMIT)
         publisher = client.create_publisher(COMMAND.type, COMMAND.name, COMMAND.qos)
         assert spinner.spin_until(lambda: publisher.get_subscription_count() == 1, LIMIT)
@@ -234,7 +246,7 @@ def test_commands_that_are_stale_or_impossible_move_nothing(network):
 
 def test_resets_are_checked_at_the_door(network):
     only = {"sim_node": parameters()["sim_node"]}
-    with temporary_node(Listener) as (client, spinner), ProcessLauncher(only):
+    with temporary_node(Listener) as (client, spinner), InProcessLauncher(only, spinner.executor):
         assert spinner.spin_until(lambda: states(client), LIMIT)
         explicit = states(client)[0]
         answer = reset(client, spinner, seed=9)
@@ -249,7 +261,10 @@ def test_resets_are_checked_at_the_door(network):
 
 
 def test_cancelling_makes_the_robot_hold(network):
-    with temporary_node(Listener) as (client, spinner), ProcessLauncher(parameters(pace=5.0)):
+    with (
+        temporary_node(Listener) as (client, spinner),
+        InProcessLauncher(parameters(pace=5.0), spinner.executor),
+    ):
         assert spinner.spin_until(lambda: client.ready(False), LIMIT)
         sent = client.send((), 0, 5)
         assert spinner.spin_until(sent.done, LIMIT)
@@ -273,7 +288,10 @@ def holds(told):
 
 
 def test_skills_are_listed_with_their_signatures(network):
-    with temporary_node(Listener) as (client, spinner), ProcessLauncher(parameters()):
+    with (
+        temporary_node(Listener) as (client, spinner),
+        InProcessLauncher(parameters(), spinner.executor),
+    ):
         service = client.create_client(LIST_SKILLS.type, LIST_SKILLS.name)
         assert spinner.spin_until(service.service_is_ready, LIMIT)
 
@@ -288,7 +306,8 @@ def test_skills_are_listed_with_their_signatures(network):
         assert len(skills) == 4
 
 
-@pytest.mark.parametrize("victim", ALL)
+@pytest.mark.timeout(180)  # starts an ensemble, each node a process, and waits for a dead one
+@pytest.mark.parametrize("victim", [*slow(*ALL[:-1]), "recorder_node"])
 def test_a_killed_node_ends_the_run_with_a_code_and_a_readable_bag(network, tmp_path, victim):
     bag = tmp_path / "bag"
     runner = subprocess.Popen(
@@ -321,6 +340,7 @@ def victim_of(runner, victim, bag):
     raise AssertionError("the run did not get under way")
 
 
+@pytest.mark.timeout(180)  # starts an ensemble, each node a process
 def test_a_full_disk_ends_the_run_and_keeps_what_was_recorded(network, tmp_path):
     import resource
 
@@ -374,7 +394,10 @@ def test_a_wrong_parameter_is_refused_in_one_line(network, arguments, code, word
 
 
 def test_parameters_can_be_read_from_outside(network):
-    with temporary_node(Listener) as (client, spinner), ProcessLauncher(parameters()):
+    with (
+        temporary_node(Listener) as (client, spinner),
+        InProcessLauncher(parameters(), spinner.executor),
+    ):
         service = client.create_client(GetParameters, "planner_node/get_parameters")
         assert spinner.spin_until(service.service_is_ready, LIMIT)
         answer = service.call_async(GetParameters.Request(names=["planner", "server_timeout"]))
@@ -391,11 +414,10 @@ def test_a_thousand_steps_are_answered_one_by_one(network):
 
 def test_states_of_an_episode_that_is_over_are_ignored(network):
     """A message of the old episode that comes late must not look like news."""
+    only = {name: parameters()[name] for name in ("sim_node", "perception_node")}
     with (
         temporary_node(Listener) as (client, spinner),
-        ProcessLauncher(
-            {name: p for name, p in parameters().items() if name in ("sim_node", "perception_node")}
-        ),
+        InProcessLauncher(only, spinner.executor),
     ):
         observations = []
         synchronizer = StateSynchronizer(client, observations.append)

@@ -76,6 +76,7 @@ def test_a_shortcut_is_executed_attributed_and_replayed(network, tmp_path):
     assert live.plan_length < pure.plan_length
 
 
+@pytest.mark.slow
 def test_processes_tell_the_same_live_and_from_the_bag(network, tmp_path):
     def slap(*arguments):
         command = [sys.executable, "-m", "ensemble.cli", *map(str, arguments)]

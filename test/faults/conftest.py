@@ -8,6 +8,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "bags"))  # and for theirs
 
 import faulty_links
 import process_faults
+from marks import slow
 
 SAMPLED = {
     "message_case": faulty_links.Case.sampled,
@@ -15,16 +16,14 @@ SAMPLED = {
     "restart_case": process_faults.Case.sampled_restart,
 }
 # Few, as each takes seconds, and unlike one another. ``--fault-cases N`` injects the first N.
-USUAL = {
-    "message_case": range(0, 80, 5),
-    "process_case": (0, 1, 2, 15),
-    "restart_case": (2, 3),
-}
+QUICK = {"message_case": (0, 5, 10, 15), "process_case": (0,), "restart_case": ()}
+SLOW = {"message_case": range(20, 80, 5), "process_case": (1, 2, 15), "restart_case": (2, 3)}
 
 
 def pytest_generate_tests(metafunc):
     asked = metafunc.config.getoption("--fault-cases")
     for name, sampled in SAMPLED.items():
         if name in metafunc.fixturenames:
-            numbers = range(asked) if asked else USUAL[name]
-            metafunc.parametrize(name, [sampled(number) for number in numbers], ids=str)
+            quick, others = (range(asked), ()) if asked else (QUICK[name], SLOW[name])
+            cases = [*map(sampled, quick), *slow(*map(sampled, others))]
+            metafunc.parametrize(name, cases, ids=str)

@@ -44,7 +44,7 @@ ROOT = Path(__file__).parents[2]
 LIBRARY = ROOT / "test" / "shortcuts" / "data" / "obstacle2d"
 SHORTCUT = "Clear_On-e41568a9"
 OBSTACLES, TOWER = get_domain("obstacle2d"), get_domain("obstacle_tower")
-FEW, MANY = 12, 60  # cases of each kind of damage to a file, where each takes long or does not
+FEW, MANY = 6, 30  # cases of each kind of damage to a file, where each takes long or does not
 
 
 def damaged_files(file, count, case_seed):

@@ -8,6 +8,7 @@ import sys
 from collections import Counter
 from contextlib import ExitStack
 
+import pytest
 from rclpy.parameter import Parameter
 
 from ensemble.client import RunClient
@@ -105,6 +106,8 @@ def ensemble(namespace, settings):
         )
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(240)  # starts two ensembles, each node a process
 def test_domain_ids_keep_two_ensembles_apart(network, other_network, tmp_path):
     runs = {
         side: subprocess.Popen(

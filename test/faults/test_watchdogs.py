@@ -46,6 +46,7 @@ def test_a_planner_that_dies_leaves_the_robot_holding(network):
         require_rest(bench)
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(3 * LIMIT)
 @pytest.mark.parametrize(
     ("victim", "code"),

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from marks import slow
 from transitions import Transitions, record
 
 from benchmarks.physics_step import BLOCK, NAMES, SCENE, tower
@@ -23,7 +24,7 @@ from slap_ros.relational import State, Type
 COUNTS = {"alike": 1000, "mixed": 1000, "toys": 400}  # toys have many pieces
 
 
-@pytest.fixture(scope="module", params=list(COUNTS))
+@pytest.fixture(scope="module", params=["alike", *slow("mixed", "toys")])
 def transitions(request) -> Transitions:
     return record(COUNTS[request.param], seed=1, kind=request.param)
 

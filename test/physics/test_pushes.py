@@ -32,6 +32,8 @@ def box_of(row) -> OrientedBox:
     return cube("any").at(Pose(tuple(row[:3].tolist()), tuple(row[3:7].tolist())))
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(180)  # a reference in much finer steps
 def test_pushes_agree_with_the_fine_reference_at_least_as_often_as_plain_stepping():
     figures = truth(PUSHES)
     assert figures["ours_agrees"] >= figures["plain_agrees"]

@@ -230,6 +230,7 @@ def test_a_study_that_is_refused_leaves_nothing_behind(installed, tmp_path):
     assert not list(tmp_path.glob("results/*"))
 
 
+@pytest.mark.slow
 def test_study_of_vacuity_counts_what_policies_do_without_eyes(installed, tmp_path):
     data = study("vacuity", tmp_path, "--starts", "4")
     operators = {one["operator"]: one for one in data["found"]["operators"]}

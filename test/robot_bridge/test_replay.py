@@ -170,7 +170,7 @@ def test_a_controller_that_fails_ends_the_replay(network, bag):
 
 def test_an_object_that_is_not_there_is_named_before_anything_moves(network, bag):
     mock = f"{QUICK},hidden=block2"
-    settings = "joint_timeout=60,controller_timeout=60,start_timeout=15"
+    settings = "joint_timeout=60,controller_timeout=60,start_timeout=8"
     code, _, told = slap_alone(bag, "--to", "mock", "--mock", mock, "--robot", settings)
     assert code == 77
     assert "not detected at the start: block2" in told

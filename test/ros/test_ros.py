@@ -20,6 +20,7 @@ from ensemble.spinner import temporary_node
 from slap_ros.bags import evaluate_bag, read_bag, replay_bag
 
 ROOT = Path(__file__).parents[2]
+pytestmark = pytest.mark.timeout(300)  # each starts several processes of ROS 2
 EXECUTABLES = (
     "sim_node",
     "perception_node",

@@ -239,6 +239,7 @@ def test_a_rollout_is_the_same_in_every_process_and_needs_no_torch():
     assert outputs[0][1] == "True"  # something was rolled out
 
 
+@pytest.mark.slow
 def test_the_shipped_shortcut_halves_what_the_drawer_takes():
     domain = get_domain("cluttered_drawer", "paper:shortcut_speed=1")
     library = chosen_library(None, domain)

@@ -34,6 +34,7 @@ SMALL = replace(
     validation=3,
     shortcuts=1,
 )
+BRIEF = replace(SMALL, ppo=replace(SMALL.ppo, total_steps=2_048))
 BRIEF_POLISH = replace(POLISH, total_steps=2_048)
 
 
@@ -120,11 +121,11 @@ def test_a_ray_cluster_learns_the_same(tmp_path):
 
 def test_it_goes_on_where_it_was_interrupted(tmp_path):
     with pytest.raises(KeyboardInterrupt):
-        train(tmp_path / "work", callback=Recorder(interrupt_at=("collecting starts", 24)))
+        train(tmp_path / "work", BRIEF, Recorder(interrupt_at=("collecting starts", 24)))
     explored = (tmp_path / "work" / "explored.json").read_bytes()
-    library, _ = train(tmp_path / "work")
+    library, _ = train(tmp_path / "work", BRIEF)
     assert (tmp_path / "work" / "explored.json").read_bytes() == explored
-    whole, _ = train(tmp_path / "whole")
+    whole, _ = train(tmp_path / "whole", BRIEF)
     assert (
         library.shortcuts[0]
         .policy.mean(whole.shortcuts[0].policy.normalisation.mean[None])
@@ -153,6 +154,7 @@ t.train(Path({work!r}))
 """
 
 
+@pytest.mark.slow
 def test_a_killed_training_resumes_from_its_checkpoint(tmp_path):
     work, tests = tmp_path / "work", str(Path(__file__).parent)
     code = KILLED.format(tests=tests, work=str(work))
@@ -167,8 +169,10 @@ def test_a_killed_training_resumes_from_its_checkpoint(tmp_path):
     assert len(library.shortcuts) == 1
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(180)  # three trainings
 def test_what_hardly_succeeds_is_learned_again_and_the_best_attempt_counts(tmp_path, monkeypatch):
-    brief = replace(SMALL, ppo=replace(SMALL.ppo, total_steps=2_048), polish=BRIEF_POLISH)
+    brief = replace(BRIEF, polish=BRIEF_POLISH)
     once, _ = train(tmp_path / "once", brief)
     monkeypatch.setattr(training, "ENOUGH_SUCCESS", 0.0)
     enough, _ = train(tmp_path / "enough", replace(brief, attempts=3))
@@ -186,10 +190,12 @@ def test_what_hardly_succeeds_is_learned_again_and_the_best_attempt_counts(tmp_p
     assert [folder.finished.exists() for folder in folders] == [i == best for i in range(2)]
 
 
+@pytest.mark.slow
 def test_steps_of_attempts_in_vain_are_counted(tmp_path, monkeypatch):
     monkeypatch.setattr(training, "ENOUGH_SUCCESS", 1.1)
-    once, _ = train(tmp_path / "once", replace(SMALL, least_saving=0.0, polish=None))
-    twice, _ = train(tmp_path / "twice", replace(SMALL, least_saving=0.0, polish=None, attempts=2))
+    plain = replace(BRIEF, least_saving=0.0, polish=None)
+    once, _ = train(tmp_path / "once", plain)
+    twice, _ = train(tmp_path / "twice", replace(plain, attempts=2))
     (one,), (other,) = once.shortcuts, twice.shortcuts
     assert other.record["attempts"] == 2
     assert other.record["environment_steps"] == 2 * one.record["environment_steps"]

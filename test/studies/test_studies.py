@@ -378,6 +378,7 @@ def test_another_kind_of_exploring_is_not_mixed_in(training, tmp_path):
 # -- files ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_files_are_complete_and_made_again_byte_for_byte_but_for_times(tmp_path, training):
     commands = [
         ["generalisation", "obstacle2d", "--tasks", 1, "--seeds", 2, *PLANNING,
