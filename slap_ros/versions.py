@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What produced a result: versions of the software, revision of the source."""
+"""What produced a result: versions of the software, revision of the source, the processor."""
 
 from __future__ import annotations
 
@@ -35,6 +35,17 @@ def versions() -> dict[str, str]:
         except PackageNotFoundError:
             continue
     return found | {"revision": revision()}
+
+
+@lru_cache(maxsize=1)
+def processor() -> str:
+    """Name of the processor: torch sums in an order of its own on each kind."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []  # not on Linux
+    models = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(models, platform.processor() or platform.machine())
 
 
 @lru_cache(maxsize=1)

@@ -14,7 +14,7 @@ from slap_ros.acquisition.rollouts import PlanRollout
 from slap_ros.acquisition.settings import AcquisitionSettings
 from slap_ros.acquisition.skill_selection import NO_PROGRESS
 from slap_ros.acquisition.task_source import TaskSource
-from slap_ros.versions import versions
+from slap_ros.versions import processor, versions
 
 
 def skill_record(
@@ -66,4 +66,5 @@ def library_record(
         "steps": state.steps,
         "settings": asdict(settings),
         "versions": dict(versions()),
+        "processor": processor(),
     }

@@ -49,6 +49,9 @@ class ExactLayer:
             weights: Shape (out, in), finite.
             bias: Shape (out,), finite.
             input_bound: Largest magnitude of an input.
+
+        Returns:
+            The layer.
         """
         rest, offsets = weights.T.astype(np.float64), bias.astype(np.float64)
         bound = input_bound * _largest_sum(rest) + float(np.abs(offsets).max())

@@ -31,7 +31,7 @@ from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.signature import Pattern, Signature
 from slap_ros.shortcuts.starts import StartRecord
 from slap_ros.shortcuts.work_folder import attempt_folder
-from slap_ros.versions import versions
+from slap_ros.versions import processor, versions
 
 Result = TypeVar("Result")
 UNRECORDED = "why was not recorded"  # in work folders of version 0.1.0
@@ -412,6 +412,7 @@ class Training:
             },
             "settings": self.settings.as_json(),
             "versions": dict(versions()),
+            "processor": processor(),
         }
 
 
