@@ -28,28 +28,27 @@ $(VENV)/.tested: $(VENV)/.installed
 	$(BIN)/pip install --quiet --disable-pip-version-check '$(strip $(TORCH))' -e '.[test]'
 	@touch $@
 
-demo: install  ## Run the whole ensemble, record bags, replay them, measure, report
+demo: install  ## Run the whole ensemble with and without a shortcut, record, replay, report
 	@set -e; export PATH="$(abspath $(BIN)):$$PATH"; bag=runs/demo-$$(date +%Y%m%d-%H%M%S); \
-	echo "== one task, every node a process"; \
-	slap run obstacle2d --seed 1 --record $$bag; \
-	echo "== the same task without learned shortcuts"; \
-	slap run obstacle2d --seed 1 --shortcuts none; \
-	slap plan obstacle2d --seed 1 --output $$bag-plan; \
-	echo "== the same numbers from the bag alone"; \
+	echo "== a Panda takes a tower apart with what it learned; every node is a process"; \
+	slap run obstacle_tower --seed 1 --record $$bag; \
+	echo "== the same task with the given skills alone; the first run is drawn meanwhile"; \
+	slap bag render $$bag --output $$bag.gif 2> $$bag-gif.log & drawing=$$!; \
+	slap run obstacle_tower --seed 1 --shortcuts none --record $$bag-pure; \
+	wait $$drawing || { cat $$bag-gif.log >&2; exit 1; }; \
+	rm $$bag-gif.log; \
+	echo "== the numbers of the first run, from its bag alone"; \
 	slap bag evaluate $$bag; \
-	echo "== the recorded commands in a fresh world"; \
+	echo "== its recorded commands in a fresh world"; \
 	slap bag replay $$bag; \
-	echo "== many tasks, and the start states of the paper"; \
-	slap evaluate obstacle2d --tasks 10 --seeds 5; \
-	slap evaluate obstacle2d --tasks 10 --seeds 5 --preset paper; \
-	echo "== a Panda takes a tower apart, block by block"; \
-	slap run obstacle_tower --seed 1 --shortcuts none --record $$bag-tower-pure; \
-	echo "== and with what it learned"; \
-	slap run obstacle_tower --seed 1 --record $$bag-tower --render $$bag-tower.gif; \
-	slap bag replay $$bag-tower; \
-	echo "== both on one page, for any browser"; \
-	slap report $$bag-tower-pure $$bag-tower --output $$bag.html; \
-	echo "bag: $$bag   abstract graph: $$bag-plan/graph.svg   animation: $$bag-tower.gif   report: $$bag.html"
+	echo "== both runs on one page, for any browser"; \
+	slap report $$bag-pure $$bag --output $$bag.html; \
+	echo "bags: $$bag $$bag-pure   animation: $$bag.gif   report: $$bag.html"; \
+	echo "== more, after source $(BIN)/activate"; \
+	echo "more: \`slap run obstacle2d --seed 1\`: a planar task, which needs no physics"; \
+	echo "more: \`slap plan obstacle2d --seed 1 --output runs/plan\`: PDDL, and the abstract graph"; \
+	echo "more: \`slap evaluate obstacle2d\`: 50 tasks, success and plan length with intervals"; \
+	echo "more: \`slap evaluate obstacle2d --preset paper\`: from the paper's start states"
 
 PYTEST := $(abspath $(BIN))/pytest -q -n $(TESTS_AT_ONCE) --dist worksteal
 
