@@ -197,6 +197,7 @@ def test_a_planner_that_goes_away_meanwhile_takes_the_skills_on_when_it_is_back(
             assert solved.success, solved.error_msg
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(180)  # a node and two trainings, each of which imports torch
 def test_what_cannot_be_acquired_is_said(network, tmp_path):
     """Each with the code of its cause; the node serves the next goal."""

@@ -261,6 +261,7 @@ def test_the_library_is_the_same_after_interruptions(tmp_path, monkeypatch):
     assert saved(library, tmp_path / "again") == uninterrupted
 
 
+@pytest.mark.slow
 def test_the_library_is_the_same_with_two_processes(tmp_path):
     one = saved(acquire(tmp_path / "one", SHORT)[0], tmp_path / "first")
     with local_workers(2) as workers:

@@ -93,6 +93,7 @@ def test_a_cut_bag_yields_what_precedes_the_cut(
     assert counts[-1] == len(truth)
 
 
+@pytest.mark.slow
 def test_a_corrupted_bag_yields_what_precedes_the_damage(
     many_chunks: Path, truth: Truth, damaged: Callable[[bytes], Path]
 ) -> None:

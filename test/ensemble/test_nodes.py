@@ -166,6 +166,7 @@ def test_a_node_that_comes_back_is_taken_up_again(network, victim):
             assert solve(client, spinner, episode=opened.episode).success
 
 
+@pytest.mark.slow
 def test_a_skill_server_that_comes_after_the_plan_is_waited_for(network):
     nodes = parameters()
     nodes["planner_node"]["patience"] = 24.0  # 120 s for it to come

@@ -4,6 +4,7 @@
 
 import pytest
 from living_ensemble import laboratory
+from marks import slow
 from process_faults import LIMIT
 
 from ensemble.network import is_embedded
@@ -46,14 +47,12 @@ def test_a_planner_that_dies_leaves_the_robot_holding(network):
         require_rest(bench)
 
 
-@pytest.mark.slow
 @pytest.mark.timeout(3 * LIMIT)
 @pytest.mark.parametrize(
     ("victim", "code"),
     [
         ("perception_node", ErrorCode.NO_STATE),
-        ("sim_node", ErrorCode.NO_STATE),
-        ("skill_server", ErrorCode.NODE_DIED),
+        *slow(("sim_node", ErrorCode.NO_STATE), ("skill_server", ErrorCode.NODE_DIED)),
     ],
 )
 def test_whoever_else_dies_ends_the_run_and_the_robot_holds(network, victim, code):

@@ -152,6 +152,7 @@ def test_the_mock_robot_does_what_was_recorded(network, bag):
     assert "the goal holds" in told
 
 
+@pytest.mark.slow
 def test_another_start_is_refused(network, bag, tmp_path):
     """The same recording from a moment later: neither arm nor blocks are there."""
     late = tmp_path / "late"
@@ -168,6 +169,7 @@ def test_a_controller_that_fails_ends_the_replay(network, bag):
     assert "steps executed" not in told
 
 
+@pytest.mark.slow
 def test_an_object_that_is_not_there_is_named_before_anything_moves(network, bag):
     mock = f"{QUICK},hidden=block2"
     settings = "joint_timeout=60,controller_timeout=60,start_timeout=8"

@@ -6,13 +6,18 @@
 """
 
 import pytest
+from marks import slow
 
 from benchmarks.shortcut_bounds import measure
 
 
 @pytest.mark.parametrize(
     ("domain", "tasks"),
-    [("obstacle2d", 8), ("obstacle_tower", 2), ("cleanup_table", 2), ("cluttered_drawer", 1)],
+    [
+        ("obstacle2d", 8),
+        ("obstacle_tower", 2),
+        *slow(("cleanup_table", 2), ("cluttered_drawer", 1)),
+    ],
 )
 def test_no_rollout_of_a_shipped_shortcut_is_shorter_than_its_bound(domain, tasks):
     figures = measure(domain, tasks)

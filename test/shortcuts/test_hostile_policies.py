@@ -104,6 +104,7 @@ def test_all_the_might_is_never_longer(value, seed):
     assert theirs.plan_length <= ours.plan_length
 
 
+@pytest.mark.slow
 def test_a_tower_is_taken_apart_all_the_same():
     domain, seed = get_domain("obstacle_tower", "paper"), 0
     brief = Sampling(samples=1, horizon=6)
