@@ -19,6 +19,7 @@ install: $(VENV)/.installed  ## Make .venv with everything that running needs
 $(VENV)/.installed: $(METADATA)
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13))' || \
 	  { echo "slap_ros needs Python 3.11 or 3.12; try: make $(MAKECMDGOALS) PYTHON=python3.12" >&2; exit 1; }
+	@echo "== setting up $(VENV), which takes about a minute"
 	$(PYTHON) -m venv $(VENV) || \
 	  { echo "no venv module; on Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
 	$(BIN)/pip install --quiet --disable-pip-version-check -e ./embedded_ros -e '.[physics]'
@@ -30,9 +31,9 @@ $(VENV)/.tested: $(VENV)/.installed
 
 demo: install  ## Run the whole ensemble with and without a shortcut, record, replay, report
 	@set -e; export PATH="$(abspath $(BIN)):$$PATH"; bag=runs/demo-$$(date +%Y%m%d-%H%M%S); \
-	echo "== a Panda takes a tower apart with what it learned; every node is a process"; \
+	echo "== a Panda slaps a tower over, as it has learned to; every node is a process"; \
 	slap run obstacle_tower --seed 1 --record $$bag; \
-	echo "== the same task with the given skills alone; the first run is drawn meanwhile"; \
+	echo "== the same task with the given skills alone; meanwhile the first run is drawn"; \
 	slap bag render $$bag --output $$bag.gif 2> $$bag-gif.log & drawing=$$!; \
 	slap run obstacle_tower --seed 1 --shortcuts none --record $$bag-pure; \
 	wait $$drawing || { cat $$bag-gif.log >&2; exit 1; }; \

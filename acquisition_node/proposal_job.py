@@ -12,7 +12,8 @@ from ensemble.acquisition_parameters import AcquisitionParameters
 from slap_ros.acquisition.attempt_log import AttemptLog, Entry
 from slap_ros.acquisition.problem import AcquisitionProblem
 from slap_ros.acquisition.proposal import Proposal
-from slap_ros.acquisition.proposal_request import INDUCED, Demonstrations, ProposalRequest
+from slap_ros.acquisition.proposal_request import Demonstrations, ProposalRequest
+from slap_ros.acquisition.proposer_names import INDUCED
 from slap_ros.bags.demonstrations import read_demonstrations
 from slap_ros.bags.reader import read_bag
 from slap_ros.core import Domain, Task

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ensemble.acquisition_parameters import AcquisitionParameters
 from slap_ros.acquisition.domain_choice import DIGEST_KEY
-from slap_ros.acquisition.proposal_request import INDUCED, LANGUAGE, MANUAL
+from slap_ros.acquisition.proposer_names import INDUCED, LANGUAGE, MANUAL
 from slap_ros.core import Domain, Task
 from slap_ros.relational import GroundAtom
 

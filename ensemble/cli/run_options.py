@@ -12,12 +12,7 @@ import typer
 
 from ensemble.patience import IMPATIENT, PATIENT
 from slap_ros.acquisition.domain_choice import SHIPPED
-from slap_ros.acquisition.proposal_request import (
-    MANUAL,
-    PROPOSERS,
-    REWARDERS,
-    require_known,
-)
+from slap_ros.acquisition.proposer_names import MANUAL, PROPOSERS, REWARDERS, require_known
 from slap_ros.bags.writer import require_new
 from slap_ros.cli.options import (
     MAX_INDEX,
@@ -36,7 +31,6 @@ from slap_ros.cli.skill_choice import Skills
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import require_writable
 from slap_ros.planning.execution import MAX_REPLANS
-from slap_ros.report import check_output
 from slap_ros.robot.worlds import MOCK, ROBOT, SIM, WORLDS
 
 
@@ -159,6 +153,8 @@ class RunOptions:
             require_new(self.record)
             require_writable(self.record)
         if self.report is not None:
+            from slap_ros.report import check_output  # few runs are reported at once
+
             check_output(self.report)
 
     def _check_world(self) -> None:

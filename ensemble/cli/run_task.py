@@ -30,7 +30,6 @@ from slap_ros.cli.console import console, print_json, styled
 from slap_ros.cli.options import say_default_seed
 from slap_ros.cli.render import check_renderable, picture_size
 from slap_ros.cli.render import render as write_animation
-from slap_ros.cli.report import write_report
 from slap_ros.cli.skill_choice import open_chosen
 from slap_ros.core import Domain, Task, task_with_goal
 from slap_ros.errors import NoSkillsError
@@ -73,6 +72,8 @@ def run_task(options: RunOptions) -> int:
         _conclude(metrics, options.record)
         code = 0
         if bag is not None and options.report is not None:
+            from slap_ros.cli.report import write_report
+
             code = write_report([bag], options.report)
     if options.render is not None:
         decoded = [decode_state(message, domain.types_by_name) for message in states]

@@ -12,6 +12,16 @@ from slap_ros.acquisition.inquiry import Inquiry
 from slap_ros.acquisition.language_proposer import LanguageProposer, LanguageRewarder
 from slap_ros.acquisition.problem import AcquisitionProblem
 from slap_ros.acquisition.proposal import Proposal
+from slap_ros.acquisition.proposer_names import (
+    COMPOSED,
+    INDUCED,
+    LANGUAGE,
+    MANUAL,
+    NO_REWARDER,
+    PROPOSERS,
+    REWARDERS,
+    require_known,
+)
 from slap_ros.acquisition.proposers import (
     ComposedRewarder,
     ManualProposer,
@@ -25,11 +35,6 @@ from slap_ros.core import Domain, Task
 from slap_ros.errors import InvalidParameterError
 from slap_ros.learning.demonstrator import AtomTrace
 from slap_ros.relational import LiftedOperator
-
-MANUAL, INDUCED, COMPOSED, LANGUAGE = "manual", "induced", "composed", "language"
-PROPOSERS = (MANUAL, INDUCED, LANGUAGE)
-REWARDERS = (MANUAL, COMPOSED, LANGUAGE)
-NO_REWARDER = "none"  # where no skill is to be learned
 
 
 @dataclass(frozen=True)
@@ -143,21 +148,6 @@ class ProposalRequest:
         if self.rewarder == MANUAL:
             return ManualRewarder(self.rewards)
         return ComposedRewarder() if self.rewarder == COMPOSED else None
-
-
-def require_known(what: str, name: str, known: Sequence[str]) -> None:
-    """Refuse a name that is not among those that there are.
-
-    Args:
-        what: Whose name it is.
-        name: As it was given.
-        known: All that there are.
-
-    Raises:
-        InvalidParameterError: It lists them.
-    """
-    if name not in known:
-        raise InvalidParameterError(f"{what} {name!r}: there are {', '.join(known)}")
 
 
 def _asked(inquiry: Inquiry | None) -> Inquiry:

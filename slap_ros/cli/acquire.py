@@ -16,12 +16,8 @@ from slap_ros.acquisition.embedding_encoder import EmbeddingEncoder
 from slap_ros.acquisition.inquiry import described
 from slap_ros.acquisition.jobs import horizon_of
 from slap_ros.acquisition.proposal import Proposal, read_proposal
-from slap_ros.acquisition.proposal_request import (
-    MANUAL,
-    REWARDERS,
-    ProposalRequest,
-    require_known,
-)
+from slap_ros.acquisition.proposal_request import ProposalRequest
+from slap_ros.acquisition.proposer_names import MANUAL, REWARDERS, require_known
 from slap_ros.acquisition.retrieval import MetricSignatureEncoder, SkillEncoder
 from slap_ros.acquisition.settings import ACQUISITION_SETTINGS, AcquisitionSettings
 from slap_ros.acquisition.skill_library import (

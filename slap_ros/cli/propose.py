@@ -15,12 +15,12 @@ from slap_ros.acquisition.inquiry import described
 from slap_ros.acquisition.operator_file import read_operators
 from slap_ros.acquisition.problem import AcquisitionProblem
 from slap_ros.acquisition.proposal import Proposal
-from slap_ros.acquisition.proposal_request import (
+from slap_ros.acquisition.proposal_request import ProposalRequest
+from slap_ros.acquisition.proposer_names import (
     INDUCED,
     MANUAL,
     NO_REWARDER,
     REWARDERS,
-    ProposalRequest,
     require_known,
 )
 from slap_ros.cli.console import console, print_json

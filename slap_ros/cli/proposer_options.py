@@ -12,14 +12,8 @@ import typer
 
 from slap_ros.acquisition.attempt_log import AttemptLog
 from slap_ros.acquisition.inquiry import Inquiry
-from slap_ros.acquisition.proposal_request import (
-    INDUCED,
-    MANUAL,
-    PROPOSERS,
-    Demonstrations,
-    ProposalRequest,
-    require_known,
-)
+from slap_ros.acquisition.proposal_request import Demonstrations, ProposalRequest
+from slap_ros.acquisition.proposer_names import INDUCED, MANUAL, PROPOSERS, require_known
 from slap_ros.bags.demonstrations import read_demonstrations
 from slap_ros.bags.reader import read_bag
 from slap_ros.cli.console import console

@@ -82,6 +82,10 @@ def test_a_planar_plan_needs_neither_physics_nor_skills_that_were_acquired():
     assert not modules & ((HEAVY - {"slap_ros.drawing"}) | ROS | LG_SAIL | STUDIES)
 
 
+def test_a_run_is_refused_before_reports_and_language_models_are_imported():
+    assert not slap("run", "--help") & (LEARNING | OTHERS | LG_SAIL | STUDIES)
+
+
 @pytest.mark.parametrize("node", NODES)
 def test_a_node_imports_what_every_domain_needs(node):
     modules = modules_after(f"import {node}.node")
