@@ -53,7 +53,7 @@ demo: install  ## Run the whole ensemble with and without a shortcut, record, re
 
 PYTEST := $(abspath $(BIN))/pytest -q -n $(TESTS_AT_ONCE) --dist worksteal
 
-test: $(VENV)/.tested lint  ## Check style and types, and run the tests, in ten minutes
+test: $(VENV)/.tested lint  ## Check style and types, and run all tests but the slow ones
 	$(PYTEST) -m "not slow"
 	cd embedded_ros && $(PYTEST)
 

@@ -36,6 +36,7 @@ from slap_ros.robot.recorded_motion import read_recorded_motion
 from slap_ros.robot.robot_world import GripperAction, RobotWorld
 from slap_ros.robot.scene_config import sampled_scene_config
 
+pytestmark = pytest.mark.timeout(180)  # runs in worlds with contact forces
 DOMAIN, SEED = "stack_at_target", 0
 TABLE_AT_BASE = Workspace((0.2, -0.5, 0.0), (0.8, 0.5, 0.9))
 STAMP = Time(sec=1, nanosec=2)

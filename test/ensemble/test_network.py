@@ -25,6 +25,7 @@ def two_hosts_possible():
     return subprocess.run(["unshare", "-rn", "true"], capture_output=True).returncode == 0
 
 
+@pytest.mark.timeout(180)  # who is to hear nothing listens for a while
 @pytest.mark.skipif(not two_hosts_possible(), reason="no network namespaces for this user")
 @pytest.mark.parametrize(("reach", "open_to_all"), [(None, False), *slow(("SUBNET", True))])
 def test_another_host_is_heard_only_where_that_was_asked_for(network, tmp_path, reach, open_to_all):

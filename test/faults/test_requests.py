@@ -31,6 +31,7 @@ from ensemble.spinner import Spinner
 from slap_ros.errors import ErrorCode
 from slap_ros.messages.interfaces import TASK
 
+pytestmark = pytest.mark.timeout(300)  # dozens of requests, some of which wait in vain
 LIMIT = 120.0  # s, far more than anything here takes
 BRIEFLY = 3.0  # s, for what may last for good and need not succeed
 # What is waited for in vain is waited for less long than in a laboratory.

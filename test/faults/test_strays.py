@@ -24,6 +24,7 @@ from ensemble.spinner import Spinner
 from sim_node.node import SimNode
 from slap_ros.bags import evaluate_bag
 
+pytestmark = pytest.mark.timeout(180)  # an ensemble is heard of in heartbeats alone
 LIMIT = 120.0  # s, far more than anything here takes
 LISTENERS = ("/perception_node", "/planner_node", "/skill_server")
 HEARD_BY = {DOMAIN.name: 6, TASK.name: 6, STATE.name: 6, ATOMS.name: 5, FAULT.name: 4}  # nodes
