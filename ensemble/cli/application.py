@@ -13,7 +13,7 @@ from slap_ros.cli.streams import open_closed_streams
 RUN = CommandEntry(
     "run",
     "ensemble.cli.run:run",
-    "Run the whole ensemble on one task: simulator, perception, planner, skills, recorder.",
+    "Run all nodes on one task: simulator, perception, planner, skills, recorder.",
 )
 WITH_REPLAY = {"bag": "ensemble.cli.replay:bag_app"}  # in the place of the core's
 COMMANDS = (

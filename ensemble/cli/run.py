@@ -8,7 +8,7 @@ from ensemble.cli.run_options import RunOptions
 
 
 def run(options: RunOptions) -> int:
-    """Run the whole ensemble on one task: simulator, perception, planner, skills, recorder."""
+    """Run all nodes on one task: simulator, perception, planner, skills, recorder."""
     from ensemble.cli.run_task import run_task
 
     return run_task(options)

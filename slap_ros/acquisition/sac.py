@@ -187,7 +187,7 @@ class SkillLearner:
         if [layer.shape for layer, _ in policy.layers] != shapes:
             given = [layer.shape for layer, _ in policy.layers]
             raise InvalidParameterError(
-                f"a policy with layers {given} is no beginning for one with layers {shapes}; "
+                f"a policy with layers {given} cannot start one with layers {shapes}; "
                 "learn with the same hidden layers"
             )
         for name, (weight, bias) in zip(names, policy.layers, strict=True):

@@ -140,7 +140,7 @@ class AcquireOptions:
         settings = read_settings(proposers.language_settings, self.encoder, proposers.base_url)
         if settings.base_url.startswith(LOCAL_SCHEME):
             raise InvalidParameterError(
-                f"--encoder asks a server, and {settings.base_url} is none: give another --base-url"
+                f"--encoder asks a server; {settings.base_url} is not one: give another --base-url"
             )
         return EmbeddingEncoder(settings, WorkFolder(self.work_folder))
 

@@ -145,8 +145,8 @@ def export(
         str | None,
         typer.Option(
             "--format",
-            help="npz, csv, parquet, or lerobot (a data set for LeRobot, in a folder). Default: as "
-            "the ending of the output says.",
+            help="Format: npz, csv, parquet, or lerobot (a data set for LeRobot, in a folder). "
+            "Default: by the ending of --output.",
         ),
     ] = None,
 ) -> None:

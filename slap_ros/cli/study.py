@@ -54,7 +54,13 @@ from slap_ros.studies.results import Data, StudyReport, describe_library
 from slap_ros.studies.trainings import TrainingFolder
 from slap_ros.studies.variations import offered, offered_number, parse_variation
 
-TABLES_IN = ("README.md", "docs/presets.md", "docs/reproducing.md", "docs/skills.md")
+TABLES_IN = (
+    "README.md",
+    "docs/presets.md",
+    "docs/reproducing.md",
+    "docs/results/README.md",
+    "docs/skills.md",
+)
 PAGES = [Path(page) for page in TABLES_IN]  # with tables made of results
 
 app = typer.Typer(

@@ -178,7 +178,7 @@ def _columns(layout: Layout, name: str, features: tuple[Feature, ...]) -> NDArra
     wanted = [feature.name for feature in features]
     if obj is None or not set(wanted) <= set(obj.type.column):
         raise InvalidStateError(
-            f"the scene's body {name!r} is no object with the features {', '.join(wanted)}; "
+            f"the scene's body {name!r} is not an object with the features {', '.join(wanted)}; "
             f"the objects are {', '.join(sorted(layout.by_name))}"
         )
     return _indices(layout, obj, features)

@@ -38,7 +38,7 @@ class DomainFactory:
         for name in self.presets:
             if not isinstance(name, str) or not name.isidentifier():
                 raise InvalidDomainError(
-                    f"{name!r} is no name of a preset: letters, digits and _ alone"
+                    f"{name!r} is not a name of a preset: use only letters, digits and _"
                 )
 
     def __call__(

@@ -115,7 +115,7 @@ def _make(name: str, preset: str) -> Domain:
     with _blaming(name, let_pass=(InvalidParameterError,)):
         domain = factory(base, changes)
         if not isinstance(domain, Domain):
-            raise InvalidDomainError(f"domain {name!r}: {domain!r} was made, which is no Domain")
+            raise InvalidDomainError(f"domain {name!r} made {domain!r}, which is not a Domain")
         if domain.name != name:
             raise InvalidDomainError(
                 f"domain {name!r} calls itself {domain.name!r}; give the entry point that name"
@@ -131,7 +131,7 @@ def _factory(name: str) -> DomainFactory:
     with _blaming(name):
         made = import_module(OURS[name]).make if name in OURS else _load(name, entries)
         if not callable(made):
-            raise InvalidDomainError(f"domain {name!r}: {made!r} is no function that makes it")
+            raise InvalidDomainError(f"domain {name!r}: {made!r} is not a function that makes it")
         return made if isinstance(made, DomainFactory) else DomainFactory(made)
 
 

@@ -164,7 +164,7 @@ def _embodied(layout: Layout, name: str) -> Object:
     obj = layout.by_name.get(name)
     if obj is None or not set(BODY_FEATURES) <= set(obj.type.features):
         raise InvalidStateError(
-            f"the scene's body {name!r} is no object with a free body's features; "
+            f"the scene's body {name!r} is not an object with a free body's features; "
             f"the objects are {', '.join(sorted(layout.by_name))}"
         )
     return obj

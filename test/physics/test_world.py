@@ -344,7 +344,7 @@ def test_impossible_scenes_are_refused_and_change_nothing(world, state, words):
 
 def test_bodies_that_the_state_does_not_have():
     state = State.build({ROBOT("robot"): robot_features(HOME)})
-    with pytest.raises(InvalidStateError, match="'T' is no object with a free body's features"):
+    with pytest.raises(InvalidStateError, match="'T' is not an object with a free body's features"):
         PandaWorld(SCENE, state)
     bare = State.build({Type("thing")("thing"): {}})
     with pytest.raises(InvalidStateError, match="a scene has one robot, the state has 0"):

@@ -65,11 +65,11 @@ def test_whatever_is_raised_when_it_is_made_is_that_domains_error(how, install):
 @pytest.mark.parametrize(
     ("entry", "text", "words"),
     [
-        ("stranger:make", "make = 3", "3 is no function that makes it"),
-        ("stranger:make", "make = lambda: 3", "3 was made, which is no Domain"),
+        ("stranger:make", "make = 3", "3 is not a function that makes it"),
+        ("stranger:make", "make = lambda: 3", "made 3, which is not a Domain"),
         ("stranger:make", SOUND, "calls itself 'sweeping'"),
         ("stranger:make", "", "has no attribute 'make'"),
-        ("stranger", "", "is no function that makes it"),
+        ("stranger", "", "is not a function that makes it"),
         ("stranger:", "", ""),
         ("a b c", "", ""),
         ("stranger:make", "make = (", "SyntaxError"),

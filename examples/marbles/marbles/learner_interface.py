@@ -11,7 +11,7 @@ from slap_ros.core import LearnerInterface
 from slap_ros.relational import Column, Object, State
 from slap_ros.relational.state import Array
 
-SCALE = 0.3  # of what is seen
+SCALE = 0.3  # of observed distances
 BEHIND = 0.02  # where the hand has to be to push a marble to the right
 
 

@@ -37,7 +37,7 @@ TYPES = (ROBOT, MARBLE_TYPE)
 
 
 def _gutter_margin(state: State, marble: Column) -> Array:
-    """How far past the edge; what is held is in the hand, wherever that is."""
+    """Distance past the edge; negative while the marble is held, in any place."""
     past: Array = state.stack(marble, "x") - GUTTER
     return np.where(state.stack(marble, "held") > 0.5, np.minimum(past, -1e-6), past)
 
