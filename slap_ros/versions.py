@@ -11,6 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import slap_ros
+from slap_ros.files import read_text
 
 LIBRARIES = (
     "numpy",
@@ -41,7 +42,7 @@ def versions() -> dict[str, str]:
 def processor() -> str:
     """Name of the processor: torch sums in an order of its own on each kind."""
     try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        lines = read_text(Path("/proc/cpuinfo")).splitlines()
     except OSError:
         lines = []  # not on Linux
     models = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
