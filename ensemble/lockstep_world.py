@@ -35,7 +35,7 @@ from ensemble.interfaces import (
 from ensemble.parameters import read_parameters
 from ensemble.world_parameters import WorldParameters
 from slap_ros.acquisition.domain_choice import open_domain
-from slap_ros.core import Action, Task
+from slap_ros.core import UNSAMPLED, Action, Task
 from slap_ros.errors import (
     ErrorCode,
     InvalidCommandError,
@@ -47,7 +47,6 @@ from slap_ros.messages.decode import decode_command, stamp_ns
 from slap_ros.relational import State
 
 QUIET = 10.0  # s between two log lines about states that cannot be shown
-UNSAMPLED = -1  # seed of a task that was given or measured, not sampled
 REFUSALS = {  # what is counted, by the error that refuses a command
     StaleCommandError: "stale_commands",
     InvalidCommandError: "invalid_commands",
@@ -185,25 +184,23 @@ class LockstepWorld(Node, ABC, Generic[P]):
         """Say what runs, also before there is a first state."""
         self._domains.publish(encode.domain_info(self._domain, self._now()))
 
-    def _open_episode(self, task: Task, seed: int, index: int) -> None:
+    def _open_episode(self, task: Task) -> None:
         """Publish a task and its initial state, as step 0 of a new episode.
 
         Args:
             task: What is to be solved.
-            seed: What sampled it, or ``UNSAMPLED``.
-            index: Which of the seed's tasks it is.
         """
         self._episode += 1
         self._step = 0
         self._fault = ErrorCode.NONE
         now = self._now()
         self._publish_domain()  # for whoever was told something else meanwhile
-        message = encode.task(task, self._domain, self._episode, seed, index, now)
+        message = encode.task(task, self._domain, self._episode, now)
         self._opened_ns = stamp_ns(message.header)
         self._tasks.publish(message)
         self._states.publish(message.initial_state)
         self._try_to_show(task.initial_state, now)
-        origin = "not sampled" if seed == UNSAMPLED else f"seed {seed}"
+        origin = "not sampled" if task.seed == UNSAMPLED else f"seed {task.seed}"
         self.get_logger().info(f"episode {self._episode}: {self._domain.name}, {origin}")
 
     def _on_reset(

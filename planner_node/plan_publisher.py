@@ -61,11 +61,9 @@ class PlanPublisher:
         Returns:
             The event's stamp, ns since the epoch.
         """
-        header = encode.header(self._stamp(kind))
-        self._events.publish(
-            PlanEvent(header=header, episode=at.episode.number, step=at.step, kind=kind, **details)
-        )
-        return stamp_ns(header)
+        event = encode.plan_event(kind, at.episode.number, at.step, self._stamp(kind), **details)
+        self._events.publish(event)
+        return stamp_ns(event.header)
 
     def _stamp(self, kind: int) -> Any:
         """The stamp of an event: planning ends as long after its start as it took.

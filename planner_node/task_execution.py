@@ -35,6 +35,7 @@ from slap_ros.errors import (
     SlapError,
     TaskCanceledError,
 )
+from slap_ros.planning.execution import DIVERGENCES
 from slap_ros.planning.options import OptionResult, hold_option
 from slap_ros.planning.plan import Plan, PlanEdge, PlanningResult
 from slap_ros.planning.planner import Planner
@@ -43,15 +44,6 @@ ANSWER_TIMEOUT = 5.0  # s, for the skill server to accept a goal, or to end one 
 ASK_AGAIN = 2.0  # s without a result after which it is asked for again
 OBSERVE_TIMEOUT = 5.0  # s, for a state that the skill server has seen to be seen here too
 
-# Outcomes of an edge after which a new plan from wherever the robot is now makes sense.
-DIVERGENCES = frozenset(
-    {
-        ErrorCode.SKILL_NOT_APPLICABLE,
-        ErrorCode.SKILL_STEP_LIMIT,
-        ErrorCode.SKILL_STOPPED_SHORT,
-        ErrorCode.INVALID_COMMAND,
-    }
-)
 # Where wrong perception is the cause of these, perceiving again may help.
 UNPLANNED = frozenset({ErrorCode.UNSOLVABLE, ErrorCode.PLANNING_LIMIT, ErrorCode.INVALID_STATE})
 

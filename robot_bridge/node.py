@@ -67,12 +67,12 @@ from typing import Any
 from builtin_interfaces.msg import Time
 from slap_msgs.srv import ResetTask
 
+from ensemble import encode
 from ensemble.entry_point import run_node
 from ensemble.interfaces import MARKERS
-from ensemble.lockstep_world import UNSAMPLED, LockstepWorld
+from ensemble.lockstep_world import LockstepWorld
 from ensemble.robot_parameters import RobotBridgeParameters
 from ensemble.steady_time import create_timer
-from ensemble.visualization import markers
 from robot_bridge.robot import Robot
 from robot_bridge.step_measurement import StepMeasurement
 from slap_ros.core import Action, Task
@@ -221,11 +221,11 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
     def _begin(self, state: State) -> None:
         goal = frozenset(self._goal) or self._domain.default_goal(state)
         self._enter(Phase.READY)
-        self._open_episode(Task(state, goal, self._domain.step_limit), UNSAMPLED, 0)
+        self._open_episode(Task(state, goal, self._domain.step_limit))
 
     def _show(self, state: State, stamp: Time) -> None:
         # Not as frames or joint states: those are the robot's own to publish.
-        self._markers.publish(markers(self._domain.display.bodies(state), stamp))
+        self._markers.publish(encode.SCENE.markers(self._domain.display.bodies(state), stamp))
 
 
 def main() -> int:

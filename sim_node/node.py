@@ -44,7 +44,7 @@ from rclpy.timer import Timer
 from slap_msgs.srv import ResetTask
 
 from ensemble.entry_point import run_node
-from ensemble.lockstep_world import UNSAMPLED, LockstepWorld
+from ensemble.lockstep_world import LockstepWorld
 from ensemble.parameters import parameter
 from ensemble.steady_time import create_timer
 from ensemble.visualization import Visualizer
@@ -85,8 +85,7 @@ class SimNode(LockstepWorld[SimParameters]):
         self._timer: Timer | None = None  # until the next state is due
         visualize = self._settings.visualize
         self._visualizer = Visualizer(self, self._domain) if visualize else None
-        first = self._settings.first_task(self._domain)
-        self._begin(first, self._settings.seed, self._settings.index)
+        self._begin(self._settings.first_task(self._domain))
 
     # -- commands and steps ---------------------------------------------------------------------
 
@@ -120,15 +119,14 @@ class SimNode(LockstepWorld[SimParameters]):
 
     def _reset(self, request: ResetTask.Request) -> None:
         if request.initial_state.objects:
-            self._begin(self._given_task(request), UNSAMPLED, 0)
+            self._begin(self._given_task(request))
         else:
-            task = self._domain.task(request.seed, request.index)
-            self._begin(task, request.seed, request.index)
+            self._begin(self._domain.task(request.seed, request.index))
 
-    def _begin(self, task: Task, seed: int, index: int) -> None:
+    def _begin(self, task: Task) -> None:
         self._world = self._domain.make_world(task.initial_state)
         self._stop_timer()
-        self._open_episode(task, seed, index)
+        self._open_episode(task)
 
     def _given_task(self, request: ResetTask.Request) -> Task:
         initial = decode_state(request.initial_state, self._domain.types_by_name)

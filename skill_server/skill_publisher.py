@@ -52,15 +52,6 @@ class SkillPublisher:
             outcome: How the option ended; an error code of NONE where it did not.
         """
         self._counts[kind] += 1
-        self._events.publish(
-            SkillEvent(
-                header=encode.header(self._node.get_clock().now().to_msg()),
-                episode=at.episode.number,
-                step=at.step,
-                kind=kind,
-                skill=option.skill.name,
-                objects=[obj.name for obj in option.objects],
-                error_code=int(outcome.code),
-                error_msg=outcome.reason,
-            )
-        )
+        now = self._node.get_clock().now().to_msg()
+        episode, step = at.episode.number, at.step
+        self._events.publish(encode.skill_event(kind, option, outcome, episode, step, now))

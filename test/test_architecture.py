@@ -19,8 +19,9 @@ FLOORS = (
     NODES,
     ("ensemble",),
     ("cli", "domain_check", "doctor"),
+    ("api",),
     ("report", "studies"),
-    ("robot", "bags", "evaluation"),
+    ("robot", "bags", "evaluation", "encoding"),
     ("acquisition", "shortcuts"),
     ("learning", "language"),
     ("drawing", "planning"),
@@ -40,8 +41,18 @@ def imports():
     return all_imports()
 
 
+DOOR = ("slap_ros", "api")  # what ``import slap_ros`` gives is named there for type checkers alone
+
+
 def inside(imports):
-    return [i for i in imports if i.imported in ORDER and i.importer != i.imported]
+    """Imports of one package of the project by another, the door's for types aside."""
+    return [
+        i
+        for i in imports
+        if i.imported in ORDER
+        and i.importer != i.imported
+        and ((i.importer, i.imported) != DOOR or i.at_run_time)
+    ]
 
 
 def test_every_package_has_a_floor(imports):

@@ -26,9 +26,10 @@ from ensemble.robot_parameters import parse_mock_robot
 from ensemble.run import RunRequest
 from ensemble.run import run as run_ensemble
 from ensemble.skill_request import SkillRequest
+from slap_ros.api.video import require_renderable
 from slap_ros.cli.console import console, print_json, styled
 from slap_ros.cli.options import say_default_seed
-from slap_ros.cli.render import check_renderable, picture_size
+from slap_ros.cli.render import picture_size
 from slap_ros.cli.render import render as write_animation
 from slap_ros.cli.skill_choice import open_chosen
 from slap_ros.core import Domain, Task, task_with_goal
@@ -143,7 +144,7 @@ def _check_planning(options: RunOptions, domain: Domain, task: Task) -> frozense
         make_planner(options.planner, domain, task.initial_state)
     chosen_library(options.shortcuts, domain, options.planner)
     if options.render is not None:
-        check_renderable(domain, task.initial_state, options.render)
+        require_renderable(domain, task.initial_state, options.render)
     return task.goal if options.goal else frozenset()
 
 

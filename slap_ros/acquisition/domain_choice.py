@@ -27,6 +27,9 @@ DEMONSTRATOR = "demonstrator"
 WORDS = (SHIPPED, NO_SKILLS, DEMONSTRATOR)
 # In a domain's configuration, which worlds announce and bags have; not there for its own skills.
 SKILLS_KEY, DIGEST_KEY = "skills", "skills_digest"
+# The skills as they were given, by the digest of the library that was found there: a domain has no
+# path in its configuration, which goes into bags.
+_OPENED: dict[str, str] = {}
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,18 @@ class DomainChoice:
             skills: As they were given; their digest is the domain's.
         """
         digest = str(domain.configuration.get(DIGEST_KEY, ""))
+        return cls(domain.name, domain.preset, skills, digest)
+
+    @classmethod
+    def opened_as(cls, domain: Domain) -> DomainChoice:
+        """The choice by which a domain was opened in this process, from what it says of itself.
+
+        Args:
+            domain: Opened by :func:`open_domain`; or made otherwise, and then without a library.
+        """
+        said = domain.configuration
+        digest = str(said.get(DIGEST_KEY, ""))
+        skills = _OPENED.get(digest, SHIPPED) if digest else str(said.get(SKILLS_KEY, SHIPPED))
         return cls(domain.name, domain.preset, skills, digest)
 
     @property
@@ -171,6 +186,7 @@ def open_domain(choice: DomainChoice) -> Domain:
         choice.require_digest(library.digest)
         folder = choice.library_folder
         assert folder is not None
+        _OPENED[library.digest] = choice.skills
         said = {SKILLS_KEY: folder.resolve().name, DIGEST_KEY: library.digest}
         return _configured(acquired_domain(domain, library), said)
     choice.require_digest("")

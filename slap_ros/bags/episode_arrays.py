@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,12 @@ from slap_ros.bags.reader import Bag
 from slap_ros.bags.recording import RecordedEpisode, initial_state
 from slap_ros.bags.taken_commands import taken_commands
 from slap_ros.core import Action, Domain
-from slap_ros.errors import DamagedBagError, ForeignBagError, InvalidStateError
+from slap_ros.errors import (
+    DamagedBagError,
+    ForeignBagError,
+    InvalidParameterError,
+    InvalidStateError,
+)
 from slap_ros.evaluation.atom_names import AtomNames, atom_names
 from slap_ros.evaluation.executed_options import ExecutedOption
 from slap_ros.evaluation.metrics import UNKNOWN, RunMetrics
@@ -29,6 +34,9 @@ from slap_ros.evaluation.run_trace import RunTrace
 from slap_ros.messages.decode import decode_state, stamp_ns
 from slap_ros.relational import State
 from slap_ros.relational.state import Array
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -105,6 +113,47 @@ class EpisodeArrays:
             "run": None if self.metrics is None else self.metrics.as_json(),
             "metadata": dict(self.metadata),
         }
+
+    def to_npz(self, path: Path | str) -> Path:
+        """Write everything as one NumPy file, as ``slap bag export --format npz`` does.
+
+        Args:
+            path: File to write, which ends in ``.npz`` and must not exist.
+
+        Returns:
+            The path.
+
+        Raises:
+            InvalidParameterError: The name has another ending, or there is something.
+            StorageFullError: It cannot be written; nothing is left behind.
+        """
+        # What exports episodes imports this file.
+        from slap_ros.bags.export import choose_format, export_episodes, require_exportable
+
+        file = Path(path)
+        npz = choose_format("npz", file)
+        require_exportable(npz, file)
+        export_episodes([self], file, npz)
+        return file
+
+    def to_pandas(self) -> DataFrame:
+        """A table with a row per state, named by step: features, actions, atoms, option, reward.
+
+        The columns are those of ``slap bag export --format csv``.
+
+        Raises:
+            InvalidParameterError: Pandas is not installed.
+        """
+        from slap_ros.bags.export.episode_table import episode_columns
+
+        try:
+            from pandas import DataFrame
+        except ImportError as error:
+            raise InvalidParameterError(
+                "to_pandas needs pandas, which is not installed: pip install pandas; "
+                "to_npz does without"
+            ) from error
+        return DataFrame(episode_columns(self)).set_index("step")
 
     def __repr__(self) -> str:
         return (

@@ -14,6 +14,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
+from slap_ros.api.video import require_renderable
 from slap_ros.bags import (
     BagEvaluation,
     bag_info,
@@ -26,7 +27,7 @@ from slap_ros.bags.export import choose_format, export_episodes, require_exporta
 from slap_ros.bags.recording import Recording
 from slap_ros.cli.console import console, exits, print_json, styled
 from slap_ros.cli.options import Json
-from slap_ros.cli.render import Size, check_renderable, picture_size
+from slap_ros.cli.render import Size, picture_size
 from slap_ros.cli.render import render as write_animation
 from slap_ros.errors import DamagedBagError, ErrorCode
 from slap_ros.evaluation.metrics import RunMetrics, known
@@ -128,7 +129,7 @@ def render(
     states = [decode_state(message, domain.types_by_name) for message in messages]
     if not states:
         raise DamagedBagError(f"{bag} has no states, so there is nothing to render")
-    check_renderable(domain, states[0], output)
+    require_renderable(domain, states[0], output)
     write_animation(domain, states, output, pixels)
     return _warn(found.damage)
 

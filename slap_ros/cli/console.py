@@ -154,6 +154,11 @@ def _internal_complaint(error: Exception) -> str:
     return f"this is a fault of slap: {error!r}; please report it with {Path(log.name)}"
 
 
+def warn(text: str) -> None:
+    """Print a sentence as a warning."""
+    console.print(styled("warning", "yellow", f" {text}"))
+
+
 def print_json(data: Any) -> None:
     """Data on stdout."""
     sys.stdout.write(json.dumps(data, allow_nan=False) + "\n")

@@ -12,20 +12,20 @@ import typer
 from rich.table import Table
 
 from slap_ros.acquisition.domain_choice import SHIPPED
+from slap_ros.api.command_line import command_line
+from slap_ros.api.evaluation import compared_approaches, run_approaches
 from slap_ros.cli.bars import counting_bars
-from slap_ros.cli.command_line import command_line
 from slap_ros.cli.console import console, print_json
 from slap_ros.cli.options import DomainName, Goal, Jobs, Json, Planner, Preset
-from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose, sampling
+from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose
 from slap_ros.cli.skill_choice import Skills, open_chosen
 from slap_ros.core import Domain
-from slap_ros.errors import ErrorCode, InvalidParameterError
-from slap_ros.evaluation.approaches import Approach, approaches, shooting
+from slap_ros.errors import ErrorCode
+from slap_ros.evaluation.approaches import Approach
 from slap_ros.evaluation.evaluation_file import require_replaceable, write_evaluation
-from slap_ros.evaluation.experiment import Experiment, Trial, run_all
+from slap_ros.evaluation.experiment import Experiment, Trial
 from slap_ros.evaluation.summary import Spread, Summary
 from slap_ros.files import require_writable
-from slap_ros.planning.planner import make_planner
 from slap_ros.shortcuts.library import Library
 from slap_ros.shortcuts.shipped import shipped_library
 from slap_ros.studies.results import describe_library, describe_skills
@@ -84,27 +84,13 @@ def evaluate(
         require_writable(output)
         require_replaceable(output, command)
     library = choose(shortcuts, chosen, planner)
-    compared = _compared(library, chosen, samples, with_shooting)
+    compared = compared_approaches(library, chosen, samples, with_shooting)
     experiment = Experiment(chosen, tasks, seeds, first_seed, planner, goal=goal, skills=skills)
-    make_planner(planner, chosen, experiment.task(first_seed, 0).initial_state)
     results = _run(experiment, compared, jobs)
     if output is not None:
         origin = {"command": command, "domain": domain, **settings}
         write_evaluation(output, origin | _libraries(chosen, shortcuts, library), results)
     return _show(experiment, [summary for summary, _ in results], json)
-
-
-def _compared(
-    library: Library | None, domain: Domain, samples: int, with_shooting: bool
-) -> list[Approach]:
-    compared = list(approaches(library, sampling(samples)))
-    if with_shooting:
-        if library is None:
-            raise InvalidParameterError(
-                "--shooting searches where shortcuts of a library would be used: give --shortcuts"
-            )
-        compared.insert(1, shooting(library, domain, sampling(samples)))
-    return compared
 
 
 def _libraries(domain: Domain, shortcuts: str | None, library: Library | None) -> dict[str, Any]:
@@ -131,21 +117,20 @@ def _run(
     experiment: Experiment, compared: Sequence[Approach], jobs: int
 ) -> list[tuple[Summary, list[Trial]]]:
     """Approach by approach, pure planning first."""
-    results: list[tuple[Summary, list[Trial]]] = []
-    yardstick: list[Trial] = []
     with counting_bars() as bar:
         watched = bar.add_task(experiment.domain.name, total=len(experiment) * len(compared))
-        for approach in compared:
-            trials = []
-            for trial in run_all(experiment, approach, jobs):
-                trials.append(trial)
-                bar.advance(watched)
-                if not trial.success:
-                    console.print(_complaint(approach, trial))
-            trials.sort(key=lambda trial: (trial.seed, trial.index))
-            yardstick = yardstick or trials
-            results.append((Summary.of(experiment, approach.name, trials, yardstick), trials))
-    return results
+
+        def on_trial(approach: Approach, trial: Trial) -> None:
+            bar.advance(watched)
+            if not trial.success:
+                console.print(_complaint(approach, trial))
+
+        tried = run_approaches(experiment, compared, jobs, on_trial)
+    yardstick = tried[0][1]
+    return [
+        (Summary.of(experiment, approach.name, trials, yardstick), trials)
+        for approach, trials in tried
+    ]
 
 
 def _complaint(approach: Approach, trial: Trial) -> str:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from threading import Event, Thread
 from typing import Self
 
@@ -25,7 +26,7 @@ class LearningBars:
             bar: What the bar itself looks like.
             after: What stands behind the text in which a bar says more, its field ``detail``.
         """
-        self.bars = Bars(
+        self._columns = (
             TextColumn("{task.description}", markup=False),
             bar,
             TextColumn("{task.fields[detail]}", markup=False),
@@ -34,13 +35,20 @@ class LearningBars:
         self._counting: dict[str, TaskID] = {}
         self._following: tuple[Event, Thread] | None = None
 
+    @cached_property
+    def bars(self) -> Bars:
+        """The bars on the screen, from the first one on: a refusal has none around it."""
+        bars = Bars(*self._columns)
+        bars.start()
+        return bars
+
     def __enter__(self) -> Self:
-        self.bars.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         self.unfollow()
-        self.bars.stop()
+        if "bars" in vars(self):
+            self.bars.stop()
 
     def on_progress(self, what: str, done: int, total: int) -> None:
         """So many jobs of a kind are done.

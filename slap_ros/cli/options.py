@@ -13,7 +13,7 @@ from typing import Annotated, Any, TypeVar, get_type_hints
 
 import typer
 
-from slap_ros.cli.command_line import option_of
+from slap_ros.api.command_line import option_of
 from slap_ros.cli.console import console
 from slap_ros.errors import InvalidParameterError
 

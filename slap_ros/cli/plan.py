@@ -21,7 +21,7 @@ from slap_ros.cli.options import (
     say_default_seed,
     seed_or_default,
 )
-from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose
+from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts
 from slap_ros.cli.skill_choice import Skills, open_chosen
 from slap_ros.files import require_writable
 
@@ -70,5 +70,5 @@ def plan(
         require_writable(output)
     chosen = open_chosen(domain, preset, skills)
     task = task_with_goal(chosen, seed_or_default(seed), index, goal)
-    plan_task(chosen, task, planner, choose(shortcuts, chosen, planner), samples, output, json)
+    plan_task(chosen, task, planner, shortcuts, samples, output, json)
     say_default_seed(seed)

@@ -7,19 +7,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from slap_ros.cli.console import console, print_json
-from slap_ros.cli.shortcuts import sampling
+from slap_ros.api.planning import plan_task as make_plan
+from slap_ros.cli.console import console, print_json, warn
+from slap_ros.cli.shortcuts import wanted
 from slap_ros.core import Domain, Task
 from slap_ros.drawing import draw_abstract_graph
 from slap_ros.errors import StorageFullError
-from slap_ros.evaluation.approaches import approaches
 from slap_ros.files import write_whole
 from slap_ros.planning.abstract_graph import AbstractGraph, build_abstract_graph
 from slap_ros.planning.plan import PlanningResult
 from slap_ros.planning.planner import Problem, plan_symbolically
 from slap_ros.relational import AtomSpace, LiftedOperator, ground_operators
 from slap_ros.relational.pddl import write_domain, write_problem
-from slap_ros.shortcuts.library import Library
 from slap_ros.versions import versions
 
 
@@ -27,7 +26,7 @@ def plan_task(
     domain: Domain,
     task: Task,
     planner: str,
-    library: Library | None,
+    shortcuts: str | None,
     samples: int,
     output: Path | None,
     json: bool,
@@ -38,7 +37,7 @@ def plan_task(
         domain: Domain of the task. Without skills, its hand-written operators are planned with.
         task: Start and goal.
         planner: Name of the planner.
-        library: Shortcuts to plan with, if any.
+        shortcuts: Folder of a shortcut library, or none; None for the shipped one.
         samples: Attempts of a shortcut in the model.
         output: Folder for domain.pddl, problem.pddl and graph.svg, if they are wanted.
         json: Whether stdout gets JSON.
@@ -49,13 +48,10 @@ def plan_task(
     if not domain.operators and domain.acquisition and domain.acquisition.operators:
         _plan_by_hand(domain, domain.acquisition.operators, task, output, json)
         return
-    space = domain.atom_space(task.initial_state)
-    approach = approaches(library, sampling(samples))[-1]
-    result = approach.planner(planner, domain, task.initial_state).plan(
-        task.initial_state, space.mask(task.goal)
-    )
+    result = make_plan(domain, task, wanted(shortcuts), planner, samples, warn)
     _show(result, json)
     if output is not None:
+        space = domain.atom_space(task.initial_state)
         graph = draw_abstract_graph(
             _graph(domain, task, space), space, result.plan, f"{domain.name}: plan"
         )

@@ -23,6 +23,7 @@ from slap_ros.acquisition.proposer_names import (
     REWARDERS,
     require_known,
 )
+from slap_ros.api.proposing import answer, request_for
 from slap_ros.cli.console import console, print_json
 from slap_ros.cli.options import DomainOrFile, Goal, Index, Json, Preset, Seed
 from slap_ros.cli.proposer_options import ProposerOptions
@@ -82,8 +83,7 @@ def propose(options: ProposeOptions, proposers: ProposerOptions) -> None:
     log = AttemptLog(
         None if options.output is None else options.output / "attempts.jsonl", show_entry
     )
-    inquiry = proposers.inquiry(request, log)
-    proposal = request.propose(inquiry)
+    proposal, inquiry = answer(request, proposers, log)
     problem = request.problem
     files = _write(options.output, proposal, problem) if options.output is not None else []
     if options.json:
@@ -109,8 +109,7 @@ def _posed(options: ProposeOptions, proposers: ProposerOptions) -> ProposalReque
         return _posed_by_files(options, options.problem, proposers.proposer)
     domain = get_domain(options.domain, options.preset)
     task = task_with_goal(domain, options.seed, options.index, options.goal)
-    shown = proposers.demonstrations_in(domain)
-    return ProposalRequest.of_task(domain, task, proposers.proposer, options.rewarder, shown)
+    return request_for(domain, task, proposers, options.rewarder)
 
 
 def _posed_by_files(options: ProposeOptions, problem: Path, proposer: str) -> ProposalRequest:

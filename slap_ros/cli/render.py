@@ -11,13 +11,11 @@ from typing import Annotated
 
 import typer
 
+from slap_ros.api.video import write_video
 from slap_ros.cli.bars import counting_bars
 from slap_ros.cli.console import console
-from slap_ros.core import Animate, Domain, PictureSize
-from slap_ros.drawing.body_pictures import SIZE, visible, write_body_animation
-from slap_ros.errors import InvalidParameterError, StorageFullError
-from slap_ros.files import require_writable
-from slap_ros.physics.animation import WRITERS
+from slap_ros.core import Domain, PictureSize
+from slap_ros.errors import InvalidParameterError
 from slap_ros.relational import State
 
 LARGEST = PictureSize(3840, 2160)
@@ -49,30 +47,6 @@ def picture_size(text: str | None) -> PictureSize | None:
     )
 
 
-def check_renderable(domain: Domain, state: State, path: Path) -> None:
-    """Refuse what could not be rendered before anything is run.
-
-    Args:
-        domain: Whose states are to be rendered.
-        state: One of them.
-        path: The file to write.
-
-    Raises:
-        InvalidParameterError: The domain displays no bodies, or the file has another ending than
-            those of animations.
-        OSError: It cannot be written.
-    """
-    if domain.display.animate is None and not visible(domain.display, state):
-        raise InvalidParameterError(
-            f"{domain.name} displays no bodies (Display.bodies), so there is nothing to render"
-        )
-    if path.suffix not in WRITERS:
-        raise InvalidParameterError(
-            f"an animation is a file that ends in {' or '.join(WRITERS)}, not {path.name!r}"
-        )
-    require_writable(path)
-
-
 def render(
     domain: Domain, states: Sequence[State], path: Path, size: PictureSize | None = None
 ) -> None:
@@ -89,18 +63,5 @@ def render(
     """
     with counting_bars() as bar:
         task = bar.add_task("rendering", total=len(states))
-        try:
-            _animation(domain)(path, states, size, lambda done: bar.update(task, completed=done))
-        except OSError as error:
-            raise StorageFullError(f"cannot write {path}: {error.strerror or error}") from error
+        write_video(domain, states, path, size, lambda done: bar.update(task, completed=done))
     console.print(f"animation: {path}")
-
-
-def _animation(domain: Domain) -> Animate:
-    """What writes an animation: the domain's own, or a plain drawing of its bodies."""
-    if domain.display.animate is not None:
-        return domain.display.animate
-    period_s = domain.execution.control_period_s
-    return lambda path, states, size, progress: write_body_animation(
-        path, domain.display, states, period_s, size or SIZE, progress
-    )

@@ -4,13 +4,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from slap_ros.cli.console import console, styled
-from slap_ros.shortcuts.shortcut import DEFAULT, Sampling
+from slap_ros.cli.console import warn
+from slap_ros.shortcuts.shortcut import DEFAULT
 
 if TYPE_CHECKING:
     from slap_ros.core import Domain
@@ -47,14 +46,14 @@ def choose(choice: str | None, domain: Domain, planner: str) -> Library | None:
         InvalidLibraryError: It cannot be used as a whole.
         InvalidParameterError: The planner cannot use it.
     """
-    from slap_ros.shortcuts.shipped import chosen_library  # only where there is a domain
+    from slap_ros.api.shortcut_choice import choose_library  # only where there is a domain
 
-    library = chosen_library(choice, domain, planner)
-    for reason in library.refused if library is not None else ():
-        console.print(styled("warning", "yellow", f" a shortcut is left out: {reason}"))
-    return library
+    return choose_library(wanted(choice), domain, planner, warn)
 
 
-def sampling(samples: int) -> Sampling:
-    """The default sampling with so many attempts."""
-    return replace(DEFAULT, samples=samples)
+def wanted(choice: str | None) -> str | None:
+    """The option's value as the Python API has it: ``shipped``, a folder, or None for none."""
+    from slap_ros.api.opening import SHIPPED_WORD
+    from slap_ros.shortcuts.shipped import NONE
+
+    return None if choice == NONE else choice or SHIPPED_WORD

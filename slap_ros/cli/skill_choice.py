@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from slap_ros.acquisition.domain_choice import DomainChoice, chosen_skills, open_domain
-from slap_ros.cli.console import console, styled
+from slap_ros.acquisition.domain_choice import DomainChoice
+from slap_ros.cli.console import warn
 
 if TYPE_CHECKING:
     from slap_ros.core import Domain
@@ -35,8 +35,6 @@ def open_chosen(domain: str, preset: str | None, skills: str) -> Domain:
     Raises:
         SlapError: There is no such domain, preset, or library.
     """
-    choice = DomainChoice(domain, preset or "", skills)
-    library = chosen_skills(choice)
-    for reason in library.refused if library is not None else ():
-        console.print(styled("warning", "yellow", f" a skill is left out: {reason}"))
-    return open_domain(choice)
+    from slap_ros.api import opening  # only where there is a domain
+
+    return opening.open_chosen(DomainChoice(domain, preset or "", skills), warn)

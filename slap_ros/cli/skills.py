@@ -18,7 +18,7 @@ from slap_ros.acquisition.skill_library import (
     load_skill_library,
     read_library_record,
 )
-from slap_ros.cli.console import console, print_json, styled
+from slap_ros.cli.console import console, print_json, warn
 from slap_ros.cli.options import Json
 from slap_ros.domains import get_domain
 
@@ -36,7 +36,7 @@ def skills(
     for skill in read.skills:
         _show(skill)
     for reason in read.refused:
-        console.print(styled("warning", "yellow", f" a skill is left out: {reason}"))
+        warn(f"a skill is left out: {reason}")
     if isinstance(answered_by := about.get("answered_by"), dict):
         console.print(f"operators or rewards are {described(answered_by)}")
     progress = about.get("progress_on_fresh_tasks")

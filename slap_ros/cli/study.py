@@ -14,10 +14,12 @@ from typing import Annotated, Any
 import typer
 
 from slap_ros.acquisition.domain_choice import DomainChoice
+from slap_ros.api.jobs import require_torch
+from slap_ros.api.shortcut_choice import sampling
 from slap_ros.cli import acquisition_study
 from slap_ros.cli.console import console, exits
 from slap_ros.cli.options import DomainName, Jobs, Preset, flat_options
-from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose, sampling
+from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose
 from slap_ros.cli.study_report import (
     FRESH_SEED,
     RESULTS,
@@ -27,7 +29,6 @@ from slap_ros.cli.study_report import (
     provenance,
     require_report,
 )
-from slap_ros.cli.train import require_torch
 from slap_ros.core import Domain
 from slap_ros.domains import get_domain, preset_names
 from slap_ros.errors import InvalidParameterError

@@ -11,8 +11,8 @@ from typing import Annotated, Any
 import typer
 from rich.progress import TaskID
 
+from slap_ros.api.command_line import command_line
 from slap_ros.cli.bars import counting_bars
-from slap_ros.cli.command_line import command_line
 from slap_ros.cli.console import console
 from slap_ros.cli.options import MAX_SEED
 from slap_ros.files import require_writable

@@ -4,38 +4,26 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
-from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
-from importlib.util import find_spec
+from dataclasses import dataclass
 from math import isnan
-from os.path import relpath
 from pathlib import Path
 from time import monotonic
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from rich.progress import BarColumn, TaskID, TimeRemainingColumn
 
-from slap_ros.acquisition.domain_choice import SHIPPED, WORDS, DomainChoice
+from slap_ros.acquisition.domain_choice import SHIPPED
+from slap_ros.api.training import skills_option
+from slap_ros.api.training import train as train_library
 from slap_ros.cli.console import console, print_json
 from slap_ros.cli.learning_bars import LearningBars
 from slap_ros.cli.options import DomainName, Json, Preset, Ray, TrainingSeed
 from slap_ros.cli.skill_choice import Skills, open_chosen
-from slap_ros.core import Domain
-from slap_ros.errors import InvalidParameterError
-from slap_ros.files import require_writable, sole_use
-from slap_ros.learning.setting_changes import changed, parse_changes
-from slap_ros.learning.task_distribution import TaskDistribution
-from slap_ros.learning.workers import Workers, local_workers, ray_workers
-from slap_ros.planning.planner import require_skills
-from slap_ros.shortcuts.library import save_library
 from slap_ros.shortcuts.progress import latest
-from slap_ros.shortcuts.settings import TrainingSettings, training_settings
-from slap_ros.shortcuts.training import CandidateGroup, Training
+from slap_ros.shortcuts.training import CandidateGroup
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
-from slap_ros.studies.results import describe_skills
 
 
 @dataclass(frozen=True)
@@ -88,37 +76,9 @@ class TrainOptions:
         return self.output or Path("runs/models") / self.domain
 
     @property
-    def work_folder(self) -> Path:
-        """Where checkpoints and logs are, by default beside the library."""
-        return self.work or self.library_folder.with_name(f"{self.library_folder.name}-training")
-
-    def training_settings(self, domain: Domain) -> TrainingSettings:
-        """Hyper-parameters of the training.
-
-        Raises:
-            InvalidParameterError: There are none of that name, or they cannot be changed so.
-            InvalidDomainError: See :func:`~slap_ros.shortcuts.settings.training_settings`.
-        """
-        chosen = training_settings(self.settings, domain)
-        changes = parse_changes(self.set or (), TrainingSettings)
-        if self.steps is not None and (both := [n for n in changes if n.endswith("total_steps")]):
-            raise InvalidParameterError(f"--steps and --set {both[0]} say the same: give one")
-        chosen = changed(chosen, changes)
-        return chosen if self.steps is None else chosen.with_total_steps(self.steps)
-
-    @property
-    def command(self) -> str:
-        """The command that trains the same library again."""
-        command = f"slap train {self.domain} --preset {self.preset}{self.skills_given}"
-        steps = "" if self.steps is None else f" --steps {self.steps}"
-        changes = "".join(f" --set {shlex.quote(text)}" for text in self.set or ())
-        return f"{command} --seed {self.seed} --settings {self.settings}{steps}{changes}"
-
-    @property
     def skills_given(self) -> str:
-        """The option ``--skills`` as a part of commands; never an absolute path."""
-        name = self.skills if self.skills in WORDS else relpath(self.skills)
-        return f" --skills {shlex.quote(name)}" if self.skills else ""
+        """The option ``--skills`` as a part of commands."""
+        return skills_option(self.skills)
 
 
 def train(options: TrainOptions) -> int:
@@ -128,25 +88,20 @@ def train(options: TrainOptions) -> int:
     TensorBoard.
     """
     domain = open_chosen(options.domain, options.preset, options.skills)
-    require_skills(domain)
-    options = replace(options, preset=domain.preset)
-    settings = options.training_settings(domain)
-    for folder in (options.library_folder, options.work_folder):
-        require_writable(folder)
-    require_torch()
     began, folder = monotonic(), options.library_folder
-    distribution = TaskDistribution(DomainChoice.of(domain, options.skills), options.seed)
-    with (
-        sole_use(options.work_folder),
-        training_workers(options.jobs, options.ray) as workers,
-        _TrainingBars() as bars,
-    ):
-        library = Training(distribution, settings, options.work_folder, workers, bars).run()
-    made_by: dict[str, Any] = {"command": options.command}
-    if acquired := describe_skills(domain):
-        made_by["skills"] = acquired
-    library = replace(library, record={**made_by, **library.record})
-    save_library(folder, library)
+    with _TrainingBars() as bars:
+        library = train_library(
+            domain,
+            folder,
+            seed=options.seed,
+            settings=options.settings,
+            changes=options.set or (),
+            steps=options.steps,
+            work=options.work,
+            jobs=options.jobs,
+            ray=options.ray,
+            callback=bars,
+        )
     seconds = monotonic() - began
     if options.json:
         print_json({"library": str(folder), **library.record, "seconds": seconds})
@@ -155,27 +110,6 @@ def train(options: TrainOptions) -> int:
         f"with `slap evaluate {options.domain}{options.skills_given} --shortcuts {folder}`",
     )
     return 0
-
-
-def training_workers(jobs: int, ray: str | None) -> AbstractContextManager[Workers]:
-    """So many processes, or the Ray cluster at an address."""
-    return local_workers(jobs) if ray is None else ray_workers(ray)
-
-
-def require_torch() -> None:
-    """Refuse to train without what training needs.
-
-    It is looked for and not imported: jobs import it, and this process would for seconds.
-
-    Raises:
-        InvalidParameterError: It is not installed.
-    """
-    missing = [name for name in ("torch", "stable_baselines3") if find_spec(name) is None]
-    if missing:
-        raise InvalidParameterError(
-            f"training needs torch and stable-baselines3, and there is no {missing[0]}: "
-            "pip install 'slap_ros[train]'"
-        )
 
 
 class _TrainingBars(LearningBars):

@@ -10,7 +10,7 @@ from slap_ros.core.domain_factory import DomainFactory, presets
 from slap_ros.core.goals import task_with_goal
 from slap_ros.core.learner_interface import LearnerInterface, Learning, SettingValue
 from slap_ros.core.skill import DemandingSkill, Policy, Skill
-from slap_ros.core.task import Task
+from slap_ros.core.task import UNSAMPLED, Task
 from slap_ros.core.world import MakeVectorWorld, SyncVectorWorld, VectorWorld, World
 
 __all__ = [
@@ -36,6 +36,7 @@ __all__ = [
     "Skill",
     "SyncVectorWorld",
     "Task",
+    "UNSAMPLED",
     "VectorWorld",
     "VisibleBody",
     "World",

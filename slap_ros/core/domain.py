@@ -15,6 +15,7 @@ from slap_ros.core.acquisition import Acquisition
 from slap_ros.core.action_space import ActionSpace
 from slap_ros.core.display import Display
 from slap_ros.core.learner_interface import Learning
+from slap_ros.core.notebook import ShownInNotebooks
 from slap_ros.core.skill import Skill
 from slap_ros.core.task import Task
 from slap_ros.core.world import SyncVectorWorld, VectorWorld, World
@@ -57,7 +58,7 @@ class Execution:
 
 
 @dataclass(frozen=True)
-class Domain:
+class Domain(ShownInNotebooks):
     """A planning domain together with its world.
 
     Operators and skills may be missing: ``acquisition`` says what they are acquired with.
@@ -126,6 +127,10 @@ class Domain:
             self._check_operator(operator)
         self._check_static_predicates()
         self._check_learned_actions()
+
+    def __str__(self) -> str:
+        """Name and preset."""
+        return f"{self.name}, preset {self.preset}"
 
     def _check_static_predicates(self) -> None:
         if self.static is None:
@@ -227,7 +232,11 @@ class Domain:
         """
         if min(seed, index) < 0:
             raise InvalidParameterError(f"seed {seed} and index {index} must not be negative")
-        rng = np.random.default_rng([seed, index])
+        task = self._sampled(np.random.default_rng([seed, index]), goal)
+        return replace(task, seed=seed, index=index)
+
+    def _sampled(self, rng: np.random.Generator, goal: str | None) -> Task:
+        """The next task of a stream, or the next that has the objects of a named goal."""
         if goal is None:
             return self.sample_task(rng)
         if goal not in self.goals:

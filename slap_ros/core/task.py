@@ -4,15 +4,33 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from slap_ros.core.notebook import ShownInNotebooks
 from slap_ros.relational import GroundAtom, State
+
+UNSAMPLED = -1  # seed of a task that was given or measured, not sampled
 
 
 @dataclass(frozen=True)
-class Task:
-    """Where to start, what to reach, and in how many environment steps."""
+class Task(ShownInNotebooks):
+    """Where to start, what to reach, and in how many environment steps.
+
+    Args:
+        initial_state: State in which it begins.
+        goal: Atoms that must hold at its end.
+        step_limit: Environment steps that it may take.
+        seed: Seed that sampled it, or ``UNSAMPLED``; of two equal tasks it may differ.
+        index: Which of the seed's tasks it is.
+    """
 
     initial_state: State
     goal: frozenset[GroundAtom]
     step_limit: int
+    seed: int = field(default=UNSAMPLED, compare=False)
+    index: int = field(default=0, compare=False)
+
+    def __str__(self) -> str:
+        """The goal, and what sampled the task."""
+        origin = "given" if self.seed == UNSAMPLED else f"seed {self.seed}, index {self.index}"
+        return f"{', '.join(sorted(map(str, self.goal)))} ({origin})"

@@ -43,16 +43,15 @@ def state_facts(
     facts = [
         f"Goal: {', '.join(words.atoms(graph.goal)) or 'nothing'}.",
         f"{nodes}, {edges} between them.",
-        _plan_fact(plan),
     ]
+    if plan is not None:
+        facts.append(_plan_fact(plan))
     if selection.hidden:
         facts.append(f"{selection.hidden} states are not shown.")
     return facts
 
 
-def _plan_fact(plan: Plan | None) -> str:
-    if plan is None:
-        return "There is no plan."
+def _plan_fact(plan: Plan) -> str:
     if not plan.edges:
         return "The plan is empty: the goal holds at the start."
     steps = counted(plan.predicted_steps, "step")

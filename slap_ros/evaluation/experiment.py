@@ -13,7 +13,7 @@ from slap_ros.acquisition.domain_choice import SHIPPED, DomainChoice, open_domai
 from slap_ros.core import Domain, Task, task_with_goal
 from slap_ros.errors import ErrorCode
 from slap_ros.evaluation.approaches import PURE_PLANNING, Approach
-from slap_ros.learning.workers import local_workers
+from slap_ros.learning.workers import Workers, local_workers
 from slap_ros.planning.execution import EpisodeResult, ExecutedEdge, Executor
 from slap_ros.relational import GroundAtom
 
@@ -203,10 +203,24 @@ def run_all(experiment: Experiment, approach: Approach, jobs: int) -> Iterator[T
     Yields:
         The figures of each task, as it ends.
     """
-    work = [task_job(experiment, approach, seed, index) for seed, index in experiment]
     with local_workers(jobs) as workers:
-        for _, trial in workers.run(try_task, work):
-            yield trial
+        yield from run_with(workers, experiment, approach)
+
+
+def run_with(workers: Workers, experiment: Experiment, approach: Approach) -> Iterator[Trial]:
+    """Solve every task of an experiment; see :func:`run_all`.
+
+    Args:
+        workers: Where the tasks are solved.
+        experiment: Which tasks.
+        approach: How to plan.
+
+    Yields:
+        The figures of each task, as it ends.
+    """
+    work = [task_job(experiment, approach, seed, index) for seed, index in experiment]
+    for _, trial in workers.run(try_task, work):
+        yield trial
 
 
 TaskJob = tuple[DomainChoice, str | None, str, Approach, int, int]

@@ -18,6 +18,7 @@ TASK = "slap_msgs/msg/Task"
 STATE = "slap_msgs/msg/ObjectCentricState"
 ATOMS = "slap_msgs/msg/AbstractState"
 COMMAND = "slap_msgs/msg/RobotCommand"
+FAULT = "slap_msgs/msg/EpisodeFault"
 PLAN = "slap_msgs/msg/Plan"
 PLAN_EVENT = "slap_msgs/msg/PlanEvent"
 SKILL_EVENT = "slap_msgs/msg/SkillEvent"
@@ -25,6 +26,8 @@ SKILL_LIBRARY = "slap_msgs/msg/SkillLibrary"
 ACQUISITION_EVENT = "slap_msgs/msg/AcquisitionEvent"
 MARKERS = "visualization_msgs/msg/MarkerArray"
 BODIES = "bodies"  # the namespace of markers that show what is there
+ROBOT = "robot"  # that of markers that show the arm
+CUBE, TRIANGLE_LIST = 1, 11  # types of markers that are drawn
 
 
 @lru_cache(maxsize=1)

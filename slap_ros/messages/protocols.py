@@ -104,6 +104,7 @@ class DomainInfoMessage(Protocol):
     name: str
     preset: str
     types: Sequence[TypeInfoMessage]
+    action_names: Sequence[str]
     control_period: float
     configuration: Sequence[KeyValueMessage]
     versions: Sequence[KeyValueMessage]

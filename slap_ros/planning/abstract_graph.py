@@ -8,10 +8,11 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
+from slap_ros.core.notebook import ShownInNotebooks
 from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.planning.hmax import HMaxHeuristic
 from slap_ros.planning.options import Option
-from slap_ros.relational import GroundOperator
+from slap_ros.relational import AtomSpace, GroundOperator
 
 MAX_NODES = 200_000  # abstract states after which the top level is given up
 MANY_NODES = 20_000  # abstract states after which those too far from the goal are pruned
@@ -27,7 +28,7 @@ class Edge:
 
 
 @dataclass
-class AbstractGraph:
+class AbstractGraph(ShownInNotebooks):
     """Abstract states in order of discovery, and the options between them.
 
     Search follows *forward* edges only, those to a node discovered later. The others lead back
@@ -38,6 +39,12 @@ class AbstractGraph:
     nodes: list[int] = field(default_factory=list)  # abstract states
     depth: list[int] = field(default_factory=list)  # operators from the start
     edges: list[Edge] = field(default_factory=list)
+    # The atoms that masks stand for, to name and draw them; None where nobody has said.
+    space: AtomSpace | None = field(default=None, repr=False, compare=False)
+
+    def __str__(self) -> str:
+        """How large it is."""
+        return f"{len(self.nodes)} abstract states, {len(self.edges)} edges"
 
     @property
     def goal_nodes(self) -> list[int]:

@@ -21,13 +21,22 @@ from slap_ros.errors import (
 )
 from slap_ros.perception import ExactPerceiver, Perceiver, Percept
 from slap_ros.planning.options import Option, OptionExecution, OptionKind, OptionResult
-from slap_ros.planning.plan import Plan, PlanEdge
+from slap_ros.planning.plan import Plan, PlanEdge, PlanningResult
 from slap_ros.planning.planner import Planner
 from slap_ros.relational import AtomSpace, State
 
 MAX_REPLANS = 5  # default; a deterministic world needs none
 # What keeps a plan from being made. What was perceived wrongly may be perceived better next time.
 UNPLANNED = (UnsolvableError, PlanningLimitError, InvalidStateError, NoDetectionError)
+# Outcomes of an edge after which a new plan from wherever the robot is now makes sense.
+DIVERGENCES = frozenset(
+    {
+        ErrorCode.SKILL_NOT_APPLICABLE,
+        ErrorCode.SKILL_STEP_LIMIT,
+        ErrorCode.SKILL_STOPPED_SHORT,
+        ErrorCode.INVALID_COMMAND,
+    }
+)
 FINAL = frozenset({ErrorCode.STEP_LIMIT, ErrorCode.NO_DETECTION})  # another plan is no help
 
 
@@ -51,6 +60,27 @@ class ExecutedEdge:
 
 
 @dataclass
+class PlanExecution:
+    """One plan of an episode, or an attempt to make one, and what came of it.
+
+    Args:
+        first_step: Environment steps taken before it.
+        planned: Plan with the effort of finding it; None where none was found.
+        seconds: Time that planning took, s.
+        outcomes: How the execution of each edge ended, in order, up to the first that failed.
+        steps: Environment steps that each of these edges took.
+        unplanned: Why none was found; without a reason where one was.
+    """
+
+    first_step: int
+    planned: PlanningResult | None = None
+    seconds: float = 0.0
+    outcomes: list[OptionResult] = field(default_factory=list)
+    steps: list[int] = field(default_factory=list)
+    unplanned: OptionResult = field(default_factory=lambda: OptionResult(ErrorCode.NONE))
+
+
+@dataclass
 class EpisodeResult:
     """What happened in one episode: a task that was solved, or not.
 
@@ -64,6 +94,7 @@ class EpisodeResult:
         planning_seconds: Of all plans together, s.
         edges_rolled_out: Options simulated while planning.
         error: Why it ended, unless it is a success.
+        plans: Every plan, in order, with what came of it.
     """
 
     success: bool = False
@@ -75,6 +106,7 @@ class EpisodeResult:
     planning_seconds: float = 0.0
     edges_rolled_out: int = 0
     error: OptionResult = field(default_factory=lambda: OptionResult(ErrorCode.NONE))
+    plans: list[PlanExecution] = field(default_factory=list)
 
     @property
     def plan_length(self) -> int:
@@ -96,6 +128,7 @@ class Executor:
         max_replans: How often a diverged plan may be replaced.
         perceiver: Gives what is known of the world; without one, everything is.
         hold_steps: See :class:`OptionExecution`.
+        begin_with: Plan to execute first, from the world's state; without one, it is planned.
     """
 
     domain: Domain
@@ -107,6 +140,7 @@ class Executor:
     max_replans: int = MAX_REPLANS
     perceiver: Perceiver | None = None
     hold_steps: int = 0
+    begin_with: PlanningResult | None = None
     _percept: Percept = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -140,23 +174,35 @@ class Executor:
         try:
             plan = self._plan(episode)
         except UNPLANNED as error:
-            return OptionResult(error.code, str(error)), True
+            episode.plans[-1].unplanned = OptionResult(error.code, str(error))
+            return episode.plans[-1].unplanned, True
         return self._execute(plan, episode), False
 
     def _plan(self, episode: EpisodeResult) -> Plan:
-        started = perf_counter()
-        try:
-            result = self.planner.plan(self._percept.state, self.goal)
-        finally:
-            episode.planning_seconds += perf_counter() - started
+        execution = PlanExecution(episode.plan_length)
+        episode.plans.append(execution)
+        if self.begin_with is not None and len(episode.plans) == 1:
+            result, execution.seconds = self.begin_with, self.begin_with.seconds
+            episode.planning_seconds += execution.seconds
+        else:
+            started = perf_counter()
+            try:
+                result = self.planner.plan(self._percept.state, self.goal)
+            finally:
+                execution.seconds = perf_counter() - started
+                episode.planning_seconds += execution.seconds
+        execution.planned = result
         episode.edges_rolled_out += result.edges_rolled_out
         return result.plan
 
     def _execute(self, plan: Plan, episode: EpisodeResult) -> OptionResult:
+        execution = episode.plans[-1]
         for edge in plan.edges:
             before = episode.plan_length
             result = self._execute_edge(edge, episode)
             steps = episode.plan_length - before
+            execution.outcomes.append(result)
+            execution.steps.append(steps)
             episode.edges.append(_executed(edge.option, steps, result.reached))
             if not result.reached:
                 return result

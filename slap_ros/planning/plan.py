@@ -4,10 +4,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
-from slap_ros.planning.options import Option
+from slap_ros.core.notebook import ShownInNotebooks
+from slap_ros.planning.options import Option, OptionKind
 from slap_ros.relational import Target
+
+if TYPE_CHECKING:
+    from slap_ros.planning.abstract_graph import AbstractGraph
+    from slap_ros.planning.planner import Planner
 
 
 @dataclass(frozen=True)
@@ -33,9 +39,33 @@ class Plan:
         """Environment steps in the planner's model."""
         return sum(edge.predicted_steps for edge in self.edges)
 
+    def __str__(self) -> str:
+        """A line per edge with its predicted steps, then their sum."""
+        lines = [f"{edge.predicted_steps:5d}  {edge}{_learned(edge)}" for edge in self.edges]
+        return "\n".join([*lines, f"{self.predicted_steps:5d}  steps"])
+
+
+def _learned(edge: PlanEdge) -> str:
+    return "  (shortcut)" if edge.option.kind is OptionKind.SHORTCUT else ""
+
 
 @dataclass(frozen=True)
-class PlanningResult:
+class PlanOrigin:
+    """What made a plan, in the words of its message.
+
+    Args:
+        planner: Name of the planner.
+        library: Digest of the shortcuts that it knew; empty where there were none.
+        samples: Attempts of a shortcut in its model.
+    """
+
+    planner: str = ""
+    library: str = ""
+    samples: int = 0
+
+
+@dataclass(frozen=True)
+class PlanningResult(ShownInNotebooks):
     """A plan and the effort of finding it.
 
     Args:
@@ -45,6 +75,11 @@ class PlanningResult:
         edges_rolled_out: Options simulated in the model.
         fails: Why no plan can be executed in the model, where this one fails there as well; empty
             where it reaches the goal.
+        graph: Graph that was searched; None where the planner builds none.
+        seconds: Time that planning took, s; 0 where nobody measured it.
+        origin: What made it.
+        planner: Planner that made it, for a plan in its place where it diverges; None where that
+            is not known.
     """
 
     plan: Plan
@@ -52,3 +87,17 @@ class PlanningResult:
     graph_edges: int
     edges_rolled_out: int
     fails: str = ""
+    graph: AbstractGraph | None = field(default=None, repr=False, compare=False)
+    seconds: float = field(default=0.0, repr=False, compare=False)
+    origin: PlanOrigin = field(default=PlanOrigin(), repr=False, compare=False)
+    planner: Planner | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def steps(self) -> int:
+        """Environment steps that the plan takes in the planner's model."""
+        return self.plan.predicted_steps
+
+    def __str__(self) -> str:
+        """The plan, and why it fails in the model where it does."""
+        fails = f"\nthis plan fails in the model, near the goal: {self.fails}" if self.fails else ""
+        return f"{self.plan}{fails}"

@@ -234,7 +234,8 @@ class GraphPlanner:
                 raise
             plan = found
         rolled_out = model.executed - before
-        return PlanningResult(plan, len(graph.nodes), len(graph.edges), rolled_out, remark)
+        sizes = len(graph.nodes), len(graph.edges)
+        return PlanningResult(plan, *sizes, rolled_out, remark, graph)
 
     def _shortest(self, state: State, goal: int) -> tuple[Plan, AbstractGraph]:
         """The plan that the search finds, and the shallowest graph in which there is one.
@@ -346,6 +347,7 @@ class GraphPlanner:
             graph = build_abstract_graph(start, goal, self.problem.operators, extra_depth)
         except UnsolvableError as error:
             raise UnsolvableError(f"{error}: {self.problem.why_not(start, goal)}") from error
+        graph.space = self.problem.model.space
         if self.shortcuts is not None:
             shortcuts, on_way = self.shortcuts.edges(graph), graph.on_way_to_goal()
             within = {edge.option.skill.name for edge in shortcuts if edge.target in on_way}

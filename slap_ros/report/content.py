@@ -12,6 +12,7 @@ from pathlib import Path
 from slap_ros.bags.evaluate import BagContents, BagEvaluation, evaluate, read_runs
 from slap_ros.bags.recording import RecordedEpisode, Recording
 from slap_ros.core import Domain
+from slap_ros.core.notebook import ShownInNotebooks
 from slap_ros.errors import InvalidDomainError
 from slap_ros.evaluation.atom_names import describe
 from slap_ros.evaluation.metrics import RunMetrics
@@ -67,7 +68,7 @@ class RunReport:
 
 
 @dataclass(frozen=True)
-class BagReport:
+class BagReport(ShownInNotebooks):
     """Everything that a page shows of one bag."""
 
     name: str
@@ -76,6 +77,10 @@ class BagReport:
     proposals: tuple[RecordedProposal, ...]
     acquisitions: tuple[RecordedAcquisition, ...]
     unchecked: str  # why no atoms were compared with recomputed ones; empty where they were
+
+    def __str__(self) -> str:
+        """Name of the bag, and how many runs it has."""
+        return f"{self.name}, {len(self.runs)} runs"
 
 
 def read_report(path: Path | str) -> BagReport:

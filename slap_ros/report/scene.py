@@ -15,13 +15,12 @@ from slap_ros.drawing.projection import drawable, is_near
 from slap_ros.evaluation.run_trace import RunTrace
 from slap_ros.geometry.pose import Vector
 from slap_ros.messages.decode import decode_state, stamp_ns
-from slap_ros.messages.interfaces import BODIES
+from slap_ros.messages.interfaces import BODIES, CUBE, TRIANGLE_LIST
 from slap_ros.messages.protocols import MarkersMessage, StateMessage
 from slap_ros.physics.links import LINK_SHAPES
 from slap_ros.physics.panda import HAND, JOINTS, LINKS, link_poses
 from slap_ros.report.traces import robot_types
 
-CUBE, TRIANGLE_LIST = 1, 11  # types of markers that are drawn
 MAX_BODIES = 64  # a frame
 MAX_FRAMES = 600  # a run; of a longer one, every second or third step and so on
 WRIST_M = 0.04  # m, above the hand's frame: where the round end of the arm meets the hand

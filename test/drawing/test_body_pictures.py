@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from slap_ros.cli.render import check_renderable, render
+from slap_ros.api.video import require_renderable
+from slap_ros.cli.render import render
 from slap_ros.core import Display, PictureSize, VisibleBody
 from slap_ros.domains import get_domain
 from slap_ros.drawing.body_pictures import SIZE, canvas_of, draw_bodies, viewpoint, visible
@@ -123,14 +124,14 @@ def test_bodies_that_cannot_be_are_left_out():
 
 def test_a_domain_without_bodies_is_refused_before_anything_runs(tmp_path):
     with pytest.raises(InvalidParameterError, match=r"displays no bodies \(Display.bodies\)"):
-        check_renderable(replace(FLAT, display=Display()), STATE, tmp_path / "a.gif")
+        require_renderable(replace(FLAT, display=Display()), STATE, tmp_path / "a.gif")
 
 
 @pytest.mark.parametrize("size", [SIZE, (320, 480)])
 def test_a_run_is_rendered_frame_by_frame(tmp_path, size):
     world = FLAT.make_world(STATE)
     states = [STATE, *(world.step(np.array([0.1, -0.1, 0.0])) for _ in range(4))]
-    check_renderable(FLAT, STATE, tmp_path / "run.gif")
+    require_renderable(FLAT, STATE, tmp_path / "run.gif")
     render(FLAT, states, tmp_path / "run.gif", PictureSize(*size))
     with Image.open(tmp_path / "run.gif") as shown:
         assert (shown.n_frames, shown.size) == (5, size)

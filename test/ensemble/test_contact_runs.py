@@ -17,11 +17,11 @@ from visualization_msgs.msg import Marker
 
 from ensemble.cli.application import app
 from ensemble.client import RunClient
+from ensemble.encode import SCENE
 from ensemble.launcher import InProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.run import RunRequest, run
 from ensemble.spinner import temporary_node
-from ensemble.visualization import frames, joint_state, markers
 from slap_ros.acquisition.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
 from slap_ros.bags import bag_info, evaluate_bag, replay_bag
 from slap_ros.bags.reader import read_bag
@@ -181,14 +181,14 @@ def test_what_is_at_a_bench_is_shown_part_by_part():
     domain = get_domain("stow_hammer")
     state = domain.task(0).initial_state
     bodies, poses = domain.display.bodies(state), domain.display.frames(state)
-    shown = markers(bodies, STAMP).markers
+    shown = SCENE.markers(bodies, STAMP).markers
     kinds = {marker.text: marker.type for marker in shown}
     things = {obj.name for obj in state.objects} - {"robot"}
     assert things <= set(kinds) == set(poses)
     assert {Marker.CUBE, Marker.TRIANGLE_LIST} == {marker.type for marker in shown}
     assert "floor" not in kinds
 
-    framed = {t.child_frame_id: t.transform for t in frames(poses, STAMP).transforms}
+    framed = {t.child_frame_id: t.transform for t in SCENE.frames(poses, STAMP).transforms}
     hammer = state.layout.object("hammer0")
     translation = framed["hammer0"].translation
     assert [translation.x, translation.y, translation.z] == state[hammer][:3].tolist()
@@ -199,6 +199,6 @@ def test_what_is_at_a_bench_is_shown_part_by_part():
     assert np.linalg.norm(way) == pytest.approx(0.1)
     assert domain.display.frames(pulled)["cabinet0"] == poses["cabinet0"]
 
-    joints = joint_state(state, STAMP).position
+    joints = SCENE.joint_state(state, STAMP).position
     hand = {body.name: body for body in domain.display.arm(state)}["panda_hand"]
     assert hand.position[:2] == pytest.approx(grasp_pose(joints).position[:2], abs=0.02)

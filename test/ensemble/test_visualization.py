@@ -7,8 +7,9 @@ import pytest
 from builtin_interfaces.msg import Time
 from visualization_msgs.msg import Marker
 
-from ensemble.visualization import body_poses, frames, joint_state, markers
+from ensemble.encode import SCENE
 from slap_ros.domains import get_domain
+from slap_ros.encoding.scene_encoder import body_poses
 from slap_ros.physics.panda import grasp_pose
 
 STAMP = Time(sec=1, nanosec=2)
@@ -21,8 +22,8 @@ def test_every_object_but_the_arm_is_a_marker_and_a_frame(name):
     domain = get_domain(name)
     state = domain.task(0).initial_state
     bodies = domain.display.bodies(state)
-    shown = {marker.text for marker in markers(bodies, STAMP).markers}
-    framed = {frame.child_frame_id for frame in frames(body_poses(bodies), STAMP).transforms}
+    shown = {marker.text for marker in SCENE.markers(bodies, STAMP).markers}
+    framed = {frame.child_frame_id for frame in SCENE.frames(body_poses(bodies), STAMP).transforms}
     everything = {obj.name for obj in state.objects}
     assert shown == framed
     assert everything - shown <= {"robot", "bin"}  # a bin is shown by its parts
@@ -31,7 +32,7 @@ def test_every_object_but_the_arm_is_a_marker_and_a_frame(name):
 def test_blocks_of_the_tower_are_where_they_are_and_as_large():
     domain = get_domain("obstacle_tower")
     state = domain.task(0).initial_state
-    for marker in markers(domain.display.bodies(state), STAMP).markers:
+    for marker in SCENE.markers(domain.display.bodies(state), STAMP).markers:
         obj = state.layout.object(marker.text)
         position = [marker.pose.position.x, marker.pose.position.y, marker.pose.position.z]
         assert np.array_equal(position, state[obj][:3])
@@ -41,7 +42,9 @@ def test_blocks_of_the_tower_are_where_they_are_and_as_large():
 def test_meshes_are_shown_by_their_triangles():
     domain = get_domain("cleanup_table", "paper")
     state = domain.task(0).initial_state
-    shown = {marker.text: marker for marker in markers(domain.display.bodies(state), STAMP).markers}
+    shown = {
+        marker.text: marker for marker in SCENE.markers(domain.display.bodies(state), STAMP).markers
+    }
     duck, table = shown["duck"], shown["table"]
     assert (duck.type, table.type) == (Marker.TRIANGLE_LIST, Marker.CUBE)
     assert (duck.scale.x, duck.scale.y, duck.scale.z) == (1.0, 1.0, 1.0)
@@ -61,13 +64,13 @@ def test_the_arm_is_shown_where_it_is():
     assert hand.position[:2] == pytest.approx((x, y), abs=0.02)
     assert 0.0 < hand.position[2] - z < 0.1  # over what it would grasp
     assert all(body.position[2] > 0.0 for body in shown.values())
-    array = markers(tuple(shown.values()), STAMP, "robot")
+    array = SCENE.markers(tuple(shown.values()), STAMP, "robot")
     assert {marker.ns for marker in array.markers} == {"robot"}
 
 
 def test_joint_states_are_those_of_the_arm_and_only_of_an_arm():
     tower = get_domain("obstacle_tower").task(0).initial_state
-    message = joint_state(tower, STAMP)
+    message = SCENE.joint_state(tower, STAMP)
     assert list(message.name) == [f"panda_joint{i}" for i in range(1, 8)]
     assert np.array_equal(message.position, tower.data[:7])
-    assert joint_state(get_domain("obstacle2d").task(0).initial_state, STAMP).name == []
+    assert SCENE.joint_state(get_domain("obstacle2d").task(0).initial_state, STAMP).name == []

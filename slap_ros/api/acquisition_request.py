@@ -1,0 +1,126 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What skills are to be acquired, how, and where they are kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from slap_ros.acquisition.embedding_encoder import EmbeddingEncoder
+from slap_ros.acquisition.proposer_names import MANUAL, REWARDERS, require_known
+from slap_ros.acquisition.retrieval import MetricSignatureEncoder, SkillEncoder
+from slap_ros.acquisition.settings import ACQUISITION_SETTINGS, AcquisitionSettings
+from slap_ros.api.command_line import command_line
+from slap_ros.api.proposers import Proposers
+from slap_ros.core import Domain
+from slap_ros.errors import InvalidParameterError
+from slap_ros.language.settings import LOCAL_SCHEME, read_settings
+from slap_ros.learning.setting_changes import changed, parse_changes
+from slap_ros.learning.work_folder import WorkFolder
+
+
+@dataclass(frozen=True)
+class AcquisitionRequest:
+    """What to acquire, how, and where to keep it.
+
+    Args:
+        domain: Domain to acquire skills in.
+        library_folder: Folder that the library is saved to.
+        work_folder: Folder for checkpoints.
+        proposers: Who proposes operators.
+        goal: Name of a goal, or atoms; None for the domain's first.
+        seed: Seed of all random numbers.
+        rewarder: Name of the rewarder: manual, composed or language.
+        settings: Name of the hyper-parameters.
+        changes: Settings to change, as texts.
+        steps: Environment steps for all skills together; None for the settings'.
+        begin_with: Libraries whose skills new ones may begin with.
+        encoder: Embedding model that says which skills are alike; None for metrics alone.
+        keep: Library whose skills are there already.
+
+    Raises:
+        InvalidParameterError: They do not fit together.
+    """
+
+    domain: Domain
+    library_folder: Path
+    work_folder: Path
+    proposers: Proposers = field(default_factory=Proposers)
+    goal: str | None = None
+    seed: int = 0
+    rewarder: str = MANUAL
+    settings: str = "small"
+    changes: Sequence[str] = ()
+    steps: int | None = None
+    begin_with: Sequence[Path] = ()
+    encoder: str | None = None
+    keep: Path | None = None
+
+    def __post_init__(self) -> None:
+        require_known("--rewarder", self.rewarder, REWARDERS)
+        if self.encoder is not None and not self.begin_with:
+            raise InvalidParameterError("--encoder is for --from: without, nothing is retrieved")
+
+    @property
+    def goal_or_first(self) -> str:
+        """The goal that is trained for; empty for each task's own."""
+        return self.goal if self.goal is not None else next(iter(self.domain.goals), "")
+
+    @property
+    def command(self) -> str:
+        """The command that acquires the same library again."""
+        return command_line(
+            "acquire",
+            self.domain.name,
+            preset=self.domain.preset,
+            goal=self.goal,
+            seed=self.seed,
+            **self.proposers.given,
+            rewarder=self.rewarder,
+            **{"from": [_shareable(folder) for folder in self.begin_with]},
+            encoder=self.encoder,
+            keep=_shareable(self.keep) if self.keep else None,
+            settings=self.settings,
+            steps=self.steps,
+            set=list(self.changes) or None,
+        )
+
+    def chosen_settings(self) -> AcquisitionSettings:
+        """Hyper-parameters of the curriculum.
+
+        Raises:
+            InvalidParameterError: There are none of that name, or they cannot be changed so.
+        """
+        if self.settings not in ACQUISITION_SETTINGS:
+            raise InvalidParameterError(
+                f"unknown settings {self.settings!r}; there are {', '.join(ACQUISITION_SETTINGS)}"
+            )
+        changes = parse_changes(self.changes, AcquisitionSettings)
+        if self.steps is not None and "total_steps" in changes:
+            raise InvalidParameterError("--steps and --set total_steps say the same: give one")
+        chosen = changed(ACQUISITION_SETTINGS[self.settings], changes)
+        return chosen if self.steps is None else replace(chosen, total_steps=self.steps)
+
+    def skill_encoder(self) -> SkillEncoder:
+        """What says which skills are alike.
+
+        Raises:
+            InvalidParameterError: Language settings cannot be read, or name no server.
+            LanguageUnavailableError: There is no key, or no client.
+        """
+        if self.encoder is None:
+            return MetricSignatureEncoder()
+        proposers = self.proposers
+        settings = read_settings(proposers.language_settings, self.encoder, proposers.base_url)
+        if settings.base_url.startswith(LOCAL_SCHEME):
+            raise InvalidParameterError(
+                f"--encoder asks a server; {settings.base_url} is not one: give another --base-url"
+            )
+        return EmbeddingEncoder(settings, WorkFolder(self.work_folder))
+
+
+def _shareable(folder: Path) -> str:
+    """A folder as it was given, or its name alone: no path of this machine goes into a library."""
+    return folder.name if folder.is_absolute() else folder.as_posix()

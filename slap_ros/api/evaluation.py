@@ -1,0 +1,193 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Evaluating approaches on many tasks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from slap_ros.acquisition.domain_choice import DomainChoice
+from slap_ros.api.jobs import some_workers
+from slap_ros.api.left_out import warn_caller
+from slap_ros.api.opening import SHIPPED_WORD
+from slap_ros.api.shortcut_choice import SAMPLES, Shortcuts, choose_library, sampling
+from slap_ros.core import Domain
+from slap_ros.errors import ErrorCode, InvalidParameterError
+from slap_ros.evaluation.approaches import Approach, approaches, shooting
+from slap_ros.evaluation.experiment import Experiment, Trial, run_with
+from slap_ros.planning.planner import make_planner
+from slap_ros.shortcuts.library import Library
+
+OnTrial = Callable[[Approach, Trial], None]
+
+
+@dataclass(frozen=True)
+class TrialRow:
+    """One task that was tried, as a row of a table: ``pandas.DataFrame(rows)`` takes them as is.
+
+    Args:
+        domain: Name of the domain.
+        preset: Preset of the domain.
+        approach: Name of the way to plan: pure_planning, slap_1_sample, slap or shooting.
+        seed: Seed of the task.
+        index: Which of the seed's tasks it is.
+        success: Whether the goal was reached.
+        plan_length: Environment steps executed.
+        shortcut_steps: Environment steps of these that shortcuts took.
+        planning_seconds: Time that all plans together took, s.
+        edges_rolled_out: Options simulated while planning.
+        replans: Plans that replaced a diverged one.
+        error: Name of the error code, as ``STEP_LIMIT``; ``NONE`` for a success.
+        reason: Why it failed, in words; empty for a success.
+    """
+
+    domain: str
+    preset: str
+    approach: str
+    seed: int
+    index: int
+    success: bool
+    plan_length: int
+    shortcut_steps: int
+    planning_seconds: float
+    edges_rolled_out: int
+    replans: int
+    error: str
+    reason: str
+
+    @classmethod
+    def of(cls, domain: Domain, approach: str, trial: Trial) -> TrialRow:
+        """The row of a trial.
+
+        Args:
+            domain: Domain of the task.
+            approach: Name of the way to plan.
+            trial: Figures of the task.
+        """
+        return cls(
+            domain.name,
+            domain.preset,
+            approach,
+            trial.seed,
+            trial.index,
+            trial.success,
+            trial.plan_length,
+            trial.shortcut_steps,
+            trial.planning_seconds,
+            trial.edges_rolled_out,
+            trial.replans,
+            ErrorCode(trial.error_code).name,
+            trial.reason,
+        )
+
+
+def evaluate(
+    domain: Domain,
+    shortcuts: Shortcuts = SHIPPED_WORD,
+    *,
+    tasks: int = 10,
+    seeds: int = 5,
+    first_seed: int = 0,
+    goal: str | None = None,
+    planner: str = "lazy",
+    samples: int = SAMPLES,
+    compare_shooting: bool = False,
+    jobs: int | None = None,
+) -> list[TrialRow]:
+    """Plan and execute many tasks, with every approach: what ``slap evaluate`` does.
+
+    The approaches are pure planning and, with shortcuts, SLAP as the paper evaluates it (one
+    sample) and SLAP with ``samples``, all on the same tasks.
+
+    Args:
+        domain: Domain of the tasks, as :func:`make` makes it.
+        shortcuts: Learned shortcuts to plan with, as for :func:`plan`.
+        tasks: Tasks per seed.
+        seeds: How many seeds.
+        first_seed: First of the seeds; training draws its tasks from seed 1000000 on.
+        goal: Another goal: one of ``domain.goals``, or atoms in PDDL; None for each task's own.
+        planner: Name of the planner.
+        samples: Attempts of a shortcut in the model.
+        compare_shooting: Whether to compare with a search of as many rollouts of random actions.
+        jobs: Number of processes; None for this one. Figures are the same but for planning
+            times: motion plans are cached, so that in one process an approach looks faster than
+            those before it. A script that uses processes needs ``if __name__ == "__main__"``.
+
+    Returns:
+        A row per approach and task, approach by approach, in the order of seeds and indices.
+
+    Raises:
+        InvalidParameterError: There is no such planner, or it cannot use shortcuts.
+        NoSkillsError: The domain has no skills yet.
+        UnknownGoalError: There is no such goal.
+        InvalidLibraryError: The library cannot be used as a whole.
+    """
+    library = choose_library(shortcuts, domain, planner, warn_caller)
+    compared = compared_approaches(library, domain, samples, compare_shooting)
+    skills = DomainChoice.opened_as(domain).skills
+    experiment = Experiment(domain, tasks, seeds, first_seed, planner, goal=goal, skills=skills)
+    results = run_approaches(experiment, compared, jobs)
+    return [
+        TrialRow.of(domain, approach.name, trial)
+        for approach, trials in results
+        for trial in trials
+    ]
+
+
+def compared_approaches(
+    library: Library | None, domain: Domain, samples: int, compare_shooting: bool
+) -> list[Approach]:
+    """What is compared, pure planning first.
+
+    Args:
+        library: Shortcuts to plan with, if any.
+        domain: Domain of the library.
+        samples: Attempts of a shortcut in the model.
+        compare_shooting: Whether search without anything learned is compared, too.
+
+    Raises:
+        InvalidParameterError: Shooting is to be compared, and there is no library.
+    """
+    compared = list(approaches(library, sampling(samples)))
+    if compare_shooting:
+        if library is None:
+            raise InvalidParameterError(
+                "--shooting searches where shortcuts of a library would be used: give --shortcuts"
+            )
+        compared.insert(1, shooting(library, domain, sampling(samples)))
+    return compared
+
+
+def run_approaches(
+    experiment: Experiment,
+    compared: Sequence[Approach],
+    jobs: int | None,
+    on_trial: OnTrial = lambda *_: None,
+) -> list[tuple[Approach, list[Trial]]]:
+    """Solve every task with every approach, each approach with processes of its own.
+
+    Args:
+        experiment: Which tasks.
+        compared: Ways to plan.
+        jobs: Number of processes; None for this one.
+        on_trial: Called with each trial as it ends.
+
+    Returns:
+        The trials of each approach, in the order of seeds and indices.
+
+    Raises:
+        InvalidParameterError: There is no such planner.
+        NoSkillsError: The domain has no skills.
+    """
+    first = experiment.task(experiment.first_seed, 0)
+    make_planner(experiment.planner, experiment.domain, first.initial_state)
+    results = []
+    for approach in compared:
+        trials = []
+        with some_workers(jobs) as workers:
+            for trial in run_with(workers, experiment, approach):
+                trials.append(trial)
+                on_trial(approach, trial)
+        results.append((approach, sorted(trials, key=lambda trial: (trial.seed, trial.index))))
+    return results

@@ -1,0 +1,67 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Which shortcuts are planned with: those that ship, none, a folder's, or a library at hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from slap_ros.api.left_out import Tell
+from slap_ros.api.opening import SHIPPED_WORD
+from slap_ros.core import Domain
+from slap_ros.errors import InvalidLibraryError, InvalidParameterError
+from slap_ros.planning.planner import PLANNERS, WITH_SHORTCUTS
+from slap_ros.shortcuts.library import Library
+from slap_ros.shortcuts.shipped import NONE, chosen_library
+from slap_ros.shortcuts.shortcut import DEFAULT, Sampling
+
+SAMPLES = DEFAULT.samples
+Shortcuts = str | Path | Library | None  # the word shipped, a folder, a library, or none
+
+
+def choose_library(
+    shortcuts: Shortcuts, domain: Domain, planner: str, tell: Tell
+) -> Library | None:
+    """The library to plan with, if any; says which of its shortcuts are left out.
+
+    Args:
+        shortcuts: Those that are wanted.
+        domain: What they must fit.
+        planner: Name of the planner that is to use them.
+        tell: Receives what is said of shortcuts that are left out.
+
+    Raises:
+        InvalidLibraryError: The library cannot be used as a whole, or is another domain's.
+        InvalidParameterError: The planner cannot use the library that was chosen.
+    """
+    if isinstance(shortcuts, Library):
+        return _fitting(shortcuts, domain, planner)
+    choice = NONE if shortcuts is None else str(shortcuts)
+    library = chosen_library("" if choice == SHIPPED_WORD else choice, domain, planner)
+    for reason in library.refused if library is not None else ():
+        tell(f"a shortcut is left out: {reason}")
+    return library
+
+
+def _fitting(library: Library, domain: Domain, planner: str) -> Library:
+    """The library, which must be the domain's and of use to the planner."""
+    if library.domain != domain.name:
+        raise InvalidLibraryError(f"shortcuts of domain {library.domain!r}, not of {domain.name!r}")
+    if planner in PLANNERS and planner not in WITH_SHORTCUTS:
+        raise InvalidParameterError(
+            f"the planner {planner} plans without shortcuts: give shortcuts=None, or use "
+            f"{' or '.join(WITH_SHORTCUTS)}"
+        )
+    return library
+
+
+def sampling(samples: int) -> Sampling:
+    """The default sampling with so many attempts.
+
+    Raises:
+        InvalidParameterError: There would be none.
+    """
+    if samples < 1:
+        raise InvalidParameterError(f"samples is {samples}; it must be at least 1")
+    return replace(DEFAULT, samples=samples)

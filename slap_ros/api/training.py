@@ -1,0 +1,157 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Training a library of shortcuts."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import replace
+from os.path import relpath
+from pathlib import Path
+from typing import Any
+
+from slap_ros.acquisition.domain_choice import WORDS, DomainChoice
+from slap_ros.api.jobs import require_torch, some_workers
+from slap_ros.api.setting_texts import Changes, change_texts
+from slap_ros.core import Domain
+from slap_ros.errors import InvalidParameterError
+from slap_ros.files import require_writable, sole_use
+from slap_ros.learning.setting_changes import changed, parse_changes
+from slap_ros.learning.task_distribution import TaskDistribution
+from slap_ros.planning.planner import require_skills
+from slap_ros.shortcuts.library import Library, save_library
+from slap_ros.shortcuts.settings import TrainingSettings, training_settings
+from slap_ros.shortcuts.training import CandidateGroup, Training, TrainingCallback
+from slap_ros.studies.results import describe_skills
+
+
+class Unwatched:
+    """Receives the events of a training, and does nothing with them."""
+
+    def on_progress(self, what: str, done: int, total: int) -> None:
+        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+
+    def on_left_out(self, use: str, index: int, reason: str) -> None:
+        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+
+    def on_ranked(self, ranked: Sequence[CandidateGroup]) -> None:
+        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+
+    def on_learning(self, name: str, folder: Path, total_steps: int) -> None:
+        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+
+    def on_validated(self, name: str, before: float, after: float, kept: bool) -> None:
+        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+
+
+def train(
+    domain: Domain,
+    folder: Path | str,
+    *,
+    seed: int = 0,
+    settings: str = "ours",
+    changes: Changes = (),
+    steps: int | None = None,
+    work: Path | str | None = None,
+    jobs: int | None = None,
+    ray: str | None = None,
+    callback: TrainingCallback | None = None,
+) -> Library:
+    """Discover and learn shortcuts: explore, rank, train, keep what makes plans shorter.
+
+    Interrupted, it continues where it was when it is called with the same arguments.
+
+    Args:
+        domain: Domain to train in, as :func:`make` makes it.
+        folder: Folder that the library is saved to.
+        seed: Seed of all random numbers.
+        settings: Name of the hyper-parameters: ours, ours_several, paper, or the domain's own.
+        changes: Settings to change, by dotted name, as ``{"exploration.rollouts": 16}``; or texts
+            as on the command line.
+        steps: Environment steps per shortcut; None for the settings'.
+        work: Folder for checkpoints; None for one beside the library's.
+        jobs: Number of processes; None for this one. A script that uses processes needs
+            ``if __name__ == "__main__"``.
+        ray: Address of a Ray cluster to run on instead, or ``local``.
+        callback: Receives what happens.
+
+    Returns:
+        The library, which :func:`plan` takes as ``shortcuts``.
+
+    Raises:
+        NoSkillsError: The domain has no skills to begin with.
+        InvalidParameterError: Torch is not installed, or a setting cannot be what it is to be.
+        BusyError: Another process trains in the same folder.
+    """
+    require_skills(domain)
+    chosen = chosen_settings(domain, settings, changes, steps)
+    library_folder, work_folder = Path(folder), training_folder(folder, work)
+    for place in (library_folder, work_folder):
+        require_writable(place)
+    require_torch()
+    choice = DomainChoice.opened_as(domain)
+    distribution = TaskDistribution(choice, seed)
+    watched = callback if callback is not None else Unwatched()
+    with sole_use(work_folder), some_workers(jobs, ray) as workers:
+        library = Training(distribution, chosen, work_folder, workers, watched).run()
+    command = train_command(choice, seed, settings, steps, change_texts(changes))
+    made_by: dict[str, Any] = {"command": command}
+    if acquired := describe_skills(domain):
+        made_by["skills"] = acquired
+    library = replace(library, record={**made_by, **library.record})
+    save_library(library_folder, library)
+    return library
+
+
+def training_folder(library: Path | str, work: Path | str | None) -> Path:
+    """Where checkpoints and logs are, by default beside the library."""
+    folder = Path(library)
+    return Path(work) if work is not None else folder.with_name(f"{folder.name}-training")
+
+
+def chosen_settings(
+    domain: Domain, name: str, changes: Changes, steps: int | None
+) -> TrainingSettings:
+    """The hyper-parameters of a training.
+
+    Args:
+        domain: Domain to train in, which may have settings of its own.
+        name: Name of the settings.
+        changes: Settings to change.
+        steps: Environment steps per shortcut; None for the settings'.
+
+    Raises:
+        InvalidParameterError: There are none of that name, or they cannot be changed so.
+        InvalidDomainError: See :func:`~slap_ros.shortcuts.settings.training_settings`.
+    """
+    chosen = training_settings(name, domain)
+    parsed = parse_changes(change_texts(changes), TrainingSettings)
+    if steps is not None and (both := [n for n in parsed if n.endswith("total_steps")]):
+        raise InvalidParameterError(f"--steps and --set {both[0]} say the same: give one")
+    chosen = changed(chosen, parsed)
+    return chosen if steps is None else chosen.with_total_steps(steps)
+
+
+def train_command(
+    choice: DomainChoice, seed: int, settings: str, steps: int | None, changes: Sequence[str]
+) -> str:
+    """The command that trains the same library again.
+
+    Args:
+        choice: Domain and skills.
+        seed: Seed of all random numbers.
+        settings: Name of the settings.
+        steps: Environment steps per shortcut, if they are given.
+        changes: Settings to change, as texts.
+    """
+    command = f"slap train {choice.name} --preset {choice.preset}{skills_option(choice.skills)}"
+    given = "" if steps is None else f" --steps {steps}"
+    sets = "".join(f" --set {shlex.quote(text)}" for text in changes)
+    return f"{command} --seed {seed} --settings {settings}{given}{sets}"
+
+
+def skills_option(skills: str) -> str:
+    """The option ``--skills`` as a part of commands; never an absolute path."""
+    name = skills if skills in WORDS else relpath(skills)
+    return f" --skills {shlex.quote(name)}" if skills else ""

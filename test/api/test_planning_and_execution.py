@@ -1,0 +1,140 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Planning and executing from Python: the same as from the command line."""
+
+import json
+import re
+import subprocess
+import sys
+
+import pytest
+
+import slap_ros
+from slap_ros.core import Domain, Task
+from slap_ros.errors import (
+    InvalidLibraryError,
+    InvalidParameterError,
+    NoSkillsError,
+    UnknownDomainError,
+)
+from slap_ros.planning.options import OptionKind
+from slap_ros.planning.plan import Plan, PlanningResult
+from slap_ros.shortcuts.library import load_library
+from slap_ros.shortcuts.shipped import shipped_library
+
+
+def slap(*arguments, code=0):
+    """What a ``slap`` command prints as JSON."""
+    told = subprocess.run(
+        [sys.executable, "-m", "ensemble.cli", *map(str, arguments), "--json"],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert told.returncode == code, told.stderr
+    return json.loads(told.stdout)
+
+
+def test_the_example_of_the_package_runs_as_it_stands(capsys):
+    example = re.search(r"::\n\n((?:    .*\n|\n)+)", slap_ros.__doc__)[1]
+    names = {}
+    exec("\n".join(line[4:] for line in example.splitlines()), names)
+    plan, run = names["plan"], names["run"]
+    printed = capsys.readouterr().out
+    assert run.success
+    pure = slap_ros.plan(names["domain"], names["task"], shortcuts=None)
+    assert printed == f"{plan} {run.steps} {pure.steps}\n"
+    assert run.steps == plan.steps < pure.steps
+    assert names["domain"].preset == "fair:obstacles=4"
+
+
+def test_what_is_returned_are_the_cores_own_objects(domain, task, plan, run):
+    assert isinstance(domain, Domain)
+    assert isinstance(task, Task)
+    assert (task.seed, task.index) == (1, 0)
+    assert isinstance(plan, PlanningResult)
+    assert run.states[0] == task.initial_state
+    assert len(run.states) == run.steps + 1 == len(run.actions) + 1
+
+
+def test_a_plan_is_printed_as_a_line_per_edge_and_the_sum(plan):
+    *edges, last = str(plan).splitlines()
+    assert len(edges) == len(plan.plan.edges)
+    assert last.split() == [str(plan.steps), "steps"]
+    assert sum(int(line.split()[0]) for line in edges) == plan.steps
+    learned = [edge.option.kind is OptionKind.SHORTCUT for edge in plan.plan.edges]
+    assert [line.endswith("(shortcut)") for line in edges] == learned
+    assert any(learned)
+
+
+def test_the_command_line_makes_the_same_plan(domain, task, plan):
+    found = slap("plan", "obstacle2d", "--seed", 1)
+    edges = [{"option": str(e), "predicted_steps": e.predicted_steps} for e in plan.plan.edges]
+    assert found["plan"] == edges
+    assert found["predicted_steps"] == plan.steps
+    assert found["edges_rolled_out"] == plan.edges_rolled_out
+    pure = slap_ros.plan(domain, task, shortcuts=None)
+    assert slap("plan", "obstacle2d", "--seed", 1, "--shortcuts", "none")["plan"] == [
+        {"option": str(e), "predicted_steps": e.predicted_steps} for e in pure.plan.edges
+    ]
+
+
+def test_shortcuts_are_those_that_ship_or_a_folders_or_a_library(domain, task, plan):
+    folder = shipped_library("obstacle2d")
+    library = load_library(folder, domain)
+    for shortcuts in (folder, str(folder), library):
+        again = slap_ros.plan(domain, task, shortcuts)
+        assert [str(e) for e in again.plan.edges] == [str(e) for e in plan.plan.edges]
+        assert again.origin == plan.origin
+    assert plan.origin.library == library.digest
+
+
+def test_settings_are_those_of_the_preset():
+    tower = slap_ros.make("obstacle_tower", obstacles=4, mass=(0.8, 1.2))
+    assert tower.preset == "fair:obstacles=4,mass=0.8..1.2"
+    further = slap_ros.make("obstacle_tower", "fair:obstacles=4", mass=(0.8, 1.2))
+    assert further.configuration == tower.configuration
+
+
+def test_what_cannot_be_is_refused(domain, task, plan):
+    with pytest.raises(UnknownDomainError):
+        slap_ros.make("nowhere")
+    with pytest.raises(InvalidParameterError, match="unknown setting"):
+        slap_ros.make("obstacle_tower", blocks=4)
+    with pytest.raises(InvalidParameterError, match="at least 1"):
+        slap_ros.plan(domain, task, samples=0)
+    with pytest.raises(NoSkillsError):
+        slap_ros.plan(slap_ros.make("obstacle2d", skills=None), task)
+    library = load_library(shipped_library("obstacle2d"), domain)
+    tower = slap_ros.make("obstacle_tower")
+    with pytest.raises(InvalidLibraryError):
+        slap_ros.plan(tower, tower.task(seed=1), library)
+    with pytest.raises(InvalidParameterError, match="without shortcuts"):
+        slap_ros.plan(domain, task, library, planner="ff")
+    with pytest.raises(InvalidParameterError):
+        slap_ros.execute(domain, task, plan, max_replans=-1)
+
+
+def test_a_run_solves_the_task_in_as_many_steps_as_were_planned(plan, run):
+    assert run.success
+    assert run.steps == plan.steps
+    assert not run.error
+    assert str(run).endswith(f"{run.steps:5d}  steps, solved")
+
+
+def test_without_a_plan_it_is_planned_with_what_ships(domain, task, run):
+    again = slap_ros.execute(domain, task)
+    assert again.success
+    assert again.states == run.states
+
+
+def test_a_plan_that_leads_nowhere_is_replaced(domain, task, plan):
+    """The last edge alone cannot be executed from the start."""
+    wrong = Plan(plan.plan.edges[-1:])
+    run = slap_ros.execute(domain, task, wrong)
+    assert run.success
+    assert run.episode.replans == 1
+    assert not run.edges[0].reached
+    without = slap_ros.execute(domain, task, wrong, max_replans=0)
+    assert not without.success
+    assert "diverged" in without.error
