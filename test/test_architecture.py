@@ -30,7 +30,7 @@ FLOORS = (
     ("contact", "motion", "physics"),
     ("core",),
     ("relational", "meshes", "geometry"),
-    ("files", "signals", "versions", "portable_math", "errors", "slap_ros"),
+    ("versions", "files", "signals", "portable_math", "errors", "slap_ros"),
 )
 ORDER = [package for floor in FLOORS for package in floor]
 ROS = re.compile(r"rclpy|embedded_ros|cyclonedds|launch(_ros)?|rosidl_.*|\w+_(msgs|interfaces)$")
