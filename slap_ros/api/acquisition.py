@@ -17,7 +17,6 @@ from slap_ros.acquisition.dead_ends import DeadEnd
 from slap_ros.acquisition.jobs import horizon_of
 from slap_ros.acquisition.proposal import Proposal, read_proposal
 from slap_ros.acquisition.proposal_request import ProposalRequest
-from slap_ros.acquisition.proposer_names import MANUAL
 from slap_ros.acquisition.retrieval import SkillEncoder
 from slap_ros.acquisition.rollouts import PlanRollout
 from slap_ros.acquisition.settings import AcquisitionSettings
@@ -88,8 +87,8 @@ def acquire(
     *,
     goal: str | None = None,
     seed: int = 0,
-    proposer: str | Proposers = MANUAL,
-    rewarder: str = MANUAL,
+    proposer: str | Proposers = "manual",
+    rewarder: str = "manual",
     settings: str = "small",
     changes: Changes = (),
     steps: int | None = None,

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from slap_ros.acquisition.domain_choice import DomainChoice
 from slap_ros.api.jobs import some_workers
 from slap_ros.api.left_out import warn_caller
-from slap_ros.api.opening import SHIPPED_WORD
 from slap_ros.api.shortcut_choice import SAMPLES, Shortcuts, choose_library, sampling
 from slap_ros.core import Domain
 from slap_ros.errors import ErrorCode, InvalidParameterError
@@ -84,7 +83,7 @@ class TrialRow:
 
 def evaluate(
     domain: Domain,
-    shortcuts: Shortcuts = SHIPPED_WORD,
+    shortcuts: Shortcuts = "shipped",
     *,
     tasks: int = 10,
     seeds: int = 5,

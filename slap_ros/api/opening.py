@@ -32,7 +32,7 @@ def domains() -> list[str]:
 def make(
     name: str,
     preset: str | None = None,
-    skills: str | Path | None = SHIPPED_WORD,
+    skills: str | Path | None = "shipped",
     **settings: SettingText,
 ) -> Domain:
     """Make a domain.

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 
 from slap_ros.api.left_out import Tell, warn_caller
-from slap_ros.api.opening import SHIPPED_WORD
 from slap_ros.api.shortcut_choice import SAMPLES, Shortcuts, choose_library, sampling
 from slap_ros.core import Domain, Task
 from slap_ros.evaluation.approaches import approaches
@@ -20,7 +19,7 @@ from slap_ros.relational import State
 def plan(
     domain: Domain,
     task: Task,
-    shortcuts: Shortcuts = SHIPPED_WORD,
+    shortcuts: Shortcuts = "shipped",
     *,
     planner: str = "lazy",
     samples: int = SAMPLES,
@@ -90,7 +89,7 @@ class NamedPlanner:
 def planner_for(
     domain: Domain,
     task: Task,
-    shortcuts: Shortcuts = SHIPPED_WORD,
+    shortcuts: Shortcuts = "shipped",
     planner: str = "lazy",
     samples: int = SAMPLES,
     tell: Tell = warn_caller,

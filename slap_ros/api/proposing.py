@@ -8,7 +8,6 @@ from slap_ros.acquisition.attempt_log import AttemptLog
 from slap_ros.acquisition.inquiry import Inquiry
 from slap_ros.acquisition.proposal import Proposal
 from slap_ros.acquisition.proposal_request import ProposalRequest
-from slap_ros.acquisition.proposer_names import MANUAL, NO_REWARDER
 from slap_ros.api.proposers import Proposers
 from slap_ros.core import Domain, Task
 
@@ -16,8 +15,8 @@ from slap_ros.core import Domain, Task
 def propose(
     domain: Domain,
     task: Task,
-    proposer: str | Proposers = MANUAL,
-    rewarder: str = NO_REWARDER,
+    proposer: str | Proposers = "manual",
+    rewarder: str = "none",
 ) -> Proposal:
     """Propose operators and rewards for a task, check them, and plan with them.
 

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The domains, one folder each, and the registry that finds them.
 
-``slap_ros.domains()`` lists them: this package has the name of a function of the Python API, and
-Python binds the name to the package once anything imports that. So the package can be called.
+``slap_ros.domains()`` gives the names of all that are installed, ours first. This package has the
+name of that function, and Python binds the name to the package once anything imports it. So the
+package itself can be called.
 """
 
 import sys

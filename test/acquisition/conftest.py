@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from slap_ros.cli import acquire
+from slap_ros.api import acquisition
 from slap_ros.domains import forget_domains
 from slap_ros.learning.workers import SequentialWorkers
 
@@ -49,4 +49,4 @@ def points_installed(
 @pytest.fixture
 def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """`slap acquire` trains here: a process takes longer to import torch than what it does here."""
-    monkeypatch.setattr(acquire, "training_workers", lambda *_: nullcontext(SequentialWorkers()))
+    monkeypatch.setattr(acquisition, "some_workers", lambda *_: nullcontext(SequentialWorkers()))
