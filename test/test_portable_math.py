@@ -30,6 +30,6 @@ def test_values_that_differ_in_their_last_bits_become_equal():
 
 @pytest.mark.slow
 @pytest.mark.timeout(300)  # nine plans, each in a process of its own
-def test_plans_and_runs_are_the_same_on_other_processors():
+def test_plans_and_runs_are_the_same_on_other_processors(network):
     found = differences(["nehalem", "baseline"], [PLAN, RECORDED_RUN])
     assert not list(map(str, found))

@@ -280,7 +280,7 @@ def test_held_is_what_the_fingers_say():
 def test_other_objects(world):
     with pytest.raises(InvalidStateError, match="its own objects"):
         world.reset(start(scene=LOOSE))
-    with pytest.raises(InvalidStateError, match="'left' is no object"):
+    with pytest.raises(InvalidStateError, match="'left' is not an object"):
         ContactWorld(BENCH, start(scene=LOOSE))
 
 
