@@ -28,12 +28,12 @@ from benchmarks.workbench import (
     start,
     value,
 )
-from slap_ros.contact import dynamics, simulation
-from slap_ros.contact.contacts import Side
-from slap_ros.contact.hand import hand_at
-from slap_ros.contact.simulation_pool import close_idle
-from slap_ros.contact.world import ContactWorld
 from slap_ros.geometry.pose import rotate
+from slap_ros.worlds.contact import dynamics, simulation
+from slap_ros.worlds.contact.contacts import Side
+from slap_ros.worlds.contact.hand import hand_at
+from slap_ros.worlds.contact.simulation_pool import close_idle
+from slap_ros.worlds.contact.world import ContactWorld
 
 COUNT = 20  # grasps of each
 STEPS = 500

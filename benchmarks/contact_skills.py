@@ -34,10 +34,6 @@ from benchmarks.workbench import (
     start,
     value,
 )
-from slap_ros.contact.features import ROBOT, robot_features
-from slap_ros.contact.hand import hand_at, wrapped
-from slap_ros.contact.scene import TABLE, BoxPart, Compound, ContactScene, CylinderPart
-from slap_ros.contact.world import ACTION_SPACE, MAX_SHIFT, MAX_TURN, ContactWorld
 from slap_ros.domains.bowls.scenery import GRIP, REST_HEIGHT, bowl
 from slap_ros.domains.groceries.scenery import GROCERIES
 from slap_ros.domains.make_coffee.scenery import POD_HALF, pod
@@ -54,9 +50,13 @@ from slap_ros.geometry.pose import (
     multiply,
     rotate,
 )
-from slap_ros.physics.features import body_features
-from slap_ros.physics.scene import GREY
 from slap_ros.relational import State
+from slap_ros.worlds.contact.features import ROBOT, robot_features
+from slap_ros.worlds.contact.hand import hand_at, wrapped
+from slap_ros.worlds.contact.scene import TABLE, BoxPart, Compound, ContactScene, CylinderPart
+from slap_ros.worlds.contact.world import ACTION_SPACE, MAX_SHIFT, MAX_TURN, ContactWorld
+from slap_ros.worlds.features import body_features
+from slap_ros.worlds.scene import GREY
 
 SHAKEN = 100  # steps
 SHAKE = (0.006, 0.006, 0.006, 0.05)  # m and rad a step, standard deviations

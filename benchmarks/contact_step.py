@@ -35,19 +35,19 @@ from benchmarks.workbench import (
     perform,
     start,
 )
-from slap_ros.contact.arm import CONTROL_PERIOD_S, arm_joints
-from slap_ros.contact.contacts import Side, Surface
-from slap_ros.contact.hand import SUBSTEPS, HandState, hand_at
-from slap_ros.contact.involved import Involved
-from slap_ros.contact.scene import ContactScene
-from slap_ros.contact.simulation import FINGER_FRICTION, ContactSimulation
-from slap_ros.contact.snapshot import ContactSnapshot, StateIndex
-from slap_ros.contact.world import ContactWorld
 from slap_ros.geometry.pose import NO_ROTATION, Pose
-from slap_ros.physics.bullet import pybullet
-from slap_ros.physics.panda import FINGER_CLOSED, FINGER_OPEN, HOME, JOINTS
-from slap_ros.physics.simulation import PANDA
 from slap_ros.relational import State
+from slap_ros.worlds.bullet import pybullet
+from slap_ros.worlds.contact.arm import CONTROL_PERIOD_S, arm_joints
+from slap_ros.worlds.contact.contacts import Side, Surface
+from slap_ros.worlds.contact.hand import SUBSTEPS, HandState, hand_at
+from slap_ros.worlds.contact.involved import Involved
+from slap_ros.worlds.contact.scene import ContactScene
+from slap_ros.worlds.contact.simulation import FINGER_FRICTION, ContactSimulation
+from slap_ros.worlds.contact.snapshot import ContactSnapshot, StateIndex
+from slap_ros.worlds.contact.world import ContactWorld
+from slap_ros.worlds.joint_space.simulation import PANDA
+from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN, HOME, JOINTS
 
 ROUNDS = 5  # the best counts: others share the machine
 ARM_TORQUES = (87.0, 87.0, 87.0, 87.0, 30.0, 30.0, 30.0)  # N m

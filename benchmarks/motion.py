@@ -30,7 +30,7 @@ from slap_ros.motion import (
     retime_fixed_steps,
     shifted,
 )
-from slap_ros.physics.panda import HOME, JOINT_HIGH, JOINT_LOW, Pose, grasp_pose
+from slap_ros.worlds.panda import HOME, JOINT_HIGH, JOINT_LOW, Pose, grasp_pose
 
 HALF = (0.025, 0.025, 0.025)  # m, of a block
 TABLE = OrientedBox(Pose((0.5, 0.0, -0.175)), (0.25, 0.4, 0.25))

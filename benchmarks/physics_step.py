@@ -28,10 +28,14 @@ from numpy.typing import NDArray
 from slap_ros.geometry.pose import Pose, conjugate, multiply
 from slap_ros.meshes.obj import to_obj
 from slap_ros.meshes.solid import Solid
-from slap_ros.physics.arm import Arm
-from slap_ros.physics.bullet import pybullet
-from slap_ros.physics.features import BODY_FEATURES, ROBOT, body_features, robot_features
-from slap_ros.physics.panda import (
+from slap_ros.relational import Object, State, Type
+from slap_ros.worlds.bullet import pybullet
+from slap_ros.worlds.features import BODY_FEATURES, ROBOT, body_features, robot_features
+from slap_ros.worlds.joint_space.arm import Arm
+from slap_ros.worlds.joint_space.simulation import PANDA, Drive, Simulation, Stepping
+from slap_ros.worlds.joint_space.snapshot import BodyState, SnapshotCodec
+from slap_ros.worlds.joint_space.world import ACTION_SPACE, STEPPING, PandaWorld
+from slap_ros.worlds.panda import (
     FINGER_OPEN,
     HOME,
     JOINT_HIGH,
@@ -41,11 +45,7 @@ from slap_ros.physics.panda import (
     grasp_pose,
     jacobian,
 )
-from slap_ros.physics.scene import CUBE_EDGE, FRICTION, TABLE, TABLE_TOP, Body, Scene, cube
-from slap_ros.physics.simulation import PANDA, Drive, Simulation, Stepping
-from slap_ros.physics.snapshot import BodyState, SnapshotCodec
-from slap_ros.physics.world import ACTION_SPACE, STEPPING, PandaWorld
-from slap_ros.relational import Object, State, Type
+from slap_ros.worlds.scene import CUBE_EDGE, FRICTION, TABLE, TABLE_TOP, Body, Scene, cube
 
 Array = NDArray[np.float64]
 
@@ -167,7 +167,7 @@ class Stepped(Protocol):
 
 
 class Ours:
-    """The world of ``slap_ros.physics``."""
+    """The world of ``slap_ros.worlds.joint_space``."""
 
     def __init__(self) -> None:
         self._start = tower()

@@ -26,8 +26,8 @@ from benchmarks.printing import show
 from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.domains.obstacle2d.dynamics import step
-from slap_ros.physics.panda import MAX_STEP
 from slap_ros.relational import State
+from slap_ros.worlds.panda import MAX_STEP
 
 BATCH = 20_000  # worlds
 ROUNDS = 30

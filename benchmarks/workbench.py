@@ -10,15 +10,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slap_ros.contact.features import (
+from slap_ros.geometry.pose import Pose, Vector, from_rotation_vector
+from slap_ros.relational import Object, State, Type
+from slap_ros.worlds.contact.features import (
     DRAWER_FEATURES,
     LID_FEATURES,
     ROBOT,
     opening_features,
     robot_features,
 )
-from slap_ros.contact.hand import HandState, hand_at
-from slap_ros.contact.scene import (
+from slap_ros.worlds.contact.hand import HandState, hand_at
+from slap_ros.worlds.contact.scene import (
     TABLE,
     BoxPart,
     Compound,
@@ -29,10 +31,8 @@ from slap_ros.contact.scene import (
     box,
     cylinder,
 )
-from slap_ros.contact.world import MAX_SHIFT, MAX_TURN, ContactWorld
-from slap_ros.geometry.pose import Pose, Vector, from_rotation_vector
-from slap_ros.physics.features import BODY_FEATURES, body_features
-from slap_ros.relational import Object, State, Type
+from slap_ros.worlds.contact.world import MAX_SHIFT, MAX_TURN, ContactWorld
+from slap_ros.worlds.features import BODY_FEATURES, body_features
 
 THING = Type("thing", BODY_FEATURES)
 DRAWER = Type("drawer", DRAWER_FEATURES)

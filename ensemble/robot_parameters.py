@@ -9,9 +9,9 @@ from dataclasses import dataclass, fields
 from ensemble.parameters import MAX_SEED, parameter, parse_parameters
 from ensemble.world_parameters import WorldParameters
 from slap_ros.errors import InvalidParameterError
-from slap_ros.physics.panda import JOINTS
 from slap_ros.robot.limits import Limits, Workspace, arm_limits
 from slap_ros.robot.tracking import TrackingSettings
+from slap_ros.worlds.panda import JOINTS
 
 # As MoveIt's configurations of Franka's arms have them; ``ros2 action list`` shows them.
 TRAJECTORY_ACTION = "ARM_arm_controller/follow_joint_trajectory"

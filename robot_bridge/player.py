@@ -36,12 +36,12 @@ from slap_ros.errors import (
     SlapError,
     StartMismatchError,
 )
-from slap_ros.physics.features import POSE_FEATURES
 from slap_ros.relational import State
 from slap_ros.robot.dry_run import DryRun
 from slap_ros.robot.limits import JointMotion
 from slap_ros.robot.recorded_motion import RecordedMotion, RecordedWaypoint
 from slap_ros.robot.robot_world import GAP_OPEN, GAP_SHUT, GRASPED, GripperAction
+from slap_ros.worlds.features import POSE_FEATURES
 
 POSITION = tuple(feature.name for feature in POSE_FEATURES[:3])
 

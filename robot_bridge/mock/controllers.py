@@ -18,7 +18,7 @@ from ensemble.robot_parameters import MockRobotParameters, action_name, arm_join
 from ensemble.steady_time import create_timer
 from robot_bridge.mock.noise_model import NoiseModel
 from robot_bridge.mock.plant import Plant
-from slap_ros.physics.panda import JOINT_HIGH, JOINT_LOW, JOINTS
+from slap_ros.worlds.panda import JOINT_HIGH, JOINT_LOW, JOINTS
 
 LONGEST_PAUSE = 1.0  # s
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from slap_ros.core import Domain
 from slap_ros.geometry.pose import Pose
-from slap_ros.physics.features import JOINT_FEATURES, POSE_FEATURES, ROBOT, VELOCITY_FEATURES
-from slap_ros.physics.panda import FINGER_OPEN, JOINTS, MAX_STEP
 from slap_ros.relational import State
+from slap_ros.worlds.features import JOINT_FEATURES, POSE_FEATURES, ROBOT, VELOCITY_FEATURES
+from slap_ros.worlds.panda import FINGER_OPEN, JOINTS, MAX_STEP
 
 ARRIVED = 1e-6  # rad
 SHUT, OPEN = 1.0, -1.0  # gripper commands

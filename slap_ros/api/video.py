@@ -11,8 +11,8 @@ from slap_ros.core import Animate, Domain, PictureSize
 from slap_ros.drawing.body_pictures import SIZE, visible, write_body_animation
 from slap_ros.errors import InvalidParameterError, StorageFullError
 from slap_ros.files import require_writable
-from slap_ros.physics.animation import WRITERS
 from slap_ros.relational import State
+from slap_ros.worlds.animation import WRITERS
 
 
 def require_renderable(domain: Domain, state: State, path: Path) -> None:

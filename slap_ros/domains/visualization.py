@@ -11,10 +11,10 @@ from pathlib import Path
 from slap_ros.core import Animate, PictureSize, VisibleBody
 from slap_ros.geometry.pose import IDENTITY
 from slap_ros.motion.arm_shapes import ARM_SHAPES, BASE
-from slap_ros.physics.panda import LINKS, link_poses
-from slap_ros.physics.viewpoint import Viewpoint
-from slap_ros.physics.visuals import Visuals
 from slap_ros.relational import State
+from slap_ros.worlds.panda import LINKS, link_poses
+from slap_ros.worlds.viewpoint import Viewpoint
+from slap_ros.worlds.visuals import Visuals
 
 METAL = (0.88, 0.9, 0.92, 1.0)  # of the arm
 
@@ -67,7 +67,7 @@ def animation(
         size: PictureSize | None,
         progress: Callable[[int], None],
     ) -> None:
-        from slap_ros.physics.rendering import Camera, write_animation  # only here are they needed
+        from slap_ros.worlds.rendering import Camera, write_animation  # only here are they needed
 
         seen_from = view or Viewpoint()
         if size is not None:

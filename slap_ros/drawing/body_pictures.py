@@ -31,8 +31,8 @@ from slap_ros.drawing.projection import (
     pose_of,
 )
 from slap_ros.geometry.pose import rotate
-from slap_ros.physics.animation import Picture, write_pictures
 from slap_ros.relational import State
+from slap_ros.worlds.animation import Picture, write_pictures
 
 SIZE = PictureSize(640, 480)
 SMOOTHING = 2  # pixels drawn for each of the picture, along each edge
@@ -59,7 +59,7 @@ def write_body_animation(
     """Write an animation of the bodies of a domain, one frame per state.
 
     Args:
-        path: The file; its ending says the format, see ``slap_ros.physics.animation``.
+        path: The file; its ending says the format, see ``slap_ros.worlds.animation``.
         display: Shows bodies, the arm among them.
         states: One per frame; not empty.
         period_s: How long each is shown.

@@ -17,7 +17,7 @@ from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.motion.arm_shapes import ARM_SHAPES, BASE, BEHIND_ELBOW
 from slap_ros.motion.joints import Array, Joints
 from slap_ros.motion.kinematics import GRASP_IN_LAST_LINK, LAST_LINK, arm_frames, matrix
-from slap_ros.physics.panda import FINGER_OPEN, JOINTS, LINKS, link_poses
+from slap_ros.worlds.panda import FINGER_OPEN, JOINTS, LINKS, link_poses
 
 MARGIN = 0.005  # m, that the arm keeps from everything
 HELD_MARGIN = -0.001  # m: a held box may rest on what it is lifted from or set down on

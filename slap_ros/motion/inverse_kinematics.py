@@ -29,7 +29,7 @@ from slap_ros.motion.joints import (
     within_limits,
 )
 from slap_ros.motion.kinematics import GRASP_IN_LAST_LINK, matrix
-from slap_ros.physics.panda import JOINTS
+from slap_ros.worlds.panda import JOINTS
 
 SHOULDER = np.array([0.0, 0.0, 0.333])  # m, where the axes of joints 1, 2 and 3 meet
 UPPER_ARM, FOREARM = 0.316, 0.384  # m, along the axes of joints 3 and 5

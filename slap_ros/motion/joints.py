@@ -11,7 +11,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.physics.panda import JOINT_HIGH, JOINT_LOW, JOINTS, MAX_STEP
+from slap_ros.worlds.panda import JOINT_HIGH, JOINT_LOW, JOINTS, MAX_STEP
 
 Array = NDArray[np.float64]
 Joints = Array  # rad, shape (7,), or (n, 7) for many configurations

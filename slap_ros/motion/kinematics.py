@@ -10,7 +10,7 @@ import numpy as np
 
 from slap_ros.geometry.pose import Pose, rotation_matrix
 from slap_ros.motion.joints import Array, Joints
-from slap_ros.physics.panda import JOINTS, grasp_pose, link_poses
+from slap_ros.worlds.panda import JOINTS, grasp_pose, link_poses
 
 LAST_LINK = JOINTS  # link 7, which carries the hand
 

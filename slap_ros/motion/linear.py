@@ -20,7 +20,7 @@ from slap_ros.motion.joints import (
     path_configurations,
     within_limits,
 )
-from slap_ros.physics.panda import GraspKinematics, grasp_pose
+from slap_ros.worlds.panda import GraspKinematics, grasp_pose
 
 INCREMENT = 0.0125  # m, between rows of the path: coming down, less than 1 mm off the line
 TURN_INCREMENT = 0.05  # rad

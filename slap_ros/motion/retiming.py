@@ -25,7 +25,7 @@ from slap_ros.motion.joints import (
     path_configurations,
 )
 from slap_ros.motion.shortcutting import points_at, without_repeats
-from slap_ros.physics.panda import MAX_STEP
+from slap_ros.worlds.panda import MAX_STEP
 
 PAPER_STEPS = 10  # control steps a straight piece, in the preset `paper`
 _ROUNDING = 1e-9  # control steps

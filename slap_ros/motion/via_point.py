@@ -23,7 +23,7 @@ from slap_ros.motion.joints import (
     path_configurations,
     within_limits,
 )
-from slap_ros.physics.panda import JOINTS
+from slap_ros.worlds.panda import JOINTS
 
 VIA_POINTS = 512  # to choose from
 SPREAD = 10.0  # control steps, the largest standard deviation from the straight way

@@ -17,9 +17,9 @@ from slap_ros.geometry.pose import Vector
 from slap_ros.messages.decode import decode_state, stamp_ns
 from slap_ros.messages.interfaces import BODIES, CUBE, TRIANGLE_LIST
 from slap_ros.messages.protocols import MarkersMessage, StateMessage
-from slap_ros.physics.links import LINK_SHAPES
-from slap_ros.physics.panda import HAND, JOINTS, LINKS, link_poses
 from slap_ros.report.traces import robot_types
+from slap_ros.worlds.joint_space.links import LINK_SHAPES
+from slap_ros.worlds.panda import HAND, JOINTS, LINKS, link_poses
 
 MAX_BODIES = 64  # a frame
 MAX_FRAMES = 600  # a run; of a longer one, every second or third step and so on

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from slap_ros.errors import UnsafeCommandError
-from slap_ros.physics.panda import grasp_pose
 from slap_ros.robot.limits import PEAK_ACCELERATION, PEAK_VELOCITY, JointMotion, Joints, Limits
 from slap_ros.robot.recorded_motion import RecordedMotion
+from slap_ros.worlds.panda import grasp_pose
 
 
 @dataclass(frozen=True)

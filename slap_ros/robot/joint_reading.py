@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass
 
 from slap_ros.errors import InvalidMeasurementError
-from slap_ros.physics.panda import JOINTS
+from slap_ros.worlds.panda import JOINTS
 
 STANDS = 0.05  # rad/s, of each joint of an arm at rest
 

@@ -16,7 +16,7 @@ from types import MappingProxyType
 
 from slap_ros.errors import InvalidParameterError, UnsafeCommandError
 from slap_ros.geometry.pose import Vector
-from slap_ros.physics.panda import JOINT_HIGH, JOINT_LOW, JOINTS, MAX_STEP, grasp_pose
+from slap_ros.worlds.panda import JOINT_HIGH, JOINT_LOW, JOINTS, MAX_STEP, grasp_pose
 
 # Of the quintic 10 s^3 - 15 s^4 + 6 s^5: its largest first and second derivative.
 PEAK_VELOCITY = 1.875

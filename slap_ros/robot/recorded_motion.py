@@ -14,17 +14,17 @@ from pathlib import Path
 
 from slap_ros.bags.reader import read_bag
 from slap_ros.bags.recording import RecordedEpisode, Recording
-from slap_ros.contact.arm import MAX_JOINT_STEP
-from slap_ros.contact.features import GRIPPER
-from slap_ros.contact.features import ROBOT as HAND_OF_FORCES
 from slap_ros.core import Domain
 from slap_ros.errors import DamagedBagError, InvalidParameterError
 from slap_ros.messages.decode import decode_goal, decode_state
-from slap_ros.physics.features import JOINT_FEATURES, ROBOT
-from slap_ros.physics.panda import MAX_STEP
 from slap_ros.relational import Object, State
 from slap_ros.robot.limits import Joints, Limits
 from slap_ros.robot.robot_world import GripperAction
+from slap_ros.worlds.contact.arm import MAX_JOINT_STEP
+from slap_ros.worlds.contact.features import GRIPPER
+from slap_ros.worlds.contact.features import ROBOT as HAND_OF_FORCES
+from slap_ros.worlds.features import JOINT_FEATURES, ROBOT
+from slap_ros.worlds.panda import MAX_STEP
 
 
 @dataclass(frozen=True)

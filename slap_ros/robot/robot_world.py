@@ -16,7 +16,6 @@ from enum import Enum
 
 import numpy as np
 
-from slap_ros.contact.features import ROBOT as HAND_OF_FORCES
 from slap_ros.core import Action, Domain
 from slap_ros.errors import (
     InvalidMeasurementError,
@@ -26,15 +25,16 @@ from slap_ros.errors import (
     UnsafeCommandError,
 )
 from slap_ros.geometry.pose import Pose
-from slap_ros.physics.features import GRASP_FEATURES, JOINT_FEATURES, ROBOT
-from slap_ros.physics.panda import FINGER_OPEN, hand_pose
-from slap_ros.physics.world import PandaWorld
 from slap_ros.relational import Object, State
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.limits import STEP_TOLERANCE, JointMotion, Limits
 from slap_ros.robot.scene_config import SceneConfig
 from slap_ros.robot.state_assembly import Grasp, StateAssembler, feature_values
 from slap_ros.robot.tracking import Detection, PoseEstimate, Track, TrackingSettings, measured_pose
+from slap_ros.worlds.contact.features import ROBOT as HAND_OF_FORCES
+from slap_ros.worlds.features import GRASP_FEATURES, JOINT_FEATURES, ROBOT
+from slap_ros.worlds.joint_space.world import PandaWorld
+from slap_ros.worlds.panda import FINGER_OPEN, hand_pose
 
 GAP_OPEN = 2.0 * FINGER_OPEN  # m, between the fingers
 GAP_SHUT = 0.0  # m

@@ -28,15 +28,15 @@ from slap_ros.core import Domain
 from slap_ros.errors import InvalidMeasurementError, InvalidSceneError, InvalidStateError
 from slap_ros.files import parse_yaml, read_text
 from slap_ros.geometry.pose import IDENTITY, ORIGIN, Pose
-from slap_ros.physics.features import (
+from slap_ros.relational import Object, State
+from slap_ros.robot.tracking import measured_pose
+from slap_ros.worlds.features import (
     ROBOT,
     body_features,
     pose_features,
     robot_features,
 )
-from slap_ros.physics.panda import HOME
-from slap_ros.relational import Object, State
-from slap_ros.robot.tracking import measured_pose
+from slap_ros.worlds.panda import HOME
 
 MAX_SCENE_BYTES = 2**20
 DETECTED = "detected_"  # prefix of detection frames where no scene file names them

@@ -8,19 +8,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from slap_ros.geometry.pose import IDENTITY, ORIGIN, Pose
-from slap_ros.physics.features import (
+from slap_ros.relational import Feature, Object, State
+from slap_ros.robot.joint_reading import JointReading
+from slap_ros.robot.tracking import PoseEstimate
+from slap_ros.worlds.features import (
     GRASP_FEATURES,
     JOINT_FEATURES,
     POSE_FEATURES,
     ROBOT,
     VELOCITY_FEATURES,
 )
-from slap_ros.physics.panda import FINGER_OPEN, hand_pose
-from slap_ros.physics.scene import Scene
-from slap_ros.physics.settling import resting_poses
-from slap_ros.relational import Feature, Object, State
-from slap_ros.robot.joint_reading import JointReading
-from slap_ros.robot.tracking import PoseEstimate
+from slap_ros.worlds.panda import FINGER_OPEN, hand_pose
+from slap_ros.worlds.scene import Scene
+from slap_ros.worlds.settling import resting_poses
 
 Changes = dict[tuple[Object, str], float]
 

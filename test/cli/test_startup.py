@@ -13,7 +13,7 @@ import pytest
 from ensemble.cli import application
 
 LEARNING = {"torch", "stable_baselines3", "tensorboard", "gymnasium", "ray"}
-PHYSICS = {"pybullet", "slap_ros.physics", "slap_ros.contact", "slap_ros.motion"}
+PHYSICS = {"pybullet", "slap_ros.worlds.joint_space", "slap_ros.worlds.contact", "slap_ros.motion"}
 PICTURES = {"PIL", "cv2", "matplotlib", "slap_ros.drawing"}
 OTHERS = {"scipy", "openai", "transformers", "pandas", "jinja2", "slap_ros.language"}
 HEAVY = LEARNING | PHYSICS | PICTURES | OTHERS

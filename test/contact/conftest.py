@@ -17,7 +17,7 @@ sys.path[:0] = [str(HERE), str(HERE.parent.parent)]  # the helpers of these test
 def world():
     """The bench, with the hand above it."""
     from benchmarks.workbench import BENCH, start
-    from slap_ros.contact.world import ContactWorld
+    from slap_ros.worlds.contact.world import ContactWorld
 
     with ContactWorld(BENCH, start()) as world:
         yield world

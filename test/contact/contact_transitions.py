@@ -18,10 +18,10 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent.parent.parent))
 
 from benchmarks.workbench import BENCH, HANDLE_AT, Move, Setting, action_towards, position, start
-from slap_ros.contact.hand import hand_at
-from slap_ros.contact.world import ACTION_SPACE, ContactWorld
 from slap_ros.geometry.pose import Pose
 from slap_ros.relational import State
+from slap_ros.worlds.contact.hand import hand_at
+from slap_ros.worlds.contact.world import ACTION_SPACE, ContactWorld
 
 LOW, HIGH = np.array(ACTION_SPACE.low), np.array(ACTION_SPACE.high)
 QUARTER = math.pi / 2

@@ -24,18 +24,18 @@ from benchmarks.workbench import (
     start,
     value,
 )
-from slap_ros.contact import simulation_pool
-from slap_ros.contact.arm import MAX_JOINT_STEP
-from slap_ros.contact.contacts import Side
-from slap_ros.contact.features import robot_features
-from slap_ros.contact.hand import LEASH, hand_at
-from slap_ros.contact.scene import TABLE, ContactScene, HandForces, box, cylinder
-from slap_ros.contact.world import ACTION_SPACE, MAX_SHIFT, MAX_TURN, ContactWorld
 from slap_ros.errors import InvalidCommandError, InvalidDomainError, InvalidStateError
 from slap_ros.geometry.pose import Pose, from_yaw
-from slap_ros.physics.bullet import pybullet
-from slap_ros.physics.panda import JOINT_HIGH, JOINT_LOW, grasp_pose
 from slap_ros.relational import State
+from slap_ros.worlds.bullet import pybullet
+from slap_ros.worlds.contact import simulation_pool
+from slap_ros.worlds.contact.arm import MAX_JOINT_STEP
+from slap_ros.worlds.contact.contacts import Side
+from slap_ros.worlds.contact.features import robot_features
+from slap_ros.worlds.contact.hand import LEASH, hand_at
+from slap_ros.worlds.contact.scene import TABLE, ContactScene, HandForces, box, cylinder
+from slap_ros.worlds.contact.world import ACTION_SPACE, MAX_SHIFT, MAX_TURN, ContactWorld
+from slap_ros.worlds.panda import JOINT_HIGH, JOINT_LOW, grasp_pose
 
 STAY = np.zeros(5)
 
@@ -176,10 +176,10 @@ def test_what_is_flung_is_met_by_what_was_left_out():
 
 def test_the_hands_own_way_is_what_the_simulation_makes_of_it():
     """Where nothing is near, both give the same."""
-    from slap_ros.contact.hand import own_way
-    from slap_ros.contact.involved import Involved
-    from slap_ros.contact.simulation import ContactSimulation
-    from slap_ros.contact.snapshot import ContactSnapshot, Placement
+    from slap_ros.worlds.contact.hand import own_way
+    from slap_ros.worlds.contact.involved import Involved
+    from slap_ros.worlds.contact.simulation import ContactSimulation
+    from slap_ros.worlds.contact.snapshot import ContactSnapshot, Placement
 
     scene = ContactScene((TABLE,))
     simulation = ContactSimulation(scene)

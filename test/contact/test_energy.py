@@ -20,10 +20,10 @@ from benchmarks.workbench import (
     start,
     value,
 )
-from slap_ros.contact.hand import hand_at
-from slap_ros.contact.world import ACTION_SPACE, MAX_SHIFT, ContactWorld
 from slap_ros.geometry.pose import Pose, from_yaw, multiply
 from slap_ros.relational import State
+from slap_ros.worlds.contact.hand import hand_at
+from slap_ros.worlds.contact.world import ACTION_SPACE, MAX_SHIFT, ContactWorld
 
 STEPS = 500
 FASTEST = 3.0  # m/s

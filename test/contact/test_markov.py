@@ -14,9 +14,9 @@ from contact_transitions import Transitions, record
 from marks import slow
 
 from benchmarks.workbench import BENCH, start
-from slap_ros.contact.simulation_pool import close_idle
-from slap_ros.contact.world import ContactWorld
 from slap_ros.relational import State
+from slap_ros.worlds.contact.simulation_pool import close_idle
+from slap_ros.worlds.contact.world import ContactWorld
 
 COUNT = 600
 

@@ -13,9 +13,9 @@ import pytest
 from domain_transitions import differing, orders, record, save
 from marks import slow
 
-from slap_ros.contact.features import ROBOT
 from slap_ros.domains import get_domain
 from slap_ros.domains.registry import OURS
+from slap_ros.worlds.contact.features import ROBOT
 
 DOMAINS = [name for name in OURS if get_domain(name).acquisition is not None]
 COUNT = 120  # steps; ``domain_transitions`` is a command for more

@@ -26,15 +26,15 @@ from benchmarks.workbench import (
     position,
     start,
 )
-from slap_ros.contact.features import ROBOT, robot_features
-from slap_ros.contact.hand import hand_at
-from slap_ros.contact.scene import TABLE, ContactScene, box
-from slap_ros.contact.settling import settled
-from slap_ros.contact.world import ContactWorld
 from slap_ros.errors import InvalidStateError
 from slap_ros.geometry.pose import Pose, from_rotation_vector, from_yaw, multiply
-from slap_ros.physics.features import POSE_FEATURES, body_features
 from slap_ros.relational import State
+from slap_ros.worlds.contact.features import ROBOT, robot_features
+from slap_ros.worlds.contact.hand import hand_at
+from slap_ros.worlds.contact.scene import TABLE, ContactScene, box
+from slap_ros.worlds.contact.settling import settled
+from slap_ros.worlds.contact.world import ContactWorld
+from slap_ros.worlds.features import POSE_FEATURES, body_features
 
 NOISE, TURN_NOISE = 0.002, 0.01  # m, rad: standard deviations
 AWAY = hand_at((0.45, 0.0, 0.35))

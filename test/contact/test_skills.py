@@ -24,10 +24,10 @@ from benchmarks.contact_skills import (
     shaken_slip,
 )
 from benchmarks.workbench import LOOSE, Move, Setting, perform, position, start, value
-from slap_ros.contact.contacts import Side
-from slap_ros.contact.hand import hand_at
-from slap_ros.contact.world import ContactWorld
 from slap_ros.geometry.pose import Pose
+from slap_ros.worlds.contact.contacts import Side
+from slap_ros.worlds.contact.hand import hand_at
+from slap_ros.worlds.contact.world import ContactWorld
 
 
 @pytest.mark.parametrize("name", GRASPABLE)

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from benchmarks.workbench import BENCH, CUBE_AT, HAND, LEFT_DRAWER, Setting, start
-from slap_ros.contact.hand import hand_at
-from slap_ros.contact.links import link_poses, links
-from slap_ros.contact.visuals import ContactVisuals
-from slap_ros.physics.panda import grasp_pose
-from slap_ros.physics.rendering import Camera
-from slap_ros.physics.viewpoint import Viewpoint
+from slap_ros.worlds.contact.hand import hand_at
+from slap_ros.worlds.contact.links import link_poses, links
+from slap_ros.worlds.contact.visuals import ContactVisuals
+from slap_ros.worlds.panda import grasp_pose
+from slap_ros.worlds.rendering import Camera
+from slap_ros.worlds.viewpoint import Viewpoint
 
 VISUALS = ContactVisuals(BENCH)
 DRAWERS_AHEAD = Viewpoint(eye=(0.1, 0.0, 0.6), target=(0.6, 0.0, 0.0), width=160, height=120)

@@ -5,8 +5,6 @@
 import numpy as np
 import pytest
 
-from slap_ros.contact.features import ROBOT, robot_features
-from slap_ros.contact.hand import PAD, hand_at
 from slap_ros.domains import get_domain
 from slap_ros.domains.benchtop.cabinet import CABINET
 from slap_ros.domains.benchtop.drawers import handle_of
@@ -18,6 +16,8 @@ from slap_ros.errors import InvalidStateError
 from slap_ros.geometry.pose import from_yaw
 from slap_ros.learning.learner_interface import learner_interface
 from slap_ros.relational import State
+from slap_ros.worlds.contact.features import ROBOT, robot_features
+from slap_ros.worlds.contact.hand import PAD, hand_at
 
 HAMMERS = get_domain("stow_hammer")
 START = HAMMERS.task(0, 0).initial_state

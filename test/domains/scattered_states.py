@@ -11,7 +11,6 @@ from functools import cache
 
 import numpy as np
 
-from slap_ros.contact.features import ROBOT
 from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.domains.benchtop.features import PLACE, THING
@@ -19,6 +18,7 @@ from slap_ros.domains.benchtop.state_access import ANGULAR, LINEAR, POSITION, QU
 from slap_ros.domains.registry import OURS
 from slap_ros.geometry.pose import from_rotation_vector, from_yaw, multiply, rotate
 from slap_ros.relational import Layout, Metric, Object, State
+from slap_ros.worlds.contact.features import ROBOT
 
 BENCHTOP = [name for name in OURS if PLACE in get_domain(name).types]
 STATES = 2_000

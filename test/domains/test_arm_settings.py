@@ -9,8 +9,8 @@ import pytest
 
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError, SkillNotApplicableError
-from slap_ros.physics.panda import MAX_STEP
 from slap_ros.portable_math import RESOLUTION
+from slap_ros.worlds.panda import MAX_STEP
 
 DOMAINS = ("obstacle_tower", "cluttered_drawer", "cleanup_table")
 LIMITS = np.array([*MAX_STEP, 1.0])

@@ -8,7 +8,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from slap_ros.contact.features import ROBOT
 from slap_ros.domains import get_domain
 from slap_ros.domains.registry import OURS
 from slap_ros.errors import (
@@ -17,8 +16,9 @@ from slap_ros.errors import (
     InvalidStateError,
     UnknownGoalError,
 )
-from slap_ros.physics.features import BODY_FEATURES, POSE_FEATURES
 from slap_ros.relational import State
+from slap_ros.worlds.contact.features import ROBOT
+from slap_ros.worlds.features import BODY_FEATURES, POSE_FEATURES
 
 DOMAINS = [name for name in OURS if get_domain(name).acquisition is not None]
 GARBAGE = 60  # states for each domain

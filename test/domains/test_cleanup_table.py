@@ -27,12 +27,12 @@ from slap_ros.domains.cleanup_table.tasks import make_task
 from slap_ros.errors import ErrorCode, InvalidParameterError
 from slap_ros.geometry.pose import Pose, rotate
 from slap_ros.meshes.solid import Solid, cuboid
-from slap_ros.physics.features import ROBOT
-from slap_ros.physics.panda import JOINT_HIGH, JOINT_LOW, MAX_STEP, grasp_pose
-from slap_ros.physics.world import PandaWorld
 from slap_ros.planning.planner import GraphPlanner, Problem
 from slap_ros.planning.search import search_exhaustively, search_lazily
 from slap_ros.relational import Column, State, Target
+from slap_ros.worlds.features import ROBOT
+from slap_ros.worlds.joint_space.world import PandaWorld
+from slap_ros.worlds.panda import JOINT_HIGH, JOINT_LOW, MAX_STEP, grasp_pose
 
 FAIR, PAPER = get_domain("cleanup_table"), get_domain("cleanup_table", "paper")
 PLACES = {"duck": (0.4, 0.1, 0.0), "toy_robot": (0.5, 0.2, 0.0), "dinosaur": (0.6, 0.1, 0.0)}

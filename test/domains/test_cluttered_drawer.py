@@ -25,14 +25,14 @@ from slap_ros.domains.tabletop.state_access import joints_of, pose_of
 from slap_ros.errors import InvalidParameterError, InvalidStateError, SkillNotApplicableError
 from slap_ros.geometry.pose import multiply, rotate
 from slap_ros.motion import linear_motion, nearest_configurations, retime
-from slap_ros.physics.panda import MAX_STEP, grasp_pose
-from slap_ros.physics.scene import TABLE_TOP
 from slap_ros.planning.abstract_graph import build_abstract_graph
 from slap_ros.planning.model import Model
 from slap_ros.planning.options import given_option
 from slap_ros.planning.planner import GraphPlanner, Problem
 from slap_ros.planning.search import search_exhaustively, search_lazily
 from slap_ros.relational import Column, State, Target
+from slap_ros.worlds.panda import MAX_STEP, grasp_pose
+from slap_ros.worlds.scene import TABLE_TOP
 
 FAIR, PAPER = get_domain("cluttered_drawer"), get_domain("cluttered_drawer", "paper")
 HALF = 0.025  # m, half a block

@@ -17,8 +17,8 @@ from slap_ros.domains.groceries.scenery import GROCERIES, INNER, OUTER, WALL_HEI
 from slap_ros.domains.groceries.tasks import basket_station, grasp_goal, station
 from slap_ros.errors import InvalidParameterError, UnknownObjectError
 from slap_ros.learning.demonstrator import demonstrate
-from slap_ros.physics.panda import FINGER_OPEN
 from slap_ros.relational import Column
+from slap_ros.worlds.panda import FINGER_OPEN
 
 DOMAIN = get_domain("groceries")
 

@@ -20,7 +20,6 @@ from drawer_states import (
 )
 
 from slap_ros.acquisition.domain_choice import DomainChoice, open_domain
-from slap_ros.contact.world import MAX_SHIFT
 from slap_ros.domains import get_domain
 from slap_ros.domains.benchtop import drawers
 from slap_ros.domains.benchtop.cabinet import TRAVEL
@@ -44,6 +43,7 @@ from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.geometry.pose import Pose
 from slap_ros.learning.demonstrator import demonstrate
 from slap_ros.relational import State
+from slap_ros.worlds.contact.world import MAX_SHIFT
 
 DOMAIN = get_domain("make_coffee")
 SCRIPTED = open_domain(DomainChoice("make_coffee", skills="demonstrator"))

@@ -19,12 +19,12 @@ from slap_ros.domains.obstacle_tower.tasks import (
 )
 from slap_ros.domains.tabletop.state_access import pose_of
 from slap_ros.errors import ErrorCode, InvalidStateError, UnsolvableError
-from slap_ros.physics.panda import MAX_STEP
-from slap_ros.physics.scene import CUBE_EDGE, Material
 from slap_ros.planning.model import Model
 from slap_ros.planning.planner import GraphPlanner, Problem, make_planner
 from slap_ros.planning.search import search_exhaustively, search_lazily
 from slap_ros.relational import State
+from slap_ros.worlds.panda import MAX_STEP
+from slap_ros.worlds.scene import CUBE_EDGE, Material
 
 FAIR, PAPER = get_domain("obstacle_tower"), get_domain("obstacle_tower", "paper")
 

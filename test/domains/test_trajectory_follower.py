@@ -9,8 +9,8 @@ pytest.importorskip("pybullet")
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.tabletop.skills import TrajectoryFollower
-from slap_ros.physics.features import JOINT_FEATURES
-from slap_ros.physics.panda import HOME, MAX_STEP
+from slap_ros.worlds.features import JOINT_FEATURES
+from slap_ros.worlds.panda import HOME, MAX_STEP
 
 DOMAIN = get_domain("obstacle_tower", "fair")
 START = DOMAIN.task(0).initial_state

@@ -10,7 +10,7 @@ from visualization_msgs.msg import Marker
 from ensemble.encode import SCENE
 from slap_ros.domains import get_domain
 from slap_ros.encoding.scene_encoder import body_poses
-from slap_ros.physics.panda import grasp_pose
+from slap_ros.worlds.panda import grasp_pose
 
 STAMP = Time(sec=1, nanosec=2)
 

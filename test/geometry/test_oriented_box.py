@@ -9,7 +9,7 @@ import pytest
 
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose
-from slap_ros.physics.bullet import pybullet
+from slap_ros.worlds.bullet import pybullet
 
 UNSURE = 2e-3  # m, distance within which either answer will do: PyBullet keeps margins
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from slap_ros.geometry.oriented_box import OrientedBox
-from slap_ros.physics.panda import HOME, JOINT_HIGH, JOINT_LOW, Pose
+from slap_ros.worlds.panda import HOME, JOINT_HIGH, JOINT_LOW, Pose
 
 STRAIGHT = (0.0, 0.0, 0.0, 1.0)
 HALF = (0.025, 0.025, 0.025)  # m, of a block

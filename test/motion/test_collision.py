@@ -20,7 +20,7 @@ from slap_ros.geometry.box_separation import separated
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.motion import CollisionChecker, inverse_kinematics
 from slap_ros.motion.kinematics import matrix
-from slap_ros.physics.panda import FINGER_OPEN, HAND, LINKS, Pose, link_poses
+from slap_ros.worlds.panda import FINGER_OPEN, HAND, LINKS, Pose, link_poses
 
 
 def place(obstacles, x, y, z, **options):

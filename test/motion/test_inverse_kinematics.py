@@ -20,7 +20,7 @@ from slap_ros.motion import (
     within_limits,
 )
 from slap_ros.motion.kinematics import arm_frames, matrix
-from slap_ros.physics.panda import JOINT_HIGH, JOINT_LOW, Pose, grasp_pose, link_poses
+from slap_ros.worlds.panda import JOINT_HIGH, JOINT_LOW, Pose, grasp_pose, link_poses
 
 
 def offsets(q, pose):

@@ -17,7 +17,7 @@ from slap_ros.motion import (
     within_limits,
 )
 from slap_ros.motion.joints import path_configurations
-from slap_ros.physics.panda import Pose, grasp_pose
+from slap_ros.worlds.panda import Pose, grasp_pose
 
 
 def off_the_line(pose, start, goal):

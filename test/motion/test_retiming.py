@@ -13,7 +13,7 @@ from motion_scenes import START
 
 from slap_ros.motion import path_steps, retime, retime_fixed_steps
 from slap_ros.motion.joints import path_configurations
-from slap_ros.physics.panda import MAX_STEP
+from slap_ros.worlds.panda import MAX_STEP
 
 PATHS = st.builds(
     lambda seed, rows, scale: np.random.default_rng(seed).normal(0.0, scale, (rows, 7)),

@@ -17,7 +17,7 @@ sys.path[:0] = [str(HERE), str(HERE.parent.parent)]  # the helpers of these test
 def world():
     """The tower, the arm at home."""
     from benchmarks.physics_step import SCENE, tower
-    from slap_ros.physics.world import PandaWorld
+    from slap_ros.worlds.joint_space.world import PandaWorld
 
     with PandaWorld(SCENE, tower()) as world:
         yield world

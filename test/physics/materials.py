@@ -9,9 +9,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from benchmarks.physics_step import BLOCK, NAMES, tower
-from slap_ros.physics.features import BODY_FEATURES, MATERIAL_FEATURES, material_features
-from slap_ros.physics.scene import CUBE_MATERIAL, Material
 from slap_ros.relational import State, Type
+from slap_ros.worlds.features import BODY_FEATURES, MATERIAL_FEATURES, material_features
+from slap_ros.worlds.scene import CUBE_MATERIAL, Material
 
 MADE_BLOCK = Type("block", (*BODY_FEATURES, *MATERIAL_FEATURES))
 

@@ -8,7 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 import pytest
 
-from slap_ros.physics.bullet import BUILD_TIME
+from slap_ros.worlds.bullet import BUILD_TIME
 
 # An extension in PyBullet's place that prints as it does, to both streams, and more.
 TALKATIVE = """
@@ -27,7 +27,7 @@ class Talkative:
         print("by python", flush=True)
 
 sys.meta_path.insert(0, Talkative())
-import slap_ros.physics.bullet
+import slap_ros.worlds.bullet
 ctypes.CDLL(None).puts(b"; later")
 """
 
@@ -49,7 +49,7 @@ def installed():
 def test_a_process_that_imports_our_physics_prints_nothing():
     talk = run("import pybullet")
     assert BUILD_TIME in talk.stdout + talk.stderr  # else there is nothing to suppress any more
-    answer = run("import slap_ros.physics.world, slap_ros.physics.rendering")
+    answer = run("import slap_ros.worlds.joint_space.world, slap_ros.worlds.rendering")
     assert (answer.stdout, answer.stderr) == (b"", b"")
 
 

@@ -11,12 +11,12 @@ from transitions import GRASP, holding
 
 from benchmarks.physics_step import NAMES, SCENE, reach, tower
 from slap_ros.errors import InvalidStateError
-from slap_ros.physics.panda import HOME
-from slap_ros.physics.scene import CUBE_MATERIAL, FRICTION, TABLE, Material, Scene, cube
-from slap_ros.physics.simulation import GRAVITY
-from slap_ros.physics.simulation_pool import close_idle
-from slap_ros.physics.world import PandaWorld
 from slap_ros.relational import State
+from slap_ros.worlds.joint_space.simulation import GRAVITY
+from slap_ros.worlds.joint_space.world import PandaWorld
+from slap_ros.worlds.panda import HOME
+from slap_ros.worlds.scene import CUBE_MATERIAL, FRICTION, TABLE, Material, Scene, cube
+from slap_ros.worlds.simulation_pool import close_idle
 
 STAY = np.zeros(8)
 

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from slap_ros.geometry.pose import Pose, multiply
-from slap_ros.physics.bullet import pybullet
-from slap_ros.physics.links import LINK_SHAPES
-from slap_ros.physics.panda import (
+from slap_ros.worlds.bullet import pybullet
+from slap_ros.worlds.joint_space.links import LINK_SHAPES
+from slap_ros.worlds.joint_space.simulation import MESHES, PANDA
+from slap_ros.worlds.panda import (
     FINGER_OPEN,
     GRASP_POINT,
     HAND,
@@ -26,7 +27,6 @@ from slap_ros.physics.panda import (
     jacobian,
     link_poses,
 )
-from slap_ros.physics.simulation import MESHES, PANDA
 
 URDF_LINKS = {  # name here: index there
     **{f"link{i}": i - 1 for i in range(1, 8)},

@@ -11,13 +11,13 @@ from transitions import HIGH, holding
 from benchmarks.physics_step import NAMES, SCENE, pushes, tower, truth, with_joints
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose
-from slap_ros.physics.arm import Arm
-from slap_ros.physics.bullet import pybullet
-from slap_ros.physics.panda import FINGER_OPEN, HOME, MAX_STEP
-from slap_ros.physics.scene import CUBE_EDGE, FLOOR_TOP, TABLE, TABLE_TOP, cube
-from slap_ros.physics.simulation import Drive, Simulation, Stepping
-from slap_ros.physics.snapshot import BodyState
-from slap_ros.physics.world import PandaWorld
+from slap_ros.worlds.bullet import pybullet
+from slap_ros.worlds.joint_space.arm import Arm
+from slap_ros.worlds.joint_space.simulation import Drive, Simulation, Stepping
+from slap_ros.worlds.joint_space.snapshot import BodyState
+from slap_ros.worlds.joint_space.world import PandaWorld
+from slap_ros.worlds.panda import FINGER_OPEN, HOME, MAX_STEP
+from slap_ros.worlds.scene import CUBE_EDGE, FLOOR_TOP, TABLE, TABLE_TOP, cube
 
 PUSHES = 40  # of the 200 that benchmarks/physics_step.py --pushes 200 compares
 FASTEST = 6.0  # m/s; falling to the floor gives 3

@@ -13,11 +13,13 @@ from transitions import HIGH, holding
 from benchmarks.physics_step import BLOCK, NAMES, SCENE, pushes, reach, tower, with_joints
 from slap_ros.errors import InvalidCommandError, InvalidDomainError, InvalidStateError
 from slap_ros.geometry.pose import Pose
-from slap_ros.physics import simulation_pool
-from slap_ros.physics.arm import Arm, Obstacle, Sweep
-from slap_ros.physics.bullet import pybullet
-from slap_ros.physics.features import ROBOT, body_features, robot_features
-from slap_ros.physics.panda import (
+from slap_ros.relational import State, Type
+from slap_ros.worlds import simulation_pool
+from slap_ros.worlds.bullet import pybullet
+from slap_ros.worlds.features import ROBOT, body_features, robot_features
+from slap_ros.worlds.joint_space.arm import Arm, Obstacle, Sweep
+from slap_ros.worlds.joint_space.world import ACTION_SPACE, PandaWorld
+from slap_ros.worlds.panda import (
     FINGER_OPEN,
     HOME,
     JOINT_HIGH,
@@ -26,9 +28,7 @@ from slap_ros.physics.panda import (
     grasp_pose,
     hand_pose,
 )
-from slap_ros.physics.scene import TABLE, Box, Scene, cube
-from slap_ros.physics.world import ACTION_SPACE, PandaWorld
-from slap_ros.relational import State, Type
+from slap_ros.worlds.scene import TABLE, Box, Scene, cube
 
 CLOSE, OPEN = np.eye(8)[7], -np.eye(8)[7]
 STAY = np.zeros(8)

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slap_ros.errors import InvalidParameterError, UnsafeCommandError
-from slap_ros.physics.panda import HOME, MAX_STEP, grasp_pose
 from slap_ros.robot.limits import FR3, PANDA, Workspace, arm_limits
+from slap_ros.worlds.panda import HOME, MAX_STEP, grasp_pose
 
 PERIOD = 0.125  # s
 ANYWHERE = Workspace((-9.0, -9.0, -9.0), (9.0, 9.0, 9.0))

@@ -17,11 +17,11 @@ from slap_ros.errors import (
     UnsafeCommandError,
 )
 from slap_ros.geometry.pose import IDENTITY, Pose
-from slap_ros.physics.features import JOINT_FEATURES, POSE_FEATURES
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.limits import PANDA, Workspace
 from slap_ros.robot.robot_world import GripperAction, RobotWorld
 from slap_ros.robot.scene_config import read_scene_config, sampled_scene_config
+from slap_ros.worlds.features import JOINT_FEATURES, POSE_FEATURES
 
 DOMAIN = get_domain("obstacle_tower", "fair")
 TASK = DOMAIN.task(1)

@@ -13,9 +13,6 @@ from slap_ros.domains.tabletop.observation import (
     joint_contributions,
 )
 from slap_ros.domains.tabletop.state_access import JOINT_NAMES
-from slap_ros.physics.features import ROBOT
-from slap_ros.physics.panda import JOINT_HIGH, JOINT_LOW, MAX_STEP
-from slap_ros.physics.scene import TABLE_TOP
 from slap_ros.relational import State
 from slap_ros.shortcuts.observation_encoder import (
     JOINT_LIMIT_WEIGHT,
@@ -23,6 +20,9 @@ from slap_ros.shortcuts.observation_encoder import (
     ObservationEncoder,
 )
 from slap_ros.shortcuts.signature import Change, Signature
+from slap_ros.worlds.features import ROBOT
+from slap_ros.worlds.panda import JOINT_HIGH, JOINT_LOW, MAX_STEP
+from slap_ros.worlds.scene import TABLE_TOP
 
 TOWER = get_domain("obstacle_tower", "paper")
 

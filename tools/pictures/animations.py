@@ -20,14 +20,14 @@ from slap_ros.domains.obstacle_tower.features import SURFACE
 from slap_ros.domains.obstacle_tower.scene import scene_of as scene_of_tower
 from slap_ros.evaluation.approaches import Approach, approaches
 from slap_ros.evaluation.experiment import solve
-from slap_ros.physics.panda import CONTROL_PERIOD_S
-from slap_ros.physics.rendering import Camera
-from slap_ros.physics.viewpoint import Viewpoint
-from slap_ros.physics.visuals import SceneVisuals, Visuals
 from slap_ros.planning.options import OptionKind
 from slap_ros.relational import State
 from slap_ros.shortcuts.shipped import chosen_library
 from slap_ros.shortcuts.shortcut import DEFAULT
+from slap_ros.worlds.panda import CONTROL_PERIOD_S
+from slap_ros.worlds.rendering import Camera
+from slap_ros.worlds.viewpoint import Viewpoint
+from slap_ros.worlds.visuals import SceneVisuals, Visuals
 
 OVERSAMPLING = 2  # pictures are drawn so many times as large, then scaled down
 SIZE_PX = (420, 380)  # of one arm's picture

@@ -12,17 +12,17 @@ from pathlib import Path
 from PIL import Image
 
 from slap_ros.acquisition.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
-from slap_ros.contact.arm import CONTROL_PERIOD_S
-from slap_ros.contact.scene import ContactScene
-from slap_ros.contact.visuals import ContactVisuals
-from slap_ros.contact.world import ContactWorld
 from slap_ros.core import Domain
 from slap_ros.geometry.pose import Vector
 from slap_ros.learning.demonstrator import demonstrate
-from slap_ros.physics.rendering import Camera
-from slap_ros.physics.viewpoint import Viewpoint
 from slap_ros.planning.execution import EpisodeResult, ExecutedEdge
 from slap_ros.relational import State
+from slap_ros.worlds.contact.arm import CONTROL_PERIOD_S
+from slap_ros.worlds.contact.scene import ContactScene
+from slap_ros.worlds.contact.visuals import ContactVisuals
+from slap_ros.worlds.contact.world import ContactWorld
+from slap_ros.worlds.rendering import Camera
+from slap_ros.worlds.viewpoint import Viewpoint
 from tools.pictures.animations import (
     DONE,
     OVERSAMPLING,

@@ -16,7 +16,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from slap_ros.contact.world import MAX_SHIFT
 from slap_ros.core import Approach, Policy
 from slap_ros.domains.benchtop.features import THING
 from slap_ros.domains.benchtop.hand_motion import CLOSE, KEEP, OPEN, HandGoal
@@ -24,6 +23,7 @@ from slap_ros.domains.benchtop.scripts import Move, follow, over, release, trave
 from slap_ros.domains.benchtop.state_access import hand_position, hand_target, held_thing
 from slap_ros.geometry.pose import Vector
 from slap_ros.relational import Object, State
+from slap_ros.worlds.contact.world import MAX_SHIFT
 
 DISTANCE = 0.04  # m before where the skill acts (LG-SAIL §5.1)
 # What is stacked is within 10 mm, so opening the fingers where a skill begins stacks nothing.

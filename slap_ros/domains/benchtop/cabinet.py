@@ -12,11 +12,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from slap_ros.contact.scene import BoxPart, Joint, JointedBody, JointKind
 from slap_ros.domains.benchtop.features import DRAWER, jointed_features
 from slap_ros.geometry.pose import Pose, Vector
-from slap_ros.physics.scene import Colour
 from slap_ros.relational import Type
+from slap_ros.worlds.contact.scene import BoxPart, Joint, JointedBody, JointKind
+from slap_ros.worlds.scene import Colour
 
 CABINET = Type("cabinet", DRAWER.features, DRAWER)
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from slap_ros.contact.features import DRAWER_FEATURES, LID_FEATURES, opening_features
 from slap_ros.geometry.pose import Pose
-from slap_ros.physics.features import BODY_FEATURES, POSE_FEATURES, body_features, pose_features
 from slap_ros.relational import Feature, Type
+from slap_ros.worlds.contact.features import DRAWER_FEATURES, LID_FEATURES, opening_features
+from slap_ros.worlds.features import BODY_FEATURES, POSE_FEATURES, body_features, pose_features
 
 SUPPORT_HEIGHT = Feature("support_height", "m")  # from its origin up to where things stand on it
 REST_HEIGHT = Feature("rest_height", "m")  # from where it stands up to its origin

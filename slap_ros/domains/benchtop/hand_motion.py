@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from slap_ros.contact.hand import wrapped
-from slap_ros.contact.world import MAX_SHIFT, MAX_TURN
 from slap_ros.core import Action
 from slap_ros.domains.benchtop.state_access import hand_position, hand_target, hand_yaw
 from slap_ros.geometry.pose import Vector
 from slap_ros.portable_math import on_grid
 from slap_ros.relational import State
+from slap_ros.worlds.contact.hand import wrapped
+from slap_ros.worlds.contact.world import MAX_SHIFT, MAX_TURN
 
 OPEN, KEEP, CLOSE = -1.0, 0.0, 1.0  # gripper commands
 NEAR = 0.002  # m, at which the hand is where it was to go

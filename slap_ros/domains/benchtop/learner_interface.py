@@ -9,11 +9,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from slap_ros.contact.features import ROBOT
-from slap_ros.contact.hand import LEASH
-from slap_ros.contact.scene import ContactScene
-from slap_ros.contact.snapshot import StateIndex
-from slap_ros.contact.way_up import way_up_is_free
 from slap_ros.core import LearnerInterface
 from slap_ros.domains.benchtop.cabinet import CABINET, HANDLE, MIDDLE
 from slap_ros.domains.benchtop.drawers import in_drawers
@@ -28,10 +23,15 @@ from slap_ros.domains.benchtop.state_access import (
     hand_positions,
     positions,
 )
-from slap_ros.physics.panda import FINGER_OPEN
 from slap_ros.relational import Column, GroundAtom, Object, Predicate, State, Type
 from slap_ros.relational.predicates import Bools
 from slap_ros.relational.state import Array
+from slap_ros.worlds.contact.features import ROBOT
+from slap_ros.worlds.contact.hand import LEASH
+from slap_ros.worlds.contact.scene import ContactScene
+from slap_ros.worlds.contact.snapshot import StateIndex
+from slap_ros.worlds.contact.way_up import way_up_is_free
+from slap_ros.worlds.panda import FINGER_OPEN
 
 HEIGHT_SCALE = 0.2  # m, the scale of what is observed of the hand's height
 FINE = 0.01  # m: below, what is observed of a distance is linear in it; above, its logarithm

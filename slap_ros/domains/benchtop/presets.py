@@ -11,17 +11,17 @@ from typing import Protocol
 
 import numpy as np
 
-from slap_ros.contact.arm import CONTROL_PERIOD_S
-from slap_ros.contact.features import ROBOT
-from slap_ros.contact.scene import ContactScene
-from slap_ros.contact.settling import settled
-from slap_ros.contact.world import ACTION_SPACE, ContactWorld
 from slap_ros.core import Acquisition, Domain, Execution, Goal, Learning, Task
 from slap_ros.domains.benchtop.learner_interface import learner_interface
 from slap_ros.domains.benchtop.metrics import COMMON
 from slap_ros.domains.benchtop.visualization import VIEW, display
-from slap_ros.physics.viewpoint import Viewpoint
 from slap_ros.relational import Layout, Metric, Predicate, State, Type
+from slap_ros.worlds.contact.arm import CONTROL_PERIOD_S
+from slap_ros.worlds.contact.features import ROBOT
+from slap_ros.worlds.contact.scene import ContactScene
+from slap_ros.worlds.contact.settling import settled
+from slap_ros.worlds.contact.world import ACTION_SPACE, ContactWorld
+from slap_ros.worlds.viewpoint import Viewpoint
 
 STEP_LIMIT = 1_000  # environment steps of a task
 HORIZON = 50  # environment steps of a learned skill, approach not counted

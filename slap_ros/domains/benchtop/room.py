@@ -6,12 +6,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from slap_ros.contact.arm import arm_joints
-from slap_ros.contact.hand import PALM, STEM, pointing_down
 from slap_ros.domains.benchtop.hand_motion import HandGoal
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, from_yaw
-from slap_ros.physics.panda import FINGER_OPEN
+from slap_ros.worlds.contact.arm import arm_joints
+from slap_ros.worlds.contact.hand import PALM, STEM, pointing_down
+from slap_ros.worlds.panda import FINGER_OPEN
 
 ROOM = 0.03  # on all sides of a hand: an approach ends up to 25 mm aside
 HIGHEST = 0.32  # up to which the hand must get, to pass over other things

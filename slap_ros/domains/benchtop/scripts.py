@@ -12,7 +12,6 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from slap_ros.contact.world import MAX_SHIFT
 from slap_ros.core import Action, Policy
 from slap_ros.domains.benchtop.features import PLACE
 from slap_ros.domains.benchtop.hand_motion import (
@@ -32,8 +31,9 @@ from slap_ros.domains.benchtop.state_access import (
     value,
 )
 from slap_ros.geometry.pose import Vector
-from slap_ros.physics.panda import FINGER_OPEN
 from slap_ros.relational import Object, State
+from slap_ros.worlds.contact.world import MAX_SHIFT
+from slap_ros.worlds.panda import FINGER_OPEN
 
 PATIENCE = 60  # environment steps after which a move is given up and the next one begins
 GRIP_STEPS = 10  # environment steps that closing or opening takes at most

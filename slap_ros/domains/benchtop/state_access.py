@@ -11,14 +11,14 @@ import math
 
 import numpy as np
 
-from slap_ros.contact.features import ROBOT
-from slap_ros.contact.hand import wrapped
 from slap_ros.domains.benchtop.features import THING
 from slap_ros.geometry.pose import Pose, Vector, rotate
 from slap_ros.geometry.rotations import rotate_each, x_axes
-from slap_ros.physics.features import POSE_FEATURES
 from slap_ros.relational import Column, Layout, Object, State
 from slap_ros.relational.state import Array
+from slap_ros.worlds.contact.features import ROBOT
+from slap_ros.worlds.contact.hand import wrapped
+from slap_ros.worlds.features import POSE_FEATURES
 
 POSITION = ("x", "y", "z")
 QUATERNION = ("qx", "qy", "qz", "qw")

@@ -7,18 +7,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 
-from slap_ros.contact.arm import CONTROL_PERIOD_S
-from slap_ros.contact.features import ROBOT
-from slap_ros.contact.links import Link, link_poses, links
-from slap_ros.contact.scene import ContactScene, CylinderPart, Part
-from slap_ros.contact.visuals import ContactVisuals
 from slap_ros.core import Display, VisibleBody
 from slap_ros.domains.visualization import animation, arm_bodies
 from slap_ros.geometry.pose import Pose, Vector
 from slap_ros.meshes.solid import prism
-from slap_ros.physics.features import JOINT_FEATURES
-from slap_ros.physics.viewpoint import Viewpoint
 from slap_ros.relational import State
+from slap_ros.worlds.contact.arm import CONTROL_PERIOD_S
+from slap_ros.worlds.contact.features import ROBOT
+from slap_ros.worlds.contact.links import Link, link_poses, links
+from slap_ros.worlds.contact.scene import ContactScene, CylinderPart, Part
+from slap_ros.worlds.contact.visuals import ContactVisuals
+from slap_ros.worlds.features import JOINT_FEATURES
+from slap_ros.worlds.viewpoint import Viewpoint
 
 SceneOf = Callable[[State], ContactScene]
 VIEW = Viewpoint(eye=(1.12, -0.84, 0.66), target=(0.46, 0.0, 0.14))

@@ -9,12 +9,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from slap_ros.contact.scene import TABLE, BoxPart, Compound, ContactScene, CylinderPart, Part
 from slap_ros.domains.benchtop.features import place_features, thing_features
 from slap_ros.domains.bowls.model import BOWL, HALVES
 from slap_ros.geometry.pose import Pose, Vector, from_yaw, rotate
-from slap_ros.physics.scene import Colour
 from slap_ros.relational import Layout, State
+from slap_ros.worlds.contact.scene import TABLE, BoxPart, Compound, ContactScene, CylinderPart, Part
+from slap_ros.worlds.scene import Colour
 
 BLACK: Colour = (0.15, 0.15, 0.17, 1.0)
 CHINA: Colour = (0.92, 0.92, 0.88, 1.0)

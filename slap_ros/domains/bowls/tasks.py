@@ -11,9 +11,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from slap_ros.contact.features import ROBOT, robot_features
-from slap_ros.contact.hand import hand_at
-from slap_ros.contact.scene import TABLE
 from slap_ros.core import Task
 from slap_ros.domains.benchtop.features import place_features
 from slap_ros.domains.benchtop.presets import STEP_LIMIT
@@ -42,6 +39,9 @@ from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, from_yaw
 from slap_ros.relational import GroundAtom, Object, State
+from slap_ros.worlds.contact.features import ROBOT, robot_features
+from slap_ros.worlds.contact.hand import hand_at
+from slap_ros.worlds.contact.scene import TABLE
 
 TRIES = 300  # scenes drawn before there is said to be no room
 DARTS = 30  # for each piece of furniture, and for each bowl

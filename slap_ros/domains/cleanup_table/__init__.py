@@ -5,7 +5,7 @@
 A Panda at the origin, a table before it and a bin to its left; x to the front, z up, m and rad.
 Read on in this order: ``shapes`` (what the toys look like), ``features`` (types), ``relations``
 (what is on what), ``predicates``, ``operators``, ``scene``, ``tasks``, ``skills``. The world is
-that of ``slap_ros.physics``.
+that of ``slap_ros.worlds.joint_space``.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from slap_ros.domains.tabletop.settling import settling
 from slap_ros.domains.tabletop.visualization import animation, visible_arm, visible_bodies
 from slap_ros.domains.variation import varied
 from slap_ros.meshes.solid import Solid
-from slap_ros.physics.panda import CONTROL_PERIOD_S
-from slap_ros.physics.scene import Scene
-from slap_ros.physics.viewpoint import Viewpoint
-from slap_ros.physics.world import PandaWorld
 from slap_ros.relational import State
+from slap_ros.worlds.joint_space.world import PandaWorld
+from slap_ros.worlds.panda import CONTROL_PERIOD_S
+from slap_ros.worlds.scene import Scene
+from slap_ros.worlds.viewpoint import Viewpoint
 
 SETTINGS: Mapping[str, tasks.RandomCleanupTasks] = {
     "fair": tasks.RandomCleanupTasks(),

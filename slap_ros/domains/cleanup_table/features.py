@@ -10,9 +10,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.physics.features import BODY_FEATURES, MATERIAL_FEATURES, POSE_FEATURES, ROBOT
 from slap_ros.relational import Column, Feature, Layout, Type
 from slap_ros.relational.predicates import Bools
+from slap_ros.worlds.features import BODY_FEATURES, MATERIAL_FEATURES, POSE_FEATURES, ROBOT
 
 WALL = 0.005  # m, thickness of the bin's walls
 

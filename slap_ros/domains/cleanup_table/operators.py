@@ -22,8 +22,8 @@ from slap_ros.domains.cleanup_table.predicates import (
     ON,
     READY_PICK,
 )
-from slap_ros.physics.features import ROBOT
 from slap_ros.relational import LiftedAtom, LiftedOperator, Predicate, Variable
+from slap_ros.worlds.features import ROBOT
 
 ROBOT_VARIABLE, BLOCK_VARIABLE = Variable("?r", ROBOT), Variable("?b", BLOCK)
 SURFACE_VARIABLE = Variable("?s", SURFACE)

@@ -15,10 +15,10 @@ from slap_ros.domains.classifiers import (
 )
 from slap_ros.domains.cleanup_table.features import BLOCK, SURFACE, THING, CleanupObjectIndex
 from slap_ros.domains.cleanup_table.relations import cleanup_relations
-from slap_ros.physics.features import ROBOT
 from slap_ros.relational import Column, Predicate, State
 from slap_ros.relational.predicates import Bools
 from slap_ros.relational.state import Array
+from slap_ros.worlds.features import ROBOT
 
 
 def _of_blocks(margins: Array, state: State, block: Column) -> Array:

@@ -12,8 +12,8 @@ from slap_ros.domains.tabletop.state_access import box_of, pose_of
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, Vector
 from slap_ros.meshes.solid import Solid
-from slap_ros.physics.scene import FRICTION, WOOD, Box, Colour, Material, Mesh, Scene
 from slap_ros.relational import Object, State
+from slap_ros.worlds.scene import FRICTION, WOOD, Box, Colour, Material, Mesh, Scene
 
 TABLE_TOP = 0.0
 FLOOR_TOP = -0.325

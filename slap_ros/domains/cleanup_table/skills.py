@@ -49,11 +49,11 @@ from slap_ros.motion import (
     path_steps,
     shifted,
 )
-from slap_ros.physics.features import ROBOT
-from slap_ros.physics.gripper import GRASP_REACH
-from slap_ros.physics.panda import FINGER_OPEN, JOINTS, grasp_pose
 from slap_ros.relational import Object, State
 from slap_ros.relational.predicates import Bools
+from slap_ros.worlds.features import ROBOT
+from slap_ros.worlds.joint_space.gripper import GRASP_REACH
+from slap_ros.worlds.panda import FINGER_OPEN, JOINTS, grasp_pose
 
 YAWS = 16  # of the hand, evenly round
 FINGER_ROOM = 0.005  # m, on each side of a block between the open fingers

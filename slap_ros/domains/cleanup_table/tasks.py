@@ -23,16 +23,16 @@ from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Vector, from_yaw
 from slap_ros.meshes.solid import Solid
-from slap_ros.physics.features import (
+from slap_ros.relational import GroundAtom, Object, State
+from slap_ros.worlds.features import (
     ROBOT,
     body_features,
     material_features,
     pose_features,
     robot_features,
 )
-from slap_ros.physics.panda import HOME
-from slap_ros.physics.scene import Material
-from slap_ros.relational import GroundAtom, Object, State
+from slap_ros.worlds.panda import HOME
+from slap_ros.worlds.scene import Material
 
 STEP_LIMIT = 600  # environment steps
 TRIES = 1_000  # places drawn for a toy before all are drawn again

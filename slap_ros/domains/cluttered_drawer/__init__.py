@@ -5,7 +5,7 @@
 A Panda at the origin, an open drawer before it, a table behind that; x to the front, z up, m and
 rad. Read on in this order: ``features`` (types), ``blocking`` (what is in a finger's way),
 ``predicates``, ``operators``, ``scene``, ``tasks``, ``skills``. The world is that of
-``slap_ros.physics``.
+``slap_ros.worlds.joint_space``.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from slap_ros.domains.tabletop.presets import TIMINGS
 from slap_ros.domains.tabletop.settling import settling
 from slap_ros.domains.tabletop.visualization import animation, visible_arm, visible_bodies
 from slap_ros.domains.variation import varied
-from slap_ros.physics.features import ROBOT
-from slap_ros.physics.panda import CONTROL_PERIOD_S
-from slap_ros.physics.viewpoint import Viewpoint
-from slap_ros.physics.world import PandaWorld
+from slap_ros.worlds.features import ROBOT
+from slap_ros.worlds.joint_space.world import PandaWorld
+from slap_ros.worlds.panda import CONTROL_PERIOD_S
+from slap_ros.worlds.viewpoint import Viewpoint
 
 SETTINGS: Mapping[str, tasks.RandomDrawerTasks | tasks.PaperDrawerTasks] = {
     "fair": tasks.RandomDrawerTasks(),

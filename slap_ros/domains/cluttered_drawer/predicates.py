@@ -18,10 +18,10 @@ from slap_ros.domains.cluttered_drawer.blocking import (
     ready_margins,
 )
 from slap_ros.domains.cluttered_drawer.features import BLOCK, DRAWER, SURFACE, TABLE, TARGET, THING
-from slap_ros.physics.features import ROBOT
 from slap_ros.relational import Column, Predicate, State, Type
 from slap_ros.relational.predicates import Bools, Classifier, Margin, cache_latest
 from slap_ros.relational.state import Array
+from slap_ros.worlds.features import ROBOT
 
 RelationsOf = Callable[[State], BlockingRelations]
 

@@ -11,8 +11,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from slap_ros.contact.features import ROBOT, robot_features
-from slap_ros.contact.hand import PALM, hand_at
 from slap_ros.core import Task
 from slap_ros.domains.benchtop.features import place_features, thing_features
 from slap_ros.domains.benchtop.hand_motion import HandGoal
@@ -26,6 +24,8 @@ from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, from_yaw
 from slap_ros.relational import GroundAtom, Object, State
+from slap_ros.worlds.contact.features import ROBOT, robot_features
+from slap_ros.worlds.contact.hand import PALM, hand_at
 
 MOST = 6  # things, by default
 TRIES = 200  # scenes drawn before there is said to be no room

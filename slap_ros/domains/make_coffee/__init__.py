@@ -3,7 +3,7 @@
 """Make Coffee: put a pod from a drawer into a holder, and close lid and drawer (LG-SAIL).
 
 Read on in this order: ``scenery`` (pod, holder, lid), ``model`` (predicates, operators),
-``tasks``, ``demonstrator``. The world is that of ``slap_ros.contact``.
+``tasks``, ``demonstrator``. The world is that of ``slap_ros.worlds.contact``.
 """
 
 from __future__ import annotations

@@ -11,7 +11,11 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 
-from slap_ros.contact.scene import (
+from slap_ros.domains.benchtop.cabinet import CABINET, CabinetShape
+from slap_ros.domains.benchtop.features import LID, THING
+from slap_ros.geometry.pose import Pose, Vector, from_rotation_vector, from_yaw
+from slap_ros.relational import Layout, State, Type
+from slap_ros.worlds.contact.scene import (
     TABLE,
     BoxPart,
     Compound,
@@ -21,11 +25,7 @@ from slap_ros.contact.scene import (
     JointKind,
     cylinder,
 )
-from slap_ros.domains.benchtop.cabinet import CABINET, CabinetShape
-from slap_ros.domains.benchtop.features import LID, THING
-from slap_ros.geometry.pose import Pose, Vector, from_rotation_vector, from_yaw
-from slap_ros.physics.scene import Colour
-from slap_ros.relational import Layout, State, Type
+from slap_ros.worlds.scene import Colour
 
 POD = Type("pod", THING.features, THING)
 HOLDER = Type("holder", LID.features, LID)

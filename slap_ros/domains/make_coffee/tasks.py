@@ -11,8 +11,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from slap_ros.contact.features import ROBOT, robot_features
-from slap_ros.contact.hand import hand_at
 from slap_ros.core import Task
 from slap_ros.domains.benchtop.cabinet import CABINET, MIDDLE, cabinet_features
 from slap_ros.domains.benchtop.features import jointed_features, thing_features
@@ -23,6 +21,8 @@ from slap_ros.domains.make_coffee.scenery import BOTTOM, HOLDER, LID_HIGH, POD, 
 from slap_ros.domains.variation import TaskSettings
 from slap_ros.geometry.pose import Pose, from_yaw
 from slap_ros.relational import Object, State
+from slap_ros.worlds.contact.features import ROBOT, robot_features
+from slap_ros.worlds.contact.hand import hand_at
 
 FACING = 0.5 * math.pi  # yaw of a front that faces the arm
 HAND = hand_at((0.45, 0.0, 0.25), 0.25 * math.pi)

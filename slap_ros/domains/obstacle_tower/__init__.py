@@ -4,7 +4,7 @@
 
 A Panda at the origin, a table before it; x to the front, z up, m and rad. Read on in this order:
 ``features`` (types), ``support`` (what lies on what), ``predicates``, ``operators``, ``scene``,
-``tasks``, ``skills``. The world is that of ``slap_ros.physics``.
+``tasks``, ``skills``. The world is that of ``slap_ros.worlds.joint_space``.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from slap_ros.domains.tabletop.presets import TIMINGS
 from slap_ros.domains.tabletop.settling import settling
 from slap_ros.domains.tabletop.visualization import animation, visible_arm, visible_bodies
 from slap_ros.domains.variation import varied
-from slap_ros.physics.features import ROBOT
-from slap_ros.physics.panda import CONTROL_PERIOD_S
-from slap_ros.physics.world import PandaWorld
+from slap_ros.worlds.features import ROBOT
+from slap_ros.worlds.joint_space.world import PandaWorld
+from slap_ros.worlds.panda import CONTROL_PERIOD_S
 
 SETTINGS: Mapping[str, tasks.RandomTowerTasks | tasks.PaperTowerTasks] = {
     "fair": tasks.RandomTowerTasks(),

@@ -7,10 +7,10 @@ from __future__ import annotations
 from slap_ros.domains.classifiers import always, has_flag, is_held, lacks_flag, none_is_held
 from slap_ros.domains.obstacle_tower.features import BLOCK, SURFACE, THING
 from slap_ros.domains.obstacle_tower.support import support_relations, support_truths
-from slap_ros.physics.features import ROBOT
 from slap_ros.relational import Column, Predicate, State
 from slap_ros.relational.predicates import Bools
 from slap_ros.relational.state import Array
+from slap_ros.worlds.features import ROBOT
 
 
 def _on(state: State, block: Column, thing: Column) -> Bools:

@@ -17,7 +17,7 @@ from slap_ros.domains.peg_in_hole import demonstrator, model
 from slap_ros.domains.peg_in_hole.scenery import scene
 from slap_ros.domains.peg_in_hole.tasks import GOALS, MM, PegTasks
 from slap_ros.domains.variation import varied
-from slap_ros.physics.viewpoint import Viewpoint
+from slap_ros.worlds.viewpoint import Viewpoint
 
 SETTINGS = {
     "fair": PegTasks(),

@@ -10,8 +10,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from slap_ros.contact.features import ROBOT, robot_features
-from slap_ros.contact.hand import hand_at
 from slap_ros.core import Goal, Task
 from slap_ros.domains.benchtop.features import place_features, thing_features
 from slap_ros.domains.benchtop.goals import goal
@@ -22,6 +20,8 @@ from slap_ros.domains.peg_in_hole.scenery import HOLES, PEG_RADIUS, PEGS, seat, 
 from slap_ros.domains.variation import TaskSettings
 from slap_ros.geometry.pose import Pose, from_yaw
 from slap_ros.relational import Object, State
+from slap_ros.worlds.contact.features import ROBOT, robot_features
+from slap_ros.worlds.contact.hand import hand_at
 
 MM = 1e-3  # m
 HAND = hand_at((0.46, 0.0, 0.24))

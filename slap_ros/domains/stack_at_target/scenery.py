@@ -7,11 +7,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import lru_cache
 
-from slap_ros.contact.scene import TABLE, Compound, ContactScene, box
 from slap_ros.domains.benchtop.features import place_features, thing_features
 from slap_ros.domains.stack_at_target.model import CUBE, TARGET
 from slap_ros.geometry.pose import Pose, from_yaw
 from slap_ros.relational import Layout, State
+from slap_ros.worlds.contact.scene import TABLE, Compound, ContactScene, box
 
 CUBE_HALF = 0.02
 TARGET_HALF = (0.03, 0.03, 0.015)  # higher than the lift from which on a cube is held

@@ -11,8 +11,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from slap_ros.contact.features import ROBOT, robot_features
-from slap_ros.contact.hand import hand_at
 from slap_ros.core import Task
 from slap_ros.domains.benchtop.presets import STEP_LIMIT
 from slap_ros.domains.benchtop.tasks import BENCH_LIMITS, Range, spread_out
@@ -20,6 +18,8 @@ from slap_ros.domains.stack_at_target.model import CUBE, GOALS, TARGET
 from slap_ros.domains.stack_at_target.scenery import TARGET_HALF, cube_features, target_features
 from slap_ros.domains.variation import TaskSettings
 from slap_ros.relational import Object, State
+from slap_ros.worlds.contact.features import ROBOT, robot_features
+from slap_ros.worlds.contact.hand import hand_at
 
 HAND = hand_at((0.5, 0.0, 0.25))
 BLOCKER_OFF = 0.005  # from a target's middle, at most, along each axis

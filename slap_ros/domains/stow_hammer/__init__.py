@@ -3,7 +3,7 @@
 """Stow Hammer: put hammers into the drawers of cabinets (LG-SAIL).
 
 Read on in this order: ``model``, ``scenery``, ``tasks``, ``demonstrator``. The world is that of
-``slap_ros.contact``.
+``slap_ros.worlds.contact``.
 """
 
 from __future__ import annotations

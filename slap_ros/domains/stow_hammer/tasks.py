@@ -11,8 +11,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from slap_ros.contact.features import ROBOT, robot_features
-from slap_ros.contact.hand import hand_at
 from slap_ros.core import Task
 from slap_ros.domains.benchtop.cabinet import CABINET, cabinet_features
 from slap_ros.domains.benchtop.features import thing_features
@@ -25,6 +23,8 @@ from slap_ros.errors import InvalidParameterError
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, from_yaw
 from slap_ros.relational import Object, State
+from slap_ros.worlds.contact.features import ROBOT, robot_features
+from slap_ros.worlds.contact.hand import hand_at
 
 HAND = hand_at((0.45, 0.0, 0.25), 0.5 * math.pi)
 FACING = 0.5 * math.pi  # yaw of a front that faces the arm, and of a hammer that lies along it

@@ -12,8 +12,8 @@ from typing import ClassVar
 from slap_ros.core import ActionSpace
 from slap_ros.domains.tabletop.timing import FixedStepTiming, SpeedLimitTiming, Timing
 from slap_ros.domains.variation import TaskSettings
-from slap_ros.physics.panda import JOINTS, MAX_STEP
-from slap_ros.physics.world import ACTION_SPACE
+from slap_ros.worlds.joint_space.world import ACTION_SPACE
+from slap_ros.worlds.panda import JOINTS, MAX_STEP
 
 # The reference does not limit its planned motions, which go up to 3 rad in a control step.
 UNLIMITED_ACTION_SPACE = replace(

@@ -17,9 +17,9 @@ from slap_ros.domains.tabletop.timing import ROUNDING, Timing
 from slap_ros.domains.tabletop.transit import Transit
 from slap_ros.errors import SkillNotApplicableError
 from slap_ros.motion import Joints, linear_motion, shifted
-from slap_ros.physics.panda import grasp_pose
 from slap_ros.portable_math import on_grid
 from slap_ros.relational import Object, State
+from slap_ros.worlds.panda import grasp_pose
 
 STEP_LIMIT = 100  # environment steps
 GRIP, RELEASE = 1.0, -1.0  # gripper commands

@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from slap_ros.motion import Free, Joints, Path, path_steps, retime, retime_fixed_steps
-from slap_ros.physics.panda import JOINTS, MAX_STEP
+from slap_ros.worlds.panda import JOINTS, MAX_STEP
 
 ROUNDING = 1e-6  # control steps
 

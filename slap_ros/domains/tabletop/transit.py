@@ -33,8 +33,8 @@ from slap_ros.motion import (
     path_steps,
     shifted,
 )
-from slap_ros.physics.panda import grasp_pose
 from slap_ros.relational import Object, State
+from slap_ros.worlds.panda import grasp_pose
 
 CLEARANCE = 0.05  # m, over a place before the approach and after the retreat
 HIGHER = 2.0 * CLEARANCE  # m, where things as high as what is held stand close to the place

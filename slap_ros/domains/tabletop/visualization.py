@@ -11,11 +11,11 @@ from slap_ros.domains import visualization
 from slap_ros.domains.tabletop.state_access import finger_of, joints_of, pose_of
 from slap_ros.geometry.pose import IDENTITY
 from slap_ros.meshes.solid import Solid
-from slap_ros.physics.panda import CONTROL_PERIOD_S
-from slap_ros.physics.scene import Body, Scene
-from slap_ros.physics.viewpoint import Viewpoint
-from slap_ros.physics.visuals import SceneVisuals
 from slap_ros.relational import State
+from slap_ros.worlds.panda import CONTROL_PERIOD_S
+from slap_ros.worlds.scene import Body, Scene
+from slap_ros.worlds.viewpoint import Viewpoint
+from slap_ros.worlds.visuals import SceneVisuals
 
 SceneOf = Callable[[State], Scene]
 

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, Vector, multiply, normalised, rotate
-from slap_ros.physics.scene import Body
+from slap_ros.worlds.scene import Body
 
 LEANING = 0.15  # rad; what is tilted by more does not lie on a face
 FLOATING = 0.015  # m, between a bottom and the top of what it is taken to lie on

@@ -25,11 +25,11 @@ from typing import NamedTuple
 from slap_ros.geometry.pose import NO_ROTATION, ORIGIN, Pose, Vector, conjugate, multiply
 from slap_ros.meshes.obj import to_obj
 from slap_ros.meshes.solid import Solid, cuboid
-from slap_ros.physics.bullet import pybullet
-from slap_ros.physics.links import LINK_SHAPES
-from slap_ros.physics.panda import CONTROL_PERIOD_S
-from slap_ros.physics.scene import FRICTION, Body, Material, Scene, Shape
-from slap_ros.physics.snapshot import BodyState
+from slap_ros.worlds.bullet import pybullet
+from slap_ros.worlds.joint_space.links import LINK_SHAPES
+from slap_ros.worlds.joint_space.snapshot import BodyState
+from slap_ros.worlds.panda import CONTROL_PERIOD_S
+from slap_ros.worlds.scene import FRICTION, Body, Material, Scene, Shape
 
 GRAVITY = 9.81  # m/s², downwards
 DRIVEN_MASS = 1e4  # kg, against which nothing else weighs

@@ -12,8 +12,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from slap_ros.contact.arm import CONTROL_PERIOD_S
-from slap_ros.contact.scene import BoxPart, HandForces
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import (
     ORIGIN,
@@ -24,7 +22,9 @@ from slap_ros.geometry.pose import (
     from_rotation_vector,
     multiply,
 )
-from slap_ros.physics.panda import FINGER_CLOSED, FINGER_OPEN
+from slap_ros.worlds.contact.arm import CONTROL_PERIOD_S
+from slap_ros.worlds.contact.scene import BoxPart, HandForces
+from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN
 
 HAND_MASS = 1.0  # kg
 FINGER_MASS = 0.5  # kg each: lighter ones are kicked by what they grip

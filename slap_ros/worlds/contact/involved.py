@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from slap_ros.contact.hand import PAD, PALM, STEM, HandState
-from slap_ros.contact.scene import Compound, JointedBody
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, Quaternion, Vector
+from slap_ros.worlds.contact.hand import PAD, PALM, STEM, HandState
+from slap_ros.worlds.contact.scene import Compound, JointedBody
 
 TOUCH = 0.002  # m: what is nearer than this may touch already
 

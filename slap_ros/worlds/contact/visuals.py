@@ -7,27 +7,27 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 
-from slap_ros.contact.links import link_poses, links
-from slap_ros.contact.scene import ContactScene, CylinderPart, Part
-from slap_ros.contact.snapshot import StateIndex
-from slap_ros.physics.scene import Colour
-from slap_ros.physics.visuals import Configuration, Cylinder, VisualShape
 from slap_ros.relational import State
+from slap_ros.worlds.contact.links import link_poses, links
+from slap_ros.worlds.contact.scene import ContactScene, CylinderPart, Part
+from slap_ros.worlds.contact.snapshot import StateIndex
+from slap_ros.worlds.scene import Colour
+from slap_ros.worlds.visuals import Configuration, Cylinder, VisualShape
 
 
 class ContactVisuals:
-    """The bodies of a scene, as :class:`~slap_ros.physics.visuals.Visuals`."""
+    """The bodies of a scene, as :class:`~slap_ros.worlds.visuals.Visuals`."""
 
     def __init__(self, scene: ContactScene) -> None:
         self._scene = scene
 
     @cached_property
     def shapes(self) -> Sequence[VisualShape]:
-        """See :class:`~slap_ros.physics.visuals.Visuals`."""
+        """See :class:`~slap_ros.worlds.visuals.Visuals`."""
         return [_shape(part, link.colour) for link in links(self._scene) for part in link.parts]
 
     def configuration(self, state: State) -> Configuration:
-        """See :class:`~slap_ros.physics.visuals.Visuals`."""
+        """See :class:`~slap_ros.worlds.visuals.Visuals`."""
         snapshot = StateIndex.of(self._scene, state.layout).read(state)
         poses = [
             pose.compose(part.pose)

@@ -13,9 +13,9 @@ import math
 from dataclasses import replace
 
 from slap_ros.geometry.pose import IDENTITY, Pose, conjugate, normalised, rotate
-from slap_ros.physics.panda import FINGER_OPEN, grasp_pose, hand_pose
-from slap_ros.physics.scene import Body, Scene
-from slap_ros.physics.snapshot import BodyState, Snapshot
+from slap_ros.worlds.joint_space.snapshot import BodyState, Snapshot
+from slap_ros.worlds.panda import FINGER_OPEN, grasp_pose, hand_pose
+from slap_ros.worlds.scene import Body, Scene
 
 GRASP_REACH = 0.01  # m, between the grasp point and a body's centre
 CLOSE, OPEN = 0.5, -0.5  # gripper commands beyond which it closes or opens

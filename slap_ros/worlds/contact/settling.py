@@ -12,13 +12,13 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-from slap_ros.contact.links import link_poses, links
-from slap_ros.contact.scene import BoxPart, Compound, ContactScene, CylinderPart, Part
-from slap_ros.contact.snapshot import StateIndex
 from slap_ros.geometry.oriented_box import UP, OrientedBox
 from slap_ros.geometry.pose import Pose, Vector, multiply, normalised, rotate
-from slap_ros.physics.settling import AXES, FLOATING, LEANING, levelled
 from slap_ros.relational import State
+from slap_ros.worlds.contact.links import link_poses, links
+from slap_ros.worlds.contact.scene import BoxPart, Compound, ContactScene, CylinderPart, Part
+from slap_ros.worlds.contact.snapshot import StateIndex
+from slap_ros.worlds.settling import AXES, FLOATING, LEANING, levelled
 
 ROUNDS = 12  # in which a body is moved out of what it is in, one thing after the other
 APART = 1e-6  # m, by which bodies may be inside one another

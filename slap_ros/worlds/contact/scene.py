@@ -22,7 +22,7 @@ from slap_ros.geometry.pose import (
     from_yaw,
     rotate,
 )
-from slap_ros.physics.scene import GREY, WOOD, Colour, RigidBody
+from slap_ros.worlds.scene import GREY, WOOD, Colour, RigidBody
 
 FRICTION = 1.0  # 1, of bodies; that of a pair of bodies is the product of both
 TABLE_FRICTION = 0.9  # 1

@@ -8,10 +8,10 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from slap_ros.contact.scene import ContactScene, Part
-from slap_ros.contact.snapshot import ContactSnapshot, Placement
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose
+from slap_ros.worlds.contact.scene import ContactScene, Part
+from slap_ros.worlds.contact.snapshot import ContactSnapshot, Placement
 
 MARGIN = 0.001  # m, between the hand and what it passes
 TIP = 0.002  # m, at the bottom of what may lean on something

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from slap_ros.geometry.pose import Pose, Vector, multiply, rotate
-from slap_ros.physics.panda import GRASP_POINT, JOINT_HIGH, JOINT_LOW
+from slap_ros.worlds.panda import GRASP_POINT, JOINT_HIGH, JOINT_LOW
 
 Joints = tuple[float, ...]  # rad, seven
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, Quaternion, Vector
-from slap_ros.physics.panda import LINKS
+from slap_ros.worlds.panda import LINKS
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,9 @@
 
 from __future__ import annotations
 
-from slap_ros.contact.scene import ContactScene
-from slap_ros.contact.simulation import ContactSimulation
-from slap_ros.physics.simulation_pool import SimulationPool
+from slap_ros.worlds.contact.scene import ContactScene
+from slap_ros.worlds.contact.simulation import ContactSimulation
+from slap_ros.worlds.simulation_pool import SimulationPool
 
 _pool: SimulationPool[ContactScene, ContactSimulation] = SimulationPool(ContactSimulation)
 acquire = _pool.acquire

@@ -14,20 +14,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.contact.arm import Joints
-from slap_ros.contact.features import (
+from slap_ros.errors import InvalidStateError
+from slap_ros.geometry.pose import Pose
+from slap_ros.relational import Feature, Layout, Object, State
+from slap_ros.worlds.contact.arm import Joints
+from slap_ros.worlds.contact.features import (
     DRAWER_FEATURES,
     HAND_FEATURES,
     ROBOT,
     hand_values,
 )
-from slap_ros.contact.hand import HandState
-from slap_ros.contact.scene import ContactScene
-from slap_ros.errors import InvalidStateError
-from slap_ros.geometry.pose import Pose
-from slap_ros.physics.features import BODY_FEATURES, JOINT_FEATURES, POSE_FEATURES
-from slap_ros.physics.snapshot import BodyState
-from slap_ros.relational import Feature, Layout, Object, State
+from slap_ros.worlds.contact.hand import HandState
+from slap_ros.worlds.contact.scene import ContactScene
+from slap_ros.worlds.features import BODY_FEATURES, JOINT_FEATURES, POSE_FEATURES
+from slap_ros.worlds.joint_space.snapshot import BodyState
 
 
 class Opening(NamedTuple):

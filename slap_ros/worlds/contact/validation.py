@@ -7,14 +7,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from slap_ros.contact.arm import arm_joints
-from slap_ros.contact.hand import LEASH, PAD, YAW_LEASH, HandState, rotation_between, wrapped
-from slap_ros.contact.scene import ContactScene, JointKind
-from slap_ros.contact.snapshot import ContactSnapshot, Placement
 from slap_ros.errors import InvalidStateError
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose
-from slap_ros.physics.panda import FINGER_CLOSED, FINGER_OPEN, JOINT_HIGH, JOINT_LOW, grasp_pose
+from slap_ros.worlds.contact.arm import arm_joints
+from slap_ros.worlds.contact.hand import LEASH, PAD, YAW_LEASH, HandState, rotation_between, wrapped
+from slap_ros.worlds.contact.scene import ContactScene, JointKind
+from slap_ros.worlds.contact.snapshot import ContactSnapshot, Placement
+from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN, JOINT_HIGH, JOINT_LOW, grasp_pose
 
 # Pressed together, bodies overlap by a few millimetres; what overlaps by more was put there.
 OVERLAP = 0.01  # m

@@ -13,9 +13,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from slap_ros.geometry.pose import IDENTITY, NO_ROTATION, ORIGIN, Pose, Vector
-from slap_ros.physics.panda import FINGER_OPEN, JOINTS
-from slap_ros.physics.scene import CUBE_MATERIAL, Material
 from slap_ros.relational import Feature, Type
+from slap_ros.worlds.panda import FINGER_OPEN, JOINTS
+from slap_ros.worlds.scene import CUBE_MATERIAL, Material
 
 POSE_FEATURES = (
     *(Feature(axis, "m") for axis in ("x", "y", "z")),

@@ -14,10 +14,14 @@ from dataclasses import replace
 
 from slap_ros.core import Action, ActionSpace, GripperAxis
 from slap_ros.errors import InvalidStateError
-from slap_ros.physics.arm import Arm, Obstacle, Penetration, Sweep
-from slap_ros.physics.features import JOINT_FEATURES
-from slap_ros.physics.gripper import grip
-from slap_ros.physics.panda import (
+from slap_ros.relational import Feature, State
+from slap_ros.worlds.features import JOINT_FEATURES
+from slap_ros.worlds.joint_space.arm import Arm, Obstacle, Penetration, Sweep
+from slap_ros.worlds.joint_space.gripper import grip
+from slap_ros.worlds.joint_space.simulation import Drive, Stepping
+from slap_ros.worlds.joint_space.snapshot import BodyState, Snapshot, SnapshotCodec
+from slap_ros.worlds.joint_space.validation import require_valid
+from slap_ros.worlds.panda import (
     HAND,
     JOINT_HIGH,
     JOINT_LOW,
@@ -25,12 +29,8 @@ from slap_ros.physics.panda import (
     grasp_pose,
     vertical_jacobian,
 )
-from slap_ros.physics.scene import Scene
-from slap_ros.physics.simulation import Drive, Stepping
-from slap_ros.physics.simulation_pool import acquire, release
-from slap_ros.physics.snapshot import BodyState, Snapshot, SnapshotCodec
-from slap_ros.physics.validation import require_valid
-from slap_ros.relational import Feature, State
+from slap_ros.worlds.scene import Scene
+from slap_ros.worlds.simulation_pool import acquire, release
 
 ACTION_SPACE = ActionSpace(
     axes=(*JOINT_FEATURES, Feature("gripper", "1")),

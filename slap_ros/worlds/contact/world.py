@@ -11,19 +11,19 @@ from __future__ import annotations
 
 import weakref
 
-from slap_ros.contact.arm import Joints, arm_joints, in_time, share_in_time
-from slap_ros.contact.contacts import ContactPoint
-from slap_ros.contact.dynamics import ContactDynamics
-from slap_ros.contact.features import GRIPPER, ROBOT
-from slap_ros.contact.hand import LEASH, YAW_LEASH, HandState, rotation_between
-from slap_ros.contact.scene import ContactScene
-from slap_ros.contact.simulation_pool import acquire, release
-from slap_ros.contact.snapshot import ContactSnapshot, StateIndex
-from slap_ros.contact.validation import require_possible
 from slap_ros.core import Action, ActionSpace, GripperAxis
 from slap_ros.errors import InvalidStateError
 from slap_ros.geometry.pose import ORIGIN, Pose, from_rotation_vector, multiply
 from slap_ros.relational import Feature, State
+from slap_ros.worlds.contact.arm import Joints, arm_joints, in_time, share_in_time
+from slap_ros.worlds.contact.contacts import ContactPoint
+from slap_ros.worlds.contact.dynamics import ContactDynamics
+from slap_ros.worlds.contact.features import GRIPPER, ROBOT
+from slap_ros.worlds.contact.hand import LEASH, YAW_LEASH, HandState, rotation_between
+from slap_ros.worlds.contact.scene import ContactScene
+from slap_ros.worlds.contact.simulation_pool import acquire, release
+from slap_ros.worlds.contact.snapshot import ContactSnapshot, StateIndex
+from slap_ros.worlds.contact.validation import require_possible
 
 MAX_SHIFT = 0.02  # m along each axis in a control step: 0.4 m/s
 MAX_TURN = 0.15  # rad about the vertical: 3 rad/s

@@ -3,20 +3,20 @@
 """The features that contact physics needs in a state, and nothing else that it remembers.
 
 A domain's robot is a :data:`ROBOT`; the types of its free bodies begin with
-:data:`~slap_ros.physics.features.BODY_FEATURES`, those of its jointed bodies have
+:data:`~slap_ros.worlds.features.BODY_FEATURES`, those of its jointed bodies have
 :data:`DRAWER_FEATURES` or :data:`LID_FEATURES`. Fixed and jointed bodies whose place differs from
-task to task have :data:`~slap_ros.physics.features.POSE_FEATURES` as well.
+task to task have :data:`~slap_ros.worlds.features.POSE_FEATURES` as well.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-from slap_ros.contact.arm import arm_joints
-from slap_ros.contact.hand import HandState
 from slap_ros.errors import InvalidStateError
-from slap_ros.physics.features import JOINT_FEATURES, POSE_FEATURES, VELOCITY_FEATURES
 from slap_ros.relational import Feature, Type
+from slap_ros.worlds.contact.arm import arm_joints
+from slap_ros.worlds.contact.hand import HandState
+from slap_ros.worlds.features import JOINT_FEATURES, POSE_FEATURES, VELOCITY_FEATURES
 
 TARGET_FEATURES = (
     *(Feature(f"target_{axis}", "m") for axis in ("x", "y", "z")),
@@ -58,7 +58,7 @@ def hand_values(hand: HandState) -> tuple[float, ...]:
 
 
 def robot_features(hand: HandState) -> Mapping[str, float]:
-    """A robot's features, for ``State.build``; ``slap_ros.contact.hand.hand_at`` makes hands.
+    """A robot's features, for ``State.build``; ``contact.hand.hand_at`` makes hands.
 
     Raises:
         InvalidStateError: The arm cannot have its hand there.

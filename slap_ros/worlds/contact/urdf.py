@@ -12,7 +12,8 @@ import math
 from collections.abc import Iterable
 from xml.etree.ElementTree import Element, SubElement, tostring
 
-from slap_ros.contact.hand import (
+from slap_ros.geometry.pose import IDENTITY, ORIGIN, Pose, Quaternion, Vector
+from slap_ros.worlds.contact.hand import (
     FINGER_INERTIA,
     FINGER_MASS,
     HALF_TURN,
@@ -22,7 +23,7 @@ from slap_ros.contact.hand import (
     PALM,
     STEM,
 )
-from slap_ros.contact.scene import (
+from slap_ros.worlds.contact.scene import (
     BoxPart,
     CylinderPart,
     JointedBody,
@@ -31,8 +32,7 @@ from slap_ros.contact.scene import (
     bounding_box,
     inertia,
 )
-from slap_ros.geometry.pose import IDENTITY, ORIGIN, Pose, Quaternion, Vector
-from slap_ros.physics.panda import FINGER_CLOSED, FINGER_OPEN
+from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN
 
 LEFT, RIGHT = 0, 1  # the fingers' links in the hand
 MOVING = 0  # the moving part's link in a jointed body

@@ -9,9 +9,9 @@ from typing import NamedTuple, Protocol
 
 from slap_ros.geometry.pose import Pose, Vector
 from slap_ros.meshes.solid import ConvexPiece, Solid
-from slap_ros.physics.scene import Body, Colour, Scene
-from slap_ros.physics.snapshot import SnapshotCodec
 from slap_ros.relational import State
+from slap_ros.worlds.joint_space.snapshot import SnapshotCodec
+from slap_ros.worlds.scene import Body, Colour, Scene
 
 
 class Cylinder(NamedTuple):
@@ -50,7 +50,7 @@ class Visuals(Protocol):
 
 
 class SceneVisuals:
-    """The bodies of a :class:`~slap_ros.physics.scene.Scene`."""
+    """The bodies of a :class:`~slap_ros.worlds.scene.Scene`."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene

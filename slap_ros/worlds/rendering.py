@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from slap_ros.geometry.pose import Pose, Vector
 from slap_ros.meshes.solid import ConvexPiece, prism
-from slap_ros.physics.animation import Picture, write_pictures
-from slap_ros.physics.bullet import pybullet
-from slap_ros.physics.scene import GREY, Colour
-from slap_ros.physics.simulation import PANDA
-from slap_ros.physics.viewpoint import Viewpoint
-from slap_ros.physics.visuals import Cylinder, Visuals, VisualShape
 from slap_ros.relational import State
+from slap_ros.worlds.animation import Picture, write_pictures
+from slap_ros.worlds.bullet import pybullet
+from slap_ros.worlds.joint_space.simulation import PANDA
+from slap_ros.worlds.scene import GREY, Colour
+from slap_ros.worlds.viewpoint import Viewpoint
+from slap_ros.worlds.visuals import Cylinder, Visuals, VisualShape
 
 ARM_JOINTS = range(7)  # indices in the URDF
 FINGER_JOINTS = (9, 10)
@@ -147,7 +147,7 @@ def write_animation(
     """Write an animation in real time, one frame per control step.
 
     Args:
-        path: The file; its ending says the format, see ``slap_ros.physics.animation``.
+        path: The file; its ending says the format, see ``slap_ros.worlds.animation``.
         camera: Draws the frames.
         states: One per control step; not empty.
         period_s: What a control step takes.

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from slap_ros.errors import InvalidStateError
 from slap_ros.geometry.pose import IDENTITY, ORIGIN, Pose, Vector
-from slap_ros.physics.features import (
+from slap_ros.relational import Feature, Layout, Object, State
+from slap_ros.worlds.features import (
     BODY_FEATURES,
     GRASP_FEATURES,
     JOINT_FEATURES,
@@ -21,8 +22,7 @@ from slap_ros.physics.features import (
     POSE_FEATURES,
     ROBOT,
 )
-from slap_ros.physics.scene import Material, Scene
-from slap_ros.relational import Feature, Layout, Object, State
+from slap_ros.worlds.scene import Material, Scene
 
 
 class BodyState(NamedTuple):

@@ -12,8 +12,9 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from slap_ros.contact.arm import CONTROL_PERIOD_S
-from slap_ros.contact.contacts import (
+from slap_ros.geometry.pose import IDENTITY, Pose
+from slap_ros.worlds.contact.arm import CONTROL_PERIOD_S
+from slap_ros.worlds.contact.contacts import (
     THE_HAND,
     ContactPoint,
     Side,
@@ -21,8 +22,8 @@ from slap_ros.contact.contacts import (
     grasped,
     groups,
 )
-from slap_ros.contact.hand import HandState, hand_at, own_way
-from slap_ros.contact.involved import (
+from slap_ros.worlds.contact.hand import HandState, hand_at, own_way
+from slap_ros.worlds.contact.involved import (
     TOUCH,
     Bounds,
     Involved,
@@ -37,12 +38,11 @@ from slap_ros.contact.involved import (
     space_of_way,
     touched,
 )
-from slap_ros.contact.scene import ContactScene
-from slap_ros.contact.simulation import GRAVITY, ContactSimulation, Outcome
-from slap_ros.contact.snapshot import ContactSnapshot, Opening, Placement
-from slap_ros.geometry.pose import IDENTITY, Pose
-from slap_ros.physics.panda import FINGER_OPEN
-from slap_ros.physics.snapshot import BodyState
+from slap_ros.worlds.contact.scene import ContactScene
+from slap_ros.worlds.contact.simulation import GRAVITY, ContactSimulation, Outcome
+from slap_ros.worlds.contact.snapshot import ContactSnapshot, Opening, Placement
+from slap_ros.worlds.joint_space.snapshot import BodyState
+from slap_ros.worlds.panda import FINGER_OPEN
 
 # What moved less than this in a control period, and is slower than this after it, is at rest.
 REST_SPEED = 0.02  # m/s and rad/s, along each axis

@@ -7,11 +7,11 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import NamedTuple
 
-from slap_ros.contact.scene import ContactScene, Part
-from slap_ros.contact.snapshot import StateIndex
 from slap_ros.geometry.pose import Pose
-from slap_ros.physics.scene import Colour
 from slap_ros.relational import State
+from slap_ros.worlds.contact.scene import ContactScene, Part
+from slap_ros.worlds.contact.snapshot import StateIndex
+from slap_ros.worlds.scene import Colour
 
 MOVING = "_moving"  # what the name of a jointed body's moving part ends with
 

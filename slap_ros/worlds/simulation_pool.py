@@ -12,8 +12,8 @@ from collections.abc import Callable
 from threading import RLock
 from typing import Generic, Protocol, TypeVar
 
-from slap_ros.physics.scene import Scene
-from slap_ros.physics.simulation import Simulation, Stepping
+from slap_ros.worlds.joint_space.simulation import Simulation, Stepping
+from slap_ros.worlds.scene import Scene
 
 MAX_IDLE = 4  # simulations kept for later
 

@@ -16,11 +16,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from slap_ros.contact.arm import CONTROL_PERIOD_S
-from slap_ros.contact.contacts import ContactPoint, Side, Surface
-from slap_ros.contact.hand import FINGER_SPEED, MASS, SHARE, SUBSTEPS, HandState
-from slap_ros.contact.involved import Involved
-from slap_ros.contact.scene import (
+from slap_ros.geometry.pose import NO_ROTATION, ORIGIN, Pose, Vector
+from slap_ros.worlds.bullet import pybullet
+from slap_ros.worlds.contact.arm import CONTROL_PERIOD_S
+from slap_ros.worlds.contact.contacts import ContactPoint, Side, Surface
+from slap_ros.worlds.contact.hand import FINGER_SPEED, MASS, SHARE, SUBSTEPS, HandState
+from slap_ros.worlds.contact.involved import Involved
+from slap_ros.worlds.contact.scene import (
     BoxPart,
     Compound,
     ContactScene,
@@ -28,12 +30,10 @@ from slap_ros.contact.scene import (
     JointedBody,
     Part,
 )
-from slap_ros.contact.snapshot import ContactSnapshot, Opening, Placement
-from slap_ros.contact.urdf import LEFT, MOVING, RIGHT, hand_urdf, jointed_urdf
-from slap_ros.geometry.pose import NO_ROTATION, ORIGIN, Pose, Vector
-from slap_ros.physics.bullet import pybullet
-from slap_ros.physics.panda import FINGER_CLOSED, FINGER_OPEN
-from slap_ros.physics.snapshot import BodyState
+from slap_ros.worlds.contact.snapshot import ContactSnapshot, Opening, Placement
+from slap_ros.worlds.contact.urdf import LEFT, MOVING, RIGHT, hand_urdf, jointed_urdf
+from slap_ros.worlds.joint_space.snapshot import BodyState
+from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN
 
 GRAVITY = 9.81  # m/s², downwards
 LIFT = (0.0, 0.0, GRAVITY * MASS)  # N, cancels the hand's weight
