@@ -51,12 +51,12 @@ from slap_ros.geometry.pose import (
     rotate,
 )
 from slap_ros.relational import State
+from slap_ros.worlds.bodies import GREY
 from slap_ros.worlds.contact.features import ROBOT, robot_features
 from slap_ros.worlds.contact.hand import hand_at, wrapped
 from slap_ros.worlds.contact.scene import TABLE, BoxPart, Compound, ContactScene, CylinderPart
 from slap_ros.worlds.contact.world import ACTION_SPACE, MAX_SHIFT, MAX_TURN, ContactWorld
 from slap_ros.worlds.features import body_features
-from slap_ros.worlds.scene import GREY
 
 SHAKEN = 100  # steps
 SHAKE = (0.006, 0.006, 0.006, 0.05)  # m and rad a step, standard deviations

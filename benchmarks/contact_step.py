@@ -37,16 +37,15 @@ from benchmarks.workbench import (
 )
 from slap_ros.geometry.pose import NO_ROTATION, Pose
 from slap_ros.relational import State
-from slap_ros.worlds.bullet import pybullet
+from slap_ros.worlds.bullet import PANDA, pybullet
 from slap_ros.worlds.contact.arm import CONTROL_PERIOD_S, arm_joints
 from slap_ros.worlds.contact.contacts import Side, Surface
 from slap_ros.worlds.contact.hand import SUBSTEPS, HandState, hand_at
 from slap_ros.worlds.contact.involved import Involved
 from slap_ros.worlds.contact.scene import ContactScene
 from slap_ros.worlds.contact.simulation import FINGER_FRICTION, ContactSimulation
-from slap_ros.worlds.contact.snapshot import ContactSnapshot, StateIndex
+from slap_ros.worlds.contact.snapshot import ContactIndex, ContactSnapshot
 from slap_ros.worlds.contact.world import ContactWorld
-from slap_ros.worlds.joint_space.simulation import PANDA
 from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN, HOME, JOINTS
 
 ROUNDS = 5  # the best counts: others share the machine
@@ -225,7 +224,7 @@ def stepping_share(script: Script) -> float:
 def arm_rate(arm: ArticulatedArm, script: Script) -> float:
     """Control steps a second of the articulated arm's physics."""
     begin, _ = script
-    index = StateIndex.of(BENCH, begin.layout)
+    index = ContactIndex.of(BENCH, begin.layout)
     now = index.read(begin)
     arm.place(index.placement(BENCH, begin))
     arm.begin(now.hand)
@@ -262,7 +261,7 @@ def _actions(script: Script) -> list[Any]:
 def _pulls(script: Script) -> list[HandState]:
     """The hand at the beginning of each step, with what it was told."""
     begin, moves = script
-    index = StateIndex.of(BENCH, begin.layout)
+    index = ContactIndex.of(BENCH, begin.layout)
     hands: list[HandState] = []
     watch: Callable[[State], None] = lambda state: hands.append(index.read(state).hand)  # noqa: E731
     with ContactWorld(BENCH, begin) as world:

@@ -29,12 +29,23 @@ from slap_ros.geometry.pose import Pose, conjugate, multiply
 from slap_ros.meshes.obj import to_obj
 from slap_ros.meshes.solid import Solid
 from slap_ros.relational import Object, State, Type
-from slap_ros.worlds.bullet import pybullet
-from slap_ros.worlds.features import BODY_FEATURES, ROBOT, body_features, robot_features
+from slap_ros.worlds.bullet import PANDA, pybullet
+from slap_ros.worlds.features import BODY_FEATURES, body_features
 from slap_ros.worlds.joint_space.arm import Arm
-from slap_ros.worlds.joint_space.simulation import PANDA, Drive, Simulation, Stepping
-from slap_ros.worlds.joint_space.snapshot import BodyState, SnapshotCodec
+from slap_ros.worlds.joint_space.features import ROBOT, robot_features
+from slap_ros.worlds.joint_space.scene import (
+    CUBE_EDGE,
+    REFERENCE_FRICTION,
+    TABLE,
+    TABLE_TOP,
+    Body,
+    Scene,
+    cube,
+)
+from slap_ros.worlds.joint_space.simulation import Drive, Simulation, Stepping
+from slap_ros.worlds.joint_space.snapshot import SceneIndex
 from slap_ros.worlds.joint_space.world import ACTION_SPACE, STEPPING, PandaWorld
+from slap_ros.worlds.layout_index import BodyState
 from slap_ros.worlds.panda import (
     FINGER_OPEN,
     HOME,
@@ -45,7 +56,6 @@ from slap_ros.worlds.panda import (
     grasp_pose,
     jacobian,
 )
-from slap_ros.worlds.scene import CUBE_EDGE, FRICTION, TABLE, TABLE_TOP, Body, Scene, cube
 
 Array = NDArray[np.float64]
 
@@ -241,8 +251,10 @@ class Plain:
         client = self._client
         pybullet.resetSimulation(physicsClientId=client)
         pybullet.setGravity(0.0, 0.0, -9.81, client)
-        scene, reader = self._scene, SnapshotCodec.of(self._scene, self._start.layout)
-        for body, pose in zip(scene.fixed, reader.fixed_poses(scene, self._start), strict=True):
+        scene, reader = self._scene, SceneIndex.of(self._scene, self._start.layout)
+        for body, pose in zip(
+            scene.fixed, reader.fixed_poses(scene.fixed, self._start), strict=True
+        ):
             self._add(body, pose)
         motions = reader.read(self._start).bodies
         self._blocks = [
@@ -262,7 +274,9 @@ class Plain:
         added: int = pybullet.createMultiBody(
             body.mass_kg, self._shape(body), -1, *pose, physicsClientId=client
         )
-        pybullet.changeDynamics(added, -1, lateralFriction=FRICTION, physicsClientId=client)
+        pybullet.changeDynamics(
+            added, -1, lateralFriction=REFERENCE_FRICTION, physicsClientId=client
+        )
         return added
 
     def _shape(self, body: Body) -> int:

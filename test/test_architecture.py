@@ -81,6 +81,19 @@ def test_who_never_imports_whom(imports):
     assert asking <= {"relational", "files", "errors"}
 
 
+def test_worlds_do_not_know_one_another():
+    """Each world imports what all share; what they share imports none of them."""
+    room = ROOT / "slap_ros" / "worlds"
+    across = [
+        f"{path.relative_to(ROOT)} imports {world}"
+        for path in sorted(room.rglob("*.py"))
+        for world in ("joint_space", "contact")
+        if path.relative_to(room).parts[0] != world
+        and f"from slap_ros.worlds.{world}" in path.read_text(encoding="utf-8")
+    ]
+    assert not across, "\n".join(across)
+
+
 def test_nothing_that_is_read_is_executed():
     """Answers of models, libraries, bags and cassettes become names and numbers, and no code."""
     executing = {"eval", "exec", "compile", "__import__", "literal_eval", "from_string"}

@@ -11,7 +11,8 @@ import numpy as np
 from slap_ros.core import Domain
 from slap_ros.geometry.pose import Pose
 from slap_ros.relational import State
-from slap_ros.worlds.features import JOINT_FEATURES, POSE_FEATURES, ROBOT, VELOCITY_FEATURES
+from slap_ros.worlds.features import JOINT_FEATURES, POSE_FEATURES, VELOCITY_FEATURES
+from slap_ros.worlds.joint_space.features import ROBOT
 from slap_ros.worlds.panda import FINGER_OPEN, JOINTS, MAX_STEP
 
 ARRIVED = 1e-6  # rad

@@ -23,7 +23,8 @@ from slap_ros.robot.robot_world import GripperAction
 from slap_ros.worlds.contact.arm import MAX_JOINT_STEP
 from slap_ros.worlds.contact.features import GRIPPER
 from slap_ros.worlds.contact.features import ROBOT as HAND_OF_FORCES
-from slap_ros.worlds.features import JOINT_FEATURES, ROBOT
+from slap_ros.worlds.features import JOINT_FEATURES
+from slap_ros.worlds.joint_space.features import ROBOT
 from slap_ros.worlds.panda import MAX_STEP
 
 

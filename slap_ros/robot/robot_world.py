@@ -32,7 +32,8 @@ from slap_ros.robot.scene_config import SceneConfig
 from slap_ros.robot.state_assembly import Grasp, StateAssembler, feature_values
 from slap_ros.robot.tracking import Detection, PoseEstimate, Track, TrackingSettings, measured_pose
 from slap_ros.worlds.contact.features import ROBOT as HAND_OF_FORCES
-from slap_ros.worlds.features import GRASP_FEATURES, JOINT_FEATURES, ROBOT
+from slap_ros.worlds.features import JOINT_FEATURES
+from slap_ros.worlds.joint_space.features import GRASP_FEATURES, ROBOT
 from slap_ros.worlds.joint_space.world import PandaWorld
 from slap_ros.worlds.panda import FINGER_OPEN, hand_pose
 

@@ -30,12 +30,8 @@ from slap_ros.files import parse_yaml, read_text
 from slap_ros.geometry.pose import IDENTITY, ORIGIN, Pose
 from slap_ros.relational import Object, State
 from slap_ros.robot.tracking import measured_pose
-from slap_ros.worlds.features import (
-    ROBOT,
-    body_features,
-    pose_features,
-    robot_features,
-)
+from slap_ros.worlds.features import body_features, pose_features
+from slap_ros.worlds.joint_space.features import ROBOT, robot_features
 from slap_ros.worlds.panda import HOME
 
 MAX_SCENE_BYTES = 2**20

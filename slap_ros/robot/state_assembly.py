@@ -11,16 +11,11 @@ from slap_ros.geometry.pose import IDENTITY, ORIGIN, Pose
 from slap_ros.relational import Feature, Object, State
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.tracking import PoseEstimate
-from slap_ros.worlds.features import (
-    GRASP_FEATURES,
-    JOINT_FEATURES,
-    POSE_FEATURES,
-    ROBOT,
-    VELOCITY_FEATURES,
-)
+from slap_ros.worlds.features import JOINT_FEATURES, POSE_FEATURES, VELOCITY_FEATURES
+from slap_ros.worlds.joint_space.features import GRASP_FEATURES, ROBOT
+from slap_ros.worlds.joint_space.scene import Scene
+from slap_ros.worlds.joint_space.settling import resting_poses
 from slap_ros.worlds.panda import FINGER_OPEN, hand_pose
-from slap_ros.worlds.scene import Scene
-from slap_ros.worlds.settling import resting_poses
 
 Changes = dict[tuple[Object, str], float]
 

@@ -16,6 +16,8 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
+from importlib.resources import files
+from pathlib import Path
 from types import ModuleType
 
 BUILD_TIME = b"pybullet build time"
@@ -49,3 +51,4 @@ def _without_build_time(libc: ctypes.CDLL, name: str) -> Iterator[None]:
 
 
 pybullet: ModuleType = _imported()
+PANDA = Path(str(files("pybullet_data"))) / "franka_panda"  # its URDF and meshes

@@ -1,21 +1,14 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The features that physics needs in a state; it keeps no other state between steps.
-
-A domain's robot is a :data:`ROBOT`; the types of its free bodies begin with
-:data:`BODY_FEATURES`, as in ``Type("block", BODY_FEATURES)``; fixed bodies whose place differs
-from task to task begin with :data:`POSE_FEATURES`. Free bodies whose mass or friction differs from
-task to task have :data:`MATERIAL_FEATURES` as well; the scene's numbers then only are defaults.
-"""
+"""Features that states of all worlds have: joints of the arm, poses and velocities of bodies."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
-from slap_ros.geometry.pose import IDENTITY, NO_ROTATION, ORIGIN, Pose, Vector
-from slap_ros.relational import Feature, Type
-from slap_ros.worlds.panda import FINGER_OPEN, JOINTS
-from slap_ros.worlds.scene import CUBE_MATERIAL, Material
+from slap_ros.geometry.pose import NO_ROTATION, ORIGIN, Pose, Vector
+from slap_ros.relational import Feature
+from slap_ros.worlds.panda import JOINTS
 
 POSE_FEATURES = (
     *(Feature(axis, "m") for axis in ("x", "y", "z")),
@@ -25,30 +18,9 @@ VELOCITY_FEATURES = (
     *(Feature(f"v{axis}", "m/s") for axis in ("x", "y", "z")),
     *(Feature(f"w{axis}", "rad/s") for axis in ("x", "y", "z")),
 )
-MATERIAL_FEATURES = (Feature("mass", "kg"), Feature("friction", "1"))
 BODY_FEATURES = (*POSE_FEATURES, *VELOCITY_FEATURES, Feature("held", "1"))
 
 JOINT_FEATURES = tuple(Feature(f"joint{i + 1}", "rad") for i in range(JOINTS))
-# The held body's pose in the hand's frame; no turn at the origin while nothing is held.
-GRASP_FEATURES = tuple(Feature(f"grasp_{f.name}", f.unit) for f in POSE_FEATURES)
-ROBOT = Type("robot", (*JOINT_FEATURES, Feature("finger", "m"), *GRASP_FEATURES))
-
-
-def robot_features(
-    joints: Sequence[float], finger: float = FINGER_OPEN, grasp: Pose = IDENTITY
-) -> Mapping[str, float]:
-    """A robot's features, for ``State.build``.
-
-    Args:
-        joints: Joint positions, rad.
-        finger: Distance of each finger from the middle, m.
-        grasp: The held body's pose in the hand's frame.
-
-    Returns:
-        A value for each feature of :data:`ROBOT`, by name.
-    """
-    values = (*joints, finger, *grasp.position, *grasp.quaternion)
-    return dict(zip((f.name for f in ROBOT.features), values, strict=True))
 
 
 def pose_features(pose: Pose) -> Mapping[str, float]:
@@ -78,8 +50,3 @@ def body_features(
     """
     values = (*position, *quaternion, *velocity, *angular_velocity, float(held))
     return dict(zip((f.name for f in BODY_FEATURES), values, strict=True))
-
-
-def material_features(material: Material = CUBE_MATERIAL) -> Mapping[str, float]:
-    """What a free body is made of, for ``State.build``."""
-    return dict(zip((f.name for f in MATERIAL_FEATURES), material, strict=True))

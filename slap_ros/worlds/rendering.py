@@ -14,9 +14,8 @@ from slap_ros.geometry.pose import Pose, Vector
 from slap_ros.meshes.solid import ConvexPiece, prism
 from slap_ros.relational import State
 from slap_ros.worlds.animation import Picture, write_pictures
-from slap_ros.worlds.bullet import pybullet
-from slap_ros.worlds.joint_space.simulation import PANDA
-from slap_ros.worlds.scene import GREY, Colour
+from slap_ros.worlds.bodies import GREY, Colour
+from slap_ros.worlds.bullet import PANDA, pybullet
 from slap_ros.worlds.viewpoint import Viewpoint
 from slap_ros.worlds.visuals import Cylinder, Visuals, VisualShape
 

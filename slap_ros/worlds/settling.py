@@ -1,47 +1,16 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Measured poses of bodies at rest, corrected to where physics would have them.
-
-A block measured 2 mm above the table neither floats nor is sunk in; left as measured it would fall
-in the planner's model, and predicates of touching would flicker.
-"""
+"""Measured poses of bodies at rest, turned so that they lie flat."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 
-from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, Vector, multiply, normalised, rotate
-from slap_ros.worlds.scene import Body
 
 LEANING = 0.15  # rad; what is tilted by more does not lie on a face
 FLOATING = 0.015  # m, between a bottom and the top of what it is taken to lie on
 AXES: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-
-
-def resting_poses(
-    measured: Mapping[int, Pose], bodies: Sequence[Body], fixed: Sequence[OrientedBox]
-) -> dict[int, Pose]:
-    """Poses of bodies at rest, each flat on what supports it; as measured where that is unclear.
-
-    Args:
-        measured: Pose of each body at rest in the base's frame, by index among the bodies.
-        bodies: The free bodies of the scene.
-        fixed: The boxes of the solid bodies that do not move, base's frame.
-
-    Returns:
-        A pose for each measured one, by the same index.
-    """
-    below = list(fixed)
-    poses = {}
-    for i in sorted(measured, key=lambda i: measured[i].position[2]):
-        pose = levelled(measured[i])
-        if pose is not None:
-            pose = _put_down(pose, bodies[i], below)
-        poses[i] = measured[i] if pose is None else pose
-        below.append(bodies[i].at(poses[i]))
-    return poses
 
 
 def levelled(pose: Pose) -> Pose | None:
@@ -56,23 +25,3 @@ def levelled(pose: Pose) -> Pose | None:
     # The shortest turn that takes (x, y, z) to the vertical.
     turn = normalised((y, -x, 0.0, 1.0 + z))
     return Pose(pose.position, normalised(multiply(turn, pose.quaternion)))
-
-
-def _put_down(pose: Pose, body: Body, below: Sequence[OrientedBox]) -> Pose | None:
-    """On the highest top near its bottom, if there is one."""
-    box = body.at(pose)  # whose middle need not be the body's origin
-    bottom = box.bottom
-    tops = [other.top for other in below if _under(box, other)]
-    near = [top for top in tops if abs(bottom - top) <= FLOATING]
-    if not near:
-        return None
-    x, y, z = pose.position
-    return Pose((x, y, z + max(near) - bottom), pose.quaternion)
-
-
-def _under(box: OrientedBox, other: OrientedBox) -> bool:
-    """Whether a box's middle is over another one, or beside it by less than it is wide."""
-    middle_x, middle_y, _ = box.pose.position
-    x, y, z = other.pose.inverse().apply((middle_x, middle_y, other.pose.position[2]))
-    reach = min(box.half)
-    return all(abs(a) <= half + reach for a, half in zip((x, y, z), other.half, strict=True))

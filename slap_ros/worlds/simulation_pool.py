@@ -12,9 +12,6 @@ from collections.abc import Callable
 from threading import RLock
 from typing import Generic, Protocol, TypeVar
 
-from slap_ros.worlds.joint_space.simulation import Simulation, Stepping
-from slap_ros.worlds.scene import Scene
-
 MAX_IDLE = 4  # simulations kept for later
 
 
@@ -61,19 +58,3 @@ class SimulationPool(Generic[Key, Pooled]):
         with self._lock:
             while self._idle:
                 self._idle.popleft()[1].close()
-
-
-_pool: SimulationPool[tuple[Scene, Stepping], Simulation] = SimulationPool(
-    lambda key: Simulation(*key)
-)
-close_idle = _pool.close_idle
-
-
-def acquire(scene: Scene, stepping: Stepping) -> Simulation:
-    """A simulation of the scene that nobody else uses."""
-    return _pool.acquire((scene, stepping))
-
-
-def release(simulation: Simulation) -> None:
-    """Keep a simulation for the next world; close the one that waited longest if there are many."""
-    _pool.release((simulation.scene, simulation.stepping), simulation)

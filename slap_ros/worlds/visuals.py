@@ -4,14 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 from slap_ros.geometry.pose import Pose, Vector
-from slap_ros.meshes.solid import ConvexPiece, Solid
+from slap_ros.meshes.solid import ConvexPiece
 from slap_ros.relational import State
-from slap_ros.worlds.joint_space.snapshot import SnapshotCodec
-from slap_ros.worlds.scene import Body, Colour, Scene
+from slap_ros.worlds.bodies import Colour
 
 
 class Cylinder(NamedTuple):
@@ -47,37 +46,3 @@ class Visuals(Protocol):
     def configuration(self, state: State) -> Configuration:
         """Where they are in a state."""
         ...
-
-
-class SceneVisuals:
-    """The bodies of a :class:`~slap_ros.worlds.scene.Scene`."""
-
-    def __init__(self, scene: Scene) -> None:
-        self._scene = scene
-        self._looks = [tuple(_looks(body)) for body in (*scene.free, *scene.fixed)]
-
-    @property
-    def shapes(self) -> Sequence[VisualShape]:
-        """See :class:`Visuals`."""
-        return [shape for look in self._looks for shape in look]
-
-    def configuration(self, state: State) -> Configuration:
-        """See :class:`Visuals`."""
-        codec = SnapshotCodec.of(self._scene, state.layout)
-        snapshot = codec.read(state)
-        poses = [motion.pose for motion in snapshot.bodies]
-        poses += codec.fixed_poses(self._scene, state)
-        return Configuration(
-            snapshot.joints,
-            (snapshot.finger, snapshot.finger),
-            [pose for look, pose in zip(self._looks, poses, strict=True) for _ in look],
-        )
-
-
-def _looks(body: Body) -> Iterator[VisualShape]:
-    """What a body looks like: one shape, or its pieces."""
-    if isinstance(body.shape, Solid):
-        for piece in body.shape.pieces:
-            yield VisualShape(piece, body.colour)
-    else:
-        yield VisualShape(body.shape, body.colour)

@@ -12,7 +12,7 @@ from slap_ros.domains.obstacle_tower.features import BLOCK, SURFACE
 from slap_ros.domains.obstacle_tower.support import CENTRED, TOUCHING
 from slap_ros.geometry.pose import Pose, multiply, rotate
 from slap_ros.relational import Object, State
-from slap_ros.worlds.scene import CUBE_EDGE, TABLE_TOP
+from slap_ros.worlds.joint_space.scene import CUBE_EDGE, TABLE_TOP
 
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 

@@ -30,7 +30,7 @@ from slap_ros.meshes.solid import Solid, cuboid
 from slap_ros.planning.planner import GraphPlanner, Problem
 from slap_ros.planning.search import search_exhaustively, search_lazily
 from slap_ros.relational import Column, State, Target
-from slap_ros.worlds.features import ROBOT
+from slap_ros.worlds.joint_space.features import ROBOT
 from slap_ros.worlds.joint_space.world import PandaWorld
 from slap_ros.worlds.panda import JOINT_HIGH, JOINT_LOW, MAX_STEP, grasp_pose
 

@@ -31,8 +31,8 @@ from slap_ros.planning.options import given_option
 from slap_ros.planning.planner import GraphPlanner, Problem
 from slap_ros.planning.search import search_exhaustively, search_lazily
 from slap_ros.relational import Column, State, Target
+from slap_ros.worlds.joint_space.scene import TABLE_TOP
 from slap_ros.worlds.panda import MAX_STEP, grasp_pose
-from slap_ros.worlds.scene import TABLE_TOP
 
 FAIR, PAPER = get_domain("cluttered_drawer"), get_domain("cluttered_drawer", "paper")
 HALF = 0.025  # m, half a block

@@ -13,7 +13,7 @@ from slap_ros.domains.obstacle2d.tasks import make_task
 from slap_ros.domains.obstacle_tower.support import TOUCHING
 from slap_ros.domains.obstacle_tower.tasks import TowerArrangement
 from slap_ros.relational import Column, State
-from slap_ros.worlds.scene import CUBE_EDGE
+from slap_ros.worlds.joint_space.scene import CUBE_EDGE
 
 DOMAINS = {name: get_domain(name) for name in ("obstacle2d", "obstacle_tower")}
 TOWER, FLAT = DOMAINS["obstacle_tower"], DOMAINS["obstacle2d"]

@@ -23,8 +23,9 @@ from slap_ros.planning.model import Model
 from slap_ros.planning.planner import GraphPlanner, Problem, make_planner
 from slap_ros.planning.search import search_exhaustively, search_lazily
 from slap_ros.relational import State
+from slap_ros.worlds.bodies import Material
+from slap_ros.worlds.joint_space.scene import CUBE_EDGE
 from slap_ros.worlds.panda import MAX_STEP
-from slap_ros.worlds.scene import CUBE_EDGE, Material
 
 FAIR, PAPER = get_domain("obstacle_tower"), get_domain("obstacle_tower", "paper")
 

@@ -11,8 +11,8 @@ from slap_ros.domains.tabletop.grasps import from_above
 from slap_ros.domains.tabletop.state_access import joints_of, pose_of
 from slap_ros.domains.tabletop.transit import CLEARANCE, Transit
 from slap_ros.motion import nearest_configurations
+from slap_ros.worlds.joint_space.scene import CUBE_EDGE
 from slap_ros.worlds.panda import grasp_pose
-from slap_ros.worlds.scene import CUBE_EDGE
 
 DOMAIN = get_domain("obstacle_tower", "paper")
 FINGERS = 0.042  # m, from the hand's middle to where an open finger ends

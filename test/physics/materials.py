@@ -10,8 +10,10 @@ import numpy as np
 
 from benchmarks.physics_step import BLOCK, NAMES, tower
 from slap_ros.relational import State, Type
-from slap_ros.worlds.features import BODY_FEATURES, MATERIAL_FEATURES, material_features
-from slap_ros.worlds.scene import CUBE_MATERIAL, Material
+from slap_ros.worlds.bodies import Material
+from slap_ros.worlds.features import BODY_FEATURES
+from slap_ros.worlds.joint_space.features import MATERIAL_FEATURES, material_features
+from slap_ros.worlds.joint_space.scene import CUBE_MATERIAL
 
 MADE_BLOCK = Type("block", (*BODY_FEATURES, *MATERIAL_FEATURES))
 

@@ -17,9 +17,9 @@ from benchmarks.physics_step import BLOCK, NAMES, SCENE, tower
 from slap_ros.geometry.pose import Pose
 from slap_ros.relational import State, Type
 from slap_ros.worlds.features import POSE_FEATURES, pose_features
+from slap_ros.worlds.joint_space.scene import TABLE, Box, Scene
+from slap_ros.worlds.joint_space.simulation_pool import close_idle
 from slap_ros.worlds.joint_space.world import PandaWorld
-from slap_ros.worlds.scene import TABLE, Box, Scene
-from slap_ros.worlds.simulation_pool import close_idle
 
 COUNTS = {"alike": 1000, "mixed": 1000, "toys": 400}  # toys have many pieces
 

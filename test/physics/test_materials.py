@@ -12,11 +12,12 @@ from transitions import GRASP, holding
 from benchmarks.physics_step import NAMES, SCENE, reach, tower
 from slap_ros.errors import InvalidStateError
 from slap_ros.relational import State
+from slap_ros.worlds.bodies import Material
+from slap_ros.worlds.joint_space.scene import CUBE_MATERIAL, REFERENCE_FRICTION, TABLE, Scene, cube
 from slap_ros.worlds.joint_space.simulation import GRAVITY
+from slap_ros.worlds.joint_space.simulation_pool import close_idle
 from slap_ros.worlds.joint_space.world import PandaWorld
 from slap_ros.worlds.panda import HOME
-from slap_ros.worlds.scene import CUBE_MATERIAL, FRICTION, TABLE, Material, Scene, cube
-from slap_ros.worlds.simulation_pool import close_idle
 
 STAY = np.zeros(8)
 
@@ -49,7 +50,7 @@ def slide(world: PandaWorld, state: State) -> float:
 @pytest.mark.parametrize("mass", [0.05, 0.5, 5.0])
 def test_a_block_slides_as_far_as_coulomb_says_whatever_its_mass(world, mass):
     for friction in (0.3, 0.4):
-        way = 0.6**2 / (2 * friction * FRICTION * GRAVITY)
+        way = 0.6**2 / (2 * friction * REFERENCE_FRICTION * GRAVITY)
         assert slide(world, shoved(friction, mass, at=0.6)) == pytest.approx(way, rel=0.15)
 
 

@@ -14,12 +14,20 @@ from slap_ros.geometry.pose import Pose
 from slap_ros.meshes.solid import Solid
 from slap_ros.worlds.bullet import pybullet
 from slap_ros.worlds.joint_space.gripper import finger_around
+from slap_ros.worlds.joint_space.scene import (
+    CUBE_EDGE,
+    CUBE_MATERIAL,
+    TABLE,
+    TABLE_TOP,
+    Mesh,
+    Scene,
+    cube,
+)
 from slap_ros.worlds.joint_space.simulation import Simulation, Stepping
+from slap_ros.worlds.joint_space.visuals import SceneVisuals
 from slap_ros.worlds.joint_space.world import PandaWorld
 from slap_ros.worlds.panda import HOME
 from slap_ros.worlds.rendering import Camera
-from slap_ros.worlds.scene import CUBE_EDGE, CUBE_MATERIAL, TABLE, TABLE_TOP, Mesh, Scene, cube
-from slap_ros.worlds.visuals import SceneVisuals
 
 CUBE = Solid.of([make.block((0.0, 0.0, 0.0), (CUBE_EDGE,) * 3)])
 CUBES = Scene((TABLE, *(Mesh(name, CUBE).with_material(CUBE_MATERIAL) for name in NAMES)))

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from slap_ros.geometry.pose import Pose, multiply
-from slap_ros.worlds.bullet import pybullet
+from slap_ros.worlds.bullet import PANDA, pybullet
 from slap_ros.worlds.joint_space.links import LINK_SHAPES
-from slap_ros.worlds.joint_space.simulation import MESHES, PANDA
+from slap_ros.worlds.joint_space.simulation import MESHES
 from slap_ros.worlds.panda import (
     FINGER_OPEN,
     GRASP_POINT,

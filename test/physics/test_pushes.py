@@ -13,11 +13,11 @@ from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose
 from slap_ros.worlds.bullet import pybullet
 from slap_ros.worlds.joint_space.arm import Arm
+from slap_ros.worlds.joint_space.scene import CUBE_EDGE, FLOOR_TOP, TABLE, TABLE_TOP, cube
 from slap_ros.worlds.joint_space.simulation import Drive, Simulation, Stepping
-from slap_ros.worlds.joint_space.snapshot import BodyState
 from slap_ros.worlds.joint_space.world import PandaWorld
+from slap_ros.worlds.layout_index import BodyState
 from slap_ros.worlds.panda import FINGER_OPEN, HOME, MAX_STEP
-from slap_ros.worlds.scene import CUBE_EDGE, FLOOR_TOP, TABLE, TABLE_TOP, cube
 
 PUSHES = 40  # of the 200 that benchmarks/physics_step.py --pushes 200 compares
 FASTEST = 6.0  # m/s; falling to the floor gives 3

@@ -16,10 +16,10 @@ from benchmarks.physics_step import NAMES, tower
 from slap_ros.relational import State
 from slap_ros.worlds.animation import WRITERS
 from slap_ros.worlds.bullet import pybullet
+from slap_ros.worlds.joint_space.scene import TABLE, Scene, cube
+from slap_ros.worlds.joint_space.visuals import SceneVisuals
 from slap_ros.worlds.panda import CONTROL_PERIOD_S
 from slap_ros.worlds.rendering import Camera, Viewpoint, write_animation
-from slap_ros.worlds.scene import TABLE, Scene, cube
-from slap_ros.worlds.visuals import SceneVisuals
 
 RED, BLUE = (0.9, 0.1, 0.1, 1.0), (0.1, 0.1, 0.9, 1.0)
 SCENE = Scene((TABLE, *(cube(n, RED if n == "T" else BLUE) for n in NAMES)))

@@ -14,10 +14,12 @@ from benchmarks.physics_step import BLOCK, NAMES, SCENE, pushes, reach, tower, w
 from slap_ros.errors import InvalidCommandError, InvalidDomainError, InvalidStateError
 from slap_ros.geometry.pose import Pose
 from slap_ros.relational import State, Type
-from slap_ros.worlds import simulation_pool
 from slap_ros.worlds.bullet import pybullet
-from slap_ros.worlds.features import ROBOT, body_features, robot_features
+from slap_ros.worlds.features import body_features
+from slap_ros.worlds.joint_space import simulation_pool
 from slap_ros.worlds.joint_space.arm import Arm, Obstacle, Sweep
+from slap_ros.worlds.joint_space.features import ROBOT, robot_features
+from slap_ros.worlds.joint_space.scene import TABLE, Box, Scene, cube
 from slap_ros.worlds.joint_space.world import ACTION_SPACE, PandaWorld
 from slap_ros.worlds.panda import (
     FINGER_OPEN,
@@ -28,7 +30,7 @@ from slap_ros.worlds.panda import (
     grasp_pose,
     hand_pose,
 )
-from slap_ros.worlds.scene import TABLE, Box, Scene, cube
+from slap_ros.worlds.simulation_pool import MAX_IDLE
 
 CLOSE, OPEN = np.eye(8)[7], -np.eye(8)[7]
 STAY = np.zeros(8)
@@ -344,7 +346,7 @@ def test_impossible_scenes_are_refused_and_change_nothing(world, state, words):
 
 def test_bodies_that_the_state_does_not_have():
     state = State.build({ROBOT("robot"): robot_features(HOME)})
-    with pytest.raises(InvalidStateError, match="'T' is not an object with a free body's features"):
+    with pytest.raises(InvalidStateError, match="'T' is not an object with the features x, y"):
         PandaWorld(SCENE, state)
     bare = State.build({Type("thing")("thing"): {}})
     with pytest.raises(InvalidStateError, match="a scene has one robot, the state has 0"):
@@ -386,7 +388,7 @@ def test_ten_worlds_made_and_closed_leak_no_clients():
     assert states[2] == states[4] != states[3] == states[5]
     for world in worlds:
         world.close()
-    assert connected() == before + simulation_pool.MAX_IDLE
+    assert connected() == before + MAX_IDLE
     simulation_pool.close_idle()
     assert connected() == before
 

@@ -9,7 +9,7 @@ import numpy as np
 from benchmarks.physics_step import BLOCK, NAMES, tower
 from slap_ros.domains.cleanup_table.shapes import shipped
 from slap_ros.relational import State
-from slap_ros.worlds.scene import TABLE, Mesh, Scene
+from slap_ros.worlds.joint_space.scene import TABLE, Mesh, Scene
 
 MASS = 0.01  # kg
 TOYS = Scene(

@@ -25,11 +25,12 @@ from toys import TOYS, heap
 from benchmarks.physics_step import SCENE, pushes, tower, with_joints
 from slap_ros.geometry.pose import Pose
 from slap_ros.relational import State
-from slap_ros.worlds.features import ROBOT, body_features, robot_features
+from slap_ros.worlds.features import body_features
+from slap_ros.worlds.joint_space.features import ROBOT, robot_features
 from slap_ros.worlds.joint_space.gripper import finger_around
+from slap_ros.worlds.joint_space.scene import Scene
 from slap_ros.worlds.joint_space.world import PandaWorld
 from slap_ros.worlds.panda import GRASP_POINT, HOME, MAX_STEP, hand_pose
-from slap_ros.worlds.scene import Scene
 
 HIGH = np.array([*MAX_STEP, 1.0])
 GRASP = Pose((0.002, -0.003, GRASP_POINT))  # not quite in the middle

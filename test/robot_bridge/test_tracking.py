@@ -11,8 +11,8 @@ from slap_ros.errors import InvalidMeasurementError
 from slap_ros.geometry.pose import NO_ROTATION, Pose
 from slap_ros.geometry.static_transforms import StaticTransforms
 from slap_ros.robot.tracking import Detection, Track, TrackingSettings, measured_pose
-from slap_ros.worlds.scene import TABLE, TABLE_TOP, cube
-from slap_ros.worlds.settling import resting_poses
+from slap_ros.worlds.joint_space.scene import TABLE, TABLE_TOP, cube
+from slap_ros.worlds.joint_space.settling import resting_poses
 
 SENSING = TrackingSettings(position_noise_m=0.002)
 RATE = 30.0  # Hz

@@ -20,9 +20,9 @@ from slap_ros.shortcuts.observation_encoder import (
     ObservationEncoder,
 )
 from slap_ros.shortcuts.signature import Change, Signature
-from slap_ros.worlds.features import ROBOT
+from slap_ros.worlds.joint_space.features import ROBOT
+from slap_ros.worlds.joint_space.scene import TABLE_TOP
 from slap_ros.worlds.panda import JOINT_HIGH, JOINT_LOW, MAX_STEP
-from slap_ros.worlds.scene import TABLE_TOP
 
 TOWER = get_domain("obstacle_tower", "paper")
 

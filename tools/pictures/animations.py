@@ -24,10 +24,11 @@ from slap_ros.planning.options import OptionKind
 from slap_ros.relational import State
 from slap_ros.shortcuts.shipped import chosen_library
 from slap_ros.shortcuts.shortcut import DEFAULT
+from slap_ros.worlds.joint_space.visuals import SceneVisuals
 from slap_ros.worlds.panda import CONTROL_PERIOD_S
 from slap_ros.worlds.rendering import Camera
 from slap_ros.worlds.viewpoint import Viewpoint
-from slap_ros.worlds.visuals import SceneVisuals, Visuals
+from slap_ros.worlds.visuals import Visuals
 
 OVERSAMPLING = 2  # pictures are drawn so many times as large, then scaled down
 SIZE_PX = (420, 380)  # of one arm's picture

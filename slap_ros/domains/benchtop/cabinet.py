@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from slap_ros.domains.benchtop.features import DRAWER, jointed_features
 from slap_ros.geometry.pose import Pose, Vector
 from slap_ros.relational import Type
+from slap_ros.worlds.bodies import Colour
 from slap_ros.worlds.contact.scene import BoxPart, Joint, JointedBody, JointKind
-from slap_ros.worlds.scene import Colour
 
 CABINET = Type("cabinet", DRAWER.features, DRAWER)
 

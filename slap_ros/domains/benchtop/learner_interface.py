@@ -29,7 +29,7 @@ from slap_ros.relational.state import Array
 from slap_ros.worlds.contact.features import ROBOT
 from slap_ros.worlds.contact.hand import LEASH
 from slap_ros.worlds.contact.scene import ContactScene
-from slap_ros.worlds.contact.snapshot import StateIndex
+from slap_ros.worlds.contact.snapshot import ContactIndex
 from slap_ros.worlds.contact.way_up import way_up_is_free
 from slap_ros.worlds.panda import FINGER_OPEN
 
@@ -165,7 +165,7 @@ def _can_leave(states: State, scene_of: Callable[[State], ContactScene]) -> Bool
 
 def _can_go_up(state: State, scene_of: Callable[[State], ContactScene]) -> bool:
     scene = scene_of(state)
-    index = StateIndex.of(scene, state.layout)
+    index = ContactIndex.of(scene, state.layout)
     return way_up_is_free(scene, index.read(state), index.placement(scene, state))
 
 

@@ -13,8 +13,8 @@ from slap_ros.domains.benchtop.features import place_features, thing_features
 from slap_ros.domains.bowls.model import BOWL, HALVES
 from slap_ros.geometry.pose import Pose, Vector, from_yaw, rotate
 from slap_ros.relational import Layout, State
+from slap_ros.worlds.bodies import Colour
 from slap_ros.worlds.contact.scene import TABLE, BoxPart, Compound, ContactScene, CylinderPart, Part
-from slap_ros.worlds.scene import Colour
 
 BLACK: Colour = (0.15, 0.15, 0.17, 1.0)
 CHINA: Colour = (0.92, 0.92, 0.88, 1.0)

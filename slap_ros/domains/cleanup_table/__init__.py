@@ -28,9 +28,9 @@ from slap_ros.domains.tabletop.visualization import animation, visible_arm, visi
 from slap_ros.domains.variation import varied
 from slap_ros.meshes.solid import Solid
 from slap_ros.relational import State
+from slap_ros.worlds.joint_space.scene import Scene
 from slap_ros.worlds.joint_space.world import PandaWorld
 from slap_ros.worlds.panda import CONTROL_PERIOD_S
-from slap_ros.worlds.scene import Scene
 from slap_ros.worlds.viewpoint import Viewpoint
 
 SETTINGS: Mapping[str, tasks.RandomCleanupTasks] = {

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from slap_ros.relational import Column, Feature, Layout, Type
 from slap_ros.relational.predicates import Bools
-from slap_ros.worlds.features import BODY_FEATURES, MATERIAL_FEATURES, POSE_FEATURES, ROBOT
+from slap_ros.worlds.features import BODY_FEATURES, POSE_FEATURES
+from slap_ros.worlds.joint_space.features import MATERIAL_FEATURES, ROBOT
 
 WALL = 0.005  # m, thickness of the bin's walls
 

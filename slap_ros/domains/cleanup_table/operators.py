@@ -23,7 +23,7 @@ from slap_ros.domains.cleanup_table.predicates import (
     READY_PICK,
 )
 from slap_ros.relational import LiftedAtom, LiftedOperator, Predicate, Variable
-from slap_ros.worlds.features import ROBOT
+from slap_ros.worlds.joint_space.features import ROBOT
 
 ROBOT_VARIABLE, BLOCK_VARIABLE = Variable("?r", ROBOT), Variable("?b", BLOCK)
 SURFACE_VARIABLE = Variable("?s", SURFACE)

@@ -18,7 +18,7 @@ from slap_ros.domains.cleanup_table.relations import cleanup_relations
 from slap_ros.relational import Column, Predicate, State
 from slap_ros.relational.predicates import Bools
 from slap_ros.relational.state import Array
-from slap_ros.worlds.features import ROBOT
+from slap_ros.worlds.joint_space.features import ROBOT
 
 
 def _of_blocks(margins: Array, state: State, block: Column) -> Array:

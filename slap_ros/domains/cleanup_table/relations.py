@@ -29,7 +29,7 @@ from slap_ros.domains.tabletop.state_access import JOINT_NAMES
 from slap_ros.relational import State
 from slap_ros.relational.predicates import Bools, cache_latest
 from slap_ros.relational.state import Array
-from slap_ros.worlds.features import ROBOT
+from slap_ros.worlds.joint_space.features import ROBOT
 
 LOW = 0.03  # height over the table at which a thing still counts as on it
 OVER, ASIDE = 0.05, 0.02  # of a hand ready to pick: over the thing's middle, and off it at most

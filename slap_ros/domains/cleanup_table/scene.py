@@ -13,7 +13,8 @@ from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, Vector
 from slap_ros.meshes.solid import Solid
 from slap_ros.relational import Object, State
-from slap_ros.worlds.scene import FRICTION, WOOD, Box, Colour, Material, Mesh, Scene
+from slap_ros.worlds.bodies import WOOD, Colour, Material
+from slap_ros.worlds.joint_space.scene import REFERENCE_FRICTION, Box, Mesh, Scene
 
 TABLE_TOP = 0.0
 FLOOR_TOP = -0.325
@@ -23,7 +24,9 @@ TABLE = OrientedBox(
 BIN = OrientedBox(Pose((0.5, 0.45, -0.275)), (0.3, 0.15, 0.05))
 DEEP = 0.3  # of the bin's floor, which reaches into the ground: what falls on it cannot pass it
 FLOOR = 0.003  # of the bin over the ground
-MATERIAL = Material(mass_kg=0.01, friction=FRICTION)  # of blocks, unless the state says otherwise
+MATERIAL = Material(
+    mass_kg=0.01, friction=REFERENCE_FRICTION
+)  # of blocks, unless the state says otherwise
 
 COLOURS: Mapping[str, Colour] = {
     "duck": (0.95, 0.8, 0.2, 1.0),

@@ -51,7 +51,7 @@ from slap_ros.motion import (
 )
 from slap_ros.relational import Object, State
 from slap_ros.relational.predicates import Bools
-from slap_ros.worlds.features import ROBOT
+from slap_ros.worlds.joint_space.features import ROBOT
 from slap_ros.worlds.joint_space.gripper import GRASP_REACH
 from slap_ros.worlds.panda import FINGER_OPEN, JOINTS, grasp_pose
 

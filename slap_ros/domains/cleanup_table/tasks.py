@@ -24,15 +24,10 @@ from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Vector, from_yaw
 from slap_ros.meshes.solid import Solid
 from slap_ros.relational import GroundAtom, Object, State
-from slap_ros.worlds.features import (
-    ROBOT,
-    body_features,
-    material_features,
-    pose_features,
-    robot_features,
-)
+from slap_ros.worlds.bodies import Material
+from slap_ros.worlds.features import body_features, pose_features
+from slap_ros.worlds.joint_space.features import ROBOT, material_features, robot_features
 from slap_ros.worlds.panda import HOME
-from slap_ros.worlds.scene import Material
 
 STEP_LIMIT = 600  # environment steps
 TRIES = 1_000  # places drawn for a toy before all are drawn again

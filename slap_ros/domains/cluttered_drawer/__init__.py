@@ -27,7 +27,7 @@ from slap_ros.domains.tabletop.presets import TIMINGS
 from slap_ros.domains.tabletop.settling import settling
 from slap_ros.domains.tabletop.visualization import animation, visible_arm, visible_bodies
 from slap_ros.domains.variation import varied
-from slap_ros.worlds.features import ROBOT
+from slap_ros.worlds.joint_space.features import ROBOT
 from slap_ros.worlds.joint_space.world import PandaWorld
 from slap_ros.worlds.panda import CONTROL_PERIOD_S
 from slap_ros.worlds.viewpoint import Viewpoint

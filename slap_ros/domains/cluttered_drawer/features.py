@@ -14,7 +14,8 @@ from slap_ros.domains.tabletop.footprints import HALVES, PARTS, Indices
 from slap_ros.domains.tabletop.state_access import HALF_NAMES, JOINT_NAMES
 from slap_ros.relational import Column, Feature, Layout, Object, Type
 from slap_ros.relational.predicates import Bools
-from slap_ros.worlds.features import BODY_FEATURES, MATERIAL_FEATURES, POSE_FEATURES, ROBOT
+from slap_ros.worlds.features import BODY_FEATURES, POSE_FEATURES
+from slap_ros.worlds.joint_space.features import MATERIAL_FEATURES, ROBOT
 
 CACHE_SIZE = 1024  # columns of objects, for each layout
 

@@ -28,7 +28,7 @@ from slap_ros.domains.cluttered_drawer.blocking import SIDES
 from slap_ros.domains.cluttered_drawer.features import BLOCK, DRAWER, TABLE, TARGET
 from slap_ros.domains.cluttered_drawer.predicates import BY_NAME
 from slap_ros.relational import LiftedAtom, LiftedOperator, Variable
-from slap_ros.worlds.features import ROBOT
+from slap_ros.worlds.joint_space.features import ROBOT
 
 AtomPattern = tuple[str, *tuple[Variable, ...]]  # a predicate's name, and variables
 

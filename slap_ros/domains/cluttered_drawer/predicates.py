@@ -21,7 +21,7 @@ from slap_ros.domains.cluttered_drawer.features import BLOCK, DRAWER, SURFACE, T
 from slap_ros.relational import Column, Predicate, State, Type
 from slap_ros.relational.predicates import Bools, Classifier, Margin, cache_latest
 from slap_ros.relational.state import Array
-from slap_ros.worlds.features import ROBOT
+from slap_ros.worlds.joint_space.features import ROBOT
 
 RelationsOf = Callable[[State], BlockingRelations]
 

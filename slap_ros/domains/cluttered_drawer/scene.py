@@ -14,8 +14,9 @@ from collections.abc import Mapping
 from slap_ros.domains.cluttered_drawer.features import BLOCK, DRAWER, TABLE, TARGET, WALL
 from slap_ros.geometry.pose import Pose, Vector
 from slap_ros.relational import Object, State
-from slap_ros.worlds import scene
-from slap_ros.worlds.scene import TABLE_TOP, WOOD, Box, Colour, Scene, cube
+from slap_ros.worlds.bodies import WOOD, Colour
+from slap_ros.worlds.joint_space import scene
+from slap_ros.worlds.joint_space.scene import TABLE_TOP, Box, Scene, cube
 
 RED: Colour = (0.85, 0.25, 0.2, 1.0)
 BLUE: Colour = (0.3, 0.45, 0.75, 1.0)

@@ -23,15 +23,11 @@ from slap_ros.domains.tabletop.variation_limits import MATERIAL_LIMITS, REACH, T
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.geometry.pose import Pose, from_yaw
 from slap_ros.relational import GroundAtom, Object, State
-from slap_ros.worlds.features import (
-    ROBOT,
-    body_features,
-    material_features,
-    pose_features,
-    robot_features,
-)
+from slap_ros.worlds.bodies import Material
+from slap_ros.worlds.features import body_features, pose_features
+from slap_ros.worlds.joint_space.features import ROBOT, material_features, robot_features
+from slap_ros.worlds.joint_space.scene import CUBE_EDGE, CUBE_MATERIAL
 from slap_ros.worlds.panda import HOME
-from slap_ros.worlds.scene import CUBE_EDGE, CUBE_MATERIAL, Material
 
 STEP_LIMIT = 500  # environment steps (SLAP, appendix)
 TRIES = 10_000  # arrangements drawn before there is said to be no room

@@ -12,8 +12,8 @@ from math import pi
 from slap_ros.domains.groceries.model import GROCERY
 from slap_ros.geometry.pose import Pose, from_rotation_vector
 from slap_ros.relational import State
+from slap_ros.worlds.bodies import Colour
 from slap_ros.worlds.contact.scene import TABLE, BoxPart, Compound, ContactScene, CylinderPart, Part
-from slap_ros.worlds.scene import Colour
 
 LYING = from_rotation_vector((0.0, 0.5 * pi, 0.0))  # of a cylinder, along x
 

@@ -15,6 +15,7 @@ from slap_ros.domains.benchtop.cabinet import CABINET, CabinetShape
 from slap_ros.domains.benchtop.features import LID, THING
 from slap_ros.geometry.pose import Pose, Vector, from_rotation_vector, from_yaw
 from slap_ros.relational import Layout, State, Type
+from slap_ros.worlds.bodies import Colour
 from slap_ros.worlds.contact.scene import (
     TABLE,
     BoxPart,
@@ -25,7 +26,6 @@ from slap_ros.worlds.contact.scene import (
     JointKind,
     cylinder,
 )
-from slap_ros.worlds.scene import Colour
 
 POD = Type("pod", THING.features, THING)
 HOLDER = Type("holder", LID.features, LID)

@@ -22,8 +22,8 @@ from slap_ros.domains.tabletop import observation
 from slap_ros.domains.tabletop.observation import Features, joined
 from slap_ros.relational import Column, GroundAtom, State
 from slap_ros.relational.state import Array
-from slap_ros.worlds.features import ROBOT
-from slap_ros.worlds.scene import CUBE_EDGE, TABLE_TOP
+from slap_ros.worlds.joint_space.features import ROBOT
+from slap_ros.worlds.joint_space.scene import CUBE_EDGE, TABLE_TOP
 
 NEAR = 0.1  # m, the scale of what is beside the target
 FALLEN = TABLE_TOP - 0.05  # m, below which a block's centre is off the table

@@ -23,7 +23,7 @@ from slap_ros.domains.obstacle_tower.predicates import (
     ON,
 )
 from slap_ros.relational import LiftedAtom, LiftedOperator, Predicate, Variable
-from slap_ros.worlds.features import ROBOT
+from slap_ros.worlds.joint_space.features import ROBOT
 
 ROBOT_VARIABLE, BLOCK_VARIABLE = Variable("?r", ROBOT), Variable("?b", BLOCK)
 TABLE, TARGET = Variable("?s", SURFACE), Variable("?t", SURFACE)

@@ -10,7 +10,7 @@ from slap_ros.domains.obstacle_tower.support import support_relations, support_t
 from slap_ros.relational import Column, Predicate, State
 from slap_ros.relational.predicates import Bools
 from slap_ros.relational.state import Array
-from slap_ros.worlds.features import ROBOT
+from slap_ros.worlds.joint_space.features import ROBOT
 
 
 def _on(state: State, block: Column, thing: Column) -> Bools:

@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from slap_ros.domains.obstacle_tower.features import BLOCK, SURFACE
 from slap_ros.relational import State
-from slap_ros.worlds.scene import TABLE, Box, Colour, Scene, cube
+from slap_ros.worlds.bodies import Colour
+from slap_ros.worlds.joint_space.scene import TABLE, Box, Scene, cube
 
 RED: Colour = (0.85, 0.25, 0.2, 1.0)
 BLUE: Colour = (0.3, 0.45, 0.75, 1.0)

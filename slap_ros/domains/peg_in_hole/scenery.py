@@ -11,8 +11,8 @@ from __future__ import annotations
 from functools import lru_cache
 
 from slap_ros.geometry.pose import ORIGIN, Pose, Vector, from_rotation_vector, from_yaw, rotate
+from slap_ros.worlds.bodies import Colour
 from slap_ros.worlds.contact.scene import TABLE, BoxPart, Compound, ContactScene, CylinderPart
-from slap_ros.worlds.scene import Colour
 
 RED: Colour = (0.85, 0.25, 0.2, 1.0)
 BLUE: Colour = (0.3, 0.45, 0.75, 1.0)

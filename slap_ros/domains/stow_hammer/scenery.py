@@ -11,8 +11,8 @@ from slap_ros.domains.benchtop.cabinet import CABINET, CabinetShape
 from slap_ros.domains.benchtop.features import THING
 from slap_ros.geometry.pose import Pose, from_rotation_vector
 from slap_ros.relational import Layout, State, Type
+from slap_ros.worlds.bodies import Colour
 from slap_ros.worlds.contact.scene import TABLE, BoxPart, Compound, ContactScene, CylinderPart
-from slap_ros.worlds.scene import Colour
 
 HAMMER = Type("hammer", THING.features, THING)
 

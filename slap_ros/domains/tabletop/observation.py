@@ -14,9 +14,9 @@ from slap_ros.motion.kinematics import GRASP_IN_LAST_LINK, arm_frames, matrix
 from slap_ros.relational import Column, Object, State
 from slap_ros.relational.predicates import Bools
 from slap_ros.relational.state import Array
-from slap_ros.worlds.features import ROBOT
+from slap_ros.worlds.joint_space.features import ROBOT
+from slap_ros.worlds.joint_space.scene import TABLE_TOP
 from slap_ros.worlds.panda import GRASP_POINT, JOINT_HIGH, JOINT_LOW, JOINTS, MAX_STEP
-from slap_ros.worlds.scene import TABLE_TOP
 
 DISTANCE_SCALE = 0.2  # m, the scale of what is seen
 SPEED_SCALE = 0.5  # m/s

@@ -14,13 +14,8 @@ from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, rotate
 from slap_ros.motion import Joints
 from slap_ros.relational import Column, Layout, Object, State
-from slap_ros.worlds.features import (
-    BODY_FEATURES,
-    GRASP_FEATURES,
-    JOINT_FEATURES,
-    POSE_FEATURES,
-    ROBOT,
-)
+from slap_ros.worlds.features import BODY_FEATURES, JOINT_FEATURES, POSE_FEATURES
+from slap_ros.worlds.joint_space.features import GRASP_FEATURES, ROBOT
 from slap_ros.worlds.panda import GRASP_POINT
 
 JOINT_NAMES = tuple(feature.name for feature in JOINT_FEATURES)

@@ -41,7 +41,7 @@ from slap_ros.worlds.contact.involved import (
 from slap_ros.worlds.contact.scene import ContactScene
 from slap_ros.worlds.contact.simulation import GRAVITY, ContactSimulation, Outcome
 from slap_ros.worlds.contact.snapshot import ContactSnapshot, Opening, Placement
-from slap_ros.worlds.joint_space.snapshot import BodyState
+from slap_ros.worlds.layout_index import BodyState
 from slap_ros.worlds.panda import FINGER_OPEN
 
 # What moved less than this in a control period, and is slower than this after it, is at rest.

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 from slap_ros.geometry.pose import Pose
 from slap_ros.relational import State
+from slap_ros.worlds.bodies import Colour
 from slap_ros.worlds.contact.scene import ContactScene, Part
-from slap_ros.worlds.contact.snapshot import StateIndex
-from slap_ros.worlds.scene import Colour
+from slap_ros.worlds.contact.snapshot import ContactIndex
 
 MOVING = "_moving"  # what the name of a jointed body's moving part ends with
 
@@ -38,7 +38,7 @@ def links(scene: ContactScene) -> tuple[Link, ...]:
 
 def link_poses(scene: ContactScene, state: State) -> list[Pose]:
     """Where the links are, in the base's frame."""
-    index = StateIndex.of(scene, state.layout)
+    index = ContactIndex.of(scene, state.layout)
     snapshot, placement = index.read(state), index.placement(scene, state)
     moving = zip(scene.jointed, placement.jointed, snapshot.openings, strict=True)
     return [

@@ -22,9 +22,9 @@ from slap_ros.geometry.pose import (
     from_yaw,
     rotate,
 )
-from slap_ros.worlds.scene import GREY, WOOD, Colour, RigidBody
+from slap_ros.worlds.bodies import GREY, WOOD, Colour, RigidBody
 
-FRICTION = 1.0  # 1, of bodies; that of a pair of bodies is the product of both
+THING_FRICTION = 1.0  # 1; that of a pair of bodies is the product of both
 TABLE_FRICTION = 0.9  # 1
 TURNS = tuple(from_yaw(math.radians(turn)) for turn in (0.0, 22.5, 45.0, 67.5))  # deg
 INSCRIBED = math.sqrt(0.5)  # half the edge of the square inside a circle of radius 1
@@ -132,7 +132,7 @@ class Compound(RigidBody):
     """
 
     parts: tuple[Part, ...]
-    friction: float = field(default=FRICTION, kw_only=True)
+    friction: float = field(default=THING_FRICTION, kw_only=True)
 
     @cached_property
     def bounding_box(self) -> OrientedBox:
@@ -217,7 +217,7 @@ class JointedBody:
     moving: tuple[Part, ...]
     joint: Joint
     mass_kg: float
-    friction: float = FRICTION
+    friction: float = THING_FRICTION
     colour: Colour = GREY
     moving_colour: Colour = WOOD
     pose: Pose = IDENTITY
@@ -316,7 +316,7 @@ def box(
     half_extents_m: Vector,
     *,
     mass_kg: float = 0.0,
-    friction: float = FRICTION,
+    friction: float = THING_FRICTION,
     colour: Colour = GREY,
     pose: Pose = IDENTITY,
     solid: bool = True,
@@ -349,7 +349,7 @@ def cylinder(
     length_m: float,
     *,
     mass_kg: float = 0.0,
-    friction: float = FRICTION,
+    friction: float = THING_FRICTION,
     colour: Colour = GREY,
     pose: Pose = IDENTITY,
     solid: bool = True,

@@ -17,7 +17,7 @@ from slap_ros.geometry.pose import Pose, Vector, multiply, normalised, rotate
 from slap_ros.relational import State
 from slap_ros.worlds.contact.links import link_poses, links
 from slap_ros.worlds.contact.scene import BoxPart, Compound, ContactScene, CylinderPart, Part
-from slap_ros.worlds.contact.snapshot import StateIndex
+from slap_ros.worlds.contact.snapshot import ContactIndex
 from slap_ros.worlds.settling import AXES, FLOATING, LEANING, levelled
 
 ROUNDS = 12  # in which a body is moved out of what it is in, one thing after the other
@@ -84,7 +84,7 @@ def settled(scene: ContactScene, state: State) -> State:
         The state in which nothing is in anything else, as far as there is room, and in which bodies
         at rest lie flat on what is just below them.
     """
-    index = StateIndex.of(scene, state.layout)
+    index = ContactIndex.of(scene, state.layout)
     snapshot = index.read(state)
     obstacles = [SettlingObstacle(piece) for piece in _standing(scene, state)]
     obstacles += [

@@ -32,7 +32,7 @@ from slap_ros.worlds.contact.scene import (
 )
 from slap_ros.worlds.contact.snapshot import ContactSnapshot, Opening, Placement
 from slap_ros.worlds.contact.urdf import LEFT, MOVING, RIGHT, hand_urdf, jointed_urdf
-from slap_ros.worlds.joint_space.snapshot import BodyState
+from slap_ros.worlds.layout_index import BodyState
 from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN
 
 GRAVITY = 9.81  # m/s², downwards

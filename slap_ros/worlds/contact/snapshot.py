@@ -1,9 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A state as the contact world computes with it: plain floats, read from and written to the array.
-
-How bodies move is a ``BodyState``, as in the other world.
-"""
+"""A state as the contact world computes with it: plain floats, read from and written to it."""
 
 from __future__ import annotations
 
@@ -12,22 +9,24 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from slap_ros.errors import InvalidStateError
 from slap_ros.geometry.pose import Pose
-from slap_ros.relational import Feature, Layout, Object, State
+from slap_ros.relational import Layout, State
 from slap_ros.worlds.contact.arm import Joints
-from slap_ros.worlds.contact.features import (
-    DRAWER_FEATURES,
-    HAND_FEATURES,
-    ROBOT,
-    hand_values,
-)
+from slap_ros.worlds.contact.features import DRAWER_FEATURES, ROBOT, hand_values
 from slap_ros.worlds.contact.hand import HandState
 from slap_ros.worlds.contact.scene import ContactScene
-from slap_ros.worlds.features import BODY_FEATURES, JOINT_FEATURES, POSE_FEATURES
-from slap_ros.worlds.joint_space.snapshot import BodyState
+from slap_ros.worlds.features import JOINT_FEATURES
+from slap_ros.worlds.layout_index import (
+    BodyState,
+    Columns,
+    LayoutIndex,
+    columns_of,
+    optional_columns,
+    pose_of,
+    poses,
+    robot_columns,
+)
 
 
 class Opening(NamedTuple):
@@ -60,39 +59,33 @@ class ContactSnapshot(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class StateIndex:
-    """Where a scene's features lie in the states of a layout."""
+class ContactIndex(LayoutIndex):
+    """Where a scene's features lie: of the robot its joints and its hand."""
 
-    layout: Layout
-    robot: NDArray[np.intp]  # (7 + hand,)
-    bodies: NDArray[np.intp]  # (free bodies, 14)
-    openings: NDArray[np.intp]  # (jointed bodies, 2)
-    everything: NDArray[np.intp]  # all of the above, one after the other
-    fixed: tuple[NDArray[np.intp] | None, ...]  # a fixed body's pose, where the state has one
-    jointed: tuple[NDArray[np.intp] | None, ...]  # the same of a jointed body
+    openings: Columns  # (jointed bodies, 2)
+    everything: Columns  # robot, bodies and openings, one after the other
+    jointed: tuple[Columns | None, ...]  # a jointed body's pose, where the state has one
 
     @staticmethod
     @lru_cache(maxsize=256)
-    def of(scene: ContactScene, layout: Layout) -> StateIndex:
+    def of(scene: ContactScene, layout: Layout) -> ContactIndex:
         """The index for a scene and a layout.
 
         Raises:
             InvalidStateError: Not exactly one robot, or a body that the state does not have.
         """
-        robots = layout.of_type(ROBOT)
-        if len(robots) != 1:
-            raise InvalidStateError(f"a scene has one robot, the state has {len(robots)}")
-        free = [_columns(layout, body.name, BODY_FEATURES) for body in scene.free]
-        jointed = [_columns(layout, body.name, DRAWER_FEATURES) for body in scene.jointed]
-        robot = _columns(layout, robots[0].name, (*JOINT_FEATURES, *HAND_FEATURES))
-        return StateIndex(
+        robot = robot_columns(layout, ROBOT, ROBOT.features)
+        bodies = columns_of(layout, [body.name for body in scene.free])
+        jointed = [body.name for body in scene.jointed]
+        openings = columns_of(layout, jointed, DRAWER_FEATURES)
+        return ContactIndex(
             layout,
             robot,
-            np.array(free, dtype=np.intp).reshape(-1, len(BODY_FEATURES)),
-            np.array(jointed, dtype=np.intp).reshape(-1, len(DRAWER_FEATURES)),
-            np.concatenate([robot, *free, *jointed]),
-            tuple(_pose_columns(layout, body.name) for body in scene.fixed),
-            tuple(_pose_columns(layout, body.name) for body in scene.jointed),
+            bodies,
+            tuple(optional_columns(layout, body.name) for body in scene.fixed),
+            openings,
+            np.concatenate([robot, bodies.ravel(), openings.ravel()]),
+            tuple(optional_columns(layout, name) for name in jointed),
         )
 
     def read(self, state: State) -> ContactSnapshot:
@@ -102,16 +95,13 @@ class StateIndex:
             InvalidStateError: Two bodies are held.
         """
         robot = state.data[self.robot].tolist()
-        rows: list[list[float]] = state.data[self.bodies].tolist()
-        held = [i for i, row in enumerate(rows) if row[-1] > 0.5]
-        if len(held) > 1:
-            raise InvalidStateError(f"the gripper holds one body at most, here {len(held)}")
+        bodies, held = self.free_bodies(state)
         return ContactSnapshot(
             tuple(robot[: len(JOINT_FEATURES)]),
             _hand(robot[len(JOINT_FEATURES) :]),
-            tuple(BodyState(_pose(row), _vector(row[7:10]), _vector(row[10:13])) for row in rows),
+            bodies,
             tuple(Opening(*row) for row in state.data[self.openings].tolist()),
-            held[0] if held else None,
+            held,
         )
 
     def write(self, state: State, snapshot: ContactSnapshot) -> State:
@@ -132,14 +122,7 @@ class StateIndex:
     def placement(self, scene: ContactScene, state: State) -> Placement:
         """Where the bodies stand that do not move."""
         return Placement(
-            tuple(
-                body.pose if columns is None else _pose(state.data[columns].tolist())
-                for body, columns in zip(scene.fixed, self.fixed, strict=True)
-            ),
-            tuple(
-                body.pose if columns is None else _pose(state.data[columns].tolist())
-                for body, columns in zip(scene.jointed, self.jointed, strict=True)
-            ),
+            self.fixed_poses(scene.fixed, state), poses(scene.jointed, self.jointed, state)
         )
 
 
@@ -147,7 +130,7 @@ def _hand(values: list[float]) -> HandState:
     """A hand from the values of ``HAND_FEATURES``."""
     tx, ty, tz, yaw, left, right, left_velocity, right_velocity, gripper = values[13:]
     return HandState(
-        _pose(values),
+        pose_of(values),
         _vector(values[7:10]),
         _vector(values[10:13]),
         (tx, ty, tz),
@@ -158,39 +141,6 @@ def _hand(values: list[float]) -> HandState:
     )
 
 
-def _pose(values: list[float]) -> Pose:
-    x, y, z, qx, qy, qz, qw = values[:7]
-    return Pose((x, y, z), (qx, qy, qz, qw))
-
-
 def _vector(values: list[float]) -> tuple[float, float, float]:
     x, y, z = values
     return (x, y, z)
-
-
-def _columns(layout: Layout, name: str, features: tuple[Feature, ...]) -> NDArray[np.intp]:
-    """Where the features of a body lie.
-
-    Raises:
-        InvalidStateError: No object of that name has them.
-    """
-    obj = layout.by_name.get(name)
-    wanted = [feature.name for feature in features]
-    if obj is None or not set(wanted) <= set(obj.type.column):
-        raise InvalidStateError(
-            f"the scene's body {name!r} is not an object with the features {', '.join(wanted)}; "
-            f"the objects are {', '.join(sorted(layout.by_name))}"
-        )
-    return _indices(layout, obj, features)
-
-
-def _pose_columns(layout: Layout, name: str) -> NDArray[np.intp] | None:
-    """Where a body's pose lies, if the state has it."""
-    obj = layout.by_name.get(name)
-    if obj is None or not set(POSE_FEATURES) <= set(obj.type.features):
-        return None
-    return _indices(layout, obj, POSE_FEATURES)
-
-
-def _indices(layout: Layout, obj: Object, features: tuple[Feature, ...]) -> NDArray[np.intp]:
-    return np.array([layout.column(obj, feature.name) for feature in features], dtype=np.intp)

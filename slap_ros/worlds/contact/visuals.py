@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from functools import cached_property
 
 from slap_ros.relational import State
+from slap_ros.worlds.bodies import Colour
 from slap_ros.worlds.contact.links import link_poses, links
 from slap_ros.worlds.contact.scene import ContactScene, CylinderPart, Part
-from slap_ros.worlds.contact.snapshot import StateIndex
-from slap_ros.worlds.scene import Colour
+from slap_ros.worlds.contact.snapshot import ContactIndex
 from slap_ros.worlds.visuals import Configuration, Cylinder, VisualShape
 
 
@@ -28,7 +28,7 @@ class ContactVisuals:
 
     def configuration(self, state: State) -> Configuration:
         """See :class:`~slap_ros.worlds.visuals.Visuals`."""
-        snapshot = StateIndex.of(self._scene, state.layout).read(state)
+        snapshot = ContactIndex.of(self._scene, state.layout).read(state)
         poses = [
             pose.compose(part.pose)
             for link, pose in zip(links(self._scene), link_poses(self._scene, state), strict=True)

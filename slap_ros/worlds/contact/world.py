@@ -9,10 +9,7 @@ for bit (``docs/contact.md`` says how, and what it costs).
 
 from __future__ import annotations
 
-import weakref
-
 from slap_ros.core import Action, ActionSpace, GripperAxis
-from slap_ros.errors import InvalidStateError
 from slap_ros.geometry.pose import ORIGIN, Pose, from_rotation_vector, multiply
 from slap_ros.relational import Feature, State
 from slap_ros.worlds.contact.arm import Joints, arm_joints, in_time, share_in_time
@@ -22,8 +19,9 @@ from slap_ros.worlds.contact.features import GRIPPER, ROBOT
 from slap_ros.worlds.contact.hand import LEASH, YAW_LEASH, HandState, rotation_between
 from slap_ros.worlds.contact.scene import ContactScene
 from slap_ros.worlds.contact.simulation_pool import acquire, release
-from slap_ros.worlds.contact.snapshot import ContactSnapshot, StateIndex
+from slap_ros.worlds.contact.snapshot import ContactIndex, ContactSnapshot
 from slap_ros.worlds.contact.validation import require_possible
+from slap_ros.worlds.simulated_world import SimulatedWorld
 
 MAX_SHIFT = 0.02  # m along each axis in a control step: 0.4 m/s
 MAX_TURN = 0.15  # rad about the vertical: 3 rad/s
@@ -42,8 +40,8 @@ PARTS = (1.0, 0.25, 0.06)  # of the way that seems to be possible, until it is
 ACTING = 0.5  # 1, beyond which the gripper is told something new
 
 
-class ContactWorld:
-    """One world. Closed, or no longer referred to, it gives its PyBullet client back."""
+class ContactWorld(SimulatedWorld[ContactScene]):
+    """A hand that is pulled to its target, and what it touches."""
 
     def __init__(self, scene: ContactScene, state: State) -> None:
         """Begin in ``state``.
@@ -55,35 +53,15 @@ class ContactWorld:
         Raises:
             InvalidStateError: A scene that cannot be.
         """
-        self._scene = scene
-        self._index = StateIndex.of(scene, state.layout)
+        super().__init__(scene, state.layout)
+        self._index = ContactIndex.of(scene, state.layout)
         (robot,) = state.layout.of_type(ROBOT)
         self._gripper = state.layout.column(robot, GRIPPER.name)
         self._require_possible(state)
         simulation = acquire(scene)
-        self._closing = weakref.finalize(self, release, simulation)
+        self._give_back(simulation, release)
         self._dynamics = ContactDynamics(scene, simulation)
         self._adopt(state)
-
-    def __enter__(self) -> ContactWorld:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Give the client back; the world cannot be stepped any more."""
-        self._closing()
-
-    @property
-    def scene(self) -> ContactScene:
-        """What there is."""
-        return self._scene
-
-    @property
-    def state(self) -> State:
-        """The current state."""
-        return self._state
 
     @property
     def contacts(self) -> tuple[ContactPoint, ...]:
@@ -96,8 +74,7 @@ class ContactWorld:
         Raises:
             InvalidStateError: A scene that cannot be, or other objects; the world stays as it is.
         """
-        if state.layout is not self._index.layout and state.layout != self._index.layout:
-            raise InvalidStateError("a world is reset to states of its own objects only")
+        self._require_own_objects(state)
         self._require_possible(state)
         self._adopt(state)
 
@@ -123,8 +100,7 @@ class ContactWorld:
             InvalidCommandError: The action is not in the action space; nothing moved.
             ValueError: The world is closed.
         """
-        if not self._closing.alive:
-            raise ValueError("this world is closed")
+        self._require_open()
         ACTION_SPACE.check(action)
         now = self._snapshot
         told = _told(now.hand, action.tolist())

@@ -15,8 +15,8 @@ from typing import NamedTuple
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import IDENTITY, Pose, Quaternion, Vector
 from slap_ros.worlds.joint_space.links import LINK_SHAPES
+from slap_ros.worlds.joint_space.scene import Body
 from slap_ros.worlds.panda import HAND, link_poses
-from slap_ros.worlds.scene import Body
 
 CLEARANCE = 0.003  # m, between the boxes around a link and a body, at which they do not touch
 LINK_DEPTH = 0.01  # m, how far a link may reach into a fixed body

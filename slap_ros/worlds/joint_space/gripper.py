@@ -13,9 +13,10 @@ import math
 from dataclasses import replace
 
 from slap_ros.geometry.pose import IDENTITY, Pose, conjugate, normalised, rotate
-from slap_ros.worlds.joint_space.snapshot import BodyState, Snapshot
+from slap_ros.worlds.joint_space.scene import Body, Scene
+from slap_ros.worlds.joint_space.snapshot import Snapshot
+from slap_ros.worlds.layout_index import BodyState
 from slap_ros.worlds.panda import FINGER_OPEN, grasp_pose, hand_pose
-from slap_ros.worlds.scene import Body, Scene
 
 GRASP_REACH = 0.01  # m, between the grasp point and a body's centre
 CLOSE, OPEN = 0.5, -0.5  # gripper commands beyond which it closes or opens

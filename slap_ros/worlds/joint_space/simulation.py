@@ -17,7 +17,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
@@ -25,11 +24,12 @@ from typing import NamedTuple
 from slap_ros.geometry.pose import NO_ROTATION, ORIGIN, Pose, Vector, conjugate, multiply
 from slap_ros.meshes.obj import to_obj
 from slap_ros.meshes.solid import Solid, cuboid
-from slap_ros.worlds.bullet import pybullet
+from slap_ros.worlds.bodies import Material
+from slap_ros.worlds.bullet import PANDA, pybullet
 from slap_ros.worlds.joint_space.links import LINK_SHAPES
-from slap_ros.worlds.joint_space.snapshot import BodyState
+from slap_ros.worlds.joint_space.scene import REFERENCE_FRICTION, Body, Scene, Shape
+from slap_ros.worlds.layout_index import BodyState
 from slap_ros.worlds.panda import CONTROL_PERIOD_S
-from slap_ros.worlds.scene import FRICTION, Body, Material, Scene, Shape
 
 GRAVITY = 9.81  # m/s², downwards
 DRIVEN_MASS = 1e4  # kg, against which nothing else weighs
@@ -38,7 +38,6 @@ LIFT = (0.0, 0.0, GRAVITY * DRIVEN_MASS)  # N, cancels a driven body's weight
 ARM_FRICTION = 0.9  # 1
 FINGER_FRICTION = 1.0  # 1
 FREE, FIXED, ARM = 1, 2, 4  # collision groups: the arm meets free bodies only
-PANDA = Path(str(files("pybullet_data"))) / "franka_panda"
 DISTANCE = 8  # index of the distance in a contact that PyBullet reports, m
 MESHES = PANDA / "meshes" / "collision"
 
@@ -115,9 +114,9 @@ class Simulation:
         # A held body is one more link. Bodies of one shape share it, as one is held at a time.
         shapes = dict.fromkeys(body.shape for body in scene.free)
         self._held_proxies = {
-            shape: self._add_driven(self._shape(shape), FRICTION) for shape in shapes
+            shape: self._add_driven(self._shape(shape), REFERENCE_FRICTION) for shape in shapes
         }
-        self._held_proxy_frictions = dict.fromkeys(shapes, FRICTION)
+        self._held_proxy_frictions = dict.fromkeys(shapes, REFERENCE_FRICTION)
         self._driven = [*self._links, *self._held_proxies.values()]
         self._parking = {body: _parking(i) for i, body in enumerate([*self._free, *self._driven])}
 

@@ -10,10 +10,11 @@ from collections.abc import Sequence
 from slap_ros.errors import InvalidStateError
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose
+from slap_ros.worlds.bodies import Material
 from slap_ros.worlds.joint_space.arm import Arm, Obstacle, Sweep
+from slap_ros.worlds.joint_space.scene import Scene
 from slap_ros.worlds.joint_space.snapshot import Snapshot
 from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN, JOINT_HIGH, JOINT_LOW
-from slap_ros.worlds.scene import Material, Scene
 
 # Pressed together, bodies overlap for a while by as much as a few centimetres; what overlaps
 # by more than this was put there.

@@ -9,18 +9,19 @@ action, bit for bit (``docs/physics.md`` says how, and what it costs).
 
 from __future__ import annotations
 
-import weakref
 from dataclasses import replace
 
 from slap_ros.core import Action, ActionSpace, GripperAxis
-from slap_ros.errors import InvalidStateError
 from slap_ros.relational import Feature, State
 from slap_ros.worlds.features import JOINT_FEATURES
 from slap_ros.worlds.joint_space.arm import Arm, Obstacle, Penetration, Sweep
 from slap_ros.worlds.joint_space.gripper import grip
+from slap_ros.worlds.joint_space.scene import Scene
 from slap_ros.worlds.joint_space.simulation import Drive, Stepping
-from slap_ros.worlds.joint_space.snapshot import BodyState, Snapshot, SnapshotCodec
+from slap_ros.worlds.joint_space.simulation_pool import acquire, release
+from slap_ros.worlds.joint_space.snapshot import SceneIndex, Snapshot
 from slap_ros.worlds.joint_space.validation import require_valid
+from slap_ros.worlds.layout_index import BodyState
 from slap_ros.worlds.panda import (
     HAND,
     JOINT_HIGH,
@@ -29,8 +30,7 @@ from slap_ros.worlds.panda import (
     grasp_pose,
     vertical_jacobian,
 )
-from slap_ros.worlds.scene import Scene
-from slap_ros.worlds.simulation_pool import acquire, release
+from slap_ros.worlds.simulated_world import SimulatedWorld
 
 ACTION_SPACE = ActionSpace(
     axes=(*JOINT_FEATURES, Feature("gripper", "1")),
@@ -51,8 +51,8 @@ RAISE_CLEARANCE = 1e-4  # m, over where it just does not
 CACHE_SIZE = 256  # arrangements of bodies of which it is known whether they are stable
 
 
-class PandaWorld:
-    """One world. Closed, or no longer referred to, it gives its PyBullet client back."""
+class PandaWorld(SimulatedWorld[Scene]):
+    """A Panda that follows joint commands, bodies that it pushes, and a gripper that attaches."""
 
     def __init__(
         self,
@@ -72,35 +72,15 @@ class PandaWorld:
         Raises:
             InvalidStateError: A scene that cannot be.
         """
-        self._scene = scene
+        super().__init__(scene, state.layout)
         self._actions = actions
-        self._reader = SnapshotCodec.of(scene, state.layout)
+        self._index = SceneIndex.of(scene, state.layout)
         self._stability: dict[object, bool] = {}
         self._solid = [i for i, body in enumerate(scene.fixed) if body.solid]
         self._adopt(state)
         self._simulation = acquire(scene, stepping)
-        self._closing = weakref.finalize(self, release, self._simulation)
+        self._give_back(self._simulation, release)
         self._prepare()
-
-    def __enter__(self) -> PandaWorld:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Give the client back; the world cannot be stepped any more."""
-        self._closing()
-
-    @property
-    def scene(self) -> Scene:
-        """The bodies of this world."""
-        return self._scene
-
-    @property
-    def state(self) -> State:
-        """The current state, all that the next step depends on."""
-        return self._state
 
     def reset(self, state: State) -> None:
         """Continue from ``state``.
@@ -108,8 +88,7 @@ class PandaWorld:
         Raises:
             InvalidStateError: A scene that cannot be, or other objects; the world stays as it is.
         """
-        if state.layout is not self._reader.layout and state.layout != self._reader.layout:
-            raise InvalidStateError("a world is reset to states of its own objects only")
+        self._require_own_objects(state)
         self._adopt(state)
         self._prepare()
 
@@ -120,10 +99,10 @@ class PandaWorld:
 
     def _adopt(self, state: State) -> None:
         state.require_finite()
-        snapshot = self._reader.read(state)
-        poses = self._reader.fixed_poses(self._scene, state)
+        snapshot = self._index.read(state)
+        poses = self._index.fixed_poses(self._scene.fixed, state)
         obstacles = [Obstacle.of(self._scene.fixed[i].at(poses[i])) for i in self._solid]
-        materials = self._reader.materials(self._scene, state)
+        materials = self._index.materials(self._scene, state)
         arm = self._arm(snapshot)
         require_valid(self._scene, snapshot, materials, arm, obstacles)
         self._state, self._snapshot, self._posture = state, snapshot, arm
@@ -142,8 +121,7 @@ class PandaWorld:
             InvalidCommandError: The action is not in the action space; nothing moved.
             ValueError: The world is closed.
         """
-        if not self._closing.alive:
-            raise ValueError("this world is closed")
+        self._require_open()
         self._actions.check(action)
         *displacement, command = action.tolist()
         gripped = self._gripped(command)
@@ -152,7 +130,7 @@ class PandaWorld:
             start = self._arm(replace(gripped, finger=self._snapshot.finger))
         goal = replace(gripped, joints=_within_limits(gripped.joints, displacement))
         self._snapshot, self._posture = self._after(gripped, goal, start)
-        self._state = self._reader.write(self._state, self._snapshot)
+        self._state = self._index.write(self._state, self._snapshot)
         return self._state
 
     def _gripped(self, command: float) -> Snapshot:

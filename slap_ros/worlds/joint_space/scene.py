@@ -4,59 +4,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple, Self
 
 from slap_ros.errors import InvalidDomainError
 from slap_ros.geometry.oriented_box import OrientedBox
-from slap_ros.geometry.pose import IDENTITY, Pose, Vector
+from slap_ros.geometry.pose import Pose, Vector
 from slap_ros.meshes.solid import Solid
+from slap_ros.worlds.bodies import GREY, WOOD, Colour, Material, RigidBody
 
-Colour = tuple[float, float, float, float]  # red green blue opacity, 0 to 1
 Shape = Vector | Solid  # half the edges of a box, m; or convex pieces
 
-FRICTION = 0.9  # 1, the reference's, of everything it has
-GREY: Colour = (0.6, 0.6, 0.6, 1.0)
-WOOD: Colour = (0.72, 0.6, 0.47, 1.0)
-
-
-class Material(NamedTuple):
-    """What a body is made of, as far as dynamics is concerned."""
-
-    mass_kg: float  # of the whole body
-    friction: float  # Coulomb's coefficient; that of a pair of bodies is the product of both
-
-
-@dataclass(frozen=True)
-class RigidBody:
-    """What bodies of all shapes have in common.
-
-    Args:
-        name: That of the object in the state which it embodies.
-        mass_kg: 0 for a body that is fixed. A free body may have another one in the state.
-        friction: See :class:`Material`; a free body may have another one in the state.
-        colour: For pictures.
-        pose: Where a fixed body stands, unless the state has pose features for it. A free body
-            is always where the state says.
-        solid: False for what only marks a place: nothing touches it.
-    """
-
-    name: str
-    mass_kg: float = field(default=0.0, kw_only=True)
-    friction: float = field(default=FRICTION, kw_only=True)
-    colour: Colour = field(default=GREY, kw_only=True)
-    pose: Pose = field(default=IDENTITY, kw_only=True)
-    solid: bool = field(default=True, kw_only=True)
-
-    @property
-    def material(self) -> Material:
-        """What it is made of, unless the state says otherwise."""
-        return Material(self.mass_kg, self.friction)
-
-    def with_material(self, material: Material) -> Self:
-        """The same body of another material."""
-        return replace(self, mass_kg=material.mass_kg, friction=material.friction)
+REFERENCE_FRICTION = 0.9  # 1, the reference's, of everything it has
 
 
 @dataclass(frozen=True)
@@ -68,6 +27,7 @@ class Box(RigidBody):
     """
 
     half_extents_m: Vector
+    friction: float = field(default=REFERENCE_FRICTION, kw_only=True)
 
     def at(self, pose: Pose) -> OrientedBox:
         """The space it fills at a pose."""
@@ -96,6 +56,7 @@ class Mesh(RigidBody):
     """
 
     shape: Solid
+    friction: float = field(default=REFERENCE_FRICTION, kw_only=True)
 
     def at(self, pose: Pose) -> OrientedBox:
         """A box around it at a pose: the space that the arm takes it to fill."""
@@ -113,7 +74,7 @@ class Mesh(RigidBody):
 Body = Box | Mesh
 
 CUBE_EDGE = 0.05  # m
-CUBE_MATERIAL = Material(mass_kg=0.5, friction=FRICTION)
+CUBE_MATERIAL = Material(mass_kg=0.5, friction=REFERENCE_FRICTION)
 TABLE = Box("table", (0.25, 0.4, 0.25), colour=WOOD, pose=Pose((0.5, 0.0, -0.175)))
 TABLE_TOP = 0.075  # m
 FLOOR_TOP = -0.425  # m
