@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from slap_ros.core import Display, Domain, Execution, Learning, presets
+from slap_ros.core import Domain, Learning, presets
 from slap_ros.domains.cleanup_table import features, operators, predicates, skills, tasks
 from slap_ros.domains.cleanup_table.learner_interface import (
     ABLATIONS,
@@ -22,15 +22,9 @@ from slap_ros.domains.cleanup_table.learner_interface import (
 )
 from slap_ros.domains.cleanup_table.scene import scene_of
 from slap_ros.domains.cleanup_table.shapes import shipped
-from slap_ros.domains.tabletop.presets import TIMINGS
-from slap_ros.domains.tabletop.settling import settling
-from slap_ros.domains.tabletop.visualization import animation, visible_arm, visible_bodies
+from slap_ros.domains.tabletop.model import TabletopModel, tabletop_domain
 from slap_ros.domains.variation import varied
 from slap_ros.meshes.solid import Solid
-from slap_ros.relational import State
-from slap_ros.worlds.joint_space.scene import Scene
-from slap_ros.worlds.joint_space.world import PandaWorld
-from slap_ros.worlds.panda import CONTROL_PERIOD_S
 from slap_ros.worlds.viewpoint import Viewpoint
 
 SETTINGS: Mapping[str, tasks.RandomCleanupTasks] = {
@@ -63,35 +57,19 @@ def make(
     shapes = shipped() if shapes is None else shapes
     settings = varied(SETTINGS[preset], changes)
 
-    def scene(state: State) -> Scene:
-        return scene_of(state, shapes)
-
-    return Domain(
-        name="cleanup_table",
-        preset=preset,
+    model = TabletopModel(
         types=features.TYPES,
         predicates=predicates.PREDICATES,
         operators=operators.OPERATORS,
-        skills=skills.skills(TIMINGS[settings.timing]),
-        action_space=settings.actions,
-        sample_task=lambda rng: settings.sample(rng, shapes),
-        make_world=lambda state: PandaWorld(scene(state), state, actions=settings.actions),
-        default_goal=tasks.everything_in_the_bin,
+        skills=skills.skills,
+        scene_of=lambda state: scene_of(state, shapes),
+        goal=tasks.everything_in_the_bin,
         step_limit=tasks.STEP_LIMIT,
-        execution=Execution(
-            control_period_s=CONTROL_PERIOD_S,
-            settle=settling(scene),
-        ),
-        display=Display(
-            bodies=lambda state: visible_bodies(scene(state), state),
-            arm=visible_arm,
-            animate=animation(scene, VIEWPOINT),
-        ),
         learning=Learning(
-            interface=LEARNER_INTERFACE,
-            settings=TRAINING_SETTINGS,
-            ablations=ABLATIONS,
-            actions=settings.learned_actions,
+            interface=LEARNER_INTERFACE, settings=TRAINING_SETTINGS, ablations=ABLATIONS
         ),
-        configuration=settings.as_configuration(),
+        view=VIEWPOINT,
+    )
+    return tabletop_domain(
+        "cleanup_table", preset, model, settings, lambda rng: settings.sample(rng, shapes)
     )
