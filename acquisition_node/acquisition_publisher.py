@@ -18,11 +18,11 @@ from slap_msgs.msg import AcquisitionEvent, RewardTerm
 from acquisition_node.trainer import Event
 from ensemble import encode
 from ensemble.interfaces import ACQUISITION_EVENTS, SKILLS
-from slap_ros.acquisition.attempt_log import Entry
-from slap_ros.acquisition.problem import AcquisitionProblem
-from slap_ros.acquisition.proposal import Proposal
-from slap_ros.acquisition.skill_library import SkillLibrary
+from slap_ros.acquisition.proposals.attempt_log import Entry
+from slap_ros.acquisition.proposals.problem import AcquisitionProblem
+from slap_ros.acquisition.proposals.proposal import Proposal
 from slap_ros.errors import SlapError, TaskCanceledError
+from slap_ros.skills.skill_library import SkillLibrary
 
 
 class AcquisitionPublisher:

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ensemble.acquisition_parameters import AcquisitionParameters
-from slap_ros.acquisition.attempt_log import AttemptLog, Entry
-from slap_ros.acquisition.problem import AcquisitionProblem
-from slap_ros.acquisition.proposal import Proposal
-from slap_ros.acquisition.proposal_request import Demonstrations, ProposalRequest
-from slap_ros.acquisition.proposer_names import INDUCED
+from slap_ros.acquisition.proposals.attempt_log import AttemptLog, Entry
+from slap_ros.acquisition.proposals.problem import AcquisitionProblem
+from slap_ros.acquisition.proposals.proposal import Proposal
+from slap_ros.acquisition.proposals.proposal_request import Demonstrations, ProposalRequest
+from slap_ros.acquisition.proposals.proposer_names import INDUCED
 from slap_ros.bags.demonstrations import read_demonstrations
 from slap_ros.bags.reader import read_bag
 from slap_ros.core import Domain, Task

@@ -13,10 +13,10 @@ from slap_msgs.action import AcquireSkills
 
 from acquisition_node.acquisition_publisher import AcquisitionPublisher
 from acquisition_node.trainer import Event, Trainer
-from slap_ros.acquisition.skill_library import SkillLibrary, load_skill_library
 from slap_ros.core import Domain
 from slap_ros.errors import NothingLearnedError
 from slap_ros.relational.pddl import write_domain
+from slap_ros.skills.skill_library import SkillLibrary, load_skill_library
 
 
 @dataclass

@@ -10,10 +10,10 @@ from hashlib import sha256
 from pathlib import Path
 
 from ensemble.acquisition_parameters import AcquisitionParameters
-from slap_ros.acquisition.domain_choice import DIGEST_KEY
-from slap_ros.acquisition.proposer_names import INDUCED, LANGUAGE, MANUAL
+from slap_ros.acquisition.proposals.proposer_names import INDUCED, LANGUAGE, MANUAL
 from slap_ros.core import Domain, Task
 from slap_ros.relational import GroundAtom
+from slap_ros.skills.domain_choice import DIGEST_KEY
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from statistics import fmean, stdev
 from time import process_time
 
 from benchmarks.printing import show
-from slap_ros.acquisition.rollouts import plan_operators
+from slap_ros.acquisition.curriculum.rollouts import plan_operators
 from slap_ros.domains import get_domain
 from slap_ros.domains.tabletop.transit import clear_caches
 from slap_ros.planning.plan import PlanningResult

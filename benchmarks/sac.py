@@ -21,9 +21,9 @@ import torch
 from stable_baselines3 import SAC
 from stable_baselines3.common.logger import Logger
 
-from slap_ros.acquisition.observations import SIZE
-from slap_ros.acquisition.sac_settings import SMALL
-from slap_ros.acquisition.sac_update import LeanSac
+from slap_ros.acquisition.training.sac_settings import SMALL
+from slap_ros.acquisition.training.sac_update import LeanSac
+from slap_ros.skills.observations import SIZE
 
 ACTIONS = 5  # x, y, z, yaw, gripper
 ROUNDS = 8

@@ -12,7 +12,6 @@ import argparse
 from statistics import fmean
 
 from benchmarks.printing import show
-from slap_ros.acquisition.domain_choice import DomainChoice
 from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.learning.task_distribution import TaskDistribution
@@ -24,6 +23,7 @@ from slap_ros.shortcuts.shipped import chosen_library
 from slap_ros.shortcuts.shortcut import DEFAULT, PAPER, Shortcut
 from slap_ros.shortcuts.starts import Start, find_start, restore_starts
 from slap_ros.shortcuts.training import mean_steps, rank
+from slap_ros.skills.domain_choice import DomainChoice
 
 FRESH = 3_000_000  # the first seed of its tasks
 HORIZON, SOON = PAPER.horizon, DEFAULT.horizon  # environment steps of an attempt

@@ -21,11 +21,11 @@ from time import perf_counter
 
 import torch
 
-from slap_ros.acquisition import jobs
-from slap_ros.acquisition.initiation_states import InitiationStates
-from slap_ros.acquisition.rollouts import PlanRollout
-from slap_ros.acquisition.settings import AcquisitionSettings
-from slap_ros.acquisition.task_source import VALIDATION, TaskSource
+from slap_ros.acquisition.curriculum import jobs
+from slap_ros.acquisition.curriculum.initiation_states import InitiationStates
+from slap_ros.acquisition.curriculum.rollouts import PlanRollout
+from slap_ros.acquisition.curriculum.task_source import VALIDATION, TaskSource
+from slap_ros.acquisition.training.settings import AcquisitionSettings
 from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.learning.setting_changes import changed, parse_changes

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ensemble.parameters import parameter
-from slap_ros.acquisition.attempt_log import AttemptLog
-from slap_ros.acquisition.inquiry import Inquiry
+from slap_ros.acquisition.proposals.attempt_log import AttemptLog
+from slap_ros.acquisition.proposals.inquiry import Inquiry
 from slap_ros.language.budget import BudgetLimits
 from slap_ros.language.settings import read_settings
 

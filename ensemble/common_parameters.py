@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from ensemble.parameters import parameter
 from ensemble.patience import IMPATIENT, PATIENT
-from slap_ros.acquisition.domain_choice import DomainChoice, open_domain
 from slap_ros.core import Domain
+from slap_ros.skills.domain_choice import DomainChoice, open_domain
 
 
 @dataclass(frozen=True)

@@ -20,10 +20,10 @@ from ensemble.interfaces import DOMAIN, SKILLS, TASK, Topic
 from ensemble.observation import Episode
 from ensemble.refusals import Refusals
 from ensemble.steady_time import create_timer
-from slap_ros.acquisition.domain_choice import DomainChoice, open_domain
 from slap_ros.core import Domain, Task
 from slap_ros.errors import SlapError
 from slap_ros.messages.decode import decode_goal, decode_state, stamp_ns
+from slap_ros.skills.domain_choice import DomainChoice, open_domain
 
 RIVAL_PERIOD = 1.0  # s, between two looks at whether another simulator is still there
 

@@ -34,7 +34,6 @@ from ensemble.interfaces import (
 )
 from ensemble.parameters import read_parameters
 from ensemble.world_parameters import WorldParameters
-from slap_ros.acquisition.domain_choice import open_domain
 from slap_ros.core import UNSAMPLED, Action, Task
 from slap_ros.errors import (
     ErrorCode,
@@ -45,6 +44,7 @@ from slap_ros.errors import (
 )
 from slap_ros.messages.decode import decode_command, stamp_ns
 from slap_ros.relational import State
+from slap_ros.skills.domain_choice import open_domain
 
 QUIET = 10.0  # s between two log lines about states that cannot be shown
 REFUSALS = {  # what is counted, by the error that refuses a command

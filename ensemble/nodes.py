@@ -47,7 +47,7 @@ class RunSettings:
     planner: str
     record: Path | None  # the bag's folder; None: no recorder
     goal: str = ""  # by name, or as atoms; empty: the task's own
-    skills: str = ""  # see slap_ros.acquisition.domain_choice
+    skills: str = ""  # see slap_ros.skills.domain_choice
     pace: float = 0.0  # environment steps per second; 0: as fast as commands come
     shortcuts: str = ""  # a library's folder, or none; empty: the shipped one
     samples: int = DEFAULT.samples  # attempts of a shortcut in the model

@@ -18,10 +18,10 @@ from ensemble import encode
 from ensemble.client import RunClient
 from ensemble.interfaces import ACQUIRE_SKILLS, RESET_TASK, Call
 from ensemble.spinner import Spinner
-from slap_ros.acquisition.domain_choice import DomainChoice
 from slap_ros.errors import ErrorCode, NotReadyError, RunTimeoutError, error_from
 from slap_ros.messages.interfaces import DOMAIN_INFO, TASK
 from slap_ros.relational import GroundAtom
+from slap_ros.skills.domain_choice import DomainChoice
 
 TAKE_ON_S = 5.0  # s, for a reset world to announce itself with its new skills
 CANCEL_S = 15.0  # s, for training to end

@@ -7,8 +7,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ensemble.parameters import MAX_SEED, parameter
-from slap_ros.acquisition.domain_choice import DomainChoice
 from slap_ros.core import Domain, Task, task_with_goal
+from slap_ros.skills.domain_choice import DomainChoice
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,8 @@ FLOORS = (
     ("robot", "bags", "evaluation", "encoding"),
     ("acquisition", "shortcuts"),
     ("learning", "language"),
+    ("skills",),
+    ("policies",),
     ("drawing", "planning"),
     ("perception", "messages"),
     ("domains",),
@@ -81,6 +83,19 @@ def test_who_never_imports_whom(imports):
     assert asking <= {"relational", "files", "errors"}
 
 
+def test_proposals_and_training_do_not_know_one_another():
+    """The curriculum imports both, and neither of them imports it."""
+    room = ROOT / "slap_ros" / "acquisition"
+    across = [
+        f"{path.relative_to(ROOT)} imports {other}"
+        for own in ("proposals", "training")
+        for path in sorted((room / own).rglob("*.py"))
+        for other in {"proposals", "training", "curriculum"} - {own}
+        if f"from slap_ros.acquisition.{other}" in path.read_text(encoding="utf-8")
+    ]
+    assert not across, "\n".join(across)
+
+
 def test_worlds_do_not_know_one_another():
     """Each world imports what all share; what they share imports none of them."""
     room = ROOT / "slap_ros" / "worlds"
@@ -105,8 +120,10 @@ def test_nothing_that_is_read_is_executed():
         "language",
         "learning",
         "messages",
+        "policies",
         "relational",
         "shortcuts",
+        "skills",
     )
     paths = [path for name in packages for path in sorted((ROOT / "slap_ros" / name).rglob("*.py"))]
     assert len(paths) > len(packages)

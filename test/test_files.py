@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from slap_ros.acquisition.operator_file import read_operators
+from slap_ros.acquisition.proposals.operator_file import read_operators
 from slap_ros.bags import bag_info
 from slap_ros.bags.mcap_reader import read_mcap
 from slap_ros.bags.rosbag2 import read_metadata
@@ -20,9 +20,9 @@ from slap_ros.errors import SlapError
 from slap_ros.files import parse_json, parse_yaml, read_bytes, read_text
 from slap_ros.language.cassette import read_cassette
 from slap_ros.language.settings import read_settings
-from slap_ros.learning.library_files import ABOUT
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.meshes.decomposition import load_mesh
+from slap_ros.policies.library_files import ABOUT
 from slap_ros.robot.scene_config import read_scene_config
 from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.shipped import require_usable

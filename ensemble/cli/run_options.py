@@ -11,8 +11,12 @@ from typing import Annotated
 import typer
 
 from ensemble.patience import IMPATIENT, PATIENT
-from slap_ros.acquisition.domain_choice import SHIPPED
-from slap_ros.acquisition.proposer_names import MANUAL, PROPOSERS, REWARDERS, require_known
+from slap_ros.acquisition.proposals.proposer_names import (
+    MANUAL,
+    PROPOSERS,
+    REWARDERS,
+    require_known,
+)
 from slap_ros.bags.writer import require_new
 from slap_ros.cli.options import (
     MAX_INDEX,
@@ -32,6 +36,7 @@ from slap_ros.errors import InvalidParameterError
 from slap_ros.files import require_writable
 from slap_ros.planning.execution import MAX_REPLANS
 from slap_ros.robot.worlds import MOCK, ROBOT, SIM, WORLDS
+from slap_ros.skills.domain_choice import SHIPPED
 
 
 @dataclass(frozen=True)

@@ -51,8 +51,8 @@ from robot_bridge.mock.controllers import MockControllers
 from robot_bridge.mock.noise_model import NoiseModel, NoiseSettings
 from robot_bridge.mock.plant import Plant
 from robot_bridge.mock.sensors import MockSensors
-from slap_ros.acquisition.domain_choice import open_domain
 from slap_ros.errors import InvalidParameterError
+from slap_ros.skills.domain_choice import open_domain
 
 FAULTS = ("", "reject", "abort", "ignore")
 

@@ -1,3 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""LG-SAIL: operators and rewards that are proposed and checked, and skills learned from them."""
+"""LG-SAIL: ``proposals`` of operators and rewards, ``training`` of skills, and the ``curriculum``.
+
+The curriculum imports both others; proposals and training do not import one another.
+"""

@@ -10,25 +10,18 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from slap_ros.acquisition.attempt_log import AttemptLog, Entry
-from slap_ros.acquisition.curriculum import Curriculum
-from slap_ros.acquisition.curriculum_callback import CurriculumCallback, OngoingRound
-from slap_ros.acquisition.dead_ends import DeadEnd
-from slap_ros.acquisition.jobs import horizon_of
-from slap_ros.acquisition.proposal import Proposal, read_proposal
-from slap_ros.acquisition.proposal_request import ProposalRequest
-from slap_ros.acquisition.retrieval import SkillEncoder
-from slap_ros.acquisition.rollouts import PlanRollout
-from slap_ros.acquisition.settings import AcquisitionSettings
-from slap_ros.acquisition.skill_library import (
-    AcquiredSkill,
-    SkillLibrary,
-    load_skill_library,
-    read_library_record,
-    save_skill_library,
-)
-from slap_ros.acquisition.skill_training import Round
-from slap_ros.acquisition.task_source import TaskSource
+from slap_ros.acquisition.curriculum.curriculum import Curriculum
+from slap_ros.acquisition.curriculum.curriculum_callback import CurriculumCallback, OngoingRound
+from slap_ros.acquisition.curriculum.dead_ends import DeadEnd
+from slap_ros.acquisition.curriculum.jobs import horizon_of
+from slap_ros.acquisition.curriculum.rollouts import PlanRollout
+from slap_ros.acquisition.curriculum.task_source import TaskSource
+from slap_ros.acquisition.proposals.attempt_log import AttemptLog, Entry
+from slap_ros.acquisition.proposals.proposal import Proposal, read_proposal
+from slap_ros.acquisition.proposals.proposal_request import ProposalRequest
+from slap_ros.acquisition.training.retrieval import SkillEncoder
+from slap_ros.acquisition.training.settings import AcquisitionSettings
+from slap_ros.acquisition.training.skill_training import Round
 from slap_ros.api.acquisition_request import AcquisitionRequest
 from slap_ros.api.jobs import require_torch, some_workers
 from slap_ros.api.left_out import Tell, warn_caller
@@ -41,25 +34,32 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import require_writable, sole_use
 from slap_ros.learning.work_folder import WorkFolder
+from slap_ros.skills.skill_library import (
+    AcquiredSkill,
+    SkillLibrary,
+    load_skill_library,
+    read_library_record,
+    save_skill_library,
+)
 
 
 class UnwatchedCurriculum:
     """Receives the events of a curriculum, and does nothing with them."""
 
     def on_progress(self, what: str, done: int, total: int) -> None:
-        """See :class:`~slap_ros.acquisition.curriculum_callback.CurriculumCallback`."""
+        """See :class:`~slap_ros.acquisition.curriculum.curriculum_callback.CurriculumCallback`."""
 
     def on_rollouts(self, iteration: int, rollouts: Sequence[PlanRollout]) -> None:
-        """See :class:`~slap_ros.acquisition.curriculum_callback.CurriculumCallback`."""
+        """See :class:`~slap_ros.acquisition.curriculum.curriculum_callback.CurriculumCallback`."""
 
     def on_dead_end(self, iteration: int, dead_end: DeadEnd) -> None:
-        """See :class:`~slap_ros.acquisition.curriculum_callback.CurriculumCallback`."""
+        """See :class:`~slap_ros.acquisition.curriculum.curriculum_callback.CurriculumCallback`."""
 
     def on_learning(self, iteration: int, rounds: Sequence[OngoingRound], steps_left: int) -> None:
-        """See :class:`~slap_ros.acquisition.curriculum_callback.CurriculumCallback`."""
+        """See :class:`~slap_ros.acquisition.curriculum.curriculum_callback.CurriculumCallback`."""
 
     def on_judged(self, iteration: int, skill: str, outcome: Round) -> None:
-        """See :class:`~slap_ros.acquisition.curriculum_callback.CurriculumCallback`."""
+        """See :class:`~slap_ros.acquisition.curriculum.curriculum_callback.CurriculumCallback`."""
 
 
 @dataclass(frozen=True)

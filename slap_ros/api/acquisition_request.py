@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from slap_ros.acquisition.embedding_encoder import EmbeddingEncoder
-from slap_ros.acquisition.proposer_names import MANUAL, REWARDERS, require_known
-from slap_ros.acquisition.retrieval import MetricSignatureEncoder, SkillEncoder
-from slap_ros.acquisition.settings import ACQUISITION_SETTINGS, AcquisitionSettings
+from slap_ros.acquisition.proposals.proposer_names import MANUAL, REWARDERS, require_known
+from slap_ros.acquisition.training.embedding_encoder import EmbeddingEncoder
+from slap_ros.acquisition.training.retrieval import MetricSignatureEncoder, SkillEncoder
+from slap_ros.acquisition.training.settings import ACQUISITION_SETTINGS, AcquisitionSettings
 from slap_ros.api.command_line import command_line
 from slap_ros.api.proposers import Proposers
 from slap_ros.core import Domain

@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from slap_ros.acquisition.domain_choice import DomainChoice
 from slap_ros.api.jobs import some_workers
 from slap_ros.api.left_out import warn_caller
 from slap_ros.api.shortcut_choice import SAMPLES, Shortcuts, choose_library, sampling
@@ -17,6 +16,7 @@ from slap_ros.evaluation.approaches import Approach, approaches, shooting
 from slap_ros.evaluation.experiment import Experiment, Trial, run_with
 from slap_ros.planning.planner import make_planner
 from slap_ros.shortcuts.library import Library
+from slap_ros.skills.domain_choice import DomainChoice
 
 OnTrial = Callable[[Approach, Trial], None]
 

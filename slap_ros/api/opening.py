@@ -6,16 +6,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from slap_ros.acquisition.domain_choice import (
+from slap_ros.api.left_out import Tell, warn_caller
+from slap_ros.core import Domain
+from slap_ros.domains import domain_names, preset_names
+from slap_ros.skills.domain_choice import (
     NO_SKILLS,
     SHIPPED,
     DomainChoice,
     chosen_skills,
     open_domain,
 )
-from slap_ros.api.left_out import Tell, warn_caller
-from slap_ros.core import Domain
-from slap_ros.domains import domain_names, preset_names
 
 SHIPPED_WORD = "shipped"  # for what ships with a domain, of skills as of shortcuts
 SettingText = str | int | float | tuple[float, float]

@@ -10,10 +10,10 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from slap_ros.acquisition.attempt_log import AttemptLog
-from slap_ros.acquisition.inquiry import Inquiry
-from slap_ros.acquisition.proposal_request import Demonstrations, ProposalRequest
-from slap_ros.acquisition.proposer_names import INDUCED, MANUAL, PROPOSERS, require_known
+from slap_ros.acquisition.proposals.attempt_log import AttemptLog
+from slap_ros.acquisition.proposals.inquiry import Inquiry
+from slap_ros.acquisition.proposals.proposal_request import Demonstrations, ProposalRequest
+from slap_ros.acquisition.proposals.proposer_names import INDUCED, MANUAL, PROPOSERS, require_known
 from slap_ros.api.left_out import Tell, warn_caller
 from slap_ros.bags.demonstrations import read_demonstrations
 from slap_ros.bags.reader import read_bag
@@ -21,8 +21,8 @@ from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.language.budget import BudgetLimits
 from slap_ros.language.settings import read_settings
-from slap_ros.learning.demonstrator import AtomTrace, record_traces
-from slap_ros.learning.scripted_skill import with_scripts
+from slap_ros.skills.demonstrator import AtomTrace, record_traces
+from slap_ros.skills.scripted_skill import with_scripts
 
 DEMONSTRATIONS = 10  # recorded where neither a number nor bags are given
 Status = Callable[[str], AbstractContextManager[Any]]  # shows a text while something lasts

@@ -4,10 +4,10 @@
 
 from __future__ import annotations
 
-from slap_ros.acquisition.attempt_log import AttemptLog
-from slap_ros.acquisition.inquiry import Inquiry
-from slap_ros.acquisition.proposal import Proposal
-from slap_ros.acquisition.proposal_request import ProposalRequest
+from slap_ros.acquisition.proposals.attempt_log import AttemptLog
+from slap_ros.acquisition.proposals.inquiry import Inquiry
+from slap_ros.acquisition.proposals.proposal import Proposal
+from slap_ros.acquisition.proposals.proposal_request import ProposalRequest
 from slap_ros.api.proposers import Proposers
 from slap_ros.core import Domain, Task
 

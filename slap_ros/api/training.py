@@ -11,7 +11,6 @@ from os.path import relpath
 from pathlib import Path
 from typing import Any
 
-from slap_ros.acquisition.domain_choice import WORDS, DomainChoice
 from slap_ros.api.jobs import require_torch, some_workers
 from slap_ros.api.setting_texts import Changes, change_texts
 from slap_ros.core import Domain
@@ -23,6 +22,7 @@ from slap_ros.planning.planner import require_skills
 from slap_ros.shortcuts.library import Library, save_library
 from slap_ros.shortcuts.settings import TrainingSettings, training_settings
 from slap_ros.shortcuts.training import CandidateGroup, Training, TrainingCallback
+from slap_ros.skills.domain_choice import WORDS, DomainChoice
 from slap_ros.studies.results import describe_skills
 
 

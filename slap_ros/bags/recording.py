@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 from math import isfinite
 from typing import Any
 
-from slap_ros.acquisition.domain_choice import NO_SKILLS, DomainChoice, open_domain
 from slap_ros.bags.reader import Bag
 from slap_ros.core import Domain
 from slap_ros.errors import ForeignBagError, InvalidLibraryError, SkillsChangedError
@@ -35,6 +34,7 @@ from slap_ros.messages.protocols import (
     TaskMessage,
 )
 from slap_ros.relational import State
+from slap_ros.skills.domain_choice import NO_SKILLS, DomainChoice, open_domain
 
 
 @dataclass

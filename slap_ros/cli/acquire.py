@@ -10,12 +10,11 @@ from typing import Annotated, Any
 
 import typer
 
-from slap_ros.acquisition.attempt_log import Entry
-from slap_ros.acquisition.inquiry import described
-from slap_ros.acquisition.jobs import horizon_of
-from slap_ros.acquisition.proposer_names import MANUAL, REWARDERS, require_known
-from slap_ros.acquisition.settings import ACQUISITION_SETTINGS
-from slap_ros.acquisition.skill_library import SkillLibrary
+from slap_ros.acquisition.curriculum.jobs import horizon_of
+from slap_ros.acquisition.proposals.attempt_log import Entry
+from slap_ros.acquisition.proposals.inquiry import described
+from slap_ros.acquisition.proposals.proposer_names import MANUAL, REWARDERS, require_known
+from slap_ros.acquisition.training.settings import ACQUISITION_SETTINGS
 from slap_ros.api.acquisition import AcquisitionWatch, acquirable, carry_out
 from slap_ros.api.acquisition_request import AcquisitionRequest
 from slap_ros.api.training import training_folder
@@ -26,6 +25,7 @@ from slap_ros.cli.options import DomainName, Goal, Jobs, Json, Preset, Ray, Trai
 from slap_ros.cli.propose import show_entry
 from slap_ros.cli.proposer_options import ProposerOptions
 from slap_ros.errors import InvalidParameterError
+from slap_ros.skills.skill_library import SkillLibrary
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,10 @@ from statistics import fmean
 
 from rich.progress import BarColumn, TaskID
 
-from slap_ros.acquisition.curriculum_callback import OngoingRound
-from slap_ros.acquisition.dead_ends import DeadEnd
-from slap_ros.acquisition.rollouts import PlanRollout, failed_stages
-from slap_ros.acquisition.skill_training import Round
+from slap_ros.acquisition.curriculum.curriculum_callback import OngoingRound
+from slap_ros.acquisition.curriculum.dead_ends import DeadEnd
+from slap_ros.acquisition.curriculum.rollouts import PlanRollout, failed_stages
+from slap_ros.acquisition.training.skill_training import Round
 from slap_ros.cli.acquisition_events import AcquisitionEvents
 from slap_ros.cli.console import console
 from slap_ros.cli.learning_bars import LearningBars

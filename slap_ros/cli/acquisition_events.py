@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from slap_ros.acquisition.attempt_log import Entry
-from slap_ros.acquisition.proposal import Proposal
-from slap_ros.acquisition.rollouts import PlanRollout
-from slap_ros.acquisition.skill_library import SkillLibrary
-from slap_ros.acquisition.skill_training import Round
+from slap_ros.acquisition.curriculum.rollouts import PlanRollout
+from slap_ros.acquisition.proposals.attempt_log import Entry
+from slap_ros.acquisition.proposals.proposal import Proposal
+from slap_ros.acquisition.training.skill_training import Round
 from slap_ros.cli.console import print_json
+from slap_ros.skills.skill_library import SkillLibrary
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,6 @@ from typing import Annotated, Any
 
 import typer
 
-from slap_ros.acquisition.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
-from slap_ros.acquisition.skill_library import read_library_record
 from slap_ros.cli import language_study
 from slap_ros.cli.console import exits
 from slap_ros.cli.language_study import MakeReport, ModelOptions
@@ -36,7 +34,9 @@ from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.experiment import Experiment
-from slap_ros.learning.shipped_models import shipped_with_siblings
+from slap_ros.policies.shipped_models import shipped_with_siblings
+from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
+from slap_ros.skills.skill_library import read_library_record
 from slap_ros.studies import acquisition, demonstrations, induction, replanning, vacuity
 from slap_ros.studies.planning_ablation import SEARCH, VARIANTS
 from slap_ros.studies.results import Data, describe_skills

@@ -10,8 +10,6 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from slap_ros.acquisition.domain_choice import DomainChoice, open_domain
-from slap_ros.acquisition.problem import metrics_of
 from slap_ros.cli.console import console, print_json
 from slap_ros.cli.options import Json, Preset, matching_domains
 from slap_ros.core import Domain
@@ -19,6 +17,8 @@ from slap_ros.domains import domain_names, preset_names
 from slap_ros.errors import InvalidDomainError, InvalidParameterError, UnknownObjectError
 from slap_ros.relational import LiftedOperator, Metric, Predicate
 from slap_ros.relational.metrics import typed_arguments, variable_names
+from slap_ros.skills.domain_choice import DomainChoice, open_domain
+from slap_ros.skills.operator_json import metrics_of
 
 GOAL_SEED = 0  # of the task in which named goals are shown
 

@@ -11,7 +11,6 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from slap_ros.acquisition.domain_choice import SHIPPED
 from slap_ros.api.command_line import command_line
 from slap_ros.api.evaluation import compared_approaches, run_approaches
 from slap_ros.cli.bars import counting_bars
@@ -28,6 +27,7 @@ from slap_ros.evaluation.summary import Spread, Summary
 from slap_ros.files import require_writable
 from slap_ros.shortcuts.library import Library
 from slap_ros.shortcuts.shipped import shipped_library
+from slap_ros.skills.domain_choice import SHIPPED
 from slap_ros.studies.results import describe_library, describe_skills
 from slap_ros.versions import versions
 

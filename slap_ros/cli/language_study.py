@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
-from slap_ros.acquisition.problem import AcquisitionProblem
+from slap_ros.acquisition.proposals.problem import AcquisitionProblem
 from slap_ros.cli.options import Preset
 from slap_ros.core import Domain, task_with_goal
 from slap_ros.domains import get_domain

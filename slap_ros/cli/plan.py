@@ -9,7 +9,6 @@ from typing import Annotated
 
 import typer
 
-from slap_ros.acquisition.domain_choice import SHIPPED
 from slap_ros.cli.options import (
     ChosenSeed,
     DomainOrFile,
@@ -24,6 +23,7 @@ from slap_ros.cli.options import (
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts
 from slap_ros.cli.skill_choice import Skills, open_chosen
 from slap_ros.files import require_writable
+from slap_ros.skills.domain_choice import SHIPPED
 
 
 def plan(

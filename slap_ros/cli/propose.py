@@ -10,13 +10,13 @@ from typing import Annotated
 
 import typer
 
-from slap_ros.acquisition.attempt_log import AttemptLog, Entry
-from slap_ros.acquisition.inquiry import described
-from slap_ros.acquisition.operator_file import read_operators
-from slap_ros.acquisition.problem import AcquisitionProblem
-from slap_ros.acquisition.proposal import Proposal
-from slap_ros.acquisition.proposal_request import ProposalRequest
-from slap_ros.acquisition.proposer_names import (
+from slap_ros.acquisition.proposals.attempt_log import AttemptLog, Entry
+from slap_ros.acquisition.proposals.inquiry import described
+from slap_ros.acquisition.proposals.operator_file import read_operators
+from slap_ros.acquisition.proposals.problem import AcquisitionProblem
+from slap_ros.acquisition.proposals.proposal import Proposal
+from slap_ros.acquisition.proposals.proposal_request import ProposalRequest
+from slap_ros.acquisition.proposals.proposer_names import (
     INDUCED,
     MANUAL,
     NO_REWARDER,

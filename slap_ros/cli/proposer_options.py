@@ -10,8 +10,8 @@ from typing import Annotated
 
 import typer
 
-from slap_ros.acquisition.proposal_request import Demonstrations
-from slap_ros.acquisition.proposer_names import MANUAL
+from slap_ros.acquisition.proposals.proposal_request import Demonstrations
+from slap_ros.acquisition.proposals.proposer_names import MANUAL
 from slap_ros.api.left_out import Tell
 from slap_ros.api.proposers import DEMONSTRATIONS, Proposers, Status
 from slap_ros.cli.console import console

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from slap_ros.acquisition.domain_choice import DomainChoice
 from slap_ros.cli.console import warn
+from slap_ros.skills.domain_choice import DomainChoice
 
 if TYPE_CHECKING:
     from slap_ros.core import Domain

@@ -10,17 +10,17 @@ from typing import Annotated, Any
 
 import typer
 
-from slap_ros.acquisition.inquiry import described
-from slap_ros.acquisition.proposal import operator_data, template_data
-from slap_ros.acquisition.skill_library import (
+from slap_ros.acquisition.proposals.inquiry import described
+from slap_ros.cli.console import console, print_json, warn
+from slap_ros.cli.options import Json
+from slap_ros.domains import get_domain
+from slap_ros.skills.operator_json import operator_data, template_data
+from slap_ros.skills.skill_library import (
     AcquiredSkill,
     SkillLibrary,
     load_skill_library,
     read_library_record,
 )
-from slap_ros.cli.console import console, print_json, warn
-from slap_ros.cli.options import Json
-from slap_ros.domains import get_domain
 
 
 def skills(

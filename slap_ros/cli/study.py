@@ -13,7 +13,6 @@ from typing import Annotated, Any
 
 import typer
 
-from slap_ros.acquisition.domain_choice import DomainChoice
 from slap_ros.api.jobs import require_torch
 from slap_ros.api.shortcut_choice import sampling
 from slap_ros.cli import acquisition_study
@@ -38,6 +37,7 @@ from slap_ros.files import read_text, write_whole
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.shortcuts.settings import ExplorationSettings, training_settings
 from slap_ros.shortcuts.shipped import shipped_libraries, shipped_library
+from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies import (
     ablation,
     dynamics,

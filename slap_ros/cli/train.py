@@ -14,7 +14,6 @@ from typing import Annotated
 import typer
 from rich.progress import BarColumn, TaskID, TimeRemainingColumn
 
-from slap_ros.acquisition.domain_choice import SHIPPED
 from slap_ros.api.training import skills_option
 from slap_ros.api.training import train as train_library
 from slap_ros.cli.console import console, print_json
@@ -24,6 +23,7 @@ from slap_ros.cli.skill_choice import Skills, open_chosen
 from slap_ros.shortcuts.progress import latest
 from slap_ros.shortcuts.training import CandidateGroup
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
+from slap_ros.skills.domain_choice import SHIPPED
 
 
 @dataclass(frozen=True)

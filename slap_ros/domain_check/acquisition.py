@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from slap_ros.core import Acquisition, Domain
 from slap_ros.doctor.check import Check
 from slap_ros.errors import InvalidParameterError, SlapError
-from slap_ros.learning.scripted_skill import with_scripts
 from slap_ros.planning.planner import plan_symbolically
 from slap_ros.relational import ground_operators
+from slap_ros.skills.scripted_skill import with_scripts
 
 
 def with_demonstrator(domain: Domain) -> Domain | None:

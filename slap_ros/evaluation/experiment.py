@@ -9,13 +9,13 @@ from dataclasses import asdict, dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
-from slap_ros.acquisition.domain_choice import SHIPPED, DomainChoice, open_domain
 from slap_ros.core import Domain, Task, task_with_goal
 from slap_ros.errors import ErrorCode
 from slap_ros.evaluation.approaches import PURE_PLANNING, Approach
 from slap_ros.learning.workers import Workers, local_workers
 from slap_ros.planning.execution import EpisodeResult, ExecutedEdge, Executor
 from slap_ros.relational import GroundAtom
+from slap_ros.skills.domain_choice import SHIPPED, DomainChoice, open_domain
 
 # What is true of most edges is left out of their JSON, which would be twice as large with it.
 MOST_EDGES: Mapping[str, Any] = MappingProxyType({"kind": "operator", "reached": True})
@@ -34,7 +34,7 @@ class Experiment:
         left_out: Seeds and indices of tasks that are not solved.
         goal: By name or as atoms, as :func:`~slap_ros.core.task_with_goal` takes it; None for the
             goal that comes with each task.
-        skills: Whose they are, as :class:`~slap_ros.acquisition.domain_choice.DomainChoice` has it.
+        skills: Whose they are, as :class:`~slap_ros.skills.domain_choice.DomainChoice` has it.
     """
 
     domain: Domain

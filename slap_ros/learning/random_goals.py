@@ -8,7 +8,7 @@ start (SLAP Fig. 9, D.1).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -17,10 +17,10 @@ import numpy as np
 
 from slap_ros.core import Domain, Task
 from slap_ros.errors import PlanningLimitError, UnsolvableError
-from slap_ros.learning.domain_spec import DomainSpec
 from slap_ros.planning.abstract_graph import build_abstract_graph
 from slap_ros.planning.planner import Problem
 from slap_ros.relational import AtomSpace, GroundAtom
+from slap_ros.skills.domain_choice import DomainChoice
 
 Goal = tuple[GroundAtom, ...]
 
@@ -73,36 +73,34 @@ def _goals_of(space: AtomSpace, atoms: int, rng: np.random.Generator) -> Iterato
     return (goals[i] for i in order)
 
 
-@dataclass(frozen=True)
-class WithRandomGoals:
+@dataclass(frozen=True, kw_only=True)
+class RandomGoalsChoice(DomainChoice):
     """A domain, some of whose tasks have another goal than their own.
 
     Args:
-        domain: Whose tasks.
-        share: Of the tasks, between 0 and 1.
+        share: Share of these tasks, between 0 and 1.
     """
 
-    domain: DomainSpec
     share: float
 
-    @property
-    def name(self) -> str:
-        """The domain's."""
-        return self.domain.name
+    @classmethod
+    def of_choice(cls, choice: DomainChoice, share: float) -> RandomGoalsChoice:
+        """The same domain with random goals.
+
+        Args:
+            choice: Domain whose tasks they are.
+            share: Share of the tasks that have another goal, between 0 and 1.
+        """
+        return cls(choice.name, choice.preset, choice.skills, choice.digest, share=share)
 
     @property
-    def preset(self) -> str:
-        """The domain's."""
-        return self.domain.preset
-
-    @property
-    def identity(self) -> Mapping[str, str]:
-        """See :attr:`slap_ros.learning.domain_spec.DomainSpec.identity`."""
-        return {**self.domain.identity, "random_goals": str(self.share)}
+    def identity(self) -> dict[str, str]:
+        """See :attr:`slap_ros.skills.domain_choice.DomainChoice.identity`."""
+        return {**super().identity, "random_goals": str(self.share)}
 
     def make(self) -> Domain:
         """The domain, whose tasks begin in the same states as without other goals."""
-        domain = self.domain.make()
+        domain = super().make()
 
         def sample_task(rng: np.random.Generator) -> Task:
             task = domain.sample_task(rng)

@@ -10,8 +10,8 @@ import gymnasium as gym
 import numpy as np
 from stable_baselines3.common.vec_env import VecEnv as Sb3VecEnv
 
-from slap_ros.learning.mlp_policy import ObservationNormalisation
 from slap_ros.learning.vec_env import VecEnv, VecEnvStep
+from slap_ros.policies.mlp_policy import ObservationNormalisation
 
 
 class StableBaselinesVecEnv(Sb3VecEnv):

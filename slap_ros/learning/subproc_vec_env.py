@@ -17,9 +17,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.learning.action_map import ActionMap
 from slap_ros.learning.linked_process import linked_process, receive, send
 from slap_ros.learning.vec_env import VecEnv, VecEnvStep
+from slap_ros.policies.action_map import ActionMap
 from slap_ros.relational.state import Array
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from slap_ros.core import Domain
-from slap_ros.learning.domain_spec import DomainSpec
+from slap_ros.skills.domain_choice import DomainChoice
 
 TRAINING_SEED = 1_000_000  # added to the seed: training never sees the tasks of evaluation
 
@@ -17,7 +17,7 @@ TRAINING_SEED = 1_000_000  # added to the seed: training never sees the tasks of
 class TaskDistribution:
     """The tasks of a domain and a seed."""
 
-    domain: DomainSpec
+    domain: DomainChoice
     seed: int
 
     @property

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.learning.action_map import ActionMap
+from slap_ros.policies.action_map import ActionMap
 from slap_ros.relational.predicates import Bools
 from slap_ros.relational.state import Array
 

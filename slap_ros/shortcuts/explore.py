@@ -21,11 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slap_ros.core import Domain
-from slap_ros.learning.action_map import ActionMap
-from slap_ros.learning.learner_interface import learner_interface
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
 from slap_ros.planning.planner import GraphPlanner, Problem
 from slap_ros.planning.search import Vertex
+from slap_ros.policies.action_map import ActionMap
+from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.relational import State
 from slap_ros.shortcuts.settings import ExplorationSettings
 from slap_ros.shortcuts.signature import Change, Signature, context_of

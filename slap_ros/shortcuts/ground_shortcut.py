@@ -11,7 +11,7 @@ import numpy as np
 
 from slap_ros.core import Action, Policy
 from slap_ros.errors import SkillNotApplicableError
-from slap_ros.learning.mlp_policy import Weights
+from slap_ros.policies.mlp_policy import Weights
 from slap_ros.relational import Object, State
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.shortcut import Shortcut

@@ -8,9 +8,9 @@ from collections.abc import Collection, Iterator, Sequence
 from functools import partial
 
 from slap_ros.core import Domain
-from slap_ros.learning.learner_interface import learner_interface
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge, EdgeBeyond
 from slap_ros.planning.options import Option, OptionKind
+from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.relational import State, Target
 from slap_ros.shortcuts.ground_shortcut import GroundShortcut
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder

@@ -27,7 +27,7 @@ from safetensors.numpy import save
 
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidLibraryError
-from slap_ros.learning.library_files import (
+from slap_ros.policies.library_files import (
     SHORTCUT,
     load_policy,
     policy_tensors,
@@ -39,7 +39,7 @@ from slap_ros.learning.library_files import (
     write_library,
     write_object,
 )
-from slap_ros.learning.mlp_policy import MlpPolicy
+from slap_ros.policies.mlp_policy import MlpPolicy
 from slap_ros.shortcuts.observation_encoder import make_action_map, observation_size
 from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.signature import Signature

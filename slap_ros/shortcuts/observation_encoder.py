@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slap_ros.core import Domain
-from slap_ros.learning.action_map import ActionMap
-from slap_ros.learning.learner_interface import learner_interface
+from slap_ros.policies.action_map import ActionMap
+from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.portable_math import on_grid
 from slap_ros.relational import AtomSpace, Column, GroundAtom, Object, State
 from slap_ros.relational.predicates import Bools, Predicate

@@ -21,9 +21,9 @@ from stable_baselines3.common.logger import configure
 
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import read_bytes
-from slap_ros.learning.mlp_policy import MlpPolicy, ObservationNormalisation
 from slap_ros.learning.stable_baselines import StableBaselinesVecEnv
 from slap_ros.learning.vec_env import VecEnv, VecEnvStep
+from slap_ros.policies.mlp_policy import MlpPolicy, ObservationNormalisation
 from slap_ros.shortcuts.ppo_settings import PpoSettings
 from slap_ros.shortcuts.progress import Progress
 

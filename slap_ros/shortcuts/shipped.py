@@ -10,10 +10,10 @@ from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError
 from slap_ros.files import parse_json, read_text
-from slap_ros.learning.learner_interface import learner_interface
-from slap_ros.learning.library_files import ABOUT
-from slap_ros.learning.shipped_models import shipped_folder, shipped_with_siblings
 from slap_ros.planning.planner import WITH_SHORTCUTS
+from slap_ros.policies.learner_interface import learner_interface
+from slap_ros.policies.library_files import ABOUT
+from slap_ros.policies.shipped_models import shipped_folder, shipped_with_siblings
 from slap_ros.shortcuts.library import Library, load_library
 
 NONE = "none"  # the choice of no library

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from slap_ros.core import Domain
-from slap_ros.learning.mlp_policy import ActionSampler, Weights
+from slap_ros.policies.mlp_policy import ActionSampler, Weights
 from slap_ros.shortcuts.observation_encoder import make_action_map
 from slap_ros.shortcuts.shortcut import Sampling, Shortcut
 
@@ -41,7 +41,7 @@ class RandomActions:
         rng: np.random.Generator,
         temperature: float | Weights = 1.0,  # noqa: ARG002 -- uniform actions have no scale
     ) -> ActionSampler:
-        """As :class:`~slap_ros.learning.mlp_policy.SampledPolicy` has it: uniform, then held."""
+        """As :class:`~slap_ros.policies.mlp_policy.SampledPolicy` has it: uniform, then held."""
         held = np.zeros((0, self.actions), dtype=np.float32)
 
         def sample(step: int, observations: Weights) -> Weights:

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from slap_ros.learning.mlp_policy import SampledPolicy
+from slap_ros.policies.mlp_policy import SampledPolicy
 from slap_ros.shortcuts.signature import Signature
 
 

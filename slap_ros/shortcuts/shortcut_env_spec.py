@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slap_ros.learning.action_map import ActionMap
-from slap_ros.learning.domain_spec import DomainSpec
+from slap_ros.policies.action_map import ActionMap
 from slap_ros.shortcuts.observation_encoder import make_action_map
 from slap_ros.shortcuts.rewards import Rewards
 from slap_ros.shortcuts.shortcut_vec_env import ShortcutVecEnv
 from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.starts import StartRecord, restore_starts
+from slap_ros.skills.domain_choice import DomainChoice
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class ShortcutEnvSpec:
         seed: Of the generator that draws the starts.
     """
 
-    domain: DomainSpec
+    domain: DomainChoice
     signature: Signature
     starts: tuple[StartRecord, ...]
     num_envs: int

@@ -12,7 +12,7 @@ from hashlib import sha256
 import numpy as np
 
 from slap_ros.core import Domain, VectorWorld
-from slap_ros.learning.mlp_policy import ActionSampler, SampledPolicy, Weights
+from slap_ros.policies.mlp_policy import ActionSampler, SampledPolicy, Weights
 from slap_ros.portable_math import on_grid
 from slap_ros.relational import State
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder

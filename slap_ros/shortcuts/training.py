@@ -18,7 +18,7 @@ from statistics import fmean
 from typing import Any, Protocol, TypeVar
 
 from slap_ros.errors import InvalidParameterError, UnsolvableError
-from slap_ros.learning.random_goals import WithRandomGoals
+from slap_ros.learning.random_goals import RandomGoalsChoice
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.learning.workers import Workers, run_in_order
@@ -263,7 +263,8 @@ class Training:
         share = self.settings.random_goals
         if not share:
             return self.distribution
-        return replace(self.distribution, domain=WithRandomGoals(self.distribution.domain, share))
+        domain = RandomGoalsChoice.of_choice(self.distribution.domain, share)
+        return replace(self.distribution, domain=domain)
 
     # -- the steps --------------------------------------------------------------------------------
 

@@ -19,8 +19,8 @@ from slap_ros.errors import InvalidParameterError, UnsolvableError
 from slap_ros.evaluation.approaches import PURE_PLANNING, approaches
 from slap_ros.evaluation.experiment import solve
 from slap_ros.evaluation.summary import Spread
-from slap_ros.learning.learner_interface import learner_interface, without
 from slap_ros.learning.task_distribution import TaskDistribution
+from slap_ros.policies.learner_interface import learner_interface, without
 from slap_ros.shortcuts import jobs
 from slap_ros.shortcuts.explore import ExplorationResult
 from slap_ros.shortcuts.library import Library
@@ -29,6 +29,7 @@ from slap_ros.shortcuts.shortcut import Sampling
 from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.starts import StartRecord
 from slap_ros.shortcuts.training import mean_steps, rank
+from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.comparison import format_spread
 from slap_ros.studies.figures import APPROACH_STYLES, LINES, label
 from slap_ros.studies.job_runner import JobRunner
@@ -57,29 +58,25 @@ of less than two standard deviations says nothing. This is one domain and one bu
 term that is worth nothing here may be worth much elsewhere."""
 
 
-@dataclass(frozen=True)
-class AblatedDomain:
+@dataclass(frozen=True, kw_only=True)
+class AblatedChoice(DomainChoice):
     """A domain whose learner's interface leaves a term out, made where it is needed.
 
     Args:
-        name: The domain's.
-        preset: The domain's.
-        term: Of ``Learning.ablations``; :data:`NOTHING` and :data:`SETTINGS` are not of the
-            interface.
+        term: Name in ``Learning.ablations``; :data:`NOTHING` and :data:`SETTINGS` leave the
+            interface as it is.
     """
 
-    name: str
-    preset: str
     term: str
 
     @property
     def identity(self) -> dict[str, str]:
-        """See :attr:`slap_ros.learning.domain_spec.DomainSpec.identity`."""
-        return {"domain": self.name, "preset": self.preset, "without": self.term}
+        """See :attr:`slap_ros.skills.domain_choice.DomainChoice.identity`."""
+        return {**super().identity, "without": self.term}
 
     def make(self) -> Domain:
-        """See :meth:`slap_ros.learning.domain_spec.DomainSpec.make`."""
-        domain = get_domain(self.name, self.preset)
+        """See :meth:`slap_ros.skills.domain_choice.DomainChoice.make`."""
+        domain = super().make()
         return domain if self.term in (NOTHING, SETTINGS) else without(domain, self.term)
 
 
@@ -106,7 +103,7 @@ class AblationSetup:
 
     def tasks_of(self, seed: int, term: str = NOTHING) -> TaskDistribution:
         """Those of a training without a term."""
-        return TaskDistribution(AblatedDomain(self.domain, self.preset, term), seed)
+        return TaskDistribution(AblatedChoice(self.domain, self.preset, term=term), seed)
 
     def settings(self, term: str) -> TrainingSettings:
         """Hyper-parameters of learning without a term; the steps are the same for all."""

@@ -10,13 +10,13 @@ from dataclasses import asdict, dataclass
 from statistics import fmean
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from slap_ros.acquisition.domain_choice import DomainChoice, chosen_skills, open_domain
-from slap_ros.acquisition.rollouts import PlanRollout, Stage, roll_out
-from slap_ros.acquisition.skill import LearnedSkill
+from slap_ros.acquisition.curriculum.rollouts import PlanRollout, Stage, roll_out
 from slap_ros.core.goals import task_with_goal
 from slap_ros.drawing.palette import MUTED
 from slap_ros.evaluation.statistics import Interval, wilson_interval
 from slap_ros.evaluation.summary import Spread
+from slap_ros.skills.domain_choice import DomainChoice, chosen_skills, open_domain
+from slap_ros.skills.skill import LearnedSkill
 from slap_ros.studies.comparison import format_spread
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
@@ -238,7 +238,7 @@ def carry_out_task(choice: DomainChoice, goal: str, seed: int, index: int) -> di
         index: Of the task.
 
     Returns:
-        A :class:`~slap_ros.acquisition.rollouts.PlanRollout` as JSON, without states.
+        A :class:`~slap_ros.acquisition.curriculum.rollouts.PlanRollout` as JSON, without states.
     """
     domain = open_domain(choice)
     skills = {n: skill for n, skill in domain.skills.items() if isinstance(skill, LearnedSkill)}

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol, TypeVar
 
-from slap_ros.acquisition.domain_choice import DomainChoice, open_domain
 from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.evaluation.approaches import Approach
@@ -16,6 +15,7 @@ from slap_ros.evaluation.experiment import Experiment, Trial, solve
 from slap_ros.evaluation.summary import Spread, Summary
 from slap_ros.planning.planner import Planner
 from slap_ros.relational import State
+from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.studies.job_runner import JobRunner
 
 

@@ -9,11 +9,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from slap_ros.acquisition.domain_choice import DomainChoice, open_domain
 from slap_ros.drawing.palette import MUTED
 from slap_ros.evaluation.statistics import Interval, wilson_interval
 from slap_ros.evaluation.summary import Spread
-from slap_ros.learning.demonstrator import demonstrate
+from slap_ros.skills.demonstrator import demonstrate
+from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.studies.comparison import format_spread, not_solved, spread_of
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner

@@ -13,14 +13,18 @@ from dataclasses import asdict, dataclass
 from itertools import permutations
 from typing import TYPE_CHECKING, Any
 
-from slap_ros.acquisition.domain_choice import DomainChoice, open_domain
-from slap_ros.acquisition.induction import InducedOperator, hold_steps_of, induce_operators
+from slap_ros.acquisition.proposals.induction import (
+    InducedOperator,
+    hold_steps_of,
+    induce_operators,
+)
 from slap_ros.core import Domain, Task
 from slap_ros.drawing.palette import MUTED
 from slap_ros.errors import InvalidParameterError, PlanningLimitError, UnsolvableError
-from slap_ros.learning.demonstrator import record_traces
 from slap_ros.planning.astar import find_shortest_sequence
 from slap_ros.relational import LiftedAtom, LiftedOperator, Variable, ground_operators
+from slap_ros.skills.demonstrator import record_traces
+from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.results import MarkdownTable, StudyReport

@@ -13,17 +13,17 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-from slap_ros.acquisition.attempt_log import AttemptLog
-from slap_ros.acquisition.complaints import Complaint, serious
-from slap_ros.acquisition.inquiry import Answer, Inquiry, Question
-from slap_ros.acquisition.problem import AcquisitionProblem
-from slap_ros.acquisition.questions import (
+from slap_ros.acquisition.proposals.attempt_log import AttemptLog
+from slap_ros.acquisition.proposals.complaints import Complaint, serious
+from slap_ros.acquisition.proposals.inquiry import Answer, Inquiry, Question
+from slap_ros.acquisition.proposals.problem import AcquisitionProblem
+from slap_ros.acquisition.proposals.questions import (
     about_decomposition,
     about_operator,
     about_plan,
     about_reward,
 )
-from slap_ros.acquisition.verification import verify
+from slap_ros.acquisition.proposals.verification import verify
 from slap_ros.errors import InvalidCassetteError
 from slap_ros.language.budget import Budget, BudgetLimits
 from slap_ros.language.request import Client, Reply, Request

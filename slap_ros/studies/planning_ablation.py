@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from time import process_time
 from typing import TYPE_CHECKING, Any
 
-from slap_ros.acquisition.problem import AcquisitionProblem
+from slap_ros.acquisition.proposals.problem import AcquisitionProblem
 from slap_ros.evaluation.statistics import wilson_interval
 from slap_ros.language.budget import BudgetLimits
 from slap_ros.studies.figures import LINES

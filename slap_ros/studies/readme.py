@@ -15,10 +15,10 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from slap_ros.acquisition.skill_library import read_library_record
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, read_text
-from slap_ros.learning.shipped_models import shipped_with_siblings
+from slap_ros.policies.shipped_models import shipped_with_siblings
+from slap_ros.skills.skill_library import read_library_record
 from slap_ros.studies.figures import label
 from slap_ros.studies.reproducing import NOT_MEASURED, other_table, paper_table
 from slap_ros.studies.results import MarkdownTable

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from slap_ros.acquisition.domain_choice import DomainChoice, chosen_skills
 from slap_ros.drawing.palette import MUTED
 from slap_ros.errors import ErrorCode
 from slap_ros.evaluation.approaches import PURE_PLANNING
@@ -17,6 +16,7 @@ from slap_ros.evaluation.experiment import Experiment, Trial, task_job, try_task
 from slap_ros.evaluation.statistics import Interval, wilson_interval
 from slap_ros.evaluation.summary import Spread
 from slap_ros.planning.execution import MAX_REPLANS
+from slap_ros.skills.domain_choice import DomainChoice, chosen_skills
 from slap_ros.studies.comparison import format_spread, named_tasks, not_solved, spread_of
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner

@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from slap_ros.acquisition.domain_choice import DIGEST_KEY, SKILLS_KEY
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, pretty_json, read_text, write_whole
 from slap_ros.shortcuts.library import Library
+from slap_ros.skills.domain_choice import DIGEST_KEY, SKILLS_KEY
 from slap_ros.studies.figures import Size, picture
 from slap_ros.versions import versions
 

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from slap_ros.acquisition.complaints import REWARD_ERROR_GROUPS, ComplaintClass
-from slap_ros.acquisition.problem import AcquisitionProblem
+from slap_ros.acquisition.proposals.complaints import REWARD_ERROR_GROUPS, ComplaintClass
+from slap_ros.acquisition.proposals.problem import AcquisitionProblem
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.statistics import wilson_interval
 from slap_ros.language.budget import BudgetLimits

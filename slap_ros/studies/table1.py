@@ -13,7 +13,6 @@ from dataclasses import asdict, dataclass
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
-from slap_ros.acquisition.domain_choice import DomainChoice
 from slap_ros.core import Domain
 from slap_ros.evaluation.approaches import PURE_PLANNING, Approach, approaches, shooting
 from slap_ros.evaluation.experiment import Experiment, Trial
@@ -21,6 +20,7 @@ from slap_ros.evaluation.statistics import Interval, ratio_interval, wilson_inte
 from slap_ros.evaluation.summary import Spread, lengths_of_both
 from slap_ros.shortcuts.library import Library
 from slap_ros.shortcuts.shortcut import Sampling
+from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.comparison import (
     PlanningSetup,
     format_spread,

@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from slap_ros.acquisition.domain_choice import DomainChoice, open_domain
-from slap_ros.acquisition.skill import LearnedSkill
 from slap_ros.core import Action, ActionSpace, Domain
 from slap_ros.drawing.palette import MUTED
 from slap_ros.errors import InvalidParameterError, SlapError
 from slap_ros.evaluation.statistics import Interval, wilson_interval
-from slap_ros.learning.demonstrator import Demonstration, demonstrate
 from slap_ros.relational import GroundOperator, State, ground_operators
+from slap_ros.skills.demonstrator import Demonstration, demonstrate
+from slap_ros.skills.domain_choice import DomainChoice, open_domain
+from slap_ros.skills.skill import LearnedSkill
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.results import MarkdownTable, StudyReport

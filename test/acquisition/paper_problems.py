@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from slap_ros.acquisition.problem import AcquisitionProblem
+from slap_ros.acquisition.proposals.problem import AcquisitionProblem
 from slap_ros.relational import (
     Column,
     Feature,

@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from slap_ros.acquisition.skill_env import Initiation
+from slap_ros.acquisition.training.skill_env import Initiation
 from slap_ros.core import (
     Acquisition,
     ActionSpace,

@@ -12,7 +12,7 @@ from points import PICK, POINTS, PUT
 from scripted_server import serving
 from typer.testing import CliRunner
 
-from slap_ros.acquisition.problem import AcquisitionProblem
+from slap_ros.acquisition.proposals.problem import AcquisitionProblem
 from slap_ros.cli import app
 from slap_ros.cli.acquire import why_left
 from slap_ros.errors import ErrorCode

@@ -29,15 +29,15 @@ from slap_msgs.msg import AcquisitionEvent, GroundAtom
 from steady_skills import PICKING, write_library
 
 from ensemble.launcher import ProcessLauncher
-from slap_ros.acquisition.skill_library import load_skill_library
 from slap_ros.bags import evaluate_bag, read_bag, replay_bag
 from slap_ros.bags.recording import Recording
 from slap_ros.errors import ErrorCode
-from slap_ros.learning.library_files import ABOUT
 from slap_ros.messages.interfaces import ACQUISITION_EVENT, SKILL_LIBRARY
+from slap_ros.policies.library_files import ABOUT
 from slap_ros.relational.pddl import parse_domain
 from slap_ros.report.content import read_report
 from slap_ros.report.page import render
+from slap_ros.skills.skill_library import load_skill_library
 
 pytestmark = pytest.mark.usefixtures("points_installed")
 

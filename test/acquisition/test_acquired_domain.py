@@ -20,8 +20,6 @@ from ensemble.client import RunClient
 from ensemble.launcher import InProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.spinner import temporary_node
-from slap_ros.acquisition.domain_choice import DomainChoice, open_domain
-from slap_ros.acquisition.skill_library import SKILL
 from slap_ros.bags import bag_info, evaluate_bag, read_bag, replay_bag
 from slap_ros.bags.recording import Recording
 from slap_ros.domains import get_domain
@@ -34,11 +32,13 @@ from slap_ros.errors import (
 )
 from slap_ros.evaluation.approaches import PURE_PLANNING
 from slap_ros.evaluation.experiment import Experiment, run_all, solve
-from slap_ros.learning import shipped_models
 from slap_ros.messages.decode import decode_target
 from slap_ros.messages.interfaces import PLAN
 from slap_ros.planning.planner import PLANNERS, Problem, make_planner
+from slap_ros.policies import shipped_models
 from slap_ros.report import read_report
+from slap_ros.skills.domain_choice import DomainChoice, open_domain
+from slap_ros.skills.skill_library import SKILL
 
 SHARED = HealthCheck.function_scoped_fixture  # the library, which nothing changes
 LIMIT_S = 120.0  # far more than anything here takes

@@ -6,17 +6,17 @@ from dataclasses import replace
 
 import pytest
 
-from slap_ros.acquisition.induction import InducedProposer, hold_steps_of
-from slap_ros.acquisition.problem import AcquisitionProblem
-from slap_ros.acquisition.proposers import (
+from slap_ros.acquisition.proposals.induction import InducedProposer, hold_steps_of
+from slap_ros.acquisition.proposals.problem import AcquisitionProblem
+from slap_ros.acquisition.proposals.proposers import (
     ComposedRewarder,
     ManualProposer,
     ManualRewarder,
     propose,
 )
 from slap_ros.domains import get_domain
-from slap_ros.learning.demonstrator import record_traces
-from slap_ros.learning.scripted_skill import with_scripts
+from slap_ros.skills.demonstrator import record_traces
+from slap_ros.skills.scripted_skill import with_scripts
 
 pytest.importorskip("pybullet")
 

@@ -21,18 +21,18 @@ from paper_problems import (
     stow_hammer,
 )
 
-from slap_ros.acquisition.complaints import (
+from slap_ros.acquisition.proposals.complaints import (
     REWARD_ERROR_GROUPS,
     Complaint,
     ComplaintClass,
     serious,
 )
-from slap_ros.acquisition.drafts import check_decomposition, check_operator
-from slap_ros.acquisition.problem import AcquisitionProblem
-from slap_ros.acquisition.proposers import ComposedRewarder, ManualProposer, propose
-from slap_ros.acquisition.questions import check_plan
-from slap_ros.acquisition.rewards import check_rewards
-from slap_ros.acquisition.verification import verify
+from slap_ros.acquisition.proposals.drafts import check_decomposition, check_operator
+from slap_ros.acquisition.proposals.problem import AcquisitionProblem
+from slap_ros.acquisition.proposals.proposers import ComposedRewarder, ManualProposer, propose
+from slap_ros.acquisition.proposals.questions import check_plan
+from slap_ros.acquisition.proposals.reward_templates import check_rewards
+from slap_ros.acquisition.proposals.verification import verify
 from slap_ros.errors import ProposalRejectedError
 from slap_ros.language.formats import parse_decomposition, parse_operator, parse_plan, parse_rewards
 from slap_ros.relational import Layout, LiftedOperator

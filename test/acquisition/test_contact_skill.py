@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from slap_ros.acquisition import jobs
-from slap_ros.acquisition.initiation_states import InitiationStates
-from slap_ros.acquisition.settings import AcquisitionSettings
-from slap_ros.acquisition.task_source import TaskSource
+from slap_ros.acquisition.curriculum import jobs
+from slap_ros.acquisition.curriculum.initiation_states import InitiationStates
+from slap_ros.acquisition.curriculum.task_source import TaskSource
+from slap_ros.acquisition.training.settings import AcquisitionSettings
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidStateError
 from slap_ros.learning.workers import local_workers

@@ -12,32 +12,34 @@ import pytest
 from points import HORIZON, PICK, POINTS, PUT, REWARDS, begin
 from steady_skills import PICKING, PUTTING, towards, write_library
 
-from slap_ros.acquisition import curriculum, skill_training
-from slap_ros.acquisition.acquired_domain import acquired_domain
-from slap_ros.acquisition.curriculum import Curriculum
-from slap_ros.acquisition.curriculum_state import CurriculumState, SkillProgress
-from slap_ros.acquisition.dead_ends import MOST_ATTEMPTS, DeadEnd, find_dead_ends
-from slap_ros.acquisition.proposal_request import Demonstrations, ProposalRequest
-from slap_ros.acquisition.retrieval import nearest, signature_of
-from slap_ros.acquisition.rollouts import PlanRollout, Stage, roll_out
-from slap_ros.acquisition.sac_settings import SacSettings
-from slap_ros.acquisition.settings import AcquisitionSettings
-from slap_ros.acquisition.skill_library import (
+from slap_ros.acquisition.curriculum import curriculum
+from slap_ros.acquisition.curriculum.curriculum import Curriculum
+from slap_ros.acquisition.curriculum.curriculum_state import CurriculumState, SkillProgress
+from slap_ros.acquisition.curriculum.dead_ends import MOST_ATTEMPTS, DeadEnd, find_dead_ends
+from slap_ros.acquisition.curriculum.rollouts import PlanRollout, Stage, roll_out
+from slap_ros.acquisition.curriculum.skill_selection import failing_often, select_skills
+from slap_ros.acquisition.curriculum.task_source import TaskSource
+from slap_ros.acquisition.proposals.proposal_request import Demonstrations, ProposalRequest
+from slap_ros.acquisition.training import skill_training
+from slap_ros.acquisition.training.retrieval import nearest
+from slap_ros.acquisition.training.sac_settings import SacSettings
+from slap_ros.acquisition.training.settings import AcquisitionSettings
+from slap_ros.core.goals import task_with_goal
+from slap_ros.errors import InvalidLibraryError, InvalidParameterError, UnsolvableError
+from slap_ros.learning.workers import SequentialWorkers, local_workers
+from slap_ros.planning.execution import Executor
+from slap_ros.planning.planner import make_planner
+from slap_ros.policies.mlp_policy import MlpPolicy
+from slap_ros.skills.acquired_domain import acquired_domain
+from slap_ros.skills.demonstrator import record_traces
+from slap_ros.skills.scripted_skill import with_scripts
+from slap_ros.skills.skill_library import (
     AcquiredSkill,
     load_skill_library,
     save_skill,
     save_skill_library,
 )
-from slap_ros.acquisition.skill_selection import failing_often, select_skills
-from slap_ros.acquisition.task_source import TaskSource
-from slap_ros.core.goals import task_with_goal
-from slap_ros.errors import InvalidLibraryError, InvalidParameterError, UnsolvableError
-from slap_ros.learning.demonstrator import record_traces
-from slap_ros.learning.mlp_policy import MlpPolicy
-from slap_ros.learning.scripted_skill import with_scripts
-from slap_ros.learning.workers import SequentialWorkers, local_workers
-from slap_ros.planning.execution import Executor
-from slap_ros.planning.planner import make_planner
+from slap_ros.skills.skill_signature import signature_of
 
 pytestmark = pytest.mark.usefixtures("points_installed")
 SAC = SacSettings(
@@ -330,8 +332,8 @@ def test_a_goal_out_of_reach_is_refused(tmp_path):
 
 def random_policy(seed=0):
     rng = np.random.default_rng(seed)
-    from slap_ros.acquisition.observations import SIZE
-    from slap_ros.acquisition.sac import AS_OBSERVED
+    from slap_ros.acquisition.training.sac import AS_OBSERVED
+    from slap_ros.skills.observations import SIZE
 
     shapes = ((32, SIZE), (32, 32), (3, 32))
     layers = tuple(

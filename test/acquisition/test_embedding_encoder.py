@@ -13,8 +13,8 @@ from points import PICK, PUT
 from steady_skills import PICKING, PUTTING, write_library
 from typer.testing import CliRunner
 
-from slap_ros.acquisition.embedding_encoder import EmbeddingEncoder, operator_sentence
-from slap_ros.acquisition.retrieval import nearest
+from slap_ros.acquisition.training.embedding_encoder import EmbeddingEncoder, operator_sentence
+from slap_ros.acquisition.training.retrieval import nearest
 from slap_ros.cli import app
 from slap_ros.errors import (
     ErrorCode,

@@ -11,14 +11,14 @@ from random import Random
 import pytest
 from paper_problems import ALL, Printed, peg_in_hole, stow_hammer
 
-from slap_ros.acquisition.induction import (
+from slap_ros.acquisition.proposals.induction import (
     InducedProposer,
     hold_steps_of,
     induce_operators,
     stable_states,
 )
-from slap_ros.acquisition.problem import AcquisitionProblem
-from slap_ros.acquisition.verification import verify
+from slap_ros.acquisition.proposals.problem import AcquisitionProblem
+from slap_ros.acquisition.proposals.verification import verify
 from slap_ros.core import Task
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError, ProposalRejectedError

@@ -8,14 +8,14 @@ from multiprocessing import active_children
 import pytest
 from points import POINTS, REWARDS
 
-from slap_ros.acquisition import jobs
-from slap_ros.acquisition.initiation_states import InitiationStates
-from slap_ros.acquisition.judges import JudgeElsewhere
-from slap_ros.acquisition.rollouts import PlanRollout
-from slap_ros.acquisition.sac import SkillLearner
-from slap_ros.acquisition.sac_settings import SacSettings
-from slap_ros.acquisition.settings import AcquisitionSettings
-from slap_ros.acquisition.task_source import VALIDATION, TaskSource
+from slap_ros.acquisition.curriculum import jobs
+from slap_ros.acquisition.curriculum.initiation_states import InitiationStates
+from slap_ros.acquisition.curriculum.rollouts import PlanRollout
+from slap_ros.acquisition.curriculum.task_source import VALIDATION, TaskSource
+from slap_ros.acquisition.training.judges import JudgeElsewhere
+from slap_ros.acquisition.training.sac import SkillLearner
+from slap_ros.acquisition.training.sac_settings import SacSettings
+from slap_ros.acquisition.training.settings import AcquisitionSettings
 
 pytestmark = pytest.mark.usefixtures("points_installed")
 

@@ -14,11 +14,11 @@ from typing import Any
 from model_answers import operator_data, operator_json, operator_text, reward_data
 from paper_problems import ALL, Printed, symbol
 
-from slap_ros.acquisition.complaints import ComplaintClass, serious
-from slap_ros.acquisition.drafts import check_operator
-from slap_ros.acquisition.problem import AcquisitionProblem
-from slap_ros.acquisition.rewards import check_rewards
-from slap_ros.acquisition.verification import verify
+from slap_ros.acquisition.proposals.complaints import ComplaintClass, serious
+from slap_ros.acquisition.proposals.drafts import check_operator
+from slap_ros.acquisition.proposals.problem import AcquisitionProblem
+from slap_ros.acquisition.proposals.reward_templates import check_rewards
+from slap_ros.acquisition.proposals.verification import verify
 from slap_ros.errors import MalformedAnswerError
 from slap_ros.language.formats import OperatorDraft, parse_operator, parse_rewards
 from slap_ros.relational import GroundOperator, Layout, LiftedOperator, Object, ground_operators

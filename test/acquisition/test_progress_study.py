@@ -10,8 +10,8 @@ from steady_skills import PICKING, towards, write_library
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
-from slap_ros.acquisition.skill_library import AcquiredSkill
-from slap_ros.learning import shipped_models
+from slap_ros.policies import shipped_models
+from slap_ros.skills.skill_library import AcquiredSkill
 
 pytestmark = pytest.mark.usefixtures("points_installed")
 

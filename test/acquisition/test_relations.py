@@ -8,18 +8,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from slap_ros.acquisition.groundings import Grounding, Groundings
-from slap_ros.acquisition.observations import (
+from slap_ros.domains import get_domain
+from slap_ros.geometry.pose import Pose, from_yaw, multiply
+from slap_ros.policies.learner_interface import learner_interface
+from slap_ros.skills.groundings import Grounding, Groundings
+from slap_ros.skills.observations import (
     PAIRS,
     RELATION_FEATURES,
     RELATIONS,
     SIZE,
     SkillObserver,
 )
-from slap_ros.acquisition.reward import OperatorEffects
-from slap_ros.domains import get_domain
-from slap_ros.geometry.pose import Pose, from_yaw, multiply
-from slap_ros.learning.learner_interface import learner_interface
+from slap_ros.skills.reward import OperatorEffects
 
 HAMMERS = get_domain("stow_hammer")
 OPERATORS = {operator.name: operator for operator in HAMMERS.acquisition.operators}

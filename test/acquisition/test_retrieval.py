@@ -4,9 +4,10 @@
 
 import pytest
 
-from slap_ros.acquisition.retrieval import SkillSignature, nearest, signature_of
-from slap_ros.acquisition.settings import AcquisitionSettings
+from slap_ros.acquisition.training.retrieval import nearest
+from slap_ros.acquisition.training.settings import AcquisitionSettings
 from slap_ros.domains import get_domain
+from slap_ros.skills.skill_signature import SkillSignature, signature_of
 
 PAIRS = [
     ("make_coffee", "Open", "stow_hammer", "Open"),

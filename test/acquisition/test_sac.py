@@ -12,17 +12,17 @@ from points import HORIZON, INTERFACE, PICK, POINTS, REWARDS, begin
 from stable_baselines3 import SAC
 from stable_baselines3.common.torch_layers import create_mlp
 
-from slap_ros.acquisition.episodes import load_episodes, save_episodes
-from slap_ros.acquisition.groundings import Groundings
-from slap_ros.acquisition.observations import SIZE
-from slap_ros.acquisition.reward import SkillReward
-from slap_ros.acquisition.sac import SkillLearner
-from slap_ros.acquisition.sac_settings import SAC_PRESETS, SMALL, sac_preset
-from slap_ros.acquisition.sac_update import LeanSac
-from slap_ros.acquisition.skill_env import SkillMdp, SkillVecEnv
-from slap_ros.acquisition.twin_critics import NormalisedRectifier, Rectifier, TwinCritics
+from slap_ros.acquisition.training.episodes import load_episodes, save_episodes
+from slap_ros.acquisition.training.sac import SkillLearner
+from slap_ros.acquisition.training.sac_settings import SAC_PRESETS, SMALL, sac_preset
+from slap_ros.acquisition.training.sac_update import LeanSac
+from slap_ros.acquisition.training.skill_env import SkillMdp, SkillVecEnv
+from slap_ros.acquisition.training.twin_critics import NormalisedRectifier, Rectifier, TwinCritics
 from slap_ros.errors import InvalidParameterError
 from slap_ros.relational import RewardTemplate
+from slap_ros.skills.groundings import Groundings
+from slap_ros.skills.observations import SIZE
+from slap_ros.skills.reward import SkillReward
 
 QUICK = replace(SMALL, random_steps=192)
 STARTS = begin(PICK, range(40))

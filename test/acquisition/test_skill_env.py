@@ -23,13 +23,13 @@ from points import (
     sample_task,
 )
 
-from slap_ros.acquisition.groundings import Grounding, Groundings
-from slap_ros.acquisition.observations import SIZE
-from slap_ros.acquisition.reward import SkillReward
-from slap_ros.acquisition.skill_env import Initiation, SkillMdp, SkillVecEnv
+from slap_ros.acquisition.training.skill_env import Initiation, SkillMdp, SkillVecEnv
 from slap_ros.errors import InvalidRewardError
 from slap_ros.relational import RewardTemplate, RewardTerm, State
 from slap_ros.relational.operators import Variable
+from slap_ros.skills.groundings import Grounding, Groundings
+from slap_ros.skills.observations import SIZE
+from slap_ros.skills.reward import SkillReward
 
 
 def scattered(count, things=2, seed=0):

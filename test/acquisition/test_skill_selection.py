@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import pytest
 
-from slap_ros.acquisition.curriculum_state import CurriculumState, SkillProgress
-from slap_ros.acquisition.initiation_states import InitiationStates
-from slap_ros.acquisition.rollouts import PlanRollout, Stage, StageEnd
-from slap_ros.acquisition.settings import AcquisitionSettings
-from slap_ros.acquisition.skill_selection import NO_PROGRESS, select_skills
+from slap_ros.acquisition.curriculum.curriculum_state import CurriculumState, SkillProgress
+from slap_ros.acquisition.curriculum.initiation_states import InitiationStates
+from slap_ros.acquisition.curriculum.rollouts import PlanRollout, Stage, StageEnd
+from slap_ros.acquisition.curriculum.skill_selection import NO_PROGRESS, select_skills
+from slap_ros.acquisition.training.settings import AcquisitionSettings
 
 SETTINGS = AcquisitionSettings()
 HERE, ELSEWHERE = 0.1, 0.7  # where Put begins, in m

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from points import HORIZON, INTERFACE, PICK, POINTS, REWARDS, begin
 
-from slap_ros.acquisition.reward import SkillReward
-from slap_ros.acquisition.validation import RANDOM, RANDOM_ROUNDS, SkillTrials
+from slap_ros.acquisition.training.validation import RANDOM, RANDOM_ROUNDS, SkillTrials
+from slap_ros.skills.reward import SkillReward
 
 REWARD = SkillReward(PICK, REWARDS["Pick"], INTERFACE)
 

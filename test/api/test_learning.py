@@ -9,7 +9,6 @@ import pytest
 from typer.testing import CliRunner
 
 import slap_ros
-from slap_ros.acquisition.domain_choice import DEMONSTRATOR
 from slap_ros.api import training
 from slap_ros.api.proposers import Proposers
 from slap_ros.api.setting_texts import change_texts
@@ -19,6 +18,7 @@ from slap_ros.learning.setting_changes import parse_changes
 from slap_ros.learning.workers import SequentialWorkers
 from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.settings import TrainingSettings
+from slap_ros.skills.domain_choice import DEMONSTRATOR
 
 TOY = {
     "exploration.tasks": 2,

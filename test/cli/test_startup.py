@@ -19,7 +19,7 @@ OTHERS = {"scipy", "openai", "transformers", "pandas", "jinja2", "slap_ros.langu
 HEAVY = LEARNING | PHYSICS | PICTURES | OTHERS
 ROS = {"rclpy", "rosbags", "cyclonedds", "slap_ros.bags"}
 PLANNING = {"yaml", "safetensors", "slap_ros.core", "slap_ros.domains", "slap_ros.evaluation"}
-LG_SAIL = {"slap_ros.acquisition.skill_library", "slap_ros.acquisition.proposal"}
+LG_SAIL = {"slap_ros.skills.skill_library", "slap_ros.acquisition.proposals.proposal"}
 SHORTCUTS = {"slap_ros.shortcuts.library", "slap_ros.shortcuts.shipped"}
 STUDIES = {"slap_ros.studies", "slap_ros.report", "slap_ros.doctor.libraries"}
 
@@ -106,7 +106,7 @@ def test_acquisition_node_learns_in_another_process():
 
 @pytest.mark.parametrize(
     "package",
-    ["slap_ros", "slap_ros.core", "slap_ros.planning", "slap_ros.learning.shipped_models"],
+    ["slap_ros", "slap_ros.core", "slap_ros.planning", "slap_ros.policies.shipped_models"],
 )
 def test_packages_for_programs_are_light(package):
     assert not modules_after(f"import {package}") & (HEAVY | ROS | LG_SAIL | STUDIES)

@@ -16,11 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
-from slap_ros.acquisition.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
 from slap_ros.core import Domain
 from slap_ros.domain_check.experience import Transition, gather
-from slap_ros.learning.demonstrator import demonstrate
 from slap_ros.relational import State
+from slap_ros.skills.demonstrator import demonstrate
+from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
 from slap_ros.worlds.contact.simulation_pool import close_idle
 
 SHUFFLES = 3

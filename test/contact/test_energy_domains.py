@@ -14,7 +14,7 @@ from slap_ros.domains import get_domain
 from slap_ros.domains.benchtop.features import THING
 from slap_ros.domains.benchtop.state_access import LINEAR, position_of
 from slap_ros.domains.registry import OURS
-from slap_ros.learning.demonstrator import demonstrate
+from slap_ros.skills.demonstrator import demonstrate
 from slap_ros.worlds.contact.features import ROBOT
 
 DOMAINS = [name for name in OURS if get_domain(name).acquisition is not None]

@@ -14,7 +14,7 @@ from slap_ros.domains.make_coffee.scenery import POD, POD_HALF, POD_RADIUS
 from slap_ros.domains.stow_hammer.scenery import HAMMER, RADIUS
 from slap_ros.errors import InvalidStateError
 from slap_ros.geometry.pose import from_yaw
-from slap_ros.learning.learner_interface import learner_interface
+from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.relational import State
 from slap_ros.worlds.contact.features import ROBOT, robot_features
 from slap_ros.worlds.contact.hand import PAD, hand_at

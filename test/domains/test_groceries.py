@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from skill_starts import CONSTANT, achieves, skill_starts
 
-from slap_ros.acquisition.domain_choice import DomainChoice, open_domain
 from slap_ros.domains import get_domain
 from slap_ros.domains.benchtop.room import within_reach
 from slap_ros.domains.benchtop.state_access import pose_of, yaw_of
@@ -16,8 +15,9 @@ from slap_ros.domains.groceries.model import NAMES
 from slap_ros.domains.groceries.scenery import GROCERIES, INNER, OUTER, WALL_HEIGHT
 from slap_ros.domains.groceries.tasks import basket_station, grasp_goal, station
 from slap_ros.errors import InvalidParameterError, UnknownObjectError
-from slap_ros.learning.demonstrator import demonstrate
 from slap_ros.relational import Column
+from slap_ros.skills.demonstrator import demonstrate
+from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.worlds.panda import FINGER_OPEN
 
 DOMAIN = get_domain("groceries")

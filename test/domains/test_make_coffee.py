@@ -19,7 +19,6 @@ from drawer_states import (
     put,
 )
 
-from slap_ros.acquisition.domain_choice import DomainChoice, open_domain
 from slap_ros.domains import get_domain
 from slap_ros.domains.benchtop import drawers
 from slap_ros.domains.benchtop.cabinet import TRAVEL
@@ -41,8 +40,9 @@ from slap_ros.domains.make_coffee.scenery import (
 )
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.geometry.pose import Pose
-from slap_ros.learning.demonstrator import demonstrate
 from slap_ros.relational import State
+from slap_ros.skills.demonstrator import demonstrate
+from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.worlds.contact.world import MAX_SHIFT
 
 DOMAIN = get_domain("make_coffee")

@@ -9,14 +9,14 @@ import pytest
 from executed import fluent_atoms
 from skill_starts import CONSTANT, achieves, skill_starts
 
-from slap_ros.acquisition.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
 from slap_ros.domains import get_domain
 from slap_ros.domains.benchtop.state_access import POSE_NAMES, pose_of
 from slap_ros.domains.peg_in_hole.demonstrator import acts_at, outwards
 from slap_ros.domains.peg_in_hole.model import HOLE, IN, IS_CLEAR, PEG
 from slap_ros.geometry.pose import IDENTITY, Pose, from_rotation_vector, from_yaw
-from slap_ros.learning.demonstrator import demonstrate
 from slap_ros.relational import Column, State
+from slap_ros.skills.demonstrator import demonstrate
+from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
 
 DOMAIN = get_domain("peg_in_hole")
 INITIAL = {"HandEmpty()", "OnTable(peg1)", "OnTable(peg2)", "IsClear(hole1)", "IsClear(hole2)"}

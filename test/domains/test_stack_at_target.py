@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from executed import fluent_atoms
 
-from slap_ros.acquisition.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
 from slap_ros.domains import get_domain
 from slap_ros.domains.benchtop.approach import ASIDE, DISTANCE
 from slap_ros.domains.benchtop.state_access import hand_position, position_of, standing_on
 from slap_ros.domains.stack_at_target.model import CUBE, IS_CLEAR, ON, TARGET
 from slap_ros.errors import InvalidParameterError, UnknownObjectError
-from slap_ros.learning.demonstrator import demonstrate
 from slap_ros.relational import State
+from slap_ros.skills.demonstrator import demonstrate
+from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
 from slap_ros.studies.vacuity import gather_starts, try_policies
 
 NAME = "stack_at_target"

@@ -18,7 +18,6 @@ from drawer_states import (
     put,
 )
 
-from slap_ros.acquisition.domain_choice import DomainChoice, open_domain
 from slap_ros.domains import get_domain
 from slap_ros.domains.benchtop import drawers
 from slap_ros.domains.benchtop.cabinet import TRAVEL
@@ -26,8 +25,9 @@ from slap_ros.domains.benchtop.state_access import pose_of
 from slap_ros.domains.stow_hammer.scenery import HALF_LENGTH, RADIUS, SHAPE
 from slap_ros.errors import InvalidParameterError, InvalidStateError
 from slap_ros.geometry.pose import Pose, from_yaw
-from slap_ros.learning.demonstrator import demonstrate
 from slap_ros.relational import State
+from slap_ros.skills.demonstrator import demonstrate
+from slap_ros.skills.domain_choice import DomainChoice, open_domain
 
 DOMAIN = get_domain("stow_hammer")
 SCRIPTED = open_domain(DomainChoice("stow_hammer", skills="demonstrator"))

@@ -22,7 +22,6 @@ from ensemble.launcher import InProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.run import RunRequest, run
 from ensemble.spinner import temporary_node
-from slap_ros.acquisition.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
 from slap_ros.bags import bag_info, evaluate_bag, replay_bag
 from slap_ros.bags.reader import read_bag
 from slap_ros.bags.recording import Recording
@@ -34,6 +33,7 @@ from slap_ros.robot.limits import Workspace, arm_limits
 from slap_ros.robot.recorded_motion import read_recorded_motion
 from slap_ros.robot.robot_world import GripperAction, RobotWorld
 from slap_ros.robot.scene_config import sampled_scene_config
+from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
 from slap_ros.worlds.panda import grasp_pose
 
 pytestmark = pytest.mark.timeout(180)  # runs in worlds with contact forces

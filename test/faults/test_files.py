@@ -18,7 +18,6 @@ from typer.testing import CliRunner
 from ensemble.cli.application import app
 from ensemble.entry_point import run_node
 from sim_node.node import SimNode
-from slap_ros.acquisition.domain_choice import DomainChoice
 from slap_ros.bags import bag_digest, bag_info, evaluate_bag, read_bag, replay_bag
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode, SlapError
@@ -37,6 +36,7 @@ from slap_ros.shortcuts.settings import ExplorationSettings, training_settings
 from slap_ros.shortcuts.shortcut import Sampling
 from slap_ros.shortcuts.training import Training
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
+from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.trainings import TrainingFolder
 
 pytestmark = pytest.mark.timeout(3600)  # for as many cases as somebody may ask for

@@ -13,12 +13,12 @@ from typing import Any
 from paper_problems import Printed
 from scripted_server import Script, Step
 
-from slap_ros.acquisition.attempt_log import AttemptLog
-from slap_ros.acquisition.inquiry import Inquiry
-from slap_ros.acquisition.language_proposer import LanguageProposer, LanguageRewarder
-from slap_ros.acquisition.proposal import Proposal
-from slap_ros.acquisition.proposers import propose
-from slap_ros.acquisition.rewards import compose_reward
+from slap_ros.acquisition.proposals.attempt_log import AttemptLog
+from slap_ros.acquisition.proposals.inquiry import Inquiry
+from slap_ros.acquisition.proposals.language_proposer import LanguageProposer, LanguageRewarder
+from slap_ros.acquisition.proposals.proposal import Proposal
+from slap_ros.acquisition.proposals.proposers import propose
+from slap_ros.acquisition.proposals.reward_templates import compose_reward
 from slap_ros.errors import SlapError
 from slap_ros.language.budget import Budget, BudgetLimits
 from slap_ros.language.cassette import open_client, with_recorded

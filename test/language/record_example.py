@@ -19,7 +19,7 @@ from model_answers import LIMITS, SETTINGS, good_script, operator_json, run  # n
 from paper_problems import peg_in_hole, printed_insert  # noqa: E402
 from scripted_server import serving  # noqa: E402
 
-from slap_ros.acquisition.problem import AcquisitionProblem  # noqa: E402
+from slap_ros.acquisition.proposals.problem import AcquisitionProblem  # noqa: E402
 from slap_ros.relational.pddl import parse_domain, parse_problem  # noqa: E402
 
 EXAMPLE = HERE.parent.parent / "examples" / "peg_in_hole"

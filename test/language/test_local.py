@@ -14,10 +14,10 @@ import pytest
 from model_answers import SETTINGS
 from paper_problems import peg_in_hole, stow_hammer
 
-from slap_ros.acquisition.attempt_log import AttemptLog
-from slap_ros.acquisition.inquiry import Inquiry
-from slap_ros.acquisition.language_proposer import LanguageProposer
-from slap_ros.acquisition.questions import about_decomposition, about_operator
+from slap_ros.acquisition.proposals.attempt_log import AttemptLog
+from slap_ros.acquisition.proposals.inquiry import Inquiry
+from slap_ros.acquisition.proposals.language_proposer import LanguageProposer
+from slap_ros.acquisition.proposals.questions import about_decomposition, about_operator
 from slap_ros.errors import LanguageUnavailableError, ProposalRejectedError
 from slap_ros.language.budget import Budget, BudgetLimits
 from slap_ros.language.cassette import make_client

@@ -23,7 +23,7 @@ from model_answers import (
 from paper_problems import ALL, peg_in_hole, printed_insert
 from scripted_server import Step, serving
 
-from slap_ros.acquisition.attempt_log import MAX_ANSWER
+from slap_ros.acquisition.proposals.attempt_log import MAX_ANSWER
 from slap_ros.errors import ErrorCode
 from slap_ros.relational import Layout
 

@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from slap_ros.learning.exact_layer import ExactLayer
-from slap_ros.learning.mlp_policy import MlpPolicy, ObservationNormalisation
+from slap_ros.policies.exact_layer import ExactLayer
+from slap_ros.policies.mlp_policy import MlpPolicy, ObservationNormalisation
 from slap_ros.portable_math import on_grid
 
 SIZES = (30, 256, 256, 7)

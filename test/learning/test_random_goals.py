@@ -5,10 +5,10 @@
 import numpy as np
 import pytest
 
-from slap_ros.acquisition.domain_choice import DomainChoice
 from slap_ros.domains import get_domain
-from slap_ros.learning.random_goals import WithRandomGoals, sample_goals
+from slap_ros.learning.random_goals import RandomGoalsChoice, sample_goals
 from slap_ros.planning.planner import Problem, make_planner
+from slap_ros.skills.domain_choice import DomainChoice
 
 CHOICE = DomainChoice("obstacle2d", "fair")
 DOMAIN = get_domain("obstacle2d")
@@ -44,7 +44,7 @@ def test_where_there_are_fewer_goals_than_asked_for_all_of_them_are_taken():
 
 @pytest.mark.parametrize(("share", "fewest", "most"), [(0.0, 0, 0), (0.5, 10, 30), (1.0, 38, 40)])
 def test_a_share_of_the_tasks_has_another_goal_and_all_begin_as_they_did(share, fewest, most):
-    domain = WithRandomGoals(CHOICE, share).make()
+    domain = RandomGoalsChoice.of_choice(CHOICE, share).make()
     others = 0
     for index in range(TASKS):
         own, task = DOMAIN.task(7, index), domain.task(7, index)
@@ -56,5 +56,5 @@ def test_a_share_of_the_tasks_has_another_goal_and_all_begin_as_they_did(share, 
 
 def test_other_goals_tell_a_domain_from_others():
     shares = (0.0, 0.5, 1.0)
-    identities = [dict(WithRandomGoals(CHOICE, share).identity) for share in shares]
+    identities = [dict(RandomGoalsChoice.of_choice(CHOICE, share).identity) for share in shares]
     assert len({tuple(identity.items()) for identity in identities}) == len(shares)

@@ -14,9 +14,9 @@ from slap_ros.bags import evaluate_bag, read_bag, replay_bag
 from slap_ros.core import ActionSpace, GripperAxis
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidCommandError, InvalidDomainError
-from slap_ros.learning.action_map import ActionMap
 from slap_ros.messages.decode import decode_command
 from slap_ros.messages.interfaces import COMMAND, DOMAIN_INFO
+from slap_ros.policies.action_map import ActionMap
 from slap_ros.relational import Feature
 from slap_ros.shortcuts.explore import Explorer
 from slap_ros.shortcuts.settings import ExplorationSettings

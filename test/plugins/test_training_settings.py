@@ -9,7 +9,6 @@ import pytest
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
-from slap_ros.acquisition.domain_choice import DomainChoice
 from slap_ros.core import Learning
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode, InvalidDomainError, InvalidParameterError, UnsolvableError
@@ -18,6 +17,7 @@ from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.workers import SequentialWorkers
 from slap_ros.shortcuts.settings import GENERAL, OURS, TrainingSettings, training_settings
 from slap_ros.shortcuts.training import Training
+from slap_ros.skills.domain_choice import DomainChoice
 
 PATCHY = patchy.make("some")
 WRONG = [

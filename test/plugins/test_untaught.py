@@ -10,7 +10,6 @@ import untaught
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
-from slap_ros.acquisition.domain_choice import DomainChoice, open_domain
 from slap_ros.core import task_with_goal
 from slap_ros.domain_check import check_domain
 from slap_ros.domains import get_domain
@@ -21,9 +20,10 @@ from slap_ros.errors import (
     UnknownGoalError,
     UnsolvableError,
 )
-from slap_ros.learning.demonstrator import demonstrate
-from slap_ros.learning.scripted_skill import with_scripts
 from slap_ros.planning.planner import SymbolicPlanner, ground_options, make_planner
+from slap_ros.skills.demonstrator import demonstrate
+from slap_ros.skills.domain_choice import DomainChoice, open_domain
+from slap_ros.skills.scripted_skill import with_scripts
 
 DOMAIN = untaught.make()
 TAUGHT = get_domain("obstacle2d")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pushing import DOMAIN, SIGNATURE, STARTS, overlap
 
-from slap_ros.learning.action_map import ActionMap
+from slap_ros.policies.action_map import ActionMap
 from slap_ros.relational import State
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.rewards import Rewards

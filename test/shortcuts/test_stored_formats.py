@@ -13,7 +13,6 @@ from pathlib import Path
 
 import pytest
 
-from slap_ros.acquisition.domain_choice import DomainChoice
 from slap_ros.domains import get_domain
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.workers import SequentialWorkers
@@ -21,6 +20,7 @@ from slap_ros.shortcuts.library import load_library, save_library
 from slap_ros.shortcuts.settings import GENERAL, ExplorationSettings, training_settings
 from slap_ros.shortcuts.shipped import shipped_library
 from slap_ros.shortcuts.training import Training
+from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.trainings import TrainingFolder
 
 DATA = Path(__file__).parent / "data" / "training_of_0_1_0"

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from pushing import SIGNATURE, STARTS
 
-from slap_ros.acquisition.domain_choice import DomainChoice
 from slap_ros.errors import InvalidStateError
 from slap_ros.learning.subproc_vec_env import make_vec_env
 from slap_ros.learning.vec_env import VecEnvStep
 from slap_ros.shortcuts.rewards import Rewards
 from slap_ros.shortcuts.shortcut_env_spec import ShortcutEnvSpec
 from slap_ros.shortcuts.starts import StartRecord
+from slap_ros.skills.domain_choice import DomainChoice
 
 RECORDS = tuple(
     StartRecord(21, index, tuple(start.state.data), start.change.add, start.change.delete)

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from slap_ros.acquisition.domain_choice import DomainChoice
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.learning.task_distribution import TaskDistribution
@@ -23,6 +22,7 @@ from slap_ros.shortcuts.settings import POLISH, ExplorationSettings, training_se
 from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.training import CandidateGroup, Training, rank
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
+from slap_ros.skills.domain_choice import DomainChoice
 
 TASKS = TaskDistribution(DomainChoice("obstacle2d", "fair"), 5)
 OURS = training_settings("ours", get_domain("obstacle2d"))

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from ensemble.cli.application import app
 from slap_ros.domains import domain_names, get_domain
 from slap_ros.errors import ErrorCode, InvalidParameterError
-from slap_ros.learning.learner_interface import learner_interface, without
+from slap_ros.policies.learner_interface import learner_interface, without
 from slap_ros.shortcuts import jobs
 from slap_ros.studies import ablation
 

@@ -15,7 +15,6 @@ from study_helpers import without_seconds
 from typer.testing import CliRunner
 
 from ensemble.cli.application import COMMANDS, app
-from slap_ros.acquisition.domain_choice import DomainChoice
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.approaches import approaches
@@ -28,6 +27,7 @@ from slap_ros.shortcuts.library import load_library, save_shortcut
 from slap_ros.shortcuts.settings import training_settings
 from slap_ros.shortcuts.shortcut import Sampling
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
+from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies import perception, pruning
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.reproducing import published

@@ -11,12 +11,12 @@ from pathlib import Path
 
 from PIL import Image
 
-from slap_ros.acquisition.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
 from slap_ros.core import Domain
 from slap_ros.geometry.pose import Vector
-from slap_ros.learning.demonstrator import demonstrate
 from slap_ros.planning.execution import EpisodeResult, ExecutedEdge
 from slap_ros.relational import State
+from slap_ros.skills.demonstrator import demonstrate
+from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
 from slap_ros.worlds.contact.arm import CONTROL_PERIOD_S
 from slap_ros.worlds.contact.scene import ContactScene
 from slap_ros.worlds.contact.visuals import ContactVisuals

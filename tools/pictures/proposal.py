@@ -8,10 +8,10 @@ import json
 import textwrap
 from pathlib import Path
 
-from slap_ros.acquisition.attempt_log import AttemptLog, Entry
-from slap_ros.acquisition.inquiry import Inquiry
-from slap_ros.acquisition.language_proposer import LanguageProposer
-from slap_ros.acquisition.problem import AcquisitionProblem
+from slap_ros.acquisition.proposals.attempt_log import AttemptLog, Entry
+from slap_ros.acquisition.proposals.inquiry import Inquiry
+from slap_ros.acquisition.proposals.language_proposer import LanguageProposer
+from slap_ros.acquisition.proposals.problem import AcquisitionProblem
 from slap_ros.drawing.layout import Area
 from slap_ros.drawing.palette import BACKGROUND, BORDER, CARD, INK, MUTED
 from slap_ros.drawing.svg import SvgPicture, SvgRectangle, SvgShape, SvgText

@@ -1,0 +1,280 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""LG-SAIL's Algorithm 1: the plan is the curriculum.
+
+An iteration of :meth:`Curriculum.run` is one of the algorithm:
+
+- *reset, plan, roll out*: plans are carried out with the skills at hand (``rollouts``);
+- *collect failed skills with their simulator states*: the ``initiation_states`` of rollouts;
+- *train them from these states*: those that ``skill_selection`` chooses, each in its
+  ``skill_training``; a new one begins with the *retrieved* known skill (``warm_start``);
+- a *dead end*, which is ours: what never succeeds is learned from scratch, and what comes before
+  it (``dead_ends``);
+- *write back*: the best checkpoint is a skill at hand of the next iteration;
+- *until nothing fails*, or progress is enough twice, or the budget is spent.
+
+Skills that do not fail are never trained. What is known between iterations is a
+``CurriculumState``. Every result is kept in a ``curriculum_folder``, so that the same command
+continues where it was interrupted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from statistics import fmean
+from typing import Any
+
+from slap_ros.acquisition.curriculum import jobs
+from slap_ros.acquisition.curriculum.curriculum_callback import CurriculumCallback, OngoingRound
+from slap_ros.acquisition.curriculum.curriculum_folder import CurriculumFolder
+from slap_ros.acquisition.curriculum.curriculum_state import CurriculumState
+from slap_ros.acquisition.curriculum.dead_ends import DeadEnd
+from slap_ros.acquisition.curriculum.initiation_states import InitiationStates
+from slap_ros.acquisition.curriculum.jobs import LearningJob, horizon_of
+from slap_ros.acquisition.curriculum.library_record import library_record, skill_record
+from slap_ros.acquisition.curriculum.rollouts import PlanRollout
+from slap_ros.acquisition.curriculum.skill_selection import (
+    NO_PROGRESS,
+    SkillSelection,
+    select_skills,
+)
+from slap_ros.acquisition.curriculum.task_source import TaskSource, fresh_tasks, training_tasks
+from slap_ros.acquisition.training.retrieval import METRICS, MetricSignatureEncoder, SkillEncoder
+from slap_ros.acquisition.training.settings import AcquisitionSettings
+from slap_ros.acquisition.training.warm_start import WarmStarts
+from slap_ros.errors import UnsolvableError
+from slap_ros.learning.workers import Workers, run_in_order
+from slap_ros.skills.skill_library import AcquiredSkill, SkillLibrary, load_skill
+
+TWICE = 2  # enough progress in a row
+
+
+@dataclass
+class Curriculum:
+    """The acquisition of all skills that the tasks of a source take.
+
+    Args:
+        source: Of tasks, operators and rewards.
+        settings: All hyper-parameters.
+        folder: Its work folder.
+        workers: Where jobs run.
+        callback: Receives its events.
+        known: Skills that new ones may begin with, by the path of their folders.
+        kept: Skills that are there already, by the path of their folders. They are used as they
+            are, and learned further only where they fail.
+        encoder: Gives operators the keys by which these are found.
+    """
+
+    source: TaskSource
+    settings: AcquisitionSettings
+    folder: Path
+    workers: Workers
+    callback: CurriculumCallback
+    known: dict[str, AcquiredSkill] = field(default_factory=dict)
+    encoder: SkillEncoder = field(default_factory=MetricSignatureEncoder)
+    kept: dict[str, AcquiredSkill] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._results = CurriculumFolder(self.folder)
+        self._domain = self.source.make_domain()
+        self._segment_steps = self.settings.segment_steps(horizon_of(self._domain))
+        self._operators = {operator.name: operator for operator in self.source.operators()}
+        self._kept_folders = {skill.operator.name: path for path, skill in self.kept.items()}
+        self._kept = {name: self.kept[path] for name, path in self._kept_folders.items()}
+        least = self.settings.least_similarity
+        self._warm_starts = WarmStarts(self._kept, self.known, self.encoder, least)
+
+    def run(self) -> SkillLibrary:
+        """Acquire until nothing fails, progress is enough twice, or the budget is spent.
+
+        Returns:
+            The skills; the record says why it ended.
+
+        Raises:
+            InvalidParameterError: The folder has another curriculum, or is damaged.
+            UnsolvableError: No task has a plan.
+        """
+        self._results.require_same(self._as_json())
+        state = CurriculumState.initial(self._operators)
+        iteration = 0
+        while not (ended := self._iterate(iteration, state)):
+            iteration += 1
+        return self._library(ended, iteration, state)
+
+    def _iterate(self, iteration: int, state: CurriculumState) -> str:
+        """Carry out plans, and train what fails from where it fails.
+
+        Args:
+            iteration: From 0.
+            state: Takes note of what comes of it.
+
+        Returns:
+            Why the curriculum is over; empty where it is not.
+        """
+        tasks = training_tasks(iteration, self.settings.rollouts)
+        rollouts = self._roll_out(iteration, "rollouts", tasks, state)
+        require_plans(rollouts, self.source)
+        state.task_progress.append(fmean(rollout.progress for rollout in rollouts))
+        self.callback.on_rollouts(iteration, rollouts)
+        if over := self._why_over(rollouts, state):
+            return over
+        unseen = fresh_tasks(iteration, self.settings.validation)
+        fresh = self._roll_out(iteration, "fresh", unseen, state)
+        selection = select_skills(rollouts, state, self.settings)
+        state.not_trained = dict(selection.not_trained)
+        if not selection.operators:
+            return NO_PROGRESS
+        self._start_over(iteration, selection.dead_ends, state)
+        self._train(iteration, self._rounds(selection, rollouts, fresh, state), state)
+        return ""
+
+    def _why_over(self, rollouts: Sequence[PlanRollout], state: CurriculumState) -> str:
+        """Why the curriculum is over; empty where it is not."""
+        if not any(rollout.plan or rollout.unplanned for rollout in rollouts):
+            return "the goal holds at the start of every task"
+        if not any(rollout.failure for rollout in rollouts):
+            return "nothing fails"
+        latest = state.task_progress[-TWICE:]
+        if len(latest) == TWICE and min(latest) >= self.settings.progress:
+            return "progress is enough"
+        if self._steps_left(state) < self._segment_steps:
+            return "the budget is spent"
+        return ""
+
+    # -- carrying out plans -----------------------------------------------------------------------
+
+    def _roll_out(
+        self, iteration: int, name: str, tasks: range, state: CurriculumState
+    ) -> list[PlanRollout]:
+        """Carry out plans with the skills at hand: those that were learned, or else are kept."""
+        learned = {name: str(self._skill(name, state)) for name in state.learned}
+        work = [(self.source, index, self._kept_folders | learned) for index in tasks]
+        return self._results.rollouts(
+            iteration, name, lambda: self._run("carrying out plans", jobs.carry_out, work)
+        )
+
+    def _skill(self, name: str, state: CurriculumState) -> Path:
+        """The folder of a skill that was learned."""
+        return self._results.skill(self._operators[name], state.skills[name].attempt)
+
+    # -- training ---------------------------------------------------------------------------------
+
+    def _start_over(
+        self, iteration: int, dead_ends: Sequence[DeadEnd], state: CurriculumState
+    ) -> None:
+        """Forget the skills that have led into dead ends, and those that ended there."""
+        for dead_end in dead_ends:
+            self.callback.on_dead_end(iteration, dead_end)
+            for name in (dead_end.before, dead_end.skill):
+                state.skills[name] = state.skills[name].from_scratch()
+
+    def _rounds(
+        self,
+        selection: SkillSelection,
+        rollouts: Sequence[PlanRollout],
+        fresh: Sequence[PlanRollout],
+        state: CurriculumState,
+    ) -> list[LearningJob]:
+        """A round of training per selected skill; the first one of a skill begins warm.
+
+        Args:
+            selection: Which skills, and for how long.
+            rollouts: On training tasks.
+            fresh: On tasks that training never sees.
+            state: Of the curriculum.
+        """
+        settings = replace(self.settings, skill_steps=selection.steps)
+        rounds = []
+        for name in selection.operators:
+            skill = state.skills[name]
+            number, attempt = skill.rounds, skill.attempt
+            again = number or attempt
+            warm_start = None if again else self._warm_starts.find(self._operators[name])
+            states = InitiationStates.of(name, rollouts), InitiationStates.of(name, fresh)
+            if attempt and not number:
+                states = states[0].for_another, states[1]
+            folder = self._results.training(name, attempt)
+            rounds.append(
+                LearningJob(
+                    self.source, name, number, *states, settings, folder, warm_start, attempt
+                )
+            )
+        return rounds
+
+    def _train(self, iteration: int, rounds: Sequence[LearningJob], state: CurriculumState) -> None:
+        """Train skills for a round each, and take note of how it went."""
+        left = self._steps_left(state)
+        outcomes = self._results.rounds(iteration, lambda: self._learn(iteration, rounds, left))
+        for job, outcome in zip(rounds, outcomes, strict=True):
+            state.skills[job.operator] = state.skills[job.operator].after(job, outcome)
+            self.callback.on_judged(iteration, job.operator, outcome)
+
+    def _learn(self, iteration: int, rounds: Sequence[LearningJob], left: int) -> list[Any]:
+        self.callback.on_learning(iteration, [OngoingRound.of(job) for job in rounds], left)
+        each = max(1, self.workers.processes // len(rounds))
+        return self._run("learning skills", jobs.learn, [(job, each) for job in rounds])
+
+    # -- the result -------------------------------------------------------------------------------
+
+    def _library(self, ended: str, iteration: int, state: CurriculumState) -> SkillLibrary:
+        """What was learned, and what was kept as it was."""
+        unseen = fresh_tasks(iteration, self.settings.validation)
+        fresh = self._roll_out(iteration, "final", unseen, state)
+        vacuity = self._vacuity(state.learned, fresh)
+        skills = [skill for name, skill in self._kept.items() if name not in state.learned]
+        for name in state.learned:
+            skill = load_skill(self._skill(name, state), self._domain)
+            record = skill_record(state.skills[name], vacuity[name], self.source.seed)
+            skills.append(replace(skill, record=record))
+        ordered = sorted(skills, key=lambda skill: skill.folder_name)
+        record = library_record(self.source, self.settings, state, ended, fresh)
+        return SkillLibrary(self.source.domain, tuple(ordered), record)
+
+    def _vacuity(self, names: Sequence[str], fresh: Sequence[PlanRollout]) -> dict[str, Any]:
+        """What policies that see nothing are worth in each skill's place; None where untried."""
+        starts = {name: InitiationStates.of(name, fresh).all for name in names}
+        begun = [name for name in names if starts[name]]
+        work = [(self.source, name, starts[name], self.settings.judged) for name in begun]
+        found = self._results.vacuity(
+            lambda: self._run("trying constant actions", jobs.vacuity, work)
+        )
+        return dict.fromkeys(names) | dict(zip(begun, found, strict=True))
+
+    # -- plumbing ---------------------------------------------------------------------------------
+
+    def _steps_left(self, state: CurriculumState) -> int:
+        return self.settings.total_steps - state.steps
+
+    def _as_json(self) -> dict[str, Any]:
+        """All that the results depend on."""
+        known = sorted(skill.folder_name for skill in self.known.values())
+        data = {"source": self.source.as_json(), **asdict(self.settings), "known": known}
+        if self.encoder.name != METRICS:
+            data["encoder"] = self.encoder.name
+        if self.kept:
+            data["kept"] = SkillLibrary(self.source.domain, tuple(self.kept.values())).digest
+        return data
+
+    def _run(
+        self, what: str, function: Callable[..., dict[str, Any]], work: Sequence[tuple[Any, ...]]
+    ) -> list[dict[str, Any]]:
+        report = partial(self.callback.on_progress, what)
+        return run_in_order(self.workers, function, work, report)
+
+
+def require_plans(rollouts: Sequence[PlanRollout], source: TaskSource) -> None:
+    """Refuse tasks of which none has a plan; where some have one, the others are left out.
+
+    Raises:
+        UnsolvableError: None has a plan.
+    """
+    without = [rollout for rollout in rollouts if rollout.unplanned]
+    if len(without) == len(rollouts):
+        goal = source.goal or "its own goal"
+        raise UnsolvableError(
+            f"none of {len(rollouts)} tasks of {source.domain} has a plan for {goal}: "
+            f"{without[0].unplanned}; give other operators, or another goal"
+        )

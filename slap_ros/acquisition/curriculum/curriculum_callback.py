@@ -1,0 +1,100 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The events of a curriculum, for whoever shows or records them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from slap_ros.acquisition.curriculum.dead_ends import DeadEnd
+from slap_ros.acquisition.curriculum.jobs import LearningJob
+from slap_ros.acquisition.curriculum.rollouts import PlanRollout
+from slap_ros.acquisition.training.skill_training import Round, rounds_in
+
+
+@dataclass(frozen=True)
+class OngoingRound:
+    """A round of a skill's training that has begun, maybe in another process.
+
+    Args:
+        skill: The operator's name.
+        number: Of the skill's round, from 0.
+        folder: Where it is learned; see :mod:`slap_ros.acquisition.training.skill_training`.
+        steps: Environment steps of the round at most.
+        segment_steps: Environment steps between two judgements.
+    """
+
+    skill: str
+    number: int
+    folder: Path
+    steps: int
+    segment_steps: int
+
+    @classmethod
+    def of(cls, job: LearningJob) -> OngoingRound:
+        """The round of a job."""
+        return cls(job.operator, job.number, job.folder, job.steps, job.segment_steps)
+
+    def so_far(self) -> Round | None:
+        """How far it got; None before its first judgement.
+
+        Raises:
+            InvalidParameterError: The folder is damaged.
+        """
+        rounds = rounds_in(self.folder)
+        return rounds[self.number] if self.number < len(rounds) else None
+
+
+class CurriculumCallback(Protocol):
+    """Receives the events of a curriculum."""
+
+    def on_progress(self, what: str, done: int, total: int) -> None:
+        """Some of a step's jobs are done.
+
+        Args:
+            what: The step, in words.
+            done: Jobs done so far; 0 as the step begins.
+            total: Jobs of the step.
+        """
+        ...
+
+    def on_rollouts(self, iteration: int, rollouts: Sequence[PlanRollout]) -> None:
+        """Plans were carried out.
+
+        Args:
+            iteration: From 0.
+            rollouts: One per task.
+        """
+        ...
+
+    def on_dead_end(self, iteration: int, dead_end: DeadEnd) -> None:
+        """Two skills are about to be learned from scratch.
+
+        Args:
+            iteration: From 0.
+            dead_end: Names them.
+        """
+        ...
+
+    def on_learning(self, iteration: int, rounds: Sequence[OngoingRound], steps_left: int) -> None:
+        """Skills are about to be learned, all of them at a time where there are the processes.
+
+        Args:
+            iteration: From 0.
+            rounds: One per skill.
+            steps_left: Environment steps that all skills together may still learn for.
+        """
+        ...
+
+    def on_judged(self, iteration: int, skill: str, outcome: Round) -> None:
+        """A skill was trained for a round.
+
+        Args:
+            iteration: From 0.
+            skill: The operator's name.
+            outcome: How it went.
+        """
+        ...

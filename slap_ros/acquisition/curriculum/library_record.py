@@ -1,0 +1,70 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a library of skills says of how it was acquired: figures by name, in its JSON files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from statistics import fmean
+from typing import Any
+
+from slap_ros.acquisition.curriculum.curriculum_state import CurriculumState, SkillProgress
+from slap_ros.acquisition.curriculum.rollouts import PlanRollout
+from slap_ros.acquisition.curriculum.skill_selection import NO_PROGRESS
+from slap_ros.acquisition.curriculum.task_source import TaskSource
+from slap_ros.acquisition.training.settings import AcquisitionSettings
+from slap_ros.versions import processor, versions
+
+
+def skill_record(
+    progress: SkillProgress, vacuity: Mapping[str, Any] | None, seed: int
+) -> dict[str, Any]:
+    """The record of a skill that was trained.
+
+    Args:
+        progress: In the end.
+        vacuity: What policies that see nothing are worth, as JSON; None where no fresh task has
+            come to the skill.
+        seed: Of the curriculum.
+    """
+    return {
+        "success": progress.success,
+        "vacuity": vacuity,
+        "steps": progress.steps,
+        "rounds": progress.rounds,
+        "attempts": progress.attempt + 1,
+        "seed": seed,
+        "began_with": progress.began_with,
+    }
+
+
+def library_record(
+    source: TaskSource,
+    settings: AcquisitionSettings,
+    state: CurriculumState,
+    ended: str,
+    fresh: Sequence[PlanRollout],
+) -> dict[str, Any]:
+    """The record of a library.
+
+    Args:
+        source: Of tasks.
+        settings: All hyper-parameters.
+        state: In the end.
+        ended: Why the curriculum is over.
+        fresh: Rollouts on tasks that training never saw.
+    """
+    return {
+        "preset": source.preset,
+        "goal": source.goal,
+        "seed": source.seed,
+        "ended": ended,
+        "left": state.not_trained if ended == NO_PROGRESS else {},
+        "progress": state.task_progress,
+        "progress_on_fresh_tasks": fmean(rollout.progress for rollout in fresh),
+        "steps": state.steps,
+        "settings": asdict(settings),
+        "versions": dict(versions()),
+        "processor": processor(),
+    }

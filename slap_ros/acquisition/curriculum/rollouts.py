@@ -1,0 +1,229 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Plans carried out with the skills at hand: how far they get, and from where they fail.
+
+A stage of a plan is done once T(x, ω) ⊆ x' and nothing that ω deletes holds (LG-SAIL Alg. 1,
+Eq. 4). Nothing is planned again, and the stages after a failed one are not run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from enum import Enum
+from typing import Any
+
+from slap_ros.core import Domain, Task, World
+from slap_ros.errors import PlanningLimitError, UnsolvableError
+from slap_ros.planning.astar import find_shortest_sequence
+from slap_ros.relational import (
+    AtomSpace,
+    GroundOperator,
+    LiftedOperator,
+    Target,
+    ground_operators,
+)
+from slap_ros.skills.skill import APPROACH_STEPS, LearnedSkill, approach_of
+
+
+class StageEnd(Enum):
+    """How a stage of a plan ended."""
+
+    DONE = "done"
+    NOT_LEARNED = "no skill yet"
+    NOT_APPROACHED = "the approach did not arrive"
+    NO_EFFECT = "effect not reached"
+    DISTURBED = "something else disturbed"
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One operator of a plan that was carried out.
+
+    Args:
+        operator: Its name.
+        objects: Names of what it was applied to.
+        state: Where its skill began, the approach done, as numbers; none where the approach did
+            not arrive.
+        end: How it ended, a value of :class:`StageEnd`.
+        steps: Environment steps of the skill, approach not counted.
+        atoms: Where it failed: the required atoms that did not hold in the end, and the forbidden
+            ones that did.
+    """
+
+    operator: str
+    objects: tuple[str, ...]
+    state: tuple[float, ...]
+    end: str
+    steps: int
+    atoms: tuple[str, ...] = ()
+
+    @property
+    def done(self) -> bool:
+        """Whether it reached its target."""
+        return self.end == StageEnd.DONE.value
+
+
+@dataclass(frozen=True)
+class PlanRollout:
+    """A task's plan, carried out as far as it went.
+
+    Args:
+        task: The task's index.
+        plan: The ground operators.
+        stages: Those that were begun, in order.
+        unplanned: Why there is no plan; empty where there is one.
+    """
+
+    task: int
+    plan: tuple[str, ...]
+    stages: tuple[Stage, ...]
+    unplanned: str = ""
+
+    @property
+    def progress(self) -> float:
+        """Share of the plan's stages that were done in order; 1 where the goal held already."""
+        if self.unplanned:
+            return 0.0
+        return sum(stage.done for stage in self.stages) / len(self.plan) if self.plan else 1.0
+
+    @property
+    def failure(self) -> Stage | None:
+        """The stage that failed; None where none did."""
+        return next((stage for stage in self.stages if not stage.done), None)
+
+    def as_json(self) -> dict[str, Any]:
+        """A JSON object."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> PlanRollout:
+        """The rollout of :meth:`as_json`.
+
+        Raises:
+            LookupError, TypeError, ValueError: It is none.
+        """
+        stages = tuple(
+            Stage(
+                str(stage["operator"]),
+                tuple(map(str, stage["objects"])),
+                tuple(map(float, stage["state"])),
+                StageEnd(stage["end"]).value,
+                int(stage["steps"]),
+                tuple(map(str, stage["atoms"])),
+            )
+            for stage in data["stages"]
+        )
+        plan = tuple(map(str, data["plan"]))
+        return cls(int(data["task"]), plan, stages, str(data["unplanned"]))
+
+
+def failed_stages(rollouts: Iterable[PlanRollout]) -> list[Stage]:
+    """The stage that failed of each plan that did not get through, in order."""
+    return [stage for rollout in rollouts if (stage := rollout.failure) is not None]
+
+
+def plan_operators(
+    domain: Domain, task: Task, operators: Sequence[LiftedOperator]
+) -> tuple[AtomSpace, list[GroundOperator]]:
+    """A shortest plan of operators, the same every time.
+
+    Args:
+        domain: The task's.
+        task: Where to start, and what to reach.
+        operators: To plan with.
+
+    Returns:
+        The task's atoms, and the plan.
+
+    Raises:
+        UnsolvableError: There is no plan.
+        PlanningLimitError: None was found within the limits.
+    """
+    space = domain.atom_space(task.initial_state)
+    ground = ground_operators(operators, space)
+    start, goal = space.abstract(task.initial_state), space.mask(task.goal)
+    return space, [ground[i] for i in find_shortest_sequence(start, goal, ground)]
+
+
+def roll_out(
+    domain: Domain,
+    task: Task,
+    index: int,
+    operators: Sequence[LiftedOperator],
+    skills: Mapping[str, LearnedSkill],
+) -> PlanRollout:
+    """Plan for a task, and carry the plan out until a stage fails.
+
+    Args:
+        domain: The task's.
+        task: Where to start, and what to reach.
+        index: The task's.
+        operators: To plan with.
+        skills: Those that were learned, by operator name.
+
+    Returns:
+        How far it went.
+    """
+    try:
+        space, plan = plan_operators(domain, task, operators)
+    except (UnsolvableError, PlanningLimitError) as error:
+        return PlanRollout(index, (), (), str(error))
+    world, stages = domain.make_world(task.initial_state), []
+    for operator in plan:
+        stage = _carry_out(domain, world, space, operator, skills.get(operator.operator.name))
+        stages.append(stage)
+        if not stage.done:
+            break
+    return PlanRollout(index, tuple(map(str, plan)), tuple(stages))
+
+
+def _carry_out(
+    domain: Domain,
+    world: World,
+    space: AtomSpace,
+    operator: GroundOperator,
+    skill: LearnedSkill | None,
+) -> Stage:
+    """Carry out one stage.
+
+    Args:
+        domain: The world's.
+        world: In which the stage begins.
+        space: The task's atoms.
+        operator: Of the stage.
+        skill: Its skill, if there is one.
+
+    Returns:
+        How it went.
+    """
+    name, objects = operator.operator.name, operator.objects
+    names = tuple(obj.name for obj in objects)
+    target = Target.after(operator, space.abstract(world.state))
+    if not _approach(domain, world, operator):
+        return Stage(name, names, (), StageEnd.NOT_APPROACHED.value, 0)
+    began = tuple(map(float, world.state.data))
+    if skill is None:
+        return Stage(name, names, began, StageEnd.NOT_LEARNED.value, 0)
+    policy, effects = skill.act(objects), False
+    for step in range(1, skill.horizon + 1):
+        action = policy(world.state)
+        assert action is not None
+        abstract = space.abstract(world.step(action))
+        if target.reached(abstract) and skill.accepts(world.state, objects):
+            return Stage(name, names, began, StageEnd.DONE.value, step)
+        effects |= not (operator.add_effects & ~abstract or operator.delete_effects & abstract)
+    end = StageEnd.DISTURBED if effects else StageEnd.NO_EFFECT
+    wrong = tuple(map(str, space.decode(target.difference(abstract))))
+    return Stage(name, names, began, end.value, skill.horizon, wrong)
+
+
+def _approach(domain: Domain, world: World, operator: GroundOperator) -> bool:
+    """Bring the hand to where the operator's skill begins; whether it arrived."""
+    policy = approach_of(domain)(world.state, operator.objects)
+    for _ in range(APPROACH_STEPS):
+        action = policy(world.state)
+        if action is None:
+            return True
+        world.step(action)
+    return False

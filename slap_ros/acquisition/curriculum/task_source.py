@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What skills are acquired for, as data that other processes can be sent."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+from slap_ros.core import Domain, Task
+from slap_ros.core.goals import task_with_goal
+from slap_ros.domains import get_domain
+from slap_ros.learning.task_distribution import TRAINING_SEED
+from slap_ros.relational import LiftedOperator, RewardTemplate
+from slap_ros.skills.operator_json import operator_data, read_operator, read_template, template_data
+
+ROLLOUTS, VALIDATION = 0, 900_000  # first task index of each use
+
+
+@dataclass(frozen=True)
+class TaskSource:
+    """Tasks of one goal in a domain, and the operators to solve them with.
+
+    Args:
+        domain: Its name.
+        preset: Of the domain.
+        goal: A name of the domain's, or atoms; empty for each task's own.
+        seed: Of everything.
+        proposal: Operators and rewards, as JSON.
+    """
+
+    domain: str
+    preset: str
+    goal: str
+    seed: int
+    proposal: str
+
+    @classmethod
+    def of(
+        cls,
+        domain: Domain,
+        goal: str,
+        seed: int,
+        operators: tuple[LiftedOperator, ...],
+        rewards: Mapping[str, RewardTemplate],
+    ) -> TaskSource:
+        """The source of a domain's tasks.
+
+        Args:
+            domain: Whose tasks.
+            goal: A name of the domain's, or atoms; empty for each task's own.
+            seed: Of everything.
+            operators: To plan with.
+            rewards: By operator name.
+        """
+        pairs = [(operator_data(o), template_data(rewards[o.name])) for o in operators]
+        return cls(domain.name, domain.preset, goal, seed, json.dumps(pairs))
+
+    def make_domain(self) -> Domain:
+        """The domain with its preset."""
+        return get_domain(self.domain, self.preset)
+
+    def task(self, index: int) -> Task:
+        """A task that evaluation never uses."""
+        return task_with_goal(self.make_domain(), TRAINING_SEED + self.seed, index, self.goal)
+
+    def operators(self) -> tuple[LiftedOperator, ...]:
+        """The operators, in order."""
+        return tuple(operator for operator, _ in _read(self))
+
+    def rewards(self) -> dict[str, RewardTemplate]:
+        """The rewards by operator name."""
+        return {operator.name: template for operator, template in _read(self)}
+
+    def as_json(self) -> dict[str, Any]:
+        """A JSON object."""
+        return {**vars(self), "proposal": json.loads(self.proposal)}
+
+
+def training_tasks(iteration: int, count: int) -> range:
+    """Indices of the tasks that an iteration carries out plans in: others in each."""
+    return _tasks_of(iteration, count, ROLLOUTS)
+
+
+def fresh_tasks(iteration: int, count: int) -> range:
+    """Indices of the tasks that an iteration judges skills on: others in each, none trained on.
+
+    Were they the same in each, a checkpoint that was lucky with them would stay for good.
+    """
+    return _tasks_of(iteration, count, VALIDATION)
+
+
+def _tasks_of(iteration: int, count: int, use: int) -> range:
+    """An iteration's indices, from those of a use."""
+    first = use + iteration * count
+    return range(first, first + count)
+
+
+@lru_cache(maxsize=64)
+def _read(source: TaskSource) -> tuple[tuple[LiftedOperator, RewardTemplate], ...]:
+    domain, pairs = source.make_domain(), []
+    for operator, template in json.loads(source.proposal):
+        read = read_operator(operator, domain)
+        pairs.append((read, read_template(template, read, domain)))
+    return tuple(pairs)

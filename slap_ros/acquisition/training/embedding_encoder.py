@@ -1,0 +1,79 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Keys of skills by an embedding model, as the paper has them (LG-SAIL §4.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from hashlib import sha256
+from typing import Any
+
+from slap_ros.language.client import OpenAIClient
+from slap_ros.language.settings import LanguageSettings
+from slap_ros.learning.work_folder import WorkFolder
+from slap_ros.relational import LiftedAtom, LiftedOperator
+from slap_ros.skills.skill_signature import SkillSignature
+
+
+def operator_sentence(operator: LiftedOperator) -> str:
+    """⟨PRE, EFF+, EFF-⟩ as text; the operator's name plays no part."""
+    parts = (
+        ("Preconditions", operator.preconditions),
+        ("Add effects", operator.add_effects),
+        ("Delete effects", operator.delete_effects),
+    )
+    return " ".join(f"{name}: {_listed(atoms)}." for name, atoms in parts)
+
+
+class EmbeddingEncoder:
+    """Asks a server with an OpenAI-compatible ``/embeddings``.
+
+    It is a :class:`~slap_ros.acquisition.training.retrieval.SkillEncoder`: a vector is a key as
+    well, its numbers by their position. Vectors are kept in the work folder, so that a
+    training that goes on begins with the same skills, whatever the server says by then.
+    """
+
+    def __init__(self, settings: LanguageSettings, work: WorkFolder) -> None:
+        """Ask nothing yet.
+
+        Args:
+            settings: Which model, where.
+            work: Where vectors are kept.
+
+        Raises:
+            LanguageUnavailableError: See :class:`~slap_ros.language.client.OpenAIClient`.
+        """
+        self._client, self._settings, self._work = OpenAIClient(settings), settings, work
+
+    @property
+    def name(self) -> str:
+        """The model, and where it is."""
+        return f"{self._settings.model} at {self._settings.base_url}"
+
+    def encode(self, operator: LiftedOperator) -> SkillSignature:
+        """The key of an operator.
+
+        Raises:
+            LanguageUnavailableError: No answer could be had.
+            LanguageRefusedError: The server does not accept the request: key, model, address.
+            InvalidParameterError: A vector that was kept is damaged.
+        """
+        text = operator_sentence(operator)
+        digest = sha256(f"{self.name}\n{text}".encode()).hexdigest()[:16]
+        return self._work.cached(
+            f"embeddings/{digest}",
+            lambda: {"text": text, "vector": self._embed(text)},
+            _signature,
+        )
+
+    def _embed(self, text: str) -> list[float]:
+        (vector,) = self._client.embed([text], self._settings.answer_seconds)
+        return vector
+
+
+def _signature(data: Any) -> SkillSignature:
+    return SkillSignature({str(i): float(number) for i, number in enumerate(data["vector"])})
+
+
+def _listed(atoms: Iterable[LiftedAtom]) -> str:
+    return ", ".join(sorted(map(str, atoms))) or "none"

@@ -1,0 +1,263 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Soft actor-critic of one skill. Needs torch.
+
+The algorithm is stable-baselines3's (Haarnoja et al. 2018), with a replay buffer of ours. Training
+goes in segments of whole episodes. Between them everything that it depends on can be written down,
+so that one that is resumed there ends with the same weights.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from stable_baselines3.common.logger import Logger
+
+from slap_ros.acquisition.training.episodes import Episodes
+from slap_ros.acquisition.training.replay_buffer import SkillReplayBuffer
+from slap_ros.acquisition.training.sac_settings import SacSettings
+from slap_ros.acquisition.training.sac_update import LeanSac
+from slap_ros.acquisition.training.skill_env import SkillVecEnv
+from slap_ros.errors import InvalidParameterError
+from slap_ros.files import read_bytes
+from slap_ros.learning.stable_baselines import StableBaselinesVecEnv
+from slap_ros.policies.mlp_policy import MlpPolicy, ObservationNormalisation
+from slap_ros.skills.observations import SIZE
+
+WORTH_A_THREAD = 128  # units of a critic's layer; with fewer, waking a second one takes longer
+MAX_CHECKPOINT_BYTES = 2**30
+ONE = np.ones(SIZE, dtype=np.float32)
+AS_OBSERVED = ObservationNormalisation(0.0 * ONE, ONE)  # clipped alone: any skill can begin another
+
+
+class ExploringSac(LeanSac):
+    """SAC whose noise is held: in the last environment longest, in each before it half as long.
+
+    Random actions of the beginning are held for 1, 2, 3 steps and so on. Noise that is correlated
+    in time reaches what white noise hardly does (Eberhard et al. 2023): fingers that are to grasp
+    must close for some steps on end. It is a function of seed and step, so that nothing of it
+    needs to be kept.
+    """
+
+    longest_hold = 1  # environment steps
+
+    def _sample_action(
+        self, learning_starts: int, action_noise: Any = None, n_envs: int = 1
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        del action_noise
+        if self.num_timesteps < learning_starts:
+            holds = [1 + env % self.longest_hold for env in range(n_envs)]
+            drawn = [rng.uniform(-1.0, 1.0, self._axes) for rng in self._draws(holds)]
+            actions = np.stack(drawn).astype(np.float32)
+        else:
+            holds = [max(1, self.longest_hold >> (n_envs - 1 - env)) for env in range(n_envs)]
+            noise = [rng.standard_normal(self._axes) for rng in self._draws(holds)]
+            actions = self._act_with(np.stack(noise).astype(np.float32))
+        return actions, actions
+
+    def _draws(self, holds: Sequence[int]) -> Iterator[np.random.Generator]:
+        """A generator for each environment, the same for the steps that it holds what it drew."""
+        assert self.seed is not None
+        step = self.num_timesteps // len(holds)
+        for env, hold in enumerate(holds):
+            yield np.random.default_rng((self.seed, env, step // hold))
+
+    @property
+    def _axes(self) -> int:
+        assert self.action_space.shape is not None
+        return self.action_space.shape[0]
+
+    def _act_with(self, noise: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The policy's actions in the present states, given noise of deviation 1, (n, axes)."""
+        with torch.no_grad():
+            mean, log_std = self.distribution(torch.as_tensor(self._last_obs))
+            actions: NDArray[np.float32] = torch.tanh(
+                mean + log_std.exp() * torch.from_numpy(noise)
+            ).numpy()
+        return actions
+
+
+class SkillLearner:
+    """SAC on the episodes of one skill."""
+
+    def __init__(
+        self,
+        env: SkillVecEnv,
+        settings: SacSettings,
+        seed: int,
+        core_to_spare: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Begin with random weights and an empty buffer.
+
+        Args:
+            env: Of the skill.
+            settings: SAC's hyper-parameters.
+            seed: Of weights, noise and batches.
+            core_to_spare: Whether there is a second core to learn with just now. What is learned
+                does not depend on it.
+        """
+        torch.set_num_threads(1)  # tiny networks: more threads only wait for one another
+        self.settings, self._env = settings, env
+        actions = env.action_map.size
+        critic_hidden = list(settings.critic_hidden or settings.hidden)
+        self._sac = ExploringSac(
+            "MlpPolicy",
+            StableBaselinesVecEnv(env, AS_OBSERVED),
+            learning_rate=settings.learning_rate,
+            buffer_size=settings.capacity,
+            learning_starts=settings.random_steps,
+            batch_size=settings.batch_size,
+            tau=settings.tau,
+            gamma=settings.discount,
+            ent_coef=f"auto_{settings.entropy_weight}",
+            train_freq=1,
+            gradient_steps=settings.environments // settings.steps_per_update,
+            replay_buffer_class=SkillReplayBuffer,
+            replay_buffer_kwargs={"mdp": env.mdp, "normalisation": AS_OBSERVED, "seed": seed},
+            target_entropy=settings.entropy_per_action * actions,
+            policy_kwargs={
+                "net_arch": {"pi": list(settings.hidden), "qf": critic_hidden},
+                "optimizer_kwargs": {"fused": True},
+            },
+            seed=seed,
+            device="cpu",
+        )
+        self._sac.longest_hold = settings.longest_hold
+        if max(critic_hidden, default=0) >= WORTH_A_THREAD:
+            self._sac.core_to_spare = core_to_spare
+        if settings.critic_layer_norm:
+            self._sac.normalise_critics()
+        self._sac.set_logger(Logger(None, []))
+
+    @property
+    def buffer(self) -> SkillReplayBuffer:
+        """What is learned from."""
+        assert isinstance(self._sac.replay_buffer, SkillReplayBuffer)
+        return self._sac.replay_buffer
+
+    @property
+    def steps(self) -> int:
+        """Environment steps so far."""
+        return self._sac.num_timesteps
+
+    def learn(self, rounds: int) -> Episodes:
+        """Run whole episodes in all environments, and learn meanwhile.
+
+        Args:
+            rounds: Episodes in each environment.
+
+        Returns:
+            These episodes; the buffer has them.
+        """
+        self._sac.learn(
+            rounds * self._env.horizon * self._env.num_envs,
+            log_interval=None,  # type: ignore[arg-type]  # no log
+            reset_num_timesteps=False,
+        )
+        episodes = self._env.take_episodes()
+        assert episodes is not None
+        self.buffer.add_episodes(episodes)
+        return episodes
+
+    def policy(self) -> MlpPolicy:
+        """The actor's average as it is now, without torch, its most likely action squashed."""
+        weights = {name: value.numpy().copy() for name, value in self._sac.averaged.items()}
+        hidden = [f"latent_pi.{2 * i}" for i in range(len(self.settings.hidden))]
+        layers = tuple(
+            (weights[f"{name}.weight"], weights[f"{name}.bias"]) for name in [*hidden, "mu"]
+        )
+        return MlpPolicy(AS_OBSERVED, layers, weights["log_std.bias"], "relu", squashed=True)
+
+    def begin_with(self, policy: MlpPolicy) -> None:
+        """Begin with the layers of another skill's policy; its noise is not taken over.
+
+        Raises:
+            InvalidParameterError: It has other layers.
+        """
+        now = self._sac.actor.state_dict()
+        hidden = [f"latent_pi.{2 * i}" for i in range(len(self.settings.hidden))]
+        names = [*hidden, "mu"]
+        shapes = [tuple(now[f"{name}.weight"].shape) for name in names]
+        if [layer.shape for layer, _ in policy.layers] != shapes:
+            given = [layer.shape for layer, _ in policy.layers]
+            raise InvalidParameterError(
+                f"a policy with layers {given} cannot start one with layers {shapes}; "
+                "learn with the same hidden layers"
+            )
+        for name, (weight, bias) in zip(names, policy.layers, strict=True):
+            for tensors in (now, self._sac.averaged):
+                tensors[f"{name}.weight"].copy_(torch.from_numpy(weight))
+                tensors[f"{name}.bias"].copy_(torch.from_numpy(bias))
+
+    # -- checkpoints ------------------------------------------------------------------------------
+
+    def save(self, path: Path) -> None:
+        """Write a checkpoint, episodes not included. One that is there stays until it is whole."""
+        sac, draft = self._sac, path.with_suffix(".draft")
+        assert sac.log_ent_coef is not None
+        assert sac.ent_coef_optimizer is not None
+        whole = BytesIO()  # torch reports a full disk as a fault of its own
+        torch.save(
+            {
+                "policy": sac.policy.state_dict(),
+                "averaged": sac.averaged,
+                "actor_optimizer": sac.actor.optimizer.state_dict(),
+                "critic_optimizer": sac.critic.optimizer.state_dict(),
+                "entropy_weight": sac.log_ent_coef.detach(),
+                "entropy_optimizer": sac.ent_coef_optimizer.state_dict(),
+                "steps": sac.num_timesteps,
+                "torch_generator": torch.get_rng_state(),
+                "buffer_generator": self.buffer.generator_state,
+            },
+            whole,
+        )
+        draft.write_bytes(whole.getbuffer())
+        draft.rename(path)
+
+    def resume(self, path: Path, episodes: list[Episodes]) -> None:
+        """Go on from a checkpoint.
+
+        Args:
+            path: Of the checkpoint.
+            episodes: All that were run before it, in their order.
+
+        Raises:
+            InvalidParameterError: It is damaged.
+        """
+        saved, sac = read_checkpoint(path), self._sac
+        assert sac.log_ent_coef is not None
+        assert sac.ent_coef_optimizer is not None
+        sac.policy.load_state_dict(saved["policy"])
+        for name, value in sac.averaged.items():
+            value.copy_(saved["averaged"][name])
+        sac.actor.optimizer.load_state_dict(saved["actor_optimizer"])
+        sac.critic.optimizer.load_state_dict(saved["critic_optimizer"])
+        with torch.no_grad():
+            sac.log_ent_coef.copy_(saved["entropy_weight"])
+        sac.ent_coef_optimizer.load_state_dict(saved["entropy_optimizer"])
+        sac.num_timesteps = saved["steps"]
+        for some in episodes:
+            self.buffer.add_episodes(some)
+        self.buffer.generator_state = saved["buffer_generator"]
+        torch.set_rng_state(saved["torch_generator"])
+
+
+def read_checkpoint(path: Path) -> dict[str, Any]:
+    """What :meth:`SkillLearner.save` wrote. Only tensors and plain data are read, never code.
+
+    Raises:
+        InvalidParameterError: It is damaged.
+    """
+    try:
+        saved = torch.load(BytesIO(read_bytes(path, MAX_CHECKPOINT_BYTES)), weights_only=True)
+        return {**saved, "averaged": dict(saved["averaged"]), "steps": int(saved["steps"])}
+    except Exception as error:  # torch says in a dozen ways that a file is damaged
+        raise InvalidParameterError(
+            f"{path}: damaged: {type(error).__name__}; remove its folder to learn this skill again"
+        ) from error

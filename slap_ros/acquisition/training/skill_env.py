@@ -1,0 +1,227 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The skill MDP as a vectorised environment: many episodes side by side, from given states.
+
+All episodes have the same fixed horizon. Success ends none of them: an agent that is paid for
+coming near, and stopped once it arrives, earns most by hovering. It ends the skill in execution
+alone. So all environments begin and end together, and the last step is a truncation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slap_ros.acquisition.training.episodes import Episodes
+from slap_ros.core import Domain, MakeVectorWorld, VectorWorld
+from slap_ros.learning.shares import proportional_shares
+from slap_ros.learning.vec_env import VecEnvStep
+from slap_ros.policies.action_map import ActionMap
+from slap_ros.relational import Layout, Object, State
+from slap_ros.relational.predicates import Bools
+from slap_ros.relational.state import Array
+from slap_ros.skills.groundings import Grounding, Groundings, Indices
+from slap_ros.skills.observations import SIZE, SkillObserver
+from slap_ros.skills.reward import SkillReward
+from slap_ros.skills.stage_targets import StageTargets
+
+
+@dataclass(frozen=True)
+class Initiation:
+    """A state in which a skill begins, the hand where the approach brought it.
+
+    Args:
+        state: In which it begins.
+        objects: What it is applied to.
+    """
+
+    state: State
+    objects: tuple[Object, ...]
+
+    @property
+    def grounding(self) -> Grounding:
+        """What the skill is applied to, among which objects."""
+        return Grounding(self.state.layout, self.objects)
+
+
+class SkillMdp:
+    """What is observed and paid for in states of an operator's skill."""
+
+    def __init__(
+        self,
+        domain: Domain,
+        reward: SkillReward,
+        groundings: Groundings,
+        dense_share: float = 1.0,
+    ) -> None:
+        """Bind a reward to a domain's features and a choice of groundings.
+
+        Args:
+            domain: Whose learner's interface is used.
+            reward: Of the operator.
+            groundings: Those that states are of.
+            dense_share: What the weighted metrics are paid by; success is paid 1.
+
+        Raises:
+            InvalidDomainError: The domain has no learner's interface.
+        """
+        self.domain, self.reward, self.groundings = domain, reward, groundings
+        self.dense_share = dense_share
+        self._observe, self._targets = SkillObserver(domain), StageTargets(domain, reward.operator)
+        self.action_map = ActionMap(domain, gripper=True)
+
+    def over(self, groundings: Groundings) -> SkillMdp:
+        """The same for states of other groundings."""
+        return SkillMdp(self.domain, self.reward, groundings, self.dense_share)
+
+    def observe(self, rows: Array, numbers: Indices) -> NDArray[np.float32]:
+        """What is observed in states.
+
+        Args:
+            rows: Shape (n, width).
+            numbers: Of the grounding of each, shape (n,).
+
+        Returns:
+            Shape (n, SIZE).
+        """
+        observed = np.zeros((len(rows), SIZE), dtype=np.float32)
+        for part in self.groundings.split(rows, numbers):
+            observed[part.rows] = self._observe(part)
+        return observed
+
+    def rewards(self, rows: Array, numbers: Indices, begun: Array) -> tuple[Array, Bools]:
+        """What arriving in states is paid, and whether they are successes.
+
+        Args:
+            rows: Shape (n, width).
+            numbers: Of the grounding of each, shape (n,).
+            begun: The states in which their episodes began, shape (n, width).
+
+        Returns:
+            Two arrays of shape (n,).
+        """
+        rewards, success = np.zeros(len(rows)), np.zeros(len(rows), dtype=bool)
+        for part in self.groundings.split(rows, numbers):
+            first = begun[part.rows, : part.state.layout.size]
+            success[part.rows] = self._targets.reached(part, first, self.reward.success(part))
+            dense = self.dense_share * self.reward.dense(part)
+            rewards[part.rows] = np.maximum(dense, success[part.rows].astype(np.float64))
+        return rewards, success
+
+
+class SkillVecEnv:
+    """Episodes of one skill; those over the same objects are stepped together."""
+
+    def __init__(
+        self,
+        mdp: SkillMdp,
+        initiations: Sequence[Initiation],
+        num_envs: int,
+        horizon: int,
+        seed: Sequence[int],
+        first_round: int = 0,
+        make_worlds: MakeVectorWorld | None = None,
+    ) -> None:
+        """Begin an episode in each environment.
+
+        Args:
+            mdp: What is observed and paid for.
+            initiations: From which every episode draws one.
+            num_envs: How many environments.
+            horizon: Environment steps of every episode.
+            seed: Of the draws.
+            first_round: Episodes that were run before in each environment: which ones are drawn
+                next depends on it and the seed alone, so that training can be resumed here.
+            make_worlds: Makes the domain's worlds; by default as the domain itself does.
+        """
+        self.mdp, self.num_envs, self.horizon = mdp, num_envs, horizon
+        self.action_map = mdp.action_map
+        self.rounds = first_round
+        self._seed = tuple(seed)
+        self._make_worlds = make_worlds or mdp.domain.make_vector_world
+        pools = _pools(initiations)
+        shares = proportional_shares([len(pool) for pool in pools], num_envs)
+        used = [(pool, share) for pool, share in zip(pools, shares, strict=True) if share]
+        bounds = np.cumsum([share for _, share in used])[:-1]
+        self._pools = [pool for pool, _ in used]
+        self._parts = np.split(np.arange(num_envs), bounds)
+        self._rows = np.zeros((num_envs, mdp.groundings.width))
+        self._numbers = np.zeros(num_envs, dtype=np.intp)
+        self._worlds: list[VectorWorld] = []
+        self._finished: list[Episodes] = []
+        self.succeeded: Bools = np.zeros(num_envs, dtype=bool)  # in the episodes that ended last
+        self._begin_round()
+
+    def step(self, actions: Array) -> VecEnvStep:
+        """See :meth:`slap_ros.learning.vec_env.VecEnv.step`; no episode ends by success."""
+        commands = self.action_map(np.asarray(actions, dtype=np.float64))
+        for world, part in zip(self._worlds, self._parts, strict=True):
+            self._rows[part] = self.mdp.groundings.rows(world.step(commands[part]).data)
+        self._trace.append(self._rows.copy())
+        self._actions.append(np.array(actions, dtype=np.float32))
+        rewards, success = self.mdp.rewards(self._rows, self._numbers, self._trace[0])
+        self._success |= success
+        final = self.mdp.observe(self._rows, self._numbers)
+        last = len(self._actions) == self.horizon
+        lengths = np.full(self.num_envs, len(self._actions), dtype=np.intp)
+        self.observations = final
+        if last:
+            self._end_round()
+        nobody = np.zeros(self.num_envs, dtype=bool)
+        return VecEnvStep(self.observations, rewards, nobody, nobody, nobody | last, lengths, final)
+
+    def take_episodes(self) -> Episodes | None:
+        """The whole episodes since they were last taken; None where there is none."""
+        if not self._finished:
+            return None
+        taken, self._finished = self._finished, []
+        return Episodes(
+            np.concatenate([episodes.states for episodes in taken]),
+            np.concatenate([episodes.actions for episodes in taken]),
+            np.concatenate([episodes.numbers for episodes in taken]),
+            self.mdp.groundings,
+        )
+
+    def _end_round(self) -> None:
+        self._finished.append(
+            Episodes(
+                np.stack(self._trace, axis=1),
+                np.stack(self._actions, axis=1),
+                self._numbers.copy(),
+                self.mdp.groundings,
+            )
+        )
+        self.succeeded = self._success
+        self.rounds += 1
+        self._begin_round()
+
+    def _begin_round(self) -> None:
+        """Draw where every environment begins its next episode."""
+        rng = np.random.default_rng((*self._seed, self.rounds))
+        fresh = not self._worlds
+        for number, (pool, part) in enumerate(zip(self._pools, self._parts, strict=True)):
+            drawn = [pool[int(rng.integers(len(pool)))] for _ in part]
+            if fresh:
+                states = [initiation.state for initiation in drawn]
+                self._worlds.append(self._make_worlds(states))
+            for i, (env, initiation) in enumerate(zip(part, drawn, strict=True)):
+                if not fresh:
+                    self._worlds[number].reset(i, initiation.state)
+                self._numbers[env] = self.mdp.groundings.number(initiation.grounding)
+            batch = State.batch([initiation.state for initiation in drawn])
+            self._rows[part] = self.mdp.groundings.rows(batch.data)
+        self._trace: list[Array] = [self._rows.copy()]
+        self._actions: list[NDArray[np.float32]] = []
+        self._success: Bools = np.zeros(self.num_envs, dtype=bool)
+        self.observations = self.mdp.observe(self._rows, self._numbers)
+
+
+def _pools(initiations: Sequence[Initiation]) -> list[list[Initiation]]:
+    """Initiations grouped by the objects that there are."""
+    pools: dict[Layout, list[Initiation]] = {}
+    for initiation in initiations:
+        pools.setdefault(initiation.state.layout, []).append(initiation)
+    return list(pools.values())

@@ -1,0 +1,285 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Learning one skill for one round of the curriculum; resumed where it was interrupted.
+
+Segment after segment: whole episodes, a checkpoint, a judgement. The best checkpoint stays, the one
+that the round began with included, since more training can destroy a good policy. While one is
+judged, the next segment is learned, unless the round may be over then. A folder has::
+
+    episodes/000.safetensors   what happened in each segment
+    003.pt, best.pt            checkpoints: after all segments so far, and the best one
+    rounds.json                the judgements of all rounds; written last, after each segment
+    best/                      the best policy, as in a library
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from slap_ros.acquisition.training.episodes import Episodes, load_episodes, save_episodes
+from slap_ros.acquisition.training.judges import Judge
+from slap_ros.acquisition.training.settings import AcquisitionSettings
+from slap_ros.acquisition.training.skill_env import Initiation, SkillMdp, SkillVecEnv
+from slap_ros.core import Domain, MakeVectorWorld
+from slap_ros.errors import InvalidParameterError
+from slap_ros.files import parse_json, read_text, write_whole
+from slap_ros.learning.work_folder import DECODING_ERRORS
+from slap_ros.policies.mlp_policy import MlpPolicy
+from slap_ros.skills.groundings import Groundings
+from slap_ros.skills.reward import SkillReward
+from slap_ros.skills.skill_library import AcquiredSkill, save_skill
+
+if TYPE_CHECKING:
+    from slap_ros.acquisition.training.sac import SkillLearner
+
+ROUNDS = "rounds.json"
+IN_A_ROW = 2  # good judgements after which a round is over
+
+
+@dataclass(frozen=True)
+class Round:
+    """What became of a skill in one round.
+
+    Args:
+        initial: Success of what the round began with, from fresh states.
+        segments: Success after each segment.
+        best: After which segment it was highest; 0 for what the round began with.
+        over: Whether the round is over.
+    """
+
+    initial: float
+    segments: tuple[float, ...] = ()
+    best: int = 0
+    over: bool = False
+
+    @classmethod
+    def from_json(cls, data: dict[str, Any]) -> Round:
+        """The inverse of ``asdict``, once it has been through JSON."""
+        segments = tuple(map(float, data["segments"]))
+        return cls(float(data["initial"]), segments, int(data["best"]), bool(data["over"]))
+
+    @property
+    def success(self) -> float:
+        """The success of the checkpoint that stays."""
+        return (self.initial, *self.segments)[self.best]
+
+    @property
+    def newest_is_best(self) -> bool:
+        """Whether the checkpoint that stays is the latest one."""
+        return self.best == len(self.segments)
+
+    def with_segment(self, success: float) -> Round:
+        """With one more segment; of equally good ones the earlier stays."""
+        segments = (*self.segments, success)
+        better = success > self.success
+        return replace(self, segments=segments, best=len(segments) if better else self.best)
+
+    def good(self, enough: float, judgements: int = IN_A_ROW) -> bool:
+        """Whether so many of the latest judgements are good."""
+        latest = (self.initial, *self.segments)[-judgements:]
+        return len(latest) == judgements and min(latest) >= enough
+
+
+def rounds_in(folder: Path) -> list[Round]:
+    """How a skill's rounds went so far; none before the first judgement.
+
+    Args:
+        folder: Of its training.
+
+    Raises:
+        InvalidParameterError: What is there is damaged.
+    """
+    path = folder / ROUNDS
+    if not path.exists():
+        return []
+    try:
+        return [Round.from_json(one) for one in parse_json(read_text(path))]
+    except DECODING_ERRORS as error:
+        raise InvalidParameterError(
+            f"{path}: damaged: {error!r}; remove its folder to learn this skill again"
+        ) from error
+
+
+@dataclass
+class SkillTraining:
+    """The training of one skill, round after round in the same folder.
+
+    Args:
+        domain: Whose worlds are stepped.
+        reward: Of the operator.
+        horizon: Environment steps of an episode.
+        settings: All hyper-parameters.
+        seed: Of the whole curriculum.
+        folder: Where everything is kept.
+        make_worlds: Makes the domain's worlds that are learned in.
+        attempt: How often the skill was learned from scratch before.
+    """
+
+    domain: Domain
+    reward: SkillReward
+    horizon: int
+    settings: AcquisitionSettings
+    seed: int
+    folder: Path
+    make_worlds: MakeVectorWorld
+    attempt: int = 0
+    _rounds: list[Round] = field(default_factory=list, init=False)
+
+    def run(
+        self,
+        number: int,
+        initiations: Sequence[Initiation],
+        judge: Judge,
+        beginning: MlpPolicy | None = None,
+    ) -> Round:
+        """One round; read where it is over, gone on with where it was interrupted.
+
+        Args:
+            number: Of the round, from 0; all before it are over.
+            initiations: States that episodes begin in.
+            judge: Of checkpoints, from states of other tasks.
+            beginning: The policy of another skill that the first round begins with.
+
+        Returns:
+            How it went; the folder has the best policy.
+
+        Raises:
+            ChildProcessError: A process that judged or stepped worlds has ended.
+            InvalidParameterError: The folder is damaged.
+        """
+        if not (self.folder / ROUNDS).exists():
+            shutil.rmtree(self.folder, ignore_errors=True)  # of a round that had hardly begun
+        self._rounds = rounds_in(self.folder)
+        if number < len(self._rounds) and self._rounds[number].over:
+            return self._rounds[number]
+        done = sum(len(earlier.segments) for earlier in self._rounds[: number + 1])
+        groundings = Groundings(list(dict.fromkeys(one.grounding for one in initiations)))
+        mdp = SkillMdp(self.domain, self.reward, groundings, self.settings.dense_share)
+        begins = number == len(self._rounds)
+        in_round = 0 if begins else len(self._rounds[number].segments)
+        learner = self._learner(mdp, initiations, number, in_round, judge)
+        self._resume(learner, number, done, beginning)
+        ahead = self._judge(learner, judge, done, None) if begins else None
+        while not self._rounds[-1].over:
+            episodes = learner.learn(self.settings.segment_episodes) if ahead is None else ahead
+            save_episodes(self._episodes(done), episodes)
+            done += 1
+            ahead = self._judge(learner, judge, done, self._rounds[-1])
+        return self._rounds[-1]
+
+    def _learner(
+        self,
+        mdp: SkillMdp,
+        initiations: Sequence[Initiation],
+        number: int,
+        segments: int,
+        judge: Judge,
+    ) -> SkillLearner:
+        from slap_ros.acquisition.training.sac import SkillLearner  # torch, here alone
+
+        seed = self._seed(number)
+        first_round = segments * self.settings.segment_episodes
+        environments = self.settings.sac.environments
+        env = SkillVecEnv(
+            mdp, initiations, environments, self.horizon, (seed,), first_round, self.make_worlds
+        )
+        return SkillLearner(env, self.settings.sac, seed, judge.core_to_spare)
+
+    def _seed(self, number: int) -> int:
+        """Every skill, attempt and round draws from streams of its own."""
+        text = f"{self.seed} {self.reward.operator.name} {number}"
+        if self.attempt:
+            text += f" {self.attempt}"
+        return int.from_bytes(sha256(text.encode()).digest()[:4], "little")
+
+    def _resume(
+        self,
+        learner: SkillLearner,
+        number: int,
+        done: int,
+        beginning: MlpPolicy | None,
+    ) -> None:
+        """Go on from the last checkpoint; a round begins with the best one where it is better.
+
+        Args:
+            learner: To go on with.
+            number: Of the round.
+            done: Segments so far, of all rounds.
+            beginning: What a first round begins with.
+        """
+        types = self.domain.types_by_name
+        earlier = [load_episodes(self._episodes(i), types) for i in range(done)]
+        if done:
+            # Where none has succeeded yet, the last one has learned most.
+            previous = self._rounds[number - 1]
+            begins = number == len(self._rounds)
+            worse = begins and previous.segments[-1] < previous.success
+            path = self.folder / "best.pt" if worse else self._checkpoint(done)
+            learner.resume(path, earlier)
+        elif beginning is not None:
+            learner.begin_with(beginning)
+
+    def _judge(
+        self, learner: SkillLearner, judge: Judge, done: int, before: Round | None
+    ) -> Episodes | None:
+        """Judge what was learned so far, and learn on meanwhile where that cannot be in vain.
+
+        Args:
+            learner: After its latest segment.
+            judge: Of its policy.
+            done: Segments so far, of all rounds.
+            before: The round without this judgement; None where it is the round's first.
+
+        Returns:
+            The next segment's episodes; None where it was not learned yet.
+        """
+        self.folder.mkdir(parents=True, exist_ok=True)
+        learner.save(self._checkpoint(done))
+        policy = learner.policy()
+        judge.begin(policy)
+        last = before is not None and self._may_be_over(before)
+        ahead = None if last else learner.learn(self.settings.segment_episodes)
+        self._take_note(judge.verdict(), before)
+        if self._rounds[-1].newest_is_best:
+            self._keep_best(policy, done)
+        self._write_rounds()  # until here the judgement, and its segment, count for nothing
+        if before is not None:
+            self._checkpoint(done - 1).unlink(missing_ok=True)
+        return ahead
+
+    def _may_be_over(self, before: Round) -> bool:
+        """Whether a round may be over after one more judgement."""
+        last = len(before.segments) + 1 == self.settings.segments(self.horizon)
+        return last or before.good(self.settings.enough, IN_A_ROW - 1)
+
+    def _take_note(self, success: float, before: Round | None) -> None:
+        if before is None:
+            self._rounds.append(Round(success))
+            return
+        now = before.with_segment(success)
+        over = len(now.segments) == self.settings.segments(self.horizon)
+        self._rounds[-1] = replace(now, over=over or now.good(self.settings.enough))
+
+    def _keep_best(self, policy: MlpPolicy, done: int) -> None:
+        """Keep a policy, and the checkpoint that it is of."""
+        draft = self.folder / "best.draft"
+        shutil.copyfile(self._checkpoint(done), draft)
+        draft.rename(self.folder / "best.pt")
+        skill = AcquiredSkill(self.reward.operator, self.reward.template, policy, self.horizon)
+        save_skill(self.folder / skill.folder_name, skill)
+
+    def _checkpoint(self, segments: int) -> Path:
+        return self.folder / f"{segments:03}.pt"
+
+    def _episodes(self, number: int) -> Path:
+        return self.folder / "episodes" / f"{number:03}.safetensors"
+
+    def _write_rounds(self) -> None:
+        data = [asdict(one) for one in self._rounds]
+        write_whole(self.folder / ROUNDS, json.dumps(data))

@@ -1,0 +1,238 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What libraries of learned policies are made of: files that are checked and never executed.
+
+A policy is a file of safetensors, what is known of it a JSON object, a library a folder of both.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Callable, Mapping
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
+
+from slap_ros.errors import InvalidLibraryError
+from slap_ros.files import parse_json, read_bytes, read_text
+from slap_ros.policies.mlp_policy import MlpPolicy, ObservationNormalisation, Weights
+
+ABOUT = "library.json"
+SKILL, SHORTCUT = "skill.json", "shortcut.json"  # what is known of a member, by its kind
+KINDS = {SKILL: "skills", SHORTCUT: "shortcuts"}
+
+Member = TypeVar("Member")
+
+
+def replace_folder(path: Path, write: Callable[[Path], None]) -> None:
+    """Write a folder in place of the one that may be there.
+
+    It is written beside and then moved, so that there always is a whole one.
+
+    Args:
+        path: Of the folder.
+        write: Fills the folder whose path it is given, which is empty.
+    """
+    path = path.resolve()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draft = path.with_name(f".{path.name}.{os.getpid()}.draft")
+    old = path.with_name(f".{path.name}.{os.getpid()}.old")
+    shutil.rmtree(draft, ignore_errors=True)
+    try:
+        draft.mkdir()
+        write(draft)
+        if path.exists():
+            path.rename(old)
+        draft.rename(path)
+    finally:  # after Ctrl-C too
+        if old.exists() and not path.exists():
+            old.rename(path)
+        for left in (draft, old):
+            shutil.rmtree(left, ignore_errors=True)
+
+
+def write_library(
+    path: Path,
+    about: Mapping[str, Any],
+    members: Mapping[str, Member],
+    save_member: Callable[[Path, Member], None],
+) -> None:
+    """Write a library as a folder, in place of the one that may be there.
+
+    Args:
+        path: Of the folder.
+        about: What it says of itself: format, domain, how it was made.
+        members: By the names of their folders.
+        save_member: Writes one into its folder.
+    """
+
+    def write(folder: Path) -> None:
+        for name, member in members.items():
+            save_member(folder / name, member)
+        write_object(folder / ABOUT, about)
+
+    replace_folder(path, write)
+
+
+def policy_tensors(policy: MlpPolicy) -> dict[str, Weights]:
+    """The policy's numbers by name."""
+    tensors = {
+        "normalisation.mean": policy.normalisation.mean,
+        "normalisation.deviation": policy.normalisation.deviation,
+        "log_std": policy.log_std,
+    }
+    for i, (weights, bias) in enumerate(policy.layers):
+        tensors[f"layer{i}.weights"] = np.ascontiguousarray(weights)
+        tensors[f"layer{i}.bias"] = np.ascontiguousarray(bias)
+    return tensors
+
+
+def save_policy(path: Path, policy: MlpPolicy) -> str:
+    """Write a policy, and return its checksum."""
+    content = save(policy_tensors(policy))
+    path.write_bytes(content)
+    return sha256(content).hexdigest()
+
+
+def load_policy(path: Path, checksum: str, recorded_in: str) -> MlpPolicy:
+    """Read a policy.
+
+    Args:
+        path: Of its file.
+        checksum: That it must have.
+        recorded_in: Name of the file that says so.
+
+    Returns:
+        The policy, its tensors of 32-bit floats that are finite and fit together.
+
+    Raises:
+        InvalidLibraryError: It is damaged.
+    """
+    try:
+        content = read_bytes(path)
+        tensors = load(content)
+    except (OSError, SafetensorError) as error:
+        raise InvalidLibraryError(f"{path}: cannot be read: {error}") from error
+    except (KeyError, TypeError, ValueError) as error:  # of formats that numpy does not have
+        raise InvalidLibraryError(f"{path}: a tensor of a kind unknown here: {error}") from error
+    if odd := sorted(name for name, tensor in tensors.items() if tensor.dtype != np.float32):
+        raise InvalidLibraryError(f"{path}: {', '.join(odd)[:80]}: not of 32-bit floats")
+    if sha256(content).hexdigest() != checksum:
+        raise InvalidLibraryError(f"{path}: damaged: its checksum is not the one in {recorded_in}")
+    try:
+        count = sum(name.endswith(".weights") for name in tensors)
+        policy = MlpPolicy(
+            ObservationNormalisation(
+                tensors["normalisation.mean"], tensors["normalisation.deviation"]
+            ),
+            tuple((tensors[f"layer{i}.weights"], tensors[f"layer{i}.bias"]) for i in range(count)),
+            tensors["log_std"],
+        )
+    except KeyError as error:
+        raise InvalidLibraryError(f"{path}: tensor {error} is missing") from error
+    _check(path, policy)
+    return policy
+
+
+def _check(path: Path, policy: MlpPolicy) -> None:
+    """Refuse tensors that do not fit together or are not finite."""
+    size = policy.normalisation.mean.shape
+    fits = bool(policy.layers) and policy.normalisation.deviation.shape == size
+    for weights, bias in policy.layers:
+        fits = fits and weights.ndim == 2 and weights.shape[1:] == size
+        size = bias.shape
+        fits = fits and weights.shape[:1] == size
+    if not fits or policy.log_std.shape != size:
+        raise InvalidLibraryError(f"{path}: the shapes of its tensors do not fit together")
+    if not all(np.isfinite(tensor).all() for tensor in policy_tensors(policy).values()):
+        raise InvalidLibraryError(f"{path}: not all numbers in it are finite")
+
+
+def read_about(path: Path, member: str, version: int, maker: str, remedy: str) -> dict[str, Any]:
+    """What a library says of itself, in its :data:`ABOUT`.
+
+    Args:
+        path: Of its folder.
+        member: :data:`SKILL` or :data:`SHORTCUT`: what it is to be a library of.
+        version: Of the format that is read.
+        maker: The command that makes such a library.
+        remedy: What to do about one of another format, in words.
+
+    Returns:
+        Format, domain and how it was made.
+
+    Raises:
+        InvalidLibraryError: There is none, or it is damaged, of the other kind, or of another
+            format.
+    """
+    if not path.is_dir():
+        raise InvalidLibraryError(f"{path}: no such folder; `{maker}` makes one")
+    about = read_object(path / ABOUT)
+    found = {kind for kind in KINDS if any(path.glob(f"*/{kind}"))}
+    if found and member not in found:
+        raise InvalidLibraryError(
+            f"{path}: a library of {KINDS[found.pop()]}, not of {KINDS[member]}; `{maker}` makes "
+            "one of these"
+        )
+    if about.get("format") != version:
+        raise InvalidLibraryError(
+            f"{path}: format {about.get('format')!r}, this version of slap_ros reads {version}; "
+            f"{remedy} or use the version of slap_ros that made it"
+        )
+    if not isinstance(about.get("domain"), str):
+        raise InvalidLibraryError(f"{path / ABOUT}: damaged: it names no domain")
+    return about
+
+
+def record_of(about: Mapping[str, Any]) -> dict[str, Any]:
+    """How a library was made, without its format and domain."""
+    return {key: value for key, value in about.items() if key not in ("format", "domain")}
+
+
+def read_members(
+    path: Path, load: Callable[[Path], Member]
+) -> tuple[tuple[Member, ...], tuple[InvalidLibraryError, ...]]:
+    """What is in the folders of a library, in order of their names.
+
+    Args:
+        path: Of the library.
+        load: Reads a folder; what it refuses with an ``InvalidLibraryError`` is left out.
+
+    Returns:
+        What could be read, and why the rest could not.
+    """
+    members, refused = [], []
+    for folder in sorted(entry for entry in path.iterdir() if entry.is_dir()):
+        try:
+            members.append(load(folder))
+        except InvalidLibraryError as error:
+            refused.append(error)
+    return tuple(members), tuple(refused)
+
+
+def read_object(path: Path) -> dict[str, Any]:
+    """The JSON object in a file.
+
+    Raises:
+        InvalidLibraryError: There is none.
+    """
+    try:
+        data = parse_json(read_text(path))
+    except OSError as error:
+        raise InvalidLibraryError(f"{path}: cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise InvalidLibraryError(f"{path}: damaged: {error}") from error
+    if not isinstance(data, dict):
+        raise InvalidLibraryError(f"{path}: damaged: a JSON object was expected")
+    return data
+
+
+def write_object(path: Path, data: Mapping[str, Any]) -> None:
+    """Write a JSON object; the same bytes for the same data."""
+    path.write_text(json.dumps(data, indent=2, allow_nan=False) + "\n", encoding="utf-8")
