@@ -26,8 +26,8 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode, SlapError
 from slap_ros.evaluation.statistics import wilson_interval
 from slap_ros.robot.worlds import MOCK
-from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.shipped import NONE, shipped_library
+from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.studies.comparison import format_spread, spread_of
 from slap_ros.studies.figures import APPROACH_STYLES, label, require_matplotlib
 from slap_ros.studies.results import (
@@ -220,7 +220,7 @@ def origin(conditions: Conditions) -> Provenance:
     """From what it is made: tasks, mock robot, and the shortcuts that ship."""
     path = shipped_library(DOMAIN)
     assert path is not None
-    library = describe_library(f"models/{DOMAIN}", load_library(path, get_domain(DOMAIN)))
+    library = describe_library(f"models/shortcuts/{DOMAIN}", load_library(path, get_domain(DOMAIN)))
     return Provenance(DOMAIN, conditions.command, {**asdict(conditions), "library": library})
 
 

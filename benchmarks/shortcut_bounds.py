@@ -18,14 +18,16 @@ from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.planning.planner import GraphPlanner, Problem
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
-from slap_ros.shortcuts.library import Library
 from slap_ros.shortcuts.shipped import chosen_library
+from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 
 DOMAINS = ("obstacle2d", "obstacle_tower", "cluttered_drawer", "cleanup_table")
 FRESH = 2_000_000  # the seed of its tasks, which neither training nor `slap evaluate` uses
 
 
-def shortest_rollouts(domain: Domain, library: Library, index: int) -> Iterator[tuple[int, int]]:
+def shortest_rollouts(
+    domain: Domain, library: ShortcutLibrary, index: int
+) -> Iterator[tuple[int, int]]:
     """What shortcuts take wherever planning for a task tries one with success.
 
     Args:

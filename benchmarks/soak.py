@@ -34,8 +34,8 @@ from slap_ros.cli.bars import counting_bars
 from slap_ros.domains import get_domain
 from slap_ros.evaluation.run_log import RunLog
 from slap_ros.files import pretty_json
-from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.shipped import shipped_library
+from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.studies.figures import LINES, picture, require_matplotlib
 from slap_ros.studies.results import MarkdownTable, describe_library
 from slap_ros.versions import versions

@@ -14,9 +14,9 @@ from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.relational import Layout, State
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
-from slap_ros.shortcuts.library import Library
 from slap_ros.shortcuts.shipped import chosen_library, require_usable
 from slap_ros.shortcuts.shortcut import DEFAULT, Shortcut
+from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class ShortcutProvider:
         require_usable(settings.shortcuts, planner)
         self.sampling = replace(DEFAULT, samples=settings.samples)
         self._node, self._choice, self._planner = node, settings.shortcuts, planner
-        self._libraries: dict[str, Library | None] = {}  # by domain
+        self._libraries: dict[str, ShortcutLibrary | None] = {}  # by domain
         self._made: dict[Layout, GroundedShortcuts] = {}  # of one episode
         self._made_for: Episode | None = None
 

@@ -24,8 +24,8 @@ from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.meshes.decomposition import load_mesh
 from slap_ros.policies.library_files import ABOUT
 from slap_ros.robot.scene_config import read_scene_config
-from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.shipped import require_usable
+from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.studies.trainings import TrainingFolder, read_curve
 
 pytestmark = pytest.mark.timeout(60)  # what waits for a writer waits for good

@@ -43,7 +43,9 @@ def checkout(tmp_path):
         "colcon_defaults.yaml",
     ):
         shutil.copy(ROOT / name, tmp_path / name)
-    shutil.copytree(ROOT / "test/shortcuts/data/obstacle2d", tmp_path / "models" / "obstacle2d")
+    shutil.copytree(
+        ROOT / "test/shortcuts/data/obstacle2d", tmp_path / "models" / "shortcuts" / "obstacle2d"
+    )
     return tmp_path
 
 
@@ -80,7 +82,7 @@ def test_colcon_builds_executables_where_ros2_run_looks_for_them(
     installed = checkout / "install" / "slap_ros"
     assert (installed / "share/ament_index/resource_index/packages/slap_ros").exists()
     assert (installed / "share/slap_ros/launch/ensemble.launch.py").exists()
-    models = installed / "share/slap_ros/models/obstacle2d"
+    models = installed / "share/slap_ros/models/shortcuts/obstacle2d"
     assert {path.name for path in models.iterdir()} == {"library.json", "Clear_On-e41568a9"}
     assert len(list((models / "Clear_On-e41568a9").iterdir())) == 2
     for name in (*NODES, "slap"):

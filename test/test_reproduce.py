@@ -10,8 +10,8 @@ import pytest
 
 from benchmarks.robot_bridge import Conditions
 from slap_ros.domains import get_domain
-from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.shipped import shipped_library
+from slap_ros.shortcuts.shortcut_library import load_library
 from tools.reproduce import PUBLISHED, differences, figures, main
 
 BY_A_BENCHMARK = {"soak", "robot_bridge_obstacle_tower"}  # of a whole ensemble; pages name them

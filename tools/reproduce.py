@@ -22,8 +22,8 @@ from time import monotonic
 from typing import Any
 
 from slap_ros.domains import get_domain
-from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.shipped import shipped_library
+from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.studies.reproducing import NOT_MEASURED, TRAINING_MINUTES, published
 from tools.imports import ROOT
 

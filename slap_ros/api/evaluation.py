@@ -15,7 +15,7 @@ from slap_ros.errors import ErrorCode, InvalidParameterError
 from slap_ros.evaluation.approaches import Approach, approaches, shooting
 from slap_ros.evaluation.experiment import Experiment, Trial, run_with
 from slap_ros.planning.planner import make_planner
-from slap_ros.shortcuts.library import Library
+from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 from slap_ros.skills.domain_choice import DomainChoice
 
 OnTrial = Callable[[Approach, Trial], None]
@@ -135,7 +135,7 @@ def evaluate(
 
 
 def compared_approaches(
-    library: Library | None, domain: Domain, samples: int, compare_shooting: bool
+    library: ShortcutLibrary | None, domain: Domain, samples: int, compare_shooting: bool
 ) -> list[Approach]:
     """What is compared, pure planning first.
 

@@ -12,17 +12,17 @@ from slap_ros.api.opening import SHIPPED_WORD
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError
 from slap_ros.planning.planner import PLANNERS, WITH_SHORTCUTS
-from slap_ros.shortcuts.library import Library
 from slap_ros.shortcuts.shipped import NONE, chosen_library
 from slap_ros.shortcuts.shortcut import DEFAULT, Sampling
+from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 
 SAMPLES = DEFAULT.samples
-Shortcuts = str | Path | Library | None  # the word shipped, a folder, a library, or none
+Shortcuts = str | Path | ShortcutLibrary | None  # the word shipped, a folder, a library, or none
 
 
 def choose_library(
     shortcuts: Shortcuts, domain: Domain, planner: str, tell: Tell
-) -> Library | None:
+) -> ShortcutLibrary | None:
     """The library to plan with, if any; says which of its shortcuts are left out.
 
     Args:
@@ -35,7 +35,7 @@ def choose_library(
         InvalidLibraryError: The library cannot be used as a whole, or is another domain's.
         InvalidParameterError: The planner cannot use the library that was chosen.
     """
-    if isinstance(shortcuts, Library):
+    if isinstance(shortcuts, ShortcutLibrary):
         return _fitting(shortcuts, domain, planner)
     choice = NONE if shortcuts is None else str(shortcuts)
     library = chosen_library("" if choice == SHIPPED_WORD else choice, domain, planner)
@@ -44,7 +44,7 @@ def choose_library(
     return library
 
 
-def _fitting(library: Library, domain: Domain, planner: str) -> Library:
+def _fitting(library: ShortcutLibrary, domain: Domain, planner: str) -> ShortcutLibrary:
     """The library, which must be the domain's and of use to the planner."""
     if library.domain != domain.name:
         raise InvalidLibraryError(f"shortcuts of domain {library.domain!r}, not of {domain.name!r}")

@@ -19,8 +19,8 @@ from slap_ros.files import require_writable, sole_use
 from slap_ros.learning.setting_changes import changed, parse_changes
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.planning.planner import require_skills
-from slap_ros.shortcuts.library import Library, save_library
 from slap_ros.shortcuts.settings import TrainingSettings, training_settings
+from slap_ros.shortcuts.shortcut_library import ShortcutLibrary, save_library
 from slap_ros.shortcuts.training import CandidateGroup, Training, TrainingCallback
 from slap_ros.skills.domain_choice import WORDS, DomainChoice
 from slap_ros.studies.results import describe_skills
@@ -57,7 +57,7 @@ def train(
     jobs: int | None = None,
     ray: str | None = None,
     callback: TrainingCallback | None = None,
-) -> Library:
+) -> ShortcutLibrary:
     """Discover and learn shortcuts: explore, rank, train, keep what makes plans shorter.
 
     Interrupted, it continues where it was when it is called with the same arguments.

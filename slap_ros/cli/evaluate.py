@@ -25,8 +25,8 @@ from slap_ros.evaluation.evaluation_file import require_replaceable, write_evalu
 from slap_ros.evaluation.experiment import Experiment, Trial
 from slap_ros.evaluation.summary import Spread, Summary
 from slap_ros.files import require_writable
-from slap_ros.shortcuts.library import Library
 from slap_ros.shortcuts.shipped import shipped_library
+from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 from slap_ros.skills.domain_choice import SHIPPED
 from slap_ros.studies.results import describe_library, describe_skills
 from slap_ros.versions import versions
@@ -93,7 +93,9 @@ def evaluate(
     return _show(experiment, [summary for summary, _ in results], json)
 
 
-def _libraries(domain: Domain, shortcuts: str | None, library: Library | None) -> dict[str, Any]:
+def _libraries(
+    domain: Domain, shortcuts: str | None, library: ShortcutLibrary | None
+) -> dict[str, Any]:
     """The libraries that an evaluation was made with, of skills and of shortcuts."""
     folder = Path(shortcuts) if shortcuts else shipped_library(domain.name)
     described = describe_library(folder.name, library) if folder and library else None

@@ -13,7 +13,7 @@ from slap_ros.shortcuts.shortcut import DEFAULT
 
 if TYPE_CHECKING:
     from slap_ros.core import Domain
-    from slap_ros.shortcuts.library import Library
+    from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 
 SAMPLES = DEFAULT.samples
 
@@ -34,7 +34,7 @@ Samples = Annotated[
 ]
 
 
-def choose(choice: str | None, domain: Domain, planner: str) -> Library | None:
+def choose(choice: str | None, domain: Domain, planner: str) -> ShortcutLibrary | None:
     """The library to plan with, if any; warns about shortcuts that are left out.
 
     Args:

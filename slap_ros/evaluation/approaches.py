@@ -10,9 +10,9 @@ from slap_ros.core import Domain
 from slap_ros.planning.planner import Planner, make_planner
 from slap_ros.relational import State
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
-from slap_ros.shortcuts.library import Library
 from slap_ros.shortcuts.shooting import exhaustive, unlearned
 from slap_ros.shortcuts.shortcut import DEFAULT, PAPER, Sampling, Shortcut
+from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Approach:
 PURE_PLANNING = Approach("pure_planning")
 
 
-def shooting(library: Library, domain: Domain, sampling: Sampling) -> Approach:
+def shooting(library: ShortcutLibrary, domain: Domain, sampling: Sampling) -> Approach:
     """Planning-time search alone, with as many rollouts as SLAP makes; nothing in it is learned.
 
     Args:
@@ -67,7 +67,7 @@ def shooting(library: Library, domain: Domain, sampling: Sampling) -> Approach:
     return Approach("shooting", searched, exhaustive(sampling))
 
 
-def approaches(library: Library | None, sampling: Sampling) -> tuple[Approach, ...]:
+def approaches(library: ShortcutLibrary | None, sampling: Sampling) -> tuple[Approach, ...]:
     """What to compare: the baseline first, planning with all samples last."""
     if library is None:
         return (PURE_PLANNING,)

@@ -18,11 +18,11 @@ from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.planning.planner import GraphPlanner, Problem
 from slap_ros.shortcuts.explore import Explorer, OperatorPath
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
-from slap_ros.shortcuts.library import load_shortcut, save_shortcut
 from slap_ros.shortcuts.progress import Progress, ProgressRecorder, latest
 from slap_ros.shortcuts.settings import ExplorationSettings, TrainingSettings
 from slap_ros.shortcuts.shortcut import Sampling, Shortcut
 from slap_ros.shortcuts.shortcut_env_spec import ShortcutEnvSpec
+from slap_ros.shortcuts.shortcut_library import load_shortcut, save_shortcut
 from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.starts import StartRecord, find_start
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder

@@ -14,22 +14,24 @@ from slap_ros.planning.planner import WITH_SHORTCUTS
 from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.policies.library_files import ABOUT
 from slap_ros.policies.shipped_models import shipped_folder, shipped_with_siblings
-from slap_ros.shortcuts.library import Library, load_library
+from slap_ros.shortcuts.shortcut_library import ShortcutLibrary, load_library
 
 NONE = "none"  # the choice of no library
 
 
 def shipped_library(domain: str) -> Path | None:
     """The folder of a domain's shipped library, if there is one."""
-    return shipped_folder(domain)
+    return shipped_folder("shortcuts", domain)
 
 
 def shipped_libraries(domain: str) -> list[Path]:
     """The folders of all of a domain's shipped libraries: the one in use, and its siblings."""
-    return shipped_with_siblings(domain)
+    return shipped_with_siblings("shortcuts", domain)
 
 
-def chosen_library(choice: str | None, domain: Domain, planner: str = "lazy") -> Library | None:
+def chosen_library(
+    choice: str | None, domain: Domain, planner: str = "lazy"
+) -> ShortcutLibrary | None:
     """Load the library that was chosen.
 
     Args:

@@ -24,10 +24,10 @@ from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.learning.workers import Workers, run_in_order
 from slap_ros.shortcuts import jobs
 from slap_ros.shortcuts.explore import ExplorationResult, OperatorPath, ShortcutCandidate
-from slap_ros.shortcuts.library import Library
 from slap_ros.shortcuts.progress import Progress
 from slap_ros.shortcuts.settings import ENOUGH_SUCCESS, TrainingSettings
 from slap_ros.shortcuts.shortcut import Shortcut
+from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 from slap_ros.shortcuts.signature import Pattern, Signature
 from slap_ros.shortcuts.starts import StartRecord
 from slap_ros.shortcuts.work_folder import attempt_folder
@@ -189,7 +189,7 @@ class Training:
     def __post_init__(self) -> None:
         self._work = WorkFolder(self.folder)
 
-    def run(self) -> Library:
+    def run(self) -> ShortcutLibrary:
         """Train until the budget is spent, or go on where an earlier run ended.
 
         Raises:
@@ -214,7 +214,7 @@ class Training:
             if length < before:
                 kept.append(group)
         record = self._record(explored, baseline, length)
-        return Library(self.distribution.domain.name, tuple(self._shortcuts), record)
+        return ShortcutLibrary(self.distribution.domain.name, tuple(self._shortcuts), record)
 
     def _most_promising(
         self, groups: Sequence[CandidateGroup], kept: Sequence[CandidateGroup]

@@ -23,9 +23,9 @@ from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.policies.learner_interface import learner_interface, without
 from slap_ros.shortcuts import jobs
 from slap_ros.shortcuts.explore import ExplorationResult
-from slap_ros.shortcuts.library import Library
 from slap_ros.shortcuts.settings import OURS, TrainingSettings, training_settings
 from slap_ros.shortcuts.shortcut import Sampling
+from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.starts import StartRecord
 from slap_ros.shortcuts.training import mean_steps, rank
@@ -299,7 +299,7 @@ def learn_without(
     )
     shortcut = jobs.learn(attempt, processes=1)
     domain = distribution.make_domain()
-    library = Library(setup.domain, (shortcut,), {})
+    library = ShortcutLibrary(setup.domain, (shortcut,), {})
     found: dict[str, Any] = {
         "success": shortcut.record["success"],
         "steps": shortcut.record["length"],

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, pretty_json, read_text, write_whole
-from slap_ros.shortcuts.library import Library
+from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 from slap_ros.skills.domain_choice import DIGEST_KEY, SKILLS_KEY
 from slap_ros.studies.figures import Size, picture
 from slap_ros.versions import versions
@@ -148,7 +148,7 @@ def write(folder: Path, report: StudyReport, origin: Provenance, cpu_seconds: fl
     return paths
 
 
-def describe_library(name: str, library: Library) -> dict[str, Any]:
+def describe_library(name: str, library: ShortcutLibrary) -> dict[str, Any]:
     """Which library it is: its name, the digest that bags have too, what it offers."""
     return {
         "name": name,

@@ -18,8 +18,8 @@ from slap_ros.evaluation.approaches import PURE_PLANNING, Approach, approaches, 
 from slap_ros.evaluation.experiment import Experiment, Trial
 from slap_ros.evaluation.statistics import Interval, ratio_interval, wilson_interval
 from slap_ros.evaluation.summary import Spread, lengths_of_both
-from slap_ros.shortcuts.library import Library
 from slap_ros.shortcuts.shortcut import Sampling
+from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.comparison import (
     PlanningSetup,
@@ -54,7 +54,7 @@ class TrainedLibrary:
     """A library and what it is called: that of its folder."""
 
     name: str
-    library: Library
+    library: ShortcutLibrary
 
 
 @dataclass(frozen=True)
@@ -256,7 +256,7 @@ def _batch(experiment: Experiment, library: str, digest: str, approach: Approach
     }
 
 
-def _ways(library: Library, domain: Domain, sampling: Sampling) -> tuple[Approach, ...]:
+def _ways(library: ShortcutLibrary, domain: Domain, sampling: Sampling) -> tuple[Approach, ...]:
     """To plan with a library, the one that learned nothing first."""
     return (shooting(library, domain, sampling), *approaches(library, sampling)[1:])
 

@@ -14,9 +14,9 @@ from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, read_text
 from slap_ros.learning.work_folder import DECODING_ERRORS
 from slap_ros.shortcuts.explore import ExplorationResult
-from slap_ros.shortcuts.library import Library, load_shortcut
 from slap_ros.shortcuts.settings import ExplorationSettings
 from slap_ros.shortcuts.shortcut import Shortcut
+from slap_ros.shortcuts.shortcut_library import ShortcutLibrary, load_shortcut
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 
 
@@ -143,7 +143,7 @@ class TrainingFolder:
 
 
 def _digest(shortcut: Shortcut) -> str:
-    return Library("", (shortcut,)).digest
+    return ShortcutLibrary("", (shortcut,)).digest
 
 
 def read_curve(path: Path) -> LearningCurve:

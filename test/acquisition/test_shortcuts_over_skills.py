@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from ensemble.cli.application import app
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode
-from slap_ros.shortcuts.library import load_library
+from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 
 pytestmark = pytest.mark.usefixtures("points_installed")

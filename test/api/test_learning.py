@@ -16,8 +16,8 @@ from slap_ros.cli import app
 from slap_ros.errors import InvalidParameterError
 from slap_ros.learning.setting_changes import parse_changes
 from slap_ros.learning.workers import SequentialWorkers
-from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.settings import TrainingSettings
+from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.skills.domain_choice import DEMONSTRATOR
 
 TOY = {

@@ -19,8 +19,8 @@ from slap_ros.errors import (
 )
 from slap_ros.planning.options import OptionKind
 from slap_ros.planning.plan import Plan, PlanningResult
-from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.shipped import shipped_library
+from slap_ros.shortcuts.shortcut_library import load_library
 
 
 def slap(*arguments, code=0):

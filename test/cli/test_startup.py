@@ -20,7 +20,7 @@ HEAVY = LEARNING | PHYSICS | PICTURES | OTHERS
 ROS = {"rclpy", "rosbags", "cyclonedds", "slap_ros.bags"}
 PLANNING = {"yaml", "safetensors", "slap_ros.core", "slap_ros.domains", "slap_ros.evaluation"}
 LG_SAIL = {"slap_ros.skills.skill_library", "slap_ros.acquisition.proposals.proposal"}
-SHORTCUTS = {"slap_ros.shortcuts.library", "slap_ros.shortcuts.shipped"}
+SHORTCUTS = {"slap_ros.shortcuts.shortcut_library", "slap_ros.shortcuts.shipped"}
 STUDIES = {"slap_ros.studies", "slap_ros.report", "slap_ros.doctor.libraries"}
 
 DOMAIN = """(define (domain lamps) (:requirements :strips :typing) (:types lamp)

@@ -23,8 +23,8 @@ from slap_ros.domain_check.experience import Transition  # noqa: E402
 from slap_ros.errors import InvalidDomainError, InvalidStateError  # noqa: E402
 from slap_ros.evaluation.approaches import approaches  # noqa: E402
 from slap_ros.relational import Feature  # noqa: E402
-from slap_ros.shortcuts.library import load_library  # noqa: E402
 from slap_ros.shortcuts.shortcut import Sampling  # noqa: E402
+from slap_ros.shortcuts.shortcut_library import load_library  # noqa: E402
 
 DOMAIN = kinder_obstruction.make()
 TASK = DOMAIN.task(7)  # evaluation begins at seed 0

@@ -32,8 +32,8 @@ from slap_ros.planning.options import OptionExecution, OptionKind
 from slap_ros.planning.plan import PlanEdge
 from slap_ros.planning.planner import Problem
 from slap_ros.relational import Target
-from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.shortcut import DEFAULT
+from slap_ros.shortcuts.shortcut_library import load_library
 
 DATA = Path(__file__).parent.parent / "shortcuts" / "data" / "obstacle2d"
 SHORTCUT = "Clear_On-e41568a9"

@@ -23,7 +23,7 @@ from recorder_node.node import RecorderNode
 from slap_ros.bags import bag_info, evaluate_bag
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError, SlapError, UnknownDomainError
-from slap_ros.shortcuts.library import load_library
+from slap_ros.shortcuts.shortcut_library import load_library
 
 ROOT = Path(__file__).parents[2]
 LIBRARY = ROOT / "test" / "shortcuts" / "data" / "obstacle2d"

@@ -15,12 +15,12 @@ from slap_ros.domains import get_domain
 from slap_ros.learning.task_distribution import TRAINING_SEED
 from slap_ros.planning.planner import Problem
 from slap_ros.relational import Target
-from slap_ros.shortcuts.library import Library, save_library
 from slap_ros.shortcuts.ppo import Learner, normalisation_of
 from slap_ros.shortcuts.ppo_settings import PpoSettings
 from slap_ros.shortcuts.progress import Progress
 from slap_ros.shortcuts.rewards import Rewards
 from slap_ros.shortcuts.shortcut import Shortcut
+from slap_ros.shortcuts.shortcut_library import ShortcutLibrary, save_library
 from slap_ros.shortcuts.shortcut_vec_env import ShortcutVecEnv
 from slap_ros.shortcuts.signature import Change, Signature
 from slap_ros.shortcuts.starts import Start
@@ -63,7 +63,7 @@ def main() -> None:
     learner.learn(report)
     record = {"steps": last.steps, "success": last.success, "length": round(last.length, 2)}
     shortcut = Shortcut(signature, learner.policy(), shortest=1, record=record)
-    save_library(DATA, Library(DOMAIN.name, (shortcut,), {"made_by": "make_library.py"}))
+    save_library(DATA, ShortcutLibrary(DOMAIN.name, (shortcut,), {"made_by": "make_library.py"}))
     print(len(starts), shortcut.name, record)  # noqa: T201
 
 

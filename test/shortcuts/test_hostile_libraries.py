@@ -15,7 +15,7 @@ from safetensors.numpy import load, save
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError
 from slap_ros.learning.work_folder import WorkFolder
-from slap_ros.shortcuts.library import load_library
+from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.shortcuts.signature import Signature
 from slap_ros.studies.trainings import TrainingFolder
 

@@ -18,9 +18,9 @@ from slap_ros.errors import InvalidLibraryError, InvalidParameterError
 from slap_ros.evaluation.approaches import PURE_PLANNING, approaches
 from slap_ros.evaluation.experiment import Experiment, run_all
 from slap_ros.shortcuts import shipped
-from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.shipped import chosen_library, require_usable, shipped_library
 from slap_ros.shortcuts.shortcut import DEFAULT, Sampling
+from slap_ros.shortcuts.shortcut_library import load_library
 
 DATA = Path(__file__).parent / "data" / "obstacle2d"
 DOMAIN = get_domain("obstacle2d")
@@ -187,7 +187,7 @@ def test_the_shipped_library_is_found_and_used_unless_told_otherwise(
 def test_a_checkout_ships_what_is_in_its_models():
     root = Path(shipped.__file__).parents[2]
     for name in ("obstacle2d", "obstacle_tower", "cleanup_table"):
-        folder = root / "models" / name
+        folder = root / "models" / "shortcuts" / name
         assert shipped_library(name) == (folder if folder.is_dir() else None)
 
 
@@ -201,7 +201,7 @@ from hashlib import sha256
 from slap_ros.domains import get_domain
 from slap_ros.planning.options import OptionKind
 from slap_ros.planning.planner import GraphPlanner, Problem
-from slap_ros.shortcuts.library import load_library
+from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
 from slap_ros.shortcuts.shipped import chosen_library
 from slap_ros.evaluation.approaches import approaches

@@ -11,9 +11,9 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidLibraryError
 from slap_ros.evaluation.approaches import approaches, shooting
 from slap_ros.evaluation.experiment import Experiment
-from slap_ros.shortcuts.library import Library, load_library, save_library
 from slap_ros.shortcuts.shooting import RandomActions
 from slap_ros.shortcuts.shortcut import Sampling
+from slap_ros.shortcuts.shortcut_library import ShortcutLibrary, load_library, save_library
 
 DOMAIN = get_domain("obstacle2d")
 LIBRARY = load_library(Path(__file__).parent / "data" / "obstacle2d", DOMAIN)
@@ -50,5 +50,5 @@ def test_it_solves_tasks_and_says_the_same_again():
 def test_it_is_no_library(tmp_path):
     alone = shooting(LIBRARY, DOMAIN, Sampling())
     with pytest.raises(InvalidLibraryError, match="no learned policy that could be stored"):
-        save_library(tmp_path / "library", Library("obstacle2d", alone.shortcuts))
+        save_library(tmp_path / "library", ShortcutLibrary("obstacle2d", alone.shortcuts))
     assert not (tmp_path / "library").exists()

@@ -12,9 +12,9 @@ from slap_ros.domains import get_domain
 from slap_ros.domains.obstacle2d.dynamics import Obstacle2DVectorWorld
 from slap_ros.planning.planner import Problem
 from slap_ros.relational import Target
-from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.shortcut import DEFAULT, Sampling
+from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.shortcuts.shortcut_rollouts import ShortcutRollouts
 from slap_ros.shortcuts.signature import Change
 

@@ -12,8 +12,8 @@ from slap_ros.evaluation.approaches import approaches
 from slap_ros.planning.model import Model
 from slap_ros.relational import Target
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
-from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.shortcut import Sampling
+from slap_ros.shortcuts.shortcut_library import load_library
 
 LIBRARY = load_library(Path(__file__).parent / "data" / "obstacle2d", DOMAIN)
 LOOSE = replace(DOMAIN, exact=False)  # other atoms may appear

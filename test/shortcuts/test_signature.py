@@ -13,7 +13,7 @@ from slap_ros.domains import get_domain
 from slap_ros.domains.obstacle_tower import make
 from slap_ros.domains.obstacle_tower.tasks import RandomTowerTasks
 from slap_ros.evaluation.approaches import Approach
-from slap_ros.shortcuts.library import load_library
+from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.shortcuts.signature import Change, Signature, concerned, context_of
 from slap_ros.shortcuts.signature_grounder import SignatureGrounder
 from slap_ros.shortcuts.signature_matcher import SignatureMatcher

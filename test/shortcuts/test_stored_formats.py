@@ -16,9 +16,9 @@ import pytest
 from slap_ros.domains import get_domain
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.workers import SequentialWorkers
-from slap_ros.shortcuts.library import load_library, save_library
 from slap_ros.shortcuts.settings import GENERAL, ExplorationSettings, training_settings
 from slap_ros.shortcuts.shipped import shipped_library
+from slap_ros.shortcuts.shortcut_library import load_library, save_library
 from slap_ros.shortcuts.training import Training
 from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.trainings import TrainingFolder

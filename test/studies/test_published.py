@@ -16,8 +16,8 @@ from slap_ros.cli.study_report import FRESH_SEED
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode
 from slap_ros.policies.shipped_models import shipped_with_siblings
-from slap_ros.shortcuts.library import load_library
 from slap_ros.shortcuts.shipped import shipped_libraries, shipped_library
+from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.skills.skill_library import load_skill_library
 from slap_ros.studies.readme import PLACE, with_tables
 

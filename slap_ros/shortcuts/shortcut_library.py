@@ -4,7 +4,7 @@
 
 ::
 
-    models/obstacle_tower/
+    models/shortcuts/obstacle_tower/
       library.json               format, domain, preset, versions, the command that made it
       NothingOn_On-8fbd5384/
         shortcut.json            signature, shortest success, training record
@@ -52,7 +52,7 @@ Record = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class Library:
+class ShortcutLibrary:
     """Shortcuts of a domain.
 
     Args:
@@ -78,14 +78,14 @@ class Library:
         return whole.hexdigest()[:16]
 
 
-def save_library(path: Path, library: Library) -> None:
+def save_library(path: Path, library: ShortcutLibrary) -> None:
     """Write a library as a folder, in place of the one that may be there."""
     about = {"format": FORMAT, "domain": library.domain, **library.record}
     shortcuts = {shortcut.name: shortcut for shortcut in library.shortcuts}
     write_library(path, about, shortcuts, save_shortcut)
 
 
-def load_library(path: Path, domain: Domain) -> Library:
+def load_library(path: Path, domain: Domain) -> ShortcutLibrary:
     """Read a library.
 
     Raises:
@@ -104,7 +104,7 @@ def load_library(path: Path, domain: Domain) -> Library:
         return shortcut
 
     shortcuts, refused = read_members(path, load)
-    return Library(domain.name, shortcuts, record_of(about), refused)
+    return ShortcutLibrary(domain.name, shortcuts, record_of(about), refused)
 
 
 def _require_fit(shortcut: Shortcut, folder: Path, domain: Domain) -> None:
