@@ -16,7 +16,8 @@ from collections.abc import Iterator
 from benchmarks.printing import show
 from slap_ros.core import Domain
 from slap_ros.domains import get_domain
-from slap_ros.planning.planner import GraphPlanner, Problem
+from slap_ros.planning.graph_planner import GraphPlanner
+from slap_ros.planning.problem import Problem
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
 from slap_ros.shortcuts.shipped import chosen_library
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary

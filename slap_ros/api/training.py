@@ -18,7 +18,7 @@ from slap_ros.errors import InvalidParameterError
 from slap_ros.files import require_writable, sole_use
 from slap_ros.learning.setting_changes import changed, parse_changes
 from slap_ros.learning.task_distribution import TaskDistribution
-from slap_ros.planning.planner import require_skills
+from slap_ros.planning.problem import require_skills
 from slap_ros.shortcuts.settings import TrainingSettings, training_settings
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary, save_library
 from slap_ros.shortcuts.training import CandidateGroup, Training, TrainingCallback

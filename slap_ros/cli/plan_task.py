@@ -16,7 +16,8 @@ from slap_ros.errors import StorageFullError
 from slap_ros.files import write_whole
 from slap_ros.planning.abstract_graph import AbstractGraph, build_abstract_graph
 from slap_ros.planning.plan import PlanningResult
-from slap_ros.planning.planner import Problem, plan_symbolically
+from slap_ros.planning.problem import Problem
+from slap_ros.planning.symbolic_planner import plan_symbolically
 from slap_ros.relational import AtomSpace, LiftedOperator, ground_operators
 from slap_ros.relational.pddl import write_domain, write_problem
 from slap_ros.versions import versions

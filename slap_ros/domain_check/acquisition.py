@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from slap_ros.core import Acquisition, Domain
 from slap_ros.doctor.check import Check
 from slap_ros.errors import InvalidParameterError, SlapError
-from slap_ros.planning.planner import plan_symbolically
+from slap_ros.planning.symbolic_planner import plan_symbolically
 from slap_ros.relational import ground_operators
 from slap_ros.skills.scripted_skill import with_scripts
 

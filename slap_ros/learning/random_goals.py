@@ -18,7 +18,7 @@ import numpy as np
 from slap_ros.core import Domain, Task
 from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.planning.abstract_graph import build_abstract_graph
-from slap_ros.planning.planner import Problem
+from slap_ros.planning.problem import Problem
 from slap_ros.relational import AtomSpace, GroundAtom
 from slap_ros.skills.domain_choice import DomainChoice
 

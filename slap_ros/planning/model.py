@@ -32,6 +32,11 @@ class Rollout:
     abstract: int = 0
     result: OptionResult = REACHED
 
+    @property
+    def moved_and_failed(self) -> bool:
+        """Whether it took steps and ended elsewhere than in its target."""
+        return self.steps > 0 and not self.reached
+
 
 class Model:
     """The known transition function (the paper's f).

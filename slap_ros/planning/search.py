@@ -33,8 +33,7 @@ replaced.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count
 
@@ -57,14 +56,14 @@ class Vertex:
         node: Index of the abstract state, whose atoms hold; where options are not exact, so may
             others.
         state: The low-level state.
-        cost: Environment steps from the start.
+        g: Environment steps from the start.
         parent: The vertex before it; None at the start.
         edge: From the parent's node to this one; None at the start.
     """
 
     node: int
     state: State
-    cost: int
+    g: int
     parent: Vertex | None = None
     edge: Edge | None = None
 
@@ -72,6 +71,47 @@ class Vertex:
     def key(self) -> VertexKey:
         """Vertices with equal keys have equal futures."""
         return self.node, self.state.key
+
+
+@dataclass(frozen=True)
+class FailedPath:
+    """A path whose last edge fails in the model.
+
+    Args:
+        plan: Its edges, with the steps that they take, the last one's until it fails.
+        node: Index of the node that the last edge should have led to.
+        abstract: The abstract state in which it ends instead.
+    """
+
+    plan: Plan
+    node: int
+    abstract: int
+
+
+@dataclass(frozen=True)
+class SearchOutcome:
+    """What a search came to.
+
+    Args:
+        plan: The plan; None where no path of the graph can be executed.
+        failed: Without a plan: paths on which a given or acquired skill moved the robot and failed,
+            in the order in which the search met them.
+        reason: Without a plan: why there is none.
+    """
+
+    plan: Plan | None
+    failed: tuple[FailedPath, ...] = ()
+    reason: str = ""
+
+    def require_plan(self) -> Plan:
+        """The plan, where there has to be one.
+
+        Raises:
+            UnsolvableError: There is none.
+        """
+        if self.plan is None:
+            raise UnsolvableError(self.reason)
+        return self.plan
 
 
 @dataclass
@@ -137,7 +177,7 @@ def _attempts(
         option = option.next_attempt()
 
 
-def search_exhaustively(graph: AbstractGraph, state: State, model: Model) -> Plan:
+def search_exhaustively(graph: AbstractGraph, state: State, model: Model) -> SearchOutcome:
     """Build the whole bottom level, then Dijkstra; stop when the best goal vertex is closed.
 
     Args:
@@ -146,33 +186,44 @@ def search_exhaustively(graph: AbstractGraph, state: State, model: Model) -> Pla
         model: Rolls options out.
 
     Returns:
-        A plan of least cost.
-
-    Raises:
-        UnsolvableError: No path of the graph can be executed from ``state``.
+        A plan of least cost, if any path of the graph can be executed from ``state``.
     """
     bottom, goals = build_bottom_level(graph, state, model), set(graph.goal_nodes)
     tie = count()
     queue = [(0, next(tie), bottom.start)]
-    closed: set[VertexKey] = set()
+    closed: dict[VertexKey, Vertex] = {}
     while queue:
-        cost, _, vertex = heapq.heappop(queue)
+        g, _, vertex = heapq.heappop(queue)
         if vertex.node in goals:
-            return _plan(graph, vertex)
+            return SearchOutcome(_plan(graph, vertex))
         if vertex.key in closed:
             continue
-        closed.add(vertex.key)
+        closed[vertex.key] = vertex
         for edge, steps, successor in bottom.successors[vertex.key]:
-            reached = Vertex(successor.node, successor.state, cost + steps, vertex, edge)
-            heapq.heappush(queue, (reached.cost, next(tie), reached))
-    raise _infeasible(graph, bottom.failures)
+            reached = Vertex(successor.node, successor.state, g + steps, vertex, edge)
+            heapq.heappush(queue, (reached.g, next(tie), reached))
+    failed = _failed_edges(graph, closed.values(), model)
+    return _without_plan(graph, failed, model, bottom.failures)
+
+
+def _failed_edges(
+    graph: AbstractGraph, vertices: Iterable[Vertex], model: Model
+) -> Iterator[Vertex]:
+    """Where operators that failed have left the robot; the model has rolled all of them out."""
+    forward = graph.forward_edges()
+    for vertex in vertices:
+        for edge in forward[vertex.node]:
+            target = edge.option.target(graph.nodes[edge.target])
+            rollout = model.roll_out(edge.option, vertex.state, target)
+            if rollout.moved_and_failed and edge.option.kind is OptionKind.OPERATOR:
+                yield Vertex(edge.target, rollout.final, vertex.g + rollout.steps, vertex, edge)
 
 
 @dataclass(order=True)
 class _QueueEntry:
     """A vertex to be expanded, or an edge out of it that was not rolled out yet."""
 
-    bound: int  # environment steps of any plan through it
+    f: int  # lower bound of the environment steps of any plan through it
     tie: int
     vertex: Vertex = field(compare=False)
     edge: Edge | None = field(compare=False)
@@ -185,7 +236,7 @@ class _QueueEntry:
 
 
 class _Frontier:
-    """The queue of A*, best first by cost so far plus lower bounds of what is to come."""
+    """The queue of A*, smallest f = g + h first; h is a lower bound of the steps to go."""
 
     def __init__(self, graph: AbstractGraph) -> None:
         self._goals = graph.goal_nodes
@@ -205,17 +256,17 @@ class _Frontier:
         self._put(_QueueEntry(0, -next(self._tie), vertex, edge, least_steps))
 
     def _put(self, entry: _QueueEntry) -> None:
-        rest = self._to_go[entry.node]
-        if rest is not None:
-            entry.bound = entry.vertex.cost + entry.least_steps + rest
+        h = self._h[entry.node]
+        if h is not None:
+            entry.f = entry.vertex.g + entry.least_steps + h
             heapq.heappush(self._queue, entry)
 
     def pop(self) -> _QueueEntry | None:
         """The best entry; None if the queue is empty."""
         while self._queue:
             best = heapq.heappop(self._queue)
-            rest = self._to_go[best.node]
-            if rest is not None and best.vertex.cost + best.least_steps + rest <= best.bound:
+            h = self._h[best.node]
+            if h is not None and best.vertex.g + best.least_steps + h <= best.f:
                 return best
             self._put(best)  # bounds rose since it was pushed
         return None
@@ -225,12 +276,12 @@ class _Frontier:
         self._look_ahead([[e for e in out if not e.option.given_up()] for out in self.forward])
 
     def _look_ahead(self, forward: list[list[Edge]]) -> None:
-        """Keep the edges through which a goal can be reached, and the steps to go from each."""
-        self._to_go = _steps_to_go(forward, self._goals)
-        self.forward = [[e for e in out if self._to_go[e.target] is not None] for out in forward]
+        """Keep the edges through which a goal can be reached, and h of each node."""
+        self._h = _steps_to_go(forward, self._goals)
+        self.forward = [[e for e in out if self._h[e.target] is not None] for out in forward]
 
 
-def search_lazily(graph: AbstractGraph, state: State, model: Model) -> Plan:
+def search_lazily(graph: AbstractGraph, state: State, model: Model) -> SearchOutcome:
     """A* with lazy edge evaluation: an edge is rolled out at the front of the queue.
 
     Until then it counts with the bound of its skill from the state at its source. As long as
@@ -243,48 +294,10 @@ def search_lazily(graph: AbstractGraph, state: State, model: Model) -> Plan:
         model: Rolls options out.
 
     Returns:
-        A plan, of least cost where bounds are admissible.
-
-    Raises:
-        UnsolvableError: No path of the graph can be executed from ``state``.
+        A plan, of least cost where bounds are admissible, if any path of the graph can be executed
+        from ``state``.
     """
     return _LazySearch(graph, state, model).run()
-
-
-@dataclass(frozen=True)
-class FailedPath:
-    """A path whose last edge fails in the model.
-
-    Args:
-        plan: Its edges, with the steps that they take, the last one's until it fails.
-        node: Index of the node that the last edge should have led to.
-        abstract: The abstract state in which it ends instead.
-    """
-
-    plan: Plan
-    node: int
-    abstract: int
-
-
-def failed_paths(graph: AbstractGraph, state: State, model: Model) -> list[FailedPath]:
-    """Where given and acquired skills have failed in a search that found no plan.
-
-    Args:
-        graph: The top level.
-        state: The low-level state to start from, in the graph's first node.
-        model: That has rolled everything out already.
-
-    Returns:
-        Paths whose last edge moved the robot, in the order in which they failed.
-    """
-    search = _LazySearch(graph, state, model)
-    with suppress(UnsolvableError):
-        search.run()
-    return [
-        FailedPath(_plan(graph, ended), edge.target, model.space.abstract(ended.state))
-        for ended in search.failed
-        if (edge := ended.edge) is not None
-    ]
 
 
 class _LazySearch:
@@ -298,20 +311,20 @@ class _LazySearch:
         start = Vertex(0, state, 0)
         self._cheapest = {start.key: 0}
         self._failures = Failures()
-        self.failed: list[Vertex] = []  # where operators that failed have left the robot
+        self._failed: list[Vertex] = []  # where operators that failed have left the robot
         self._frontier.push(start)
 
-    def run(self) -> Plan:
+    def run(self) -> SearchOutcome:
         """Until the best entry of the queue is a goal vertex."""
         while (best := self._frontier.pop()) is not None:
             vertex, edge = best.vertex, best.edge
             if edge is not None:
                 self._evaluate(vertex, edge)
             elif vertex.node in self._goals:
-                return _plan(self._graph, vertex)
-            elif vertex.cost == self._cheapest[vertex.key]:
+                return SearchOutcome(_plan(self._graph, vertex))
+            elif vertex.g == self._cheapest[vertex.key]:
                 self._expand(vertex)
-        raise _infeasible(self._graph, self._failures)
+        return _without_plan(self._graph, self._failed, self._model, self._failures)
 
     def _expand(self, vertex: Vertex) -> None:
         """Queue the edges out of a vertex, each with its bound."""
@@ -329,35 +342,35 @@ class _LazySearch:
         if edge.option.attempt == 0:
             self._failures.add(edge.option, target, rollout)
         if rollout.reached:
-            cost = vertex.cost + rollout.steps
-            reached = Vertex(edge.target, rollout.final, cost, vertex, edge)
-            if cost < self._cheapest.get(reached.key, cost + 1):
-                self._cheapest[reached.key] = cost
+            g = vertex.g + rollout.steps
+            reached = Vertex(edge.target, rollout.final, g, vertex, edge)
+            if g < self._cheapest.get(reached.key, g + 1):
+                self._cheapest[reached.key] = g
                 self._frontier.push(reached)
             following = edge.option.next_attempt()
             if following is not None:  # it takes longer, but the next option may take less
                 self._frontier.push(vertex, replace(edge, option=following), rollout.steps)
             return
-        if rollout.steps and edge.option.kind is OptionKind.OPERATOR:
-            cost = vertex.cost + rollout.steps
-            self.failed.append(Vertex(edge.target, rollout.final, cost, vertex, edge))
+        if rollout.moved_and_failed and edge.option.kind is OptionKind.OPERATOR:
+            g = vertex.g + rollout.steps
+            self._failed.append(Vertex(edge.target, rollout.final, g, vertex, edge))
         if edge.option.given_up():
             self._frontier.drop_given_up()
 
 
 def _steps_to_go(forward: list[list[Edge]], goals: Sequence[int]) -> list[int | None]:
     """Lower bound of the steps from each node to a goal; None where there is no way."""
-    steps: list[int | None] = [None] * len(forward)
+    h: list[int | None] = [None] * len(forward)
     for goal in goals:
-        steps[goal] = 0
+        h[goal] = 0
     for node in reversed(range(len(forward))):  # forward edges lead to later nodes
         for edge in forward[node]:
-            rest = steps[edge.target]
-            if rest is not None:
-                through = edge.option.skill.least_steps + rest
-                known = steps[node]
-                steps[node] = through if known is None else min(known, through)
-    return steps
+            beyond = h[edge.target]
+            if beyond is not None:
+                through = edge.option.skill.least_steps + beyond
+                known = h[node]
+                h[node] = through if known is None else min(known, through)
+    return h
 
 
 def _plan(graph: AbstractGraph, goal: Vertex) -> Plan:
@@ -365,7 +378,7 @@ def _plan(graph: AbstractGraph, goal: Vertex) -> Plan:
         PlanEdge(
             edge.option,
             edge.option.target(graph.nodes[edge.target]),
-            vertex.cost - parent.cost,
+            vertex.g - parent.g,
         )
         for vertex, parent, edge in _path(goal)
     ]
@@ -378,7 +391,14 @@ def _path(vertex: Vertex) -> Iterator[tuple[Vertex, Vertex, Edge]]:
         vertex = vertex.parent
 
 
-def _infeasible(graph: AbstractGraph, failures: Failures) -> UnsolvableError:
+def _without_plan(
+    graph: AbstractGraph, failed: Iterable[Vertex], model: Model, failures: Failures
+) -> SearchOutcome:
+    """The outcome of a search that found no plan."""
     what = f"no path through the {len(graph.nodes)} abstract states can be executed from here"
     why = failures.in_words()
-    return UnsolvableError(f"{what}: {why}" if why else what)
+    paths = tuple(
+        FailedPath(_plan(graph, ended), ended.node, model.space.abstract(ended.state))
+        for ended in failed
+    )
+    return SearchOutcome(None, paths, f"{what}: {why}" if why else what)

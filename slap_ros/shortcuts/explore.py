@@ -20,9 +20,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.core import Domain
+from slap_ros.core import Domain, Task
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
-from slap_ros.planning.planner import GraphPlanner, Problem
+from slap_ros.planning.graph_planner import GraphPlanner
+from slap_ros.planning.plan import Plan
+from slap_ros.planning.problem import Problem
 from slap_ros.planning.search import Vertex
 from slap_ros.policies.action_map import ActionMap
 from slap_ros.policies.learner_interface import learner_interface
@@ -120,42 +122,66 @@ class Explorer:
     def __init__(
         self,
         domain: Domain,
+        problem: Problem,
+        task: Task,
+        plan: Plan,
+        settings: ExplorationSettings,
+        rng: np.random.Generator,
+    ) -> None:
+        """Build the task's abstract graph; see :meth:`of_task`.
+
+        Args:
+            domain: Domain of the task.
+            problem: Operators and model over the task's objects.
+            task: Task to explore.
+            plan: Plan without shortcuts for the task.
+            settings: Number of rollouts, and of nodes that they begin in.
+            rng: Draws the random actions.
+        """
+        self.task = task
+        self._domain, self._problem, self._plan = domain, problem, plan
+        self._settings, self._rng = settings, rng
+        self.space = problem.model.space
+        self._grasping = self.space.mask(
+            atom
+            for atom in self.space.atoms
+            if atom.predicate in learner_interface(domain).grasping
+        )
+        self.graph = build_abstract_graph(
+            self.space.abstract(task.initial_state), self.space.mask(task.goal), problem.operators
+        )
+        worlds = settings.rollouts if domain.steps_together else UNBATCHED_WORLDS
+        self._worlds = domain.make_vector_world([task.initial_state] * worlds)
+        self._grips = np.arange(worlds) % 2 == 1  # whether the gripper acts in a world
+        self._steps = 0
+
+    @classmethod
+    def of_task(
+        cls,
+        domain: Domain,
         seed: int,
         index: int,
         settings: ExplorationSettings,
         rng: np.random.Generator,
-    ) -> None:
-        """Plan for the task and build its abstract graph.
+    ) -> Explorer:
+        """The explorer of a task, which is planned for first.
 
         Args:
-            domain: Whose task.
-            seed: Of the task.
-            index: Of the task.
-            settings: How many rollouts, from how many nodes.
+            domain: Domain of the task.
+            seed: Seed of the task.
+            index: Index of the task.
+            settings: Number of rollouts, and of nodes that they begin in.
             rng: Draws the random actions.
 
         Raises:
             UnsolvableError: The task has no plan.
             PlanningLimitError: A limit was reached before a plan was found.
         """
-        self.task = domain.task(seed, index)
-        self._domain, self._settings, self._rng = domain, settings, rng
-        self._problem = Problem.of(domain, self.task.initial_state)
-        self.space = self._problem.model.space
-        self._grasping = self.space.mask(
-            atom
-            for atom in self.space.atoms
-            if atom.predicate in learner_interface(domain).grasping
-        )
-        goal = self.space.mask(self.task.goal)
-        self._plan = GraphPlanner(self._problem).plan(self.task.initial_state, goal).plan
-        self.graph = build_abstract_graph(
-            self.space.abstract(self.task.initial_state), goal, self._problem.operators
-        )
-        worlds = settings.rollouts if domain.steps_together else UNBATCHED_WORLDS
-        self._worlds = domain.make_vector_world([self.task.initial_state] * worlds)
-        self._grips = np.arange(worlds) % 2 == 1  # whether the gripper acts in a world
-        self._steps = 0
+        task = domain.task(seed, index)
+        problem = Problem.of(domain, task.initial_state)
+        goal = problem.model.space.mask(task.goal)
+        plan = GraphPlanner(problem).plan(task.initial_state, goal).plan
+        return cls(domain, problem, task, plan, settings, rng)
 
     def explore(self) -> ExplorationResult:
         """Collect states, roll out from them, value what was reached."""
@@ -211,9 +237,9 @@ class Explorer:
         node = self.graph.nodes[source.node]
         change = Change.between(node, self.graph.nodes[j])
         context = context_of(node, learner_interface(self._domain).grasping, self.space)
-        motions = vertex.cost - source.cost
+        motions = vertex.g - source.g
         steps = min(lengths)
-        expected = source.cost + ABSORBED_MOTION * motions + steps
+        expected = source.g + ABSORBED_MOTION * motions + steps
         return ShortcutCandidate(
             Signature.of(change, self.space, context),
             operator_path_to(source),
@@ -231,7 +257,7 @@ class Explorer:
         vertices = []
         for vertex in self._cheapest_first():
             if vertex.edge is not None and vertex.parent is not None:
-                steps = vertex.cost - vertex.parent.cost
+                steps = vertex.g - vertex.parent.g
                 costs.setdefault(vertex.edge.option.skill.name, []).append(steps)
             vertices.append(vertex)
             if len(vertices) == self._settings.nodes:
@@ -253,7 +279,7 @@ class Explorer:
             for edge in forward[vertex.node] if vertex.node not in goals else []:
                 reached = self._follow(vertex, edge)
                 if reached is not None:
-                    heapq.heappush(queue, (reached.cost, next(tie), reached))
+                    heapq.heappush(queue, (reached.g, next(tie), reached))
 
     def _follow(self, vertex: Vertex, edge: Edge) -> Vertex | None:
         """Where an edge leads to from a vertex; None where it cannot be executed."""
@@ -262,7 +288,7 @@ class Explorer:
         self._steps += rollout.steps
         if not rollout.reached:
             return None
-        return Vertex(edge.target, rollout.final, vertex.cost + rollout.steps, vertex, edge)
+        return Vertex(edge.target, rollout.final, vertex.g + rollout.steps, vertex, edge)
 
     def _roll_out(self, vertex: Vertex) -> dict[int, list[int]]:
         """Random rollouts, for all targets at once: steps to each node reached, by node.

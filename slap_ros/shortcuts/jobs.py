@@ -15,7 +15,8 @@ import numpy as np
 from slap_ros.errors import PlanningLimitError, SlapError, UnsolvableError
 from slap_ros.learning.subproc_vec_env import make_vec_env
 from slap_ros.learning.task_distribution import TaskDistribution
-from slap_ros.planning.planner import GraphPlanner, Problem
+from slap_ros.planning.graph_planner import GraphPlanner
+from slap_ros.planning.problem import Problem
 from slap_ros.shortcuts.explore import Explorer, OperatorPath
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
 from slap_ros.shortcuts.progress import Progress, ProgressRecorder, latest
@@ -53,7 +54,9 @@ def explore(
     """
     began = process_time()
     rng = np.random.default_rng([distribution.seed, EXPLORATION, index])
-    explorer = Explorer(distribution.make_domain(), distribution.task_seed, index, settings, rng)
+    explorer = Explorer.of_task(
+        distribution.make_domain(), distribution.task_seed, index, settings, rng
+    )
     return {**explorer.explore().as_json(), "cpu_s": process_time() - began}
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from slap_ros.core import Domain
 from slap_ros.errors import SlapError
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
-from slap_ros.planning.planner import Problem
+from slap_ros.planning.problem import Problem
 from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.relational import AtomSpace, State
 from slap_ros.shortcuts.explore import OperatorPath, steps_to_goal

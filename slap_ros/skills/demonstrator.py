@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from slap_ros.core import Domain, Task
 from slap_ros.errors import UnsolvableError
 from slap_ros.planning.execution import EpisodeResult, Executor
-from slap_ros.planning.planner import SymbolicPlanner, ground_options
+from slap_ros.planning.problem import ground_options
+from slap_ros.planning.symbolic_planner import SymbolicPlanner
 from slap_ros.relational import AtomSpace, GroundAtom
 
 DEMONSTRATION_SEED = 3_000_000  # neither evaluation nor training sees these tasks

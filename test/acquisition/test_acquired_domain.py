@@ -34,7 +34,8 @@ from slap_ros.evaluation.approaches import PURE_PLANNING
 from slap_ros.evaluation.experiment import Experiment, run_all, solve
 from slap_ros.messages.decode import decode_target
 from slap_ros.messages.interfaces import PLAN
-from slap_ros.planning.planner import PLANNERS, Problem, make_planner
+from slap_ros.planning.planner import PLANNERS, make_planner
+from slap_ros.planning.problem import Problem
 from slap_ros.policies import shipped_models
 from slap_ros.report import read_report
 from slap_ros.skills.domain_choice import DomainChoice, open_domain

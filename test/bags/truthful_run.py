@@ -243,7 +243,7 @@ class Script:
             for ground in self.domain.ground(self.space)
         )
         graph = build_abstract_graph(self.space.abstract(state), self.space.mask(goal), operators)
-        plan = search_lazily(graph, state, model)
+        plan = search_lazily(graph, state, model).require_plan()
         self.clock_ns += 123_456_789
         self.plan_event(PlanEventKind.PLANNED, 0, rolled=model.executed)
         self.truth.planning_ns = self.clock_ns - started

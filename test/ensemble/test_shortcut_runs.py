@@ -30,7 +30,7 @@ from slap_ros.evaluation.experiment import Experiment
 from slap_ros.planning.model import Model
 from slap_ros.planning.options import OptionExecution, OptionKind
 from slap_ros.planning.plan import PlanEdge
-from slap_ros.planning.planner import Problem
+from slap_ros.planning.problem import Problem
 from slap_ros.relational import Target
 from slap_ros.shortcuts.shortcut import DEFAULT
 from slap_ros.shortcuts.shortcut_library import load_library

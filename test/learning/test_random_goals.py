@@ -7,7 +7,8 @@ import pytest
 
 from slap_ros.domains import get_domain
 from slap_ros.learning.random_goals import RandomGoalsChoice, sample_goals
-from slap_ros.planning.planner import Problem, make_planner
+from slap_ros.planning.planner import make_planner
+from slap_ros.planning.problem import Problem
 from slap_ros.skills.domain_choice import DomainChoice
 
 CHOICE = DomainChoice("obstacle2d", "fair")

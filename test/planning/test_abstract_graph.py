@@ -11,7 +11,7 @@ from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.planning import abstract_graph
 from slap_ros.planning.abstract_graph import EdgeBeyond, add_beyond, build_abstract_graph
 from slap_ros.planning.hmax import HMaxHeuristic
-from slap_ros.planning.planner import Problem
+from slap_ros.planning.problem import Problem
 from slap_ros.relational import GroundOperator, LiftedOperator
 
 

@@ -17,7 +17,8 @@ from slap_ros.errors import ErrorCode, UnsolvableError
 from slap_ros.evaluation.approaches import PURE_PLANNING
 from slap_ros.evaluation.experiment import solve
 from slap_ros.planning.abstract_graph import build_unrolled_graph
-from slap_ros.planning.planner import Problem, make_planner
+from slap_ros.planning.planner import make_planner
+from slap_ros.planning.problem import Problem
 from slap_ros.relational import (
     Feature,
     Layout,

@@ -15,7 +15,8 @@ from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
 from slap_ros.planning.model import Rollout
 from slap_ros.planning.options import Option, OptionKind
-from slap_ros.planning.planner import Problem, make_planner
+from slap_ros.planning.planner import make_planner
+from slap_ros.planning.problem import Problem
 from slap_ros.planning.search import search_exhaustively, search_lazily
 from slap_ros.relational import Feature, Layout, State, Target, Type
 
@@ -47,7 +48,7 @@ class MadeUpSkill:
 class MadeUpModel:
     """Roll-outs by table: deterministic, path-dependent, some infeasible."""
 
-    space = SimpleNamespace(decode=lambda mask: ())
+    space = SimpleNamespace(decode=lambda mask: (), abstract=lambda state: 0)
 
     def __init__(self):
         self.executed = 0
@@ -92,11 +93,8 @@ def made_up_graphs(draw):
 
 def cost_or_none(search, graph):
     model = MadeUpModel()
-    try:
-        plan = search(graph, State(LAYOUT, [0.0]), model)
-    except UnsolvableError:
-        return None
-    return plan.predicted_steps
+    plan = search(graph, State(LAYOUT, [0.0]), model).plan
+    return None if plan is None else plan.predicted_steps
 
 
 @settings(max_examples=400, deadline=None)
@@ -143,7 +141,7 @@ def test_lazy_search_does_not_look_at_dead_ends():
     for target, skill in skills.items():
         graph.edges.append(Edge(0, target, Option(OptionKind.OPERATOR, skill, ())))
     model = MadeUpModel()
-    plan = search_lazily(graph, State(LAYOUT, [0.0]), model)
+    plan = search_lazily(graph, State(LAYOUT, [0.0]), model).require_plan()
     assert [edge.option.skill.name for edge in plan.edges] == ["there"]
     assert model.executed == 1
 
@@ -271,11 +269,10 @@ def graphs_with_shortcuts(draw):
 @given(graphs_with_shortcuts())
 def test_a_plan_is_too_long_by_no_more_than_bounds_are_too_high(graph):
     state, model = State(LAYOUT, [0.0]), MadeUpModel()
-    try:
-        best = search_exhaustively(graph, state, model)
-    except UnsolvableError:
+    best = search_exhaustively(graph, state, model).plan
+    if best is None:
         return
-    lazy = search_lazily(graph, state, model)
+    lazy = search_lazily(graph, state, model).require_plan()
     excess = 0
     for edge in best.edges:
         rollout = model.roll_out(edge.option, state, edge.target)

@@ -15,8 +15,9 @@ from slap_ros.errors import ErrorCode, UnsolvableError
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge
 from slap_ros.planning.model import Rollout
 from slap_ros.planning.options import Option, OptionExecution, OptionKind, OptionResult
-from slap_ros.planning.planner import ground_options, make_planner
-from slap_ros.planning.search import failed_paths, search_exhaustively, search_lazily
+from slap_ros.planning.planner import make_planner
+from slap_ros.planning.problem import ground_options
+from slap_ros.planning.search import search_exhaustively, search_lazily
 from slap_ros.relational import Feature, Layout, State, Target, Type
 
 MASKS = st.integers(0, 255)
@@ -82,7 +83,7 @@ class Sloppy:
 class SloppyModel:
     """Ends with other atoms than were expected; it is the target that says whether it did."""
 
-    space = SimpleNamespace(decode=lambda mask: ())
+    space = SimpleNamespace(decode=lambda mask: (), abstract=lambda state: 0)
     executed = 0
 
     def roll_out(self, option, state, target):
@@ -113,9 +114,8 @@ def graphs(draw):
 def test_lazy_and_exhaustive_agree_where_atoms_may_appear(graph):
     start, costs = State(LAYOUT, [0.0]), []
     for search in (search_lazily, search_exhaustively):
-        try:
-            plan = search(graph, start, SloppyModel())
-        except UnsolvableError:
+        plan = search(graph, start, SloppyModel()).plan
+        if plan is None:
             costs.append(None)
             continue
         costs.append(plan.predicted_steps)
@@ -227,7 +227,8 @@ def made_up(skill, kind=OptionKind.OPERATOR):
     return Option(kind, skill, (), deletes=0)
 
 
-def test_where_everything_fails_the_search_tells_how_far_it_came():
+@pytest.mark.parametrize("search", [search_lazily, search_exhaustively])
+def test_where_everything_fails_the_search_tells_how_far_it_came(search):
     graph = AbstractGraph(GOAL, [AT_START, ON_WAY, GOAL], [0, 1, 2])
     graph.edges += [
         Edge(0, 1, made_up(Failing("walks", 4, 0.0, ends=ON_WAY))),
@@ -237,9 +238,11 @@ def test_where_everything_fails_the_search_tells_how_far_it_came():
         Edge(0, 2, made_up(Failing("slaps", 5, 0.0, ends=BROKEN), OptionKind.SHORTCUT)),
     ]
     start = State(LAYOUT, [float(AT_START)])
+    outcome = search(graph, start, FailingModel())
+    assert outcome.plan is None
     with pytest.raises(UnsolvableError):
-        search_lazily(graph, start, FailingModel())
-    found = {str(path.plan.edges[-1]): path for path in failed_paths(graph, start, FailingModel())}
+        outcome.require_plan()
+    found = {str(path.plan.edges[-1]): path for path in outcome.failed}
     assert set(found) == {"stumbles()", "breaks()"}
     assert [str(edge) for edge in found["stumbles()"].plan.edges] == ["walks()", "stumbles()"]
     assert [path.abstract for path in found.values()] == [

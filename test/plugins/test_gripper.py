@@ -103,7 +103,7 @@ def test_a_policy_moves_all_that_is_no_gripper():
 
 def explorer(domain):
     settings = ExplorationSettings(rollouts=64, length=30, nodes=3)
-    return Explorer(domain, 0, 0, settings, np.random.default_rng(0))
+    return Explorer.of_task(domain, 0, 0, settings, np.random.default_rng(0))
 
 
 def test_random_rollouts_close_and_open_the_axis_that_is_the_gripper():

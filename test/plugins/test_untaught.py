@@ -20,7 +20,9 @@ from slap_ros.errors import (
     UnknownGoalError,
     UnsolvableError,
 )
-from slap_ros.planning.planner import SymbolicPlanner, ground_options, make_planner
+from slap_ros.planning.planner import make_planner
+from slap_ros.planning.problem import ground_options
+from slap_ros.planning.symbolic_planner import SymbolicPlanner
 from slap_ros.skills.demonstrator import demonstrate
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.skills.scripted_skill import with_scripts

@@ -13,7 +13,7 @@ import numpy as np
 
 from slap_ros.domains import get_domain
 from slap_ros.learning.task_distribution import TRAINING_SEED
-from slap_ros.planning.planner import Problem
+from slap_ros.planning.problem import Problem
 from slap_ros.relational import Target
 from slap_ros.shortcuts.ppo import Learner, normalisation_of
 from slap_ros.shortcuts.ppo_settings import PpoSettings

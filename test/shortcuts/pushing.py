@@ -3,7 +3,7 @@
 """Starts of a shortcut in Obstacle 2D: with a block in the hand, push another off the target."""
 
 from slap_ros.domains import get_domain
-from slap_ros.planning.planner import Problem
+from slap_ros.planning.problem import Problem
 from slap_ros.relational import Target
 from slap_ros.shortcuts.signature import Change, Signature
 from slap_ros.shortcuts.starts import Start

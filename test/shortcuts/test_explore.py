@@ -12,7 +12,7 @@ from slap_ros.shortcuts.settings import ExplorationSettings
 def explore(nodes):
     settings = ExplorationSettings(rollouts=16, length=30, nodes=nodes)
     rng = np.random.default_rng(0)
-    explorer = Explorer(get_domain("cluttered_drawer"), 1_000_000, 0, settings, rng)
+    explorer = Explorer.of_task(get_domain("cluttered_drawer"), 1_000_000, 0, settings, rng)
     return explorer.explore().candidates
 
 

@@ -11,7 +11,7 @@ from slap_ros.domains import get_domain
 from slap_ros.evaluation.approaches import PURE_PLANNING, Approach
 from slap_ros.evaluation.experiment import Experiment
 from slap_ros.planning.abstract_graph import build_abstract_graph
-from slap_ros.planning.planner import Problem
+from slap_ros.planning.problem import Problem
 from slap_ros.policies.mlp_policy import MlpPolicy, ObservationNormalisation
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.shortcut import Sampling, Shortcut

@@ -10,7 +10,7 @@ import pytest
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.obstacle2d.dynamics import Obstacle2DVectorWorld
-from slap_ros.planning.planner import Problem
+from slap_ros.planning.problem import Problem
 from slap_ros.relational import Target
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.shortcut import DEFAULT, Sampling

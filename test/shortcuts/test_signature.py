@@ -176,7 +176,7 @@ def test_a_signature_survives_json():
 def test_the_matcher_finds_exactly_the_pairs_that_match():
     domain = get_domain("obstacle2d", "fair")
     from slap_ros.planning.abstract_graph import build_abstract_graph
-    from slap_ros.planning.planner import Problem
+    from slap_ros.planning.problem import Problem
 
     for index in range(5):
         task = domain.task(11, index)

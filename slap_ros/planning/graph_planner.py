@@ -1,0 +1,129 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Plans through the abstract planning graph, shortcuts among its edges (SLAP §4.1, Alg. 2)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from slap_ros.errors import InvalidParameterError, UnsolvableError
+from slap_ros.planning.abstract_graph import (
+    AbstractGraph,
+    Edge,
+    EdgeBeyond,
+    add_beyond,
+    build_abstract_graph,
+)
+from slap_ros.planning.model import Model
+from slap_ros.planning.plan import PlanningResult
+from slap_ros.planning.problem import Problem
+from slap_ros.planning.recovery import Recovery
+from slap_ros.planning.search import SearchOutcome, search_lazily
+from slap_ros.relational import State
+
+Search = Callable[[AbstractGraph, State, Model], SearchOutcome]
+
+
+class ShortcutSource(Protocol):
+    """Gives shortcut edges for an abstract graph."""
+
+    def edges(self, graph: AbstractGraph) -> Sequence[Edge]:
+        """Edges to be added to a graph."""
+        ...
+
+    def beyond(self, graph: AbstractGraph, within: Collection[str]) -> Sequence[EdgeBeyond]:
+        """Edges to abstract states that a graph may not have.
+
+        Args:
+            graph: Where they begin.
+            within: Names of the shortcuts that stay in it.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class GraphPlanner:
+    """The abstract planning graph, then a shortest path through it (SLAP §4.1, Alg. 2).
+
+    Shortcuts are edges like others: one that fails in the model leads nowhere, and without any
+    this is pure planning. One of which no edge is on a way to the goal may lead out of the graph
+    (:func:`~slap_ros.planning.abstract_graph.add_beyond`). Where no path can be executed, the
+    graph is deepened beyond the paper's: by one layer at a time, up to ``max_extra_depth``.
+
+    In the same graph, a plan with shortcuts is never longer in the model than one without; see
+    :mod:`slap_ros.planning.search`. A plan that shortcuts make possible in a shallower graph is
+    taken, though a deeper one might have a shorter plan.
+
+    Where skills fail on every path, see :mod:`slap_ros.planning.recovery`.
+
+    Args:
+        problem: The model, and the ground operators with their options.
+        search: Lazy or exhaustive.
+        max_extra_depth: Layers, one per operator, by which the graph may be deepened, and operators
+            of a detour.
+        shortcuts: Where shortcut edges come from.
+    """
+
+    problem: Problem
+    search: Search = search_lazily
+    max_extra_depth: int = 2
+    shortcuts: ShortcutSource | None = None
+
+    def __post_init__(self) -> None:
+        if self.max_extra_depth < 0:
+            raise InvalidParameterError(f"max_extra_depth must not be negative: {self}")
+
+    def plan(self, state: State, goal: int) -> PlanningResult:
+        """See :class:`~slap_ros.planning.planner.Planner`."""
+        model = self.problem.model
+        before, remark = model.executed, ""
+        graph, outcome = self.search_to(state, goal)
+        plan = outcome.plan
+        if plan is None:
+            recovery = Recovery(self.problem, graph, state, goal, outcome.failed)
+            if self.problem.exact:
+                plan = recovery.past_side_effect(self.search_to)
+            elif (plan := recovery.detour(self.max_extra_depth)) is None:
+                plan, remark = recovery.despite_failures(), outcome.reason
+            if plan is None:
+                raise UnsolvableError(outcome.reason)
+        rolled_out = model.executed - before
+        sizes = len(graph.nodes), len(graph.edges)
+        return PlanningResult(plan, *sizes, rolled_out, remark, graph)
+
+    def search_to(self, state: State, goal: int) -> tuple[AbstractGraph, SearchOutcome]:
+        """Search the shallowest graph in which there is a plan, else the deepest one.
+
+        Args:
+            state: Low-level state to start from.
+            goal: Mask of atoms that must hold.
+
+        Returns:
+            The graph, and what the search in it came to.
+
+        Raises:
+            UnsolvableError: No operators lead to the goal.
+        """
+        start = self.problem.model.space.abstract(state)
+        for extra_depth in range(self.max_extra_depth + 1):
+            graph = self._graph(start, goal, extra_depth)
+            outcome = self.search(graph, state, self.problem.model)
+            if outcome.plan is not None:
+                break
+        return graph, outcome
+
+    def _graph(self, start: int, goal: int, extra_depth: int) -> AbstractGraph:
+        """The top level with shortcuts; an error says which atoms of the goal cannot be had."""
+        try:
+            graph = build_abstract_graph(start, goal, self.problem.operators, extra_depth)
+        except UnsolvableError as error:
+            raise UnsolvableError(f"{error}: {self.problem.why_not(start, goal)}") from error
+        graph.space = self.problem.model.space
+        if self.shortcuts is not None:
+            shortcuts, on_way = self.shortcuts.edges(graph), graph.on_way_to_goal()
+            within = {edge.option.skill.name for edge in shortcuts if edge.target in on_way}
+            add_beyond(graph, self.shortcuts.beyond(graph, within), self.problem.operators)
+            graph.edges.extend(shortcuts)
+        return graph
