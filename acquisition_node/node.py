@@ -12,7 +12,7 @@ ROS Parameters:
     output (string, "runs/skills"): folder for libraries of skills, and for what is learned for
         them. A goal has a folder of its own there, in which the same goal goes on.
     settings (string, "small"), changes (string, ""): how skills are learned, as ``slap acquire``
-        has it; changes as ``rollouts=20 sac.discount=0.9``.
+        has it; changes as ``rollouts=20 sac.gamma=0.9``.
     steps (int, 150000): environment steps that a goal may learn for at most.
     jobs (int, 1): processes that learn.
     begin_with (string, ""): libraries that skills may begin with, separated by blanks.

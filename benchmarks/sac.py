@@ -70,10 +70,10 @@ def main() -> None:
     parser.add_argument("--updates", type=int, default=400)
     updates = parser.parse_args().updates // ROUNDS
     torch.set_num_threads(1)
-    same = {"batch_size": SMALL.batch_size, "policy_kwargs": {"net_arch": list(SMALL.hidden)}}
+    same = {"batch_size": SMALL.batch_size, "policy_kwargs": {"net_arch": list(SMALL.net_arch)}}
     fused = {
         "batch_size": SMALL.batch_size,
-        "policy_kwargs": {"net_arch": list(SMALL.hidden), "optimizer_kwargs": {"fused": True}},
+        "policy_kwargs": {"net_arch": list(SMALL.net_arch), "optimizer_kwargs": {"fused": True}},
     }
     as_skills_learn = make(LeanSac, **fused)
     as_skills_learn.normalise_critics()

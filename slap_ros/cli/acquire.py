@@ -73,7 +73,7 @@ class AcquireOptions:
         list[str] | None,
         typer.Option(
             metavar="NAME=VALUE",
-            help="Change one of the settings, such as sac.discount=0.99. May be repeated. A wrong "
+            help="Change one of the settings, such as sac.gamma=0.99. May be repeated. A wrong "
             "name lists all names.",
         ),
     ] = None

@@ -17,6 +17,7 @@ from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from slap_ros.core import SettingValue
 from slap_ros.errors import InvalidParameterError
+from slap_ros.learning.stored_keys import field_name
 
 S = TypeVar("S")
 OFF = "none"  # on the command line: a part that is left out
@@ -24,14 +25,14 @@ LARGEST = 10**9  # of a whole number
 ZERO_TOO = frozenset({"alternatives", "refinements", "shortcuts"})  # other counts begin at 1
 BELOW_1 = math.nextafter(1.0, 0.0)
 RANGES: Mapping[str, tuple[float, float]] = {  # of fractions; all others are finite
-    "discount": (0.0, BELOW_1),
+    "gamma": (0.0, BELOW_1),
     "enough": (0.0, 1.0),
-    "entropy": (0.0, sys.float_info.max),
+    "ent_coef": (0.0, sys.float_info.max),
     "gae_lambda": (0.0, 1.0),
     "learning_rate": (math.ulp(0.0), 1.0),
     "least_saving": (0.0, BELOW_1),
     "least_similarity": (0.0, 1.0),
-    "log_std": (-20.0, 2.0),
+    "log_std_init": (-20.0, 2.0),
     "progress": (0.0, 1.0),
     "random_goals": (0.0, 1.0),
     "rehearsal": (0.0, BELOW_1),
@@ -95,6 +96,9 @@ def changed(settings: S, changes: Mapping[str, SettingValue]) -> S:
 def parse_changes(texts: Sequence[str], kind: type) -> dict[str, SettingValue]:
     """Changes as the command line has them, ``exploration.rollouts=16``.
 
+    Commands that libraries record may have the names of an earlier version, which files still have
+    (:mod:`slap_ros.learning.stored_keys`).
+
     Args:
         texts: One per setting.
         kind: The dataclass whose settings they are.
@@ -108,9 +112,10 @@ def parse_changes(texts: Sequence[str], kind: type) -> dict[str, SettingValue]:
     """
     known, changes = setting_names(kind), dict[str, SettingValue]()
     for text in texts:
-        name, equals, value = (piece.strip() for piece in text.partition("="))
+        given, equals, value = (piece.strip() for piece in text.partition("="))
         if not equals:
             raise InvalidParameterError(f"{text!r} is not of the form exploration.rollouts=16")
+        name = _current_name(given, kind)
         _require_known(name, known)
         if name in changes:
             raise InvalidParameterError(f"setting {name!r} is given twice")
@@ -121,6 +126,18 @@ def parse_changes(texts: Sequence[str], kind: type) -> dict[str, SettingValue]:
                 f"setting {name!r} must be {_in_words(name, known[name])}, not {value!r}"
             ) from None
     return changes
+
+
+def _current_name(given: str, kind: type) -> str:
+    """A dotted name with each part as its dataclass has it now."""
+    names: list[str] = []
+    part: type | None = kind
+    for piece in given.split("."):
+        name = piece if part is None else field_name(part, piece)
+        hint = None if part is None else get_type_hints(part).get(name)
+        names.append(name)
+        part = None if hint is None else _part(hint)
+    return ".".join(names)
 
 
 def _require_known(name: str, known: Mapping[str, Any]) -> None:

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slap_ros.core import Domain, Task
+from slap_ros.learning.stored_keys import restored, stored
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
 from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.plan import Plan
@@ -31,7 +32,6 @@ from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.relational import State
 from slap_ros.shortcuts.settings import ExplorationSettings
 from slap_ros.shortcuts.signature import Change, Signature, context_of
-from slap_ros.shortcuts.stored_keys import restored, stored
 
 OperatorPath = tuple[str, ...]  # operators by which a shortcut's source was reached
 ABSORBED_MOTION = 0.5  # of a motion's steps that remain where it is part of a shortcut
@@ -61,7 +61,7 @@ class ShortcutCandidate:
     expected_saving: float
 
     def as_json(self) -> dict[str, Any]:
-        """A JSON object, under the keys of :mod:`slap_ros.shortcuts.stored_keys`."""
+        """A JSON object, under the keys of :mod:`slap_ros.learning.stored_keys`."""
         return stored(self)
 
     @classmethod
@@ -97,7 +97,7 @@ class ExplorationResult:
     operator_steps: Mapping[str, float]
 
     def as_json(self) -> dict[str, Any]:
-        """A JSON object, under the keys of :mod:`slap_ros.shortcuts.stored_keys`."""
+        """A JSON object, under the keys of :mod:`slap_ros.learning.stored_keys`."""
         return stored(self)
 
     @classmethod

@@ -178,7 +178,7 @@ class LearningAttempt:
                 self.distribution.domain,
                 self.signature,
                 self.starts,
-                ppo.environments // ppo.parts,
+                ppo.n_envs // ppo.parts,
                 self.settings.horizon,
                 self.settings.rewards_in(stage),
                 (self.distribution.seed, len(self.starts), stage, part, *again),

@@ -115,17 +115,17 @@ class Learner:
         self._ppo = PPO(
             "MlpPolicy",
             self._env,
-            n_steps=settings.rollout_steps,
+            n_steps=settings.n_steps,
             batch_size=settings.batch_size,
-            n_epochs=settings.epochs,
+            n_epochs=settings.n_epochs,
             learning_rate=self._rate,
-            gamma=settings.discount,
+            gamma=settings.gamma,
             gae_lambda=settings.gae_lambda,
-            ent_coef=settings.entropy,
+            ent_coef=settings.ent_coef,
             policy_kwargs={
-                "net_arch": list(settings.hidden),
+                "net_arch": list(settings.net_arch),
                 "activation_fn": torch.nn.Tanh,
-                "log_std_init": settings.log_std,
+                "log_std_init": settings.log_std_init,
             },
             seed=seed,
             device="cpu",
@@ -152,7 +152,7 @@ class Learner:
     def policy(self) -> MlpPolicy:
         """The policy as it is now, without torch."""
         weights = {k: v.detach().cpu().numpy().copy() for k, v in self._weights().items()}
-        hidden = [f"mlp_extractor.policy_net.{2 * i}" for i in range(len(self.settings.hidden))]
+        hidden = [f"mlp_extractor.policy_net.{2 * i}" for i in range(len(self.settings.net_arch))]
         layers = tuple(
             (weights[f"{name}.weight"], weights[f"{name}.bias"]) for name in [*hidden, "action_net"]
         )
@@ -169,7 +169,7 @@ class Learner:
     def initialise_from(self, earlier: Learner) -> None:
         """Begin with the weights of an earlier learner, but with this one's noise."""
         weights = earlier._weights()
-        weights["log_std"] = torch.full_like(weights["log_std"], self.settings.log_std)
+        weights["log_std"] = torch.full_like(weights["log_std"], self.settings.log_std_init)
         self._ppo.policy.load_state_dict(weights)
         self._env.shortest = earlier._env.shortest
 

@@ -11,24 +11,24 @@ from slap_ros.errors import InvalidParameterError
 
 @dataclass(frozen=True)
 class PpoSettings:
-    """PPO's hyper-parameters, under their usual names."""
+    """PPO's hyper-parameters, under the names of stable-baselines3."""
 
-    environments: int = 16
+    n_envs: int = 16
     parts: int = 1  # that the environments are divided into, for processes of their own
-    rollout_steps: int = 64  # in each environment between updates
+    n_steps: int = 64  # in each environment between updates
     batch_size: int = 256
-    epochs: int = 10
+    n_epochs: int = 10
     learning_rate: float = 1e-3
     anneal: bool = True  # the learning rate, linearly, to a twentieth
-    discount: float = 0.97
+    gamma: float = 0.97
     gae_lambda: float = 0.9
-    entropy: float = 0.0
-    log_std: float = -0.5
-    hidden: tuple[int, ...] = (64, 64)
+    ent_coef: float = 0.0
+    log_std_init: float = -0.5
+    net_arch: tuple[int, ...] = (64, 64)
     total_steps: int = 300_000
 
     def __post_init__(self) -> None:
-        if self.environments % self.parts:
+        if self.n_envs % self.parts:
             raise InvalidParameterError(
-                f"{self.environments} environments cannot be divided into {self.parts} equal parts"
+                f"{self.n_envs} environments cannot be divided into {self.parts} equal parts"
             )

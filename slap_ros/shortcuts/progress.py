@@ -14,13 +14,13 @@ from typing import Any, Protocol
 
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, read_text
+from slap_ros.learning.stored_keys import restored, stored
 from slap_ros.learning.work_folder import DECODING_ERRORS
 from slap_ros.policies.library_files import replace_folder
 from slap_ros.policies.mlp_policy import MlpPolicy
 from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.shortcut_library import save_shortcut
 from slap_ros.shortcuts.signature import Signature
-from slap_ros.shortcuts.stored_keys import restored, stored
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 
 CHECKPOINT_S = 30.0  # between checkpoints

@@ -24,7 +24,7 @@ class Rewards:
         failure: Of the step after which the target cannot be reached any more, on top of ``step``
             for ever.
         shaping: Weight of the difference of the potential.
-        discount: Per step; here, for what ``step`` comes to for ever.
+        gamma: Per step; here, for what ``step`` comes to for ever.
         scale: Of the whole, which gives returns a magnitude that critics learn well.
     """
 
@@ -32,7 +32,7 @@ class Rewards:
     success: float = 43.0
     failure: float = -5.0
     shaping: float = 1.0
-    discount: float = 0.97
+    gamma: float = 0.97
     scale: float = 0.1
 
     def of(self, gain: Array, success: Bools, failure: Bools) -> Array:
@@ -54,7 +54,7 @@ class Rewards:
         Returns:
             Shape (n,).
         """
-        worst = self.failure + self.step / (1.0 - self.discount)
+        worst = self.failure + self.step / (1.0 - self.gamma)
         return self.scale * (
             self.step + self.success * success + self.shaping * gain + worst * (failure & ~success)
         )

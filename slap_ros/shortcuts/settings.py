@@ -11,10 +11,10 @@ from typing import Any
 from slap_ros.core import Domain, SettingValue
 from slap_ros.errors import InvalidDomainError, InvalidParameterError
 from slap_ros.learning.setting_changes import changed
+from slap_ros.learning.stored_keys import restored, stored
 from slap_ros.shortcuts.ppo_settings import PpoSettings
 from slap_ros.shortcuts.rewards import Rewards
 from slap_ros.shortcuts.shortcut import DEFAULT, PAPER, Sampling
-from slap_ros.shortcuts.stored_keys import restored, stored
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class ExplorationSettings:
     nodes: int = 6
 
     def as_json(self) -> dict[str, Any]:
-        """A JSON object, under the keys of :mod:`slap_ros.shortcuts.stored_keys`."""
+        """A JSON object, under the keys of :mod:`slap_ros.learning.stored_keys`."""
         return stored(self)
 
     @classmethod
@@ -55,11 +55,11 @@ class ExplorationSettings:
 ENOUGH_SUCCESS = 0.5  # share of the last episodes of the first stage: no further attempt
 LEARN = PpoSettings(total_steps=250_000)
 POLISH = PpoSettings(
-    rollout_steps=128,
+    n_steps=128,
     batch_size=512,
     learning_rate=4e-4,
     gae_lambda=0.95,
-    log_std=-1.3,
+    log_std_init=-1.3,
     total_steps=250_000,
 )
 
@@ -110,7 +110,7 @@ class TrainingSettings:
     def rewards_in(self, stage: int) -> Rewards:
         """The rewards of a stage, with the discount of that stage."""
         rewards = self.rewards if stage == 0 or self.polish_rewards is None else self.polish_rewards
-        return replace(rewards, discount=self.stages[stage].discount)
+        return replace(rewards, gamma=self.stages[stage].gamma)
 
     @property
     def total_steps(self) -> int:
@@ -136,7 +136,7 @@ class TrainingSettings:
         )
 
     def as_json(self) -> dict[str, Any]:
-        """A JSON object, under the keys of :mod:`slap_ros.shortcuts.stored_keys`.
+        """A JSON object, under the keys of :mod:`slap_ros.learning.stored_keys`.
 
         A single attempt and no other goals are left out, as work folders have it from when there
         was no other way.
@@ -150,15 +150,15 @@ class TrainingSettings:
 
 OURS = TrainingSettings()
 _PAPER_PPO = PpoSettings(
-    environments=1,
-    rollout_steps=100,
+    n_envs=1,
+    n_steps=100,
     batch_size=16,
     learning_rate=3e-4,
     anneal=False,
-    discount=0.99,
+    gamma=0.99,
     gae_lambda=0.95,
-    entropy=0.01,
-    log_std=0.0,
+    ent_coef=0.01,
+    log_std_init=0.0,
 )
 # The paper says -1 per step; its code adds 100 for success, and 0.5 and 10 in Obstacle 2D.
 _PAPER = replace(
@@ -166,7 +166,7 @@ _PAPER = replace(
     exploration=ExplorationSettings(rollouts=100, length=300, hits=5, action_repeat=1, nodes=1000),
     polish=None,
     ppo=replace(_PAPER_PPO, total_steps=300_000),
-    rewards=Rewards(step=-1.0, success=100.0, failure=0.0, shaping=0.0, discount=0.99, scale=1.0),
+    rewards=Rewards(step=-1.0, success=100.0, failure=0.0, shaping=0.0, gamma=0.99, scale=1.0),
     horizon=100,
     sampling=PAPER,
 )

@@ -18,14 +18,15 @@ from ensemble.spinner import temporary_node
 LIMIT = 120.0  # s
 # Both skills of `points` are learned with these in seconds.
 LEARNED = (
-    "sac.hidden=32,32 sac.batch_size=64 sac.learning_rate=0.002 sac.discount=0.9 sac.tau=0.02 "
-    "sac.random_steps=192 rollouts=12 validation=12 judged=24 segment_episodes=4 skill_steps=4000"
+    "sac.net_arch=32,32 sac.batch_size=64 sac.learning_rate=0.002 sac.gamma=0.9 sac.tau=0.02 "
+    "sac.learning_starts=192 rollouts=12 validation=12 judged=24 segment_episodes=4 "
+    "skill_steps=4000"
 )
 # Nothing is learned with these, and that takes a few seconds in several judgements.
 BRIEF = {
     "changes": (
-        "sac.hidden=8,8 sac.batch_size=16 sac.random_steps=96 rollouts=2 validation=2 judged=4 "
-        "segment_episodes=2 skill_steps=1200"
+        "sac.net_arch=8,8 sac.batch_size=16 sac.learning_starts=96 rollouts=2 validation=2 "
+        "judged=4 segment_episodes=2 skill_steps=1200"
     ),
     "steps": 2400,
 }

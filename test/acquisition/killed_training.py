@@ -28,7 +28,12 @@ KILLS = 10
 SHARE = 1 / 4  # of an undisturbed training's processor time: a process has half of it, on average
 SETTINGS = AcquisitionSettings(
     SacSettings(
-        hidden=(32, 32), batch_size=64, learning_rate=2e-3, discount=0.9, tau=0.02, random_steps=192
+        net_arch=(32, 32),
+        batch_size=64,
+        learning_rate=2e-3,
+        gamma=0.9,
+        tau=0.02,
+        learning_starts=192,
     ),
     rollouts=3,
     validation=3,

@@ -19,8 +19,8 @@ from slap_ros.errors import ErrorCode
 
 pytestmark = pytest.mark.usefixtures("points_installed")
 SMALL = [
-    "rollouts=2", "validation=2", "skill_steps=200", "segment_episodes=2", "sac.hidden=8,8",
-    "sac.random_steps=96",
+    "rollouts=2", "validation=2", "skill_steps=200", "segment_episodes=2", "sac.net_arch=8,8",
+    "sac.learning_starts=96",
 ]  # fmt: skip
 SHORTCUTS = str(Path(__file__).parents[2] / "models" / "shortcuts" / "obstacle2d")
 BUDGET = [*(word for change in SMALL for word in ("--set", change)), "--steps", 200, "--jobs", 1]

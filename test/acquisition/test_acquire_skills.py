@@ -87,7 +87,7 @@ def slap(*arguments):
 @pytest.mark.parametrize("begun", [*slow(False), True])
 def test_a_run_acquires_what_it_lacks_and_one_bag_tells_it_all(network, tmp_path, begun):
     """Without any skill, and with a library that lacks one of two, which keeps the other one."""
-    bag, changes = tmp_path / "bag", LEARNED.replace("sac.hidden=32,32 ", "")
+    bag, changes = tmp_path / "bag", LEARNED.replace("sac.net_arch=32,32 ", "")
     skills = ["--skills", write_library(tmp_path / "some", PICKING)] if begun else []
     ran = slap(
         "run", "points", "--acquire", "--goal", "swapped", "--record", bag, *skills, "--json",

@@ -56,7 +56,7 @@ def out_of_reach(start):
 
 def test_starts_that_the_world_refuses_are_left_out_and_counted(tmp_path):
     settings = AcquisitionSettings(segment_episodes=1, skill_steps=1)
-    settings = replace(settings, sac=replace(settings.sac, environments=2))
+    settings = replace(settings, sac=replace(settings.sac, n_envs=2))
     good = begin(0)
     bad = out_of_reach(good)
     with local_workers(1) as workers:

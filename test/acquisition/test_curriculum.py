@@ -43,7 +43,7 @@ from slap_ros.skills.skill_signature import signature_of
 
 pytestmark = pytest.mark.usefixtures("points_installed")
 SAC = SacSettings(
-    hidden=(32, 32), batch_size=64, learning_rate=2e-3, discount=0.9, tau=0.02, random_steps=192
+    net_arch=(32, 32), batch_size=64, learning_rate=2e-3, gamma=0.9, tau=0.02, learning_starts=192
 )
 WHOLE = AcquisitionSettings(
     SAC,
@@ -394,7 +394,7 @@ def test_a_skill_that_fails_again_is_learned_further(tmp_path):
     weak = replace(PICKING, policy=towards(0, False))
     weak.policy.layers[1][0][0, 1] = 0.0  # it never goes to the left
     there = kept(tmp_path / "weak", weak, PUTTING)
-    settings = replace(SHORT, rollouts=8, sac=replace(SAC, hidden=(4,)))
+    settings = replace(SHORT, rollouts=8, sac=replace(SAC, net_arch=(4,)))
     library, events = acquire(tmp_path / "work", settings, kept=there)
     assert {name for name, _ in events.judged} == {"Pick"}
     first = events.judged[0][1]

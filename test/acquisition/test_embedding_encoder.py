@@ -153,8 +153,8 @@ def test_new_skills_begin_with_those_that_the_server_finds_alike(
     monkeypatch.setenv(KEY_VARIABLE, KEY)
     known = write_library(tmp_path / "known", PUTTING, PICKING)
     changes = [
-        "rollouts=2", "validation=2", "skill_steps=200", "segment_episodes=2", "sac.hidden=4",
-        "sac.random_steps=96",
+        "rollouts=2", "validation=2", "skill_steps=200", "segment_episodes=2", "sac.net_arch=4",
+        "sac.learning_starts=96",
     ]  # fmt: skip
     with serving() as server:
         asked = (

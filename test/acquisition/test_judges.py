@@ -20,7 +20,7 @@ from slap_ros.acquisition.training.settings import AcquisitionSettings
 pytestmark = pytest.mark.usefixtures("points_installed")
 
 SOURCE = TaskSource.of(POINTS, "train", 1, POINTS.acquisition.operators, REWARDS)
-SAC = SacSettings(hidden=(16, 16), batch_size=32, random_steps=96)
+SAC = SacSettings(net_arch=(16, 16), batch_size=32, learning_starts=96)
 SEGMENTS = 4
 SETTINGS = AcquisitionSettings(SAC, segment_episodes=2, skill_steps=SEGMENTS * 192)
 

@@ -24,7 +24,7 @@ from slap_ros.skills.groundings import Groundings
 from slap_ros.skills.observations import SIZE
 from slap_ros.skills.reward import SkillReward
 
-QUICK = replace(SMALL, random_steps=192)
+QUICK = replace(SMALL, learning_starts=192)
 STARTS = begin(PICK, range(40))
 FRESH = begin(PICK, range(40, 80))
 MDP = SkillMdp(
@@ -93,7 +93,7 @@ def test_gradients_of_critics_are_those_of_automatic_differentiation_to_the_bit(
 
 def test_a_second_core_changes_nothing_that_is_learned():
     """Whether it is there all the time or now and then; the layers are those it is used for."""
-    settings = replace(QUICK, critic_hidden=(256, 256), batch_size=128)
+    settings = replace(QUICK, critic_net_arch=(256, 256), batch_size=128)
     asked = []
 
     def now_and_then():
@@ -126,7 +126,7 @@ def test_values_of_what_is_far_from_everything_tried_are_bounded_by_normalised_l
     assert spread(1e3, QUICK) < 3.0 * spread(1.0, QUICK)
 
 
-@pytest.mark.parametrize("settings", [QUICK, replace(QUICK, critic_hidden=(24, 16))])
+@pytest.mark.parametrize("settings", [QUICK, replace(QUICK, critic_net_arch=(24, 16))])
 def test_what_is_resumed_ends_with_the_same_weights(tmp_path, settings):
     whole = learner(settings=settings)
     for segment in range(2):
@@ -189,12 +189,12 @@ def test_rewards_are_computed_again_when_the_template_changes():
 
 
 def test_a_full_buffer_forgets_the_oldest():
-    small = replace(QUICK, capacity=5 * HORIZON * 8)
+    small = replace(QUICK, buffer_size=5 * HORIZON * 8)
     env = SkillVecEnv(MDP, STARTS, 8, HORIZON, (1,))
     one = SkillLearner(env, small, 1)
     for _ in range(4):
         episodes = one.learn(2)
-    assert one.buffer.size() <= small.capacity
+    assert one.buffer.size() <= small.buffer_size
     count = episodes.transitions
     newest = one.buffer.actions[one.buffer.size() - count : one.buffer.size(), 0]
     assert np.array_equal(newest, episodes.actions.reshape(count, -1))
@@ -218,7 +218,7 @@ def test_a_skill_can_begin_with_another_ones_weights():
 
 
 def test_larger_critics_leave_the_policy_as_small_as_it_is():
-    small, one = learner(), learner(settings=replace(QUICK, critic_hidden=(24, 16)))
+    small, one = learner(), learner(settings=replace(QUICK, critic_net_arch=(24, 16)))
     one.begin_with(small.policy())  # has the same layers
     critics = {k: v.shape for k, v in weights(one).items() if k.startswith("critic.qf1")}
     widths = [shape[0] for name, shape in critics.items() if name.endswith("weight")]
@@ -232,7 +232,7 @@ def test_random_actions_are_held_longer_in_each_environment():
     one = learner()
     one.learn(1)  # whole episodes of random actions, then of the policy's with noise
     random = one.buffer.actions[: HORIZON * 8, 0].reshape(8, HORIZON, -1)[
-        :, : QUICK.random_steps // 8
+        :, : QUICK.learning_starts // 8
     ]
     for env, actions in enumerate(random):
         changes = (np.abs(np.diff(actions, axis=0)).max(axis=1) > 0).nonzero()[0] + 1
@@ -262,4 +262,4 @@ def test_unknown_settings_are_refused():
     with pytest.raises(InvalidParameterError, match="there are small, large, maple"):
         sac_preset("huge")
     with pytest.raises(InvalidParameterError, match="give a multiple"):
-        replace(SMALL, environments=7)
+        replace(SMALL, n_envs=7)

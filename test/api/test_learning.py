@@ -84,7 +84,7 @@ def test_proposers_that_do_not_fit_are_refused():
 
 
 def test_changes_of_settings_are_texts_and_back():
-    changes = {**TOY, "polish": None, "ppo.hidden": (8, 8), "ppo.anneal": False}
+    changes = {**TOY, "polish": None, "ppo.net_arch": (8, 8), "ppo.anneal": False}
     assert parse_changes(change_texts(changes), TrainingSettings) == changes
 
 

@@ -40,7 +40,7 @@ def make(preset: str, changes: Mapping[str, str]) -> Domain:
             sweeping.LEARNER_INTERFACE,
             settings={
                 "ours": {"exploration.rollouts": 32, "polish": None, "shortcuts": 0},
-                "quick": {"ppo.total_steps": 1000, "ppo.hidden": (8,)},
+                "quick": {"ppo.total_steps": 1000, "ppo.net_arch": (8,)},
             },
         ),
     )

@@ -37,12 +37,12 @@ WRONG = [
     "rewards.step=inf",
     "rewards.step=1e400",
     "rewards.step=none",
-    "ppo.discount=1",
+    "ppo.gamma=1",
     "ppo.learning_rate=0",
     "ppo.anneal=1",
     "ppo.anneal=yes",
-    "ppo.hidden=64,x",
-    "ppo.hidden=0",
+    "ppo.net_arch=64,x",
+    "ppo.net_arch=0",
     "ppo=none",
     "polish=all",
     "__class__=1",
@@ -92,7 +92,15 @@ def test_a_setting_that_is_given_twice_is_refused():
 def test_a_part_that_is_left_out_comes_back_with_its_settings():
     off = changed(OURS, {"polish": None})
     assert off.polish is None
-    assert changed(off, {"polish.epochs": 3}).polish.epochs == 3
+    assert changed(off, {"polish.n_epochs": 3}).polish.n_epochs == 3
+
+
+def test_recorded_commands_may_have_the_names_of_stored_files():
+    old = ["ppo.hidden=8", "polish.environments=4", "rewards.discount=0.9", "exploration.hold=2"]
+    new = ["ppo.net_arch=8", "polish.n_envs=4", "rewards.gamma=0.9", "exploration.action_repeat=2"]
+    assert parse_changes(old, TrainingSettings) == parse_changes(new, TrainingSettings)
+    with pytest.raises(InvalidParameterError, match=r"'ppo\.gamma' is given twice"):
+        parse_changes(["ppo.gamma=0.9", "ppo.discount=0.9"], TrainingSettings)
 
 
 def test_a_domains_own_settings_are_used_and_changed():
@@ -100,7 +108,7 @@ def test_a_domains_own_settings_are_used_and_changed():
         OURS, exploration=replace(OURS.exploration, rollouts=32), polish=None, shortcuts=0
     )
     assert training_settings("paper", PATCHY) == GENERAL["paper"]
-    assert training_settings("quick", PATCHY).ppo.hidden == (8,)
+    assert training_settings("quick", PATCHY).ppo.net_arch == (8,)
     several = training_settings("ours_several", PATCHY)
     assert several.exploration == replace(OURS.exploration, tasks=24, rollouts=32)
     assert (several.polish, several.shortcuts, several.random_goals) == (None, 8, 0.5)

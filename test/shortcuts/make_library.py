@@ -51,7 +51,7 @@ def main() -> None:
     starts = [found for index in range(TASKS) if (found := start(index)) is not None]
     signature = Signature.of(starts[0].change, starts[0].space, frozenset({"Holding"}))
     rng, settings = np.random.default_rng(0), PpoSettings(total_steps=STEPS)
-    env = ShortcutVecEnv(DOMAIN, signature, starts, settings.environments, HORIZON, Rewards(), rng)
+    env = ShortcutVecEnv(DOMAIN, signature, starts, settings.n_envs, HORIZON, Rewards(), rng)
     learner = Learner(env, normalisation_of(env, rng, 64), settings, seed=0)
     last = Progress(0, 0, 0.0, 0.0, 0.0, HORIZON)
 

@@ -29,7 +29,7 @@ OURS = training_settings("ours", get_domain("obstacle2d"))
 THEN = replace(  # as the training was started then
     OURS,
     exploration=ExplorationSettings(tasks=2, rollouts=60, length=30, action_repeat=4),
-    ppo=replace(OURS.ppo, environments=32, hidden=(16, 16), total_steps=3_000),
+    ppo=replace(OURS.ppo, n_envs=32, net_arch=(16, 16), total_steps=3_000),
     starts=24,
     validation=3,
     shortcuts=1,

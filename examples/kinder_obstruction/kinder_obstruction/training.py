@@ -12,7 +12,7 @@ TRAINING: dict[str, SettingValue] = {
     "exploration.length": 48,
     "exploration.nodes": 2,  # the start, and with the target in the hand
     "ppo.total_steps": 60_000,
-    "polish.rollout_steps": 64,
+    "polish.n_steps": 64,
     "polish.total_steps": 40_000,
     "horizon": 60,
     "starts": 100,

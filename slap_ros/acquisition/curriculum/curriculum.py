@@ -21,7 +21,7 @@ continues where it was interrupted.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from statistics import fmean
@@ -46,6 +46,7 @@ from slap_ros.acquisition.training.retrieval import METRICS, MetricSignatureEnco
 from slap_ros.acquisition.training.settings import AcquisitionSettings
 from slap_ros.acquisition.training.warm_start import WarmStarts
 from slap_ros.errors import UnsolvableError
+from slap_ros.learning.stored_keys import stored
 from slap_ros.learning.workers import Workers, run_in_order
 from slap_ros.skills.skill_library import AcquiredSkill, SkillLibrary, load_skill
 
@@ -251,7 +252,7 @@ class Curriculum:
     def _as_json(self) -> dict[str, Any]:
         """All that the results depend on."""
         known = sorted(skill.folder_name for skill in self.known.values())
-        data = {"source": self.source.as_json(), **asdict(self.settings), "known": known}
+        data = {"source": self.source.as_json(), **stored(self.settings), "known": known}
         if self.encoder.name != METRICS:
             data["encoder"] = self.encoder.name
         if self.kept:

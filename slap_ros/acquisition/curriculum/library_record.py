@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from statistics import fmean
 from typing import Any
 
@@ -14,6 +13,7 @@ from slap_ros.acquisition.curriculum.rollouts import PlanRollout
 from slap_ros.acquisition.curriculum.skill_selection import NO_PROGRESS
 from slap_ros.acquisition.curriculum.task_source import TaskSource
 from slap_ros.acquisition.training.settings import AcquisitionSettings
+from slap_ros.learning.stored_keys import stored
 from slap_ros.versions import processor, versions
 
 
@@ -64,7 +64,7 @@ def library_record(
         "progress": state.task_progress,
         "progress_on_fresh_tasks": fmean(rollout.progress for rollout in fresh),
         "steps": state.steps,
-        "settings": asdict(settings),
+        "settings": stored(settings),
         "versions": dict(versions()),
         "processor": processor(),
     }

@@ -105,24 +105,24 @@ class SkillLearner:
         torch.set_num_threads(1)  # tiny networks: more threads only wait for one another
         self.settings, self._env = settings, env
         actions = env.action_map.size
-        critic_hidden = list(settings.critic_hidden or settings.hidden)
+        critic_hidden = list(settings.critic_net_arch or settings.net_arch)
         self._sac = ExploringSac(
             "MlpPolicy",
             StableBaselinesVecEnv(env, AS_OBSERVED),
             learning_rate=settings.learning_rate,
-            buffer_size=settings.capacity,
-            learning_starts=settings.random_steps,
+            buffer_size=settings.buffer_size,
+            learning_starts=settings.learning_starts,
             batch_size=settings.batch_size,
             tau=settings.tau,
-            gamma=settings.discount,
-            ent_coef=f"auto_{settings.entropy_weight}",
+            gamma=settings.gamma,
+            ent_coef=f"auto_{settings.ent_coef}",
             train_freq=1,
-            gradient_steps=settings.environments // settings.steps_per_update,
+            gradient_steps=settings.n_envs // settings.train_freq,
             replay_buffer_class=SkillReplayBuffer,
             replay_buffer_kwargs={"mdp": env.mdp, "normalisation": AS_OBSERVED, "seed": seed},
             target_entropy=settings.entropy_per_action * actions,
             policy_kwargs={
-                "net_arch": {"pi": list(settings.hidden), "qf": critic_hidden},
+                "net_arch": {"pi": list(settings.net_arch), "qf": critic_hidden},
                 "optimizer_kwargs": {"fused": True},
             },
             seed=seed,
@@ -168,7 +168,7 @@ class SkillLearner:
     def policy(self) -> MlpPolicy:
         """The actor's average as it is now, without torch, its most likely action squashed."""
         weights = {name: value.numpy().copy() for name, value in self._sac.averaged.items()}
-        hidden = [f"latent_pi.{2 * i}" for i in range(len(self.settings.hidden))]
+        hidden = [f"latent_pi.{2 * i}" for i in range(len(self.settings.net_arch))]
         layers = tuple(
             (weights[f"{name}.weight"], weights[f"{name}.bias"]) for name in [*hidden, "mu"]
         )
@@ -181,7 +181,7 @@ class SkillLearner:
             InvalidParameterError: It has other layers.
         """
         now = self._sac.actor.state_dict()
-        hidden = [f"latent_pi.{2 * i}" for i in range(len(self.settings.hidden))]
+        hidden = [f"latent_pi.{2 * i}" for i in range(len(self.settings.net_arch))]
         names = [*hidden, "mu"]
         shapes = [tuple(now[f"{name}.weight"].shape) for name in names]
         if [layer.shape for layer, _ in policy.layers] != shapes:

@@ -72,9 +72,9 @@ class LeanSac(SAC):
         for _ in range(gradient_steps):
             batch = self.replay_buffer.sample(batch_size)  # type: ignore[union-attr]
             actions, log_prob = self._act(batch.observations)
-            entropy_weight = self._update_entropy_weight(log_prob)
-            self._update_critic(batch, entropy_weight)
-            self._update_actor(batch.observations, actions, log_prob, entropy_weight)
+            ent_coef = self._update_ent_coef(log_prob)
+            self._update_critic(batch, ent_coef)
+            self._update_actor(batch.observations, actions, log_prob, ent_coef)
             with torch.no_grad():
                 torch._foreach_lerp_(following, online, self.tau)
         self._n_updates += gradient_steps
@@ -109,7 +109,7 @@ class LeanSac(SAC):
         mean, log_std = self.actor.mu(hidden), self.actor.log_std(hidden)  # type: ignore[operator]
         return mean, log_std.clamp(LOG_STD_MIN, LOG_STD_MAX)
 
-    def _update_entropy_weight(self, log_prob: torch.Tensor) -> torch.Tensor:
+    def _update_ent_coef(self, log_prob: torch.Tensor) -> torch.Tensor:
         """Move the entropy's weight towards the target entropy; the weight before that."""
         assert self.log_ent_coef is not None
         assert self.ent_coef_optimizer is not None
@@ -120,16 +120,16 @@ class LeanSac(SAC):
         return weight
 
     @torch.no_grad()
-    def _update_critic(self, batch: Any, entropy_weight: torch.Tensor) -> None:
+    def _update_critic(self, batch: Any, ent_coef: torch.Tensor) -> None:
         actions, log_prob = self._act(batch.next_observations)
         with self._threads():
-            one, other = self._target(batch.next_observations, actions).values
-            value = torch.minimum(one, other)
-            value -= entropy_weight * log_prob
-            wanted = batch.rewards + (1.0 - batch.dones) * self.gamma * value
+            q1, q2 = self._target(batch.next_observations, actions).values
+            value = torch.minimum(q1, q2)
+            value -= ent_coef * log_prob
+            target_q_values = batch.rewards + (1.0 - batch.dones) * self.gamma * value
             forward = self._online(batch.observations, batch.actions)
             # Of the mean squared error of both, which is half of the sum of their losses.
-            gradient = (forward.values - wanted).mul_(2.0 / forward.values.numel())
+            gradient = (forward.values - target_q_values).mul_(2.0 / forward.values.numel())
             gradients = self._online.weight_gradients(forward, gradient)
         _descend(self.critic.optimizer, self._online.tensors, gradients)
 
@@ -138,7 +138,7 @@ class LeanSac(SAC):
         observations: torch.Tensor,
         actions: torch.Tensor,
         log_prob: torch.Tensor,
-        entropy_weight: torch.Tensor,
+        ent_coef: torch.Tensor,
     ) -> None:
         """Towards actions of more value and entropy: less (weight · log_prob - min value).mean().
 
@@ -146,14 +146,14 @@ class LeanSac(SAC):
             observations: Shape (n, size).
             actions: Drawn from the policy in each, with its gradient, shape (n, axes).
             log_prob: Logarithm of their density, with its gradient, shape (n, 1).
-            entropy_weight: What entropy is worth.
+            ent_coef: What entropy is worth.
         """
         n, axes = actions.shape
         with torch.no_grad(), self._threads():
             forward = self._online(observations, actions)
             by_values = _share_in_minimum(forward.values).mul_(-1.0 / n)
             by_actions = self._online.action_gradient(forward, by_values, axes)
-            by_log_prob = (entropy_weight / n).expand_as(log_prob)
+            by_log_prob = (ent_coef / n).expand_as(log_prob)
         gradients = torch.autograd.grad(
             (actions, log_prob), self._actor_weights, (by_actions, by_log_prob)
         )
@@ -162,8 +162,8 @@ class LeanSac(SAC):
 
 def _share_in_minimum(values: torch.Tensor) -> torch.Tensor:
     """The gradient of the smaller of two values by each of them; they share it where equal."""
-    one, other = values
-    first = (one < other).to(values.dtype).add_((one == other).to(values.dtype), alpha=0.5)
+    q1, q2 = values
+    first = (q1 < q2).to(values.dtype).add_((q1 == q2).to(values.dtype), alpha=0.5)
     return torch.stack([first, 1.0 - first])
 
 

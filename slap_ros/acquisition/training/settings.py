@@ -64,7 +64,7 @@ class AcquisitionSettings:
 
     def segment_steps(self, horizon: int) -> int:
         """Environment steps of a segment."""
-        return self.segment_episodes * self.sac.environments * horizon
+        return self.segment_episodes * self.sac.n_envs * horizon
 
 
 ACQUISITION_SETTINGS: Mapping[str, AcquisitionSettings] = {

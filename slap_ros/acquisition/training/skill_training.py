@@ -185,7 +185,7 @@ class SkillTraining:
 
         seed = self._seed(number)
         first_round = segments * self.settings.segment_episodes
-        environments = self.settings.sac.environments
+        environments = self.settings.sac.n_envs
         env = SkillVecEnv(
             mdp, initiations, environments, self.horizon, (seed,), first_round, self.make_worlds
         )

@@ -166,11 +166,11 @@ ABLATIONS: Mapping[str, LearnerInterface] = {
 # Where a training in this domain differs; see `slap train --settings`.
 TRAINING_SETTINGS: Mapping[str, Mapping[str, SettingValue]] = {
     "ours": {
-        "ppo.environments": 32,
+        "ppo.n_envs": 32,
         "ppo.parts": 2,
         "ppo.batch_size": 512,
         "ppo.total_steps": 300_000,
-        "polish.environments": 32,
+        "polish.n_envs": 32,
         "polish.parts": 2,
         "polish.batch_size": 1024,
         "polish.total_steps": 1_500_000,

@@ -16,8 +16,27 @@ KEYS: Mapping[str, Mapping[str, str]] = {
     "CandidateGroup": {"operator_path": "origin", "relative_saving": "promise"},
     "ExplorationResult": {"candidates": "finds", "pairs": "candidates"},
     "ExplorationSettings": {"action_repeat": "hold"},
+    "PpoSettings": {
+        "n_envs": "environments",
+        "n_steps": "rollout_steps",
+        "n_epochs": "epochs",
+        "gamma": "discount",
+        "ent_coef": "entropy",
+        "log_std_init": "log_std",
+        "net_arch": "hidden",
+    },
     "Progress": {"failure": "lost"},
-    "Rewards": {"success": "done", "failure": "lost"},
+    "Rewards": {"success": "done", "failure": "lost", "gamma": "discount"},
+    "SacSettings": {
+        "n_envs": "environments",
+        "net_arch": "hidden",
+        "critic_net_arch": "critic_hidden",
+        "train_freq": "steps_per_update",
+        "gamma": "discount",
+        "ent_coef": "entropy_weight",
+        "learning_starts": "random_steps",
+        "buffer_size": "capacity",
+    },
     "Sampling": {"batch": "crowd", "alternatives": "ends"},
     "ShortcutCandidate": {"operator_path": "origin", "expected_saving": "promise"},
     "TrainingSettings": {"polish_rewards": "careful"},
@@ -42,6 +61,14 @@ def stored(instance: Any) -> dict[str, Any]:
         keys.get(field.name, field.name): to_json(getattr(instance, field.name))
         for field in fields(instance)
     }
+
+
+def field_name(cls: type, key: str) -> str:
+    """The field that a key stands for; a field's own name stands for itself."""
+    keys = KEYS.get(cls.__name__, {})
+    if key in {field.name for field in fields(cls)}:
+        return key
+    return next((name for name, stored_key in keys.items() if stored_key == key), key)
 
 
 def restored(cls: type, data: Mapping[str, Any]) -> dict[str, Any]:
