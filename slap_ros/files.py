@@ -128,15 +128,15 @@ def read_text(path: Path, limit: int = MAX_BYTES) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
-def write_whole(path: Path, text: str) -> None:
-    """Write a file in UTF-8: at every moment there is the old one, or the new one, whole.
+def write_whole(path: Path, content: str | bytes) -> None:
+    """Write a file, text in UTF-8: at every moment there is the old one, or the new one, whole.
 
     Raises:
         OSError: It cannot be written; the old one is untouched.
     """
     draft = path.with_name(f".{path.name}.tmp")
     try:
-        draft.write_text(text, encoding="utf-8")
+        draft.write_bytes(content.encode() if isinstance(content, str) else content)
         draft.replace(path)
     finally:  # after Ctrl-C too
         with suppress(OSError):

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -16,6 +16,18 @@ from slap_ros.files import parse_json, read_text, write_whole
 Result = TypeVar("Result")
 # What decoding raises where JSON is not what was written.
 DECODING_ERRORS = (OSError, AttributeError, LookupError, TypeError, ValueError, OverflowError)
+
+
+def damaged(path: Path | str, what: Exception | str, advice: str) -> InvalidParameterError:
+    """The error for a file that is not as it was written.
+
+    Args:
+        path: Path of the file, maybe with the place in it.
+        what: What is wrong with it.
+        advice: What to do.
+    """
+    what = repr(what) if isinstance(what, Exception) else what
+    return InvalidParameterError(f"{path}: damaged: {what}; {advice}")
 
 
 @dataclass(frozen=True)
@@ -49,6 +61,20 @@ class WorkFolder:
         try:
             return decode(parse_json(read_text(path)))
         except DECODING_ERRORS as error:
+            raise damaged(path, error, "remove it to have it made again") from error
+
+    def require_same(self, settings: Mapping[str, Any]) -> None:
+        """Refuse a folder with another training; an empty one becomes this one's.
+
+        Args:
+            settings: All that its results depend on, as JSON.
+
+        Raises:
+            InvalidParameterError: The folder has another training, or is damaged.
+        """
+        own = json.loads(json.dumps(settings))
+        if self.cached("settings", lambda: own, lambda theirs: theirs) != own:
             raise InvalidParameterError(
-                f"{path}: damaged: {error!r}; remove it to have it made again"
-            ) from error
+                f"{self.path} has a training with other settings; give another folder, or remove "
+                "this one"
+            )

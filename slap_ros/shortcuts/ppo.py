@@ -8,8 +8,7 @@ The algorithm is stable-baselines3's.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
-from io import BytesIO
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,15 +18,14 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
-from slap_ros.errors import InvalidParameterError
-from slap_ros.files import read_bytes
+from slap_ros.learning.checkpoint import load_checkpoint, save_checkpoint
+from slap_ros.learning.policy_export import exported_layers, hidden_layers
 from slap_ros.learning.stable_baselines import StableBaselinesVecEnv
 from slap_ros.learning.vec_env import VecEnv, VecEnvStep
 from slap_ros.policies.mlp_policy import MlpPolicy, ObservationNormalisation
 from slap_ros.shortcuts.ppo_settings import PpoSettings
 from slap_ros.shortcuts.progress import Progress
 
-MAX_CHECKPOINT_BYTES = 2**30
 RECENT = 200  # episodes over which success and length are taken
 ACTION_REPEAT = 8  # steps for which a random action is repeated before normalisation
 
@@ -152,10 +150,8 @@ class Learner:
     def policy(self) -> MlpPolicy:
         """The policy as it is now, without torch."""
         weights = {k: v.detach().cpu().numpy().copy() for k, v in self._weights().items()}
-        hidden = [f"mlp_extractor.policy_net.{2 * i}" for i in range(len(self.settings.net_arch))]
-        layers = tuple(
-            (weights[f"{name}.weight"], weights[f"{name}.bias"]) for name in [*hidden, "action_net"]
-        )
+        hidden = hidden_layers("mlp_extractor.policy_net", len(self.settings.net_arch))
+        layers = exported_layers(weights, [*hidden, "action_net"])
         return MlpPolicy(self._env.normalisation, layers, weights["log_std"])
 
     def _weights(self) -> dict[str, torch.Tensor]:
@@ -175,17 +171,15 @@ class Learner:
 
     def save(self, path: Path) -> None:
         """Write a checkpoint. One that is there stays whole until the new one is."""
-        draft = path.with_suffix(".draft")
-        torch.save(
+        save_checkpoint(
+            path,
             {
                 "steps": self._ppo.num_timesteps,
                 "shortest": self._env.shortest,
                 "policy": self._ppo.policy.state_dict(),
                 "optimizer": self._ppo.policy.optimizer.state_dict(),
             },
-            draft,
         )
-        draft.rename(path)
 
     def resume(self, path: Path) -> None:
         """Continue from a checkpoint. Episodes begin again.
@@ -201,21 +195,19 @@ class Learner:
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:
-    """What :meth:`Learner.save` wrote. Only tensors and plain data are read, never code.
+    """What :meth:`Learner.save` wrote.
 
     Raises:
         InvalidParameterError: It is damaged.
     """
-    try:
-        saved = torch.load(BytesIO(read_bytes(path, MAX_CHECKPOINT_BYTES)), weights_only=True)
-        steps, shortest = int(saved["steps"]), int(saved["shortest"])
-        return {
-            "steps": steps,
-            "shortest": shortest,
-            "policy": dict(saved["policy"]),
-            "optimizer": dict(saved["optimizer"]),
-        }
-    except Exception as error:  # torch says in a dozen ways that a file is damaged
-        raise InvalidParameterError(
-            f"{path}: damaged: {type(error).__name__}; remove it to learn this stage again"
-        ) from error
+    return load_checkpoint(path, _restored, "remove it to learn this stage again")
+
+
+def _restored(saved: Mapping[str, Any]) -> dict[str, Any]:
+    """What :meth:`Learner.save` wrote."""
+    return {
+        "steps": int(saved["steps"]),
+        "shortest": int(saved["shortest"]),
+        "policy": dict(saved["policy"]),
+        "optimizer": dict(saved["optimizer"]),
+    }

@@ -12,10 +12,9 @@ from pathlib import Path
 from time import monotonic
 from typing import Any, Protocol
 
-from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, read_text
 from slap_ros.learning.stored_keys import restored, stored
-from slap_ros.learning.work_folder import DECODING_ERRORS
+from slap_ros.learning.work_folder import DECODING_ERRORS, damaged
 from slap_ros.policies.library_files import replace_folder
 from slap_ros.policies.mlp_policy import MlpPolicy
 from slap_ros.shortcuts.shortcut import Shortcut
@@ -64,9 +63,8 @@ def latest(folder: ShortcutWorkFolder) -> dict[int, Progress]:
         lines = [parse_json(line) for line in read_text(folder.progress).split("\n")[:-1]]
         return {int(line["stage"]): _restored(line) for line in lines}
     except DECODING_ERRORS as error:
-        raise InvalidParameterError(
-            f"{folder.progress}: damaged: {error!r}; remove the folder to learn the shortcut again"
-        ) from error
+        advice = "remove the folder to learn the shortcut again"
+        raise damaged(folder.progress, error, advice) from error
 
 
 def _restored(line: Mapping[str, Any]) -> Progress:

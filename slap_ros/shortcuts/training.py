@@ -8,7 +8,6 @@ interrupted.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -17,7 +16,7 @@ from pathlib import Path
 from statistics import fmean
 from typing import Any, Protocol, TypeVar
 
-from slap_ros.errors import InvalidParameterError, UnsolvableError
+from slap_ros.errors import UnsolvableError
 from slap_ros.learning.random_goals import RandomGoalsChoice
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.work_folder import WorkFolder
@@ -270,13 +269,7 @@ class Training:
 
     def _require_same_settings(self) -> None:
         """Refuse a folder with another training."""
-        own = {"place": self.distribution.as_json(), **self.settings.as_json()}
-        own = json.loads(json.dumps(own))
-        if self._work.cached("settings", lambda: own, lambda theirs: theirs) != own:
-            raise InvalidParameterError(
-                f"{self.folder} has a training with other settings; give another folder, or remove "
-                "this one"
-            )
+        self._work.require_same({"place": self.distribution.as_json(), **self.settings.as_json()})
 
     def _explore(self) -> list[ExplorationResult]:
         return self._work.cached(

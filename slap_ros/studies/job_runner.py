@@ -11,9 +11,8 @@ from dataclasses import asdict, dataclass
 from resource import RUSAGE_CHILDREN, RUSAGE_SELF, getrusage
 from typing import Any, TypeVar
 
-from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json
-from slap_ros.learning.work_folder import DECODING_ERRORS
+from slap_ros.learning.work_folder import DECODING_ERRORS, damaged
 from slap_ros.learning.workers import SequentialWorkers, Workers, local_workers
 from slap_ros.studies.study_log import StudyLog
 from slap_ros.studies.study_progress import StudyProgress
@@ -92,10 +91,8 @@ class JobRunner:
         try:
             return decode(self.log.results[name])
         except DECODING_ERRORS as error:
-            raise InvalidParameterError(
-                f"{self.log.path}: what it has of {name!r} is damaged: {error!r}; remove the file "
-                "to begin again"
-            ) from error
+            where = f"{self.log.path}, {name!r}"
+            raise damaged(where, error, "remove the file to begin again") from error
 
     def _workers(self, apart: bool) -> AbstractContextManager[Workers]:
         """Processes, or this one where a single one is enough and need not be a new one."""

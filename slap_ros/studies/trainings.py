@@ -12,7 +12,7 @@ from typing import Any
 
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, read_text
-from slap_ros.learning.work_folder import DECODING_ERRORS
+from slap_ros.learning.work_folder import DECODING_ERRORS, damaged
 from slap_ros.shortcuts.explore import ExplorationResult
 from slap_ros.shortcuts.settings import ExplorationSettings
 from slap_ros.shortcuts.shortcut import Shortcut
@@ -205,6 +205,5 @@ def _read(path: Path) -> Any:
         raise _damaged(path, error) from error
 
 
-def _damaged(where: Path | str, why: Exception | str) -> InvalidParameterError:
-    reason = repr(why) if isinstance(why, Exception) else why
-    return InvalidParameterError(f"{where}: damaged: {reason}")
+def _damaged(where: Path | str, what: Exception | str) -> InvalidParameterError:
+    return damaged(where, what, "give another work folder, or train again")

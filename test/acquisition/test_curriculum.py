@@ -209,7 +209,7 @@ def test_a_finished_curriculum_is_read(whole, finished):
     again, events = acquire(finished / "work", WHOLE)
     assert not events.computed
     assert again.digest == whole[0].digest
-    with pytest.raises(InvalidParameterError, match="has another training"):
+    with pytest.raises(InvalidParameterError, match="training with other settings"):
         acquire(finished / "work", WHOLE, seed=2)
 
 
@@ -376,7 +376,7 @@ def test_skills_that_are_there_are_kept_and_what_is_missing_is_learned(tmp_path)
         name: data for name, data in before.items() if "Pick" in name
     }
     assert [skill.operator.name for skill in library.skills] == ["Pick", "Put"]
-    with pytest.raises(InvalidParameterError, match="has another training"):
+    with pytest.raises(InvalidParameterError, match="training with other settings"):
         slower = replace(PICKING, horizon=PICKING.horizon - 1)
         acquire(tmp_path / "work", SHORT, kept=kept(tmp_path / "slower", slower))
 

@@ -128,7 +128,7 @@ def test_what_cannot_be_gone_on_with_is_refused_and_left_as_it_is(log):
     for lines, said in (
         ([json.dumps(other), first], "is what `slap study goals obstacle2d --goals 7` has done"),
         ([json.dumps(library), first], "with another library or other settings"),
-        ([header, json.dumps(half)], "is damaged"),
+        ([header, json.dumps(half)], "damaged"),
         ([header, "what is this"], "is no log of a study"),
         ([header, '{"task": 1}'], "is no log of a study"),
         (["[]"], "is no log of a study"),

@@ -17,14 +17,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from slap_ros.acquisition.curriculum.rollouts import PlanRollout
 from slap_ros.acquisition.training.skill_training import Round
-from slap_ros.errors import InvalidParameterError
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.relational import LiftedOperator
 from slap_ros.skills.skill_library import skill_folder_name
@@ -48,11 +46,7 @@ class CurriculumFolder:
         Raises:
             InvalidParameterError: The folder has another curriculum, or is damaged.
         """
-        own = json.loads(json.dumps(curriculum))
-        if self._work.cached("settings", lambda: own, lambda theirs: theirs) != own:
-            raise InvalidParameterError(
-                f"{self._path} has another training; give another folder, or remove this one"
-            )
+        self._work.require_same(curriculum)
 
     def rollouts(self, iteration: int, name: str, compute: Compute) -> list[PlanRollout]:
         """The plans that were carried out in an iteration.

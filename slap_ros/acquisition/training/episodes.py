@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
-from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, read_bytes
+from slap_ros.learning.work_folder import damaged
 from slap_ros.relational import Layout, Object, Type
 from slap_ros.relational.state import Array
 from slap_ros.skills.groundings import Grounding, Groundings, Indices
@@ -91,9 +91,7 @@ def load_episodes(path: Path, types: Mapping[str, Type]) -> Episodes:
         _require_fit(episodes)
         return episodes
     except (OSError, SafetensorError, LookupError, TypeError, ValueError) as error:
-        raise InvalidParameterError(
-            f"{path}: damaged: {error!r}; remove its folder to learn this skill again"
-        ) from error
+        raise damaged(path, error, "remove its folder to learn this skill again") from error
 
 
 def _require_fit(episodes: Episodes) -> None:

@@ -9,8 +9,7 @@ so that one that is resumed there ends with the same weights.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from io import BytesIO
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,13 +24,13 @@ from slap_ros.acquisition.training.sac_settings import SacSettings
 from slap_ros.acquisition.training.sac_update import LeanSac
 from slap_ros.acquisition.training.skill_env import SkillVecEnv
 from slap_ros.errors import InvalidParameterError
-from slap_ros.files import read_bytes
+from slap_ros.learning.checkpoint import load_checkpoint, save_checkpoint
+from slap_ros.learning.policy_export import exported_layers, hidden_layers
 from slap_ros.learning.stable_baselines import StableBaselinesVecEnv
 from slap_ros.policies.mlp_policy import MlpPolicy, ObservationNormalisation
 from slap_ros.skills.observations import SIZE
 
 WORTH_A_THREAD = 128  # units of a critic's layer; with fewer, waking a second one takes longer
-MAX_CHECKPOINT_BYTES = 2**30
 ONE = np.ones(SIZE, dtype=np.float32)
 AS_OBSERVED = ObservationNormalisation(0.0 * ONE, ONE)  # clipped alone: any skill can begin another
 
@@ -168,11 +167,12 @@ class SkillLearner:
     def policy(self) -> MlpPolicy:
         """The actor's average as it is now, without torch, its most likely action squashed."""
         weights = {name: value.numpy().copy() for name, value in self._sac.averaged.items()}
-        hidden = [f"latent_pi.{2 * i}" for i in range(len(self.settings.net_arch))]
-        layers = tuple(
-            (weights[f"{name}.weight"], weights[f"{name}.bias"]) for name in [*hidden, "mu"]
-        )
+        layers = exported_layers(weights, self._layer_names)
         return MlpPolicy(AS_OBSERVED, layers, weights["log_std.bias"], "relu", squashed=True)
+
+    @property
+    def _layer_names(self) -> list[str]:
+        return [*hidden_layers("latent_pi", len(self.settings.net_arch)), "mu"]
 
     def begin_with(self, policy: MlpPolicy) -> None:
         """Begin with the layers of another skill's policy; its noise is not taken over.
@@ -181,8 +181,7 @@ class SkillLearner:
             InvalidParameterError: It has other layers.
         """
         now = self._sac.actor.state_dict()
-        hidden = [f"latent_pi.{2 * i}" for i in range(len(self.settings.net_arch))]
-        names = [*hidden, "mu"]
+        names = self._layer_names
         shapes = [tuple(now[f"{name}.weight"].shape) for name in names]
         if [layer.shape for layer, _ in policy.layers] != shapes:
             given = [layer.shape for layer, _ in policy.layers]
@@ -199,11 +198,11 @@ class SkillLearner:
 
     def save(self, path: Path) -> None:
         """Write a checkpoint, episodes not included. One that is there stays until it is whole."""
-        sac, draft = self._sac, path.with_suffix(".draft")
+        sac = self._sac
         assert sac.log_ent_coef is not None
         assert sac.ent_coef_optimizer is not None
-        whole = BytesIO()  # torch reports a full disk as a fault of its own
-        torch.save(
+        save_checkpoint(
+            path,
             {
                 "policy": sac.policy.state_dict(),
                 "averaged": sac.averaged,
@@ -215,10 +214,7 @@ class SkillLearner:
                 "torch_generator": torch.get_rng_state(),
                 "buffer_generator": self.buffer.generator_state,
             },
-            whole,
         )
-        draft.write_bytes(whole.getbuffer())
-        draft.rename(path)
 
     def resume(self, path: Path, episodes: list[Episodes]) -> None:
         """Go on from a checkpoint.
@@ -249,15 +245,14 @@ class SkillLearner:
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:
-    """What :meth:`SkillLearner.save` wrote. Only tensors and plain data are read, never code.
+    """What :meth:`SkillLearner.save` wrote.
 
     Raises:
         InvalidParameterError: It is damaged.
     """
-    try:
-        saved = torch.load(BytesIO(read_bytes(path, MAX_CHECKPOINT_BYTES)), weights_only=True)
-        return {**saved, "averaged": dict(saved["averaged"]), "steps": int(saved["steps"])}
-    except Exception as error:  # torch says in a dozen ways that a file is damaged
-        raise InvalidParameterError(
-            f"{path}: damaged: {type(error).__name__}; remove its folder to learn this skill again"
-        ) from error
+    return load_checkpoint(path, _restored, "remove its folder to learn this skill again")
+
+
+def _restored(saved: Mapping[str, Any]) -> dict[str, Any]:
+    """What :meth:`SkillLearner.save` wrote."""
+    return {**saved, "averaged": dict(saved["averaged"]), "steps": int(saved["steps"])}

@@ -27,9 +27,8 @@ from slap_ros.acquisition.training.judges import Judge
 from slap_ros.acquisition.training.settings import AcquisitionSettings
 from slap_ros.acquisition.training.skill_env import Initiation, SkillMdp, SkillVecEnv
 from slap_ros.core import Domain, MakeVectorWorld
-from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, read_text, write_whole
-from slap_ros.learning.work_folder import DECODING_ERRORS
+from slap_ros.learning.work_folder import DECODING_ERRORS, damaged
 from slap_ros.policies.mlp_policy import MlpPolicy
 from slap_ros.skills.groundings import Groundings
 from slap_ros.skills.reward import SkillReward
@@ -101,9 +100,7 @@ def rounds_in(folder: Path) -> list[Round]:
     try:
         return [Round.from_json(one) for one in parse_json(read_text(path))]
     except DECODING_ERRORS as error:
-        raise InvalidParameterError(
-            f"{path}: damaged: {error!r}; remove its folder to learn this skill again"
-        ) from error
+        raise damaged(path, error, "remove its folder to learn this skill again") from error
 
 
 @dataclass

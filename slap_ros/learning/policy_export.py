@@ -1,0 +1,27 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""From torch's networks to policies that run without torch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Layers = tuple[tuple[NDArray[np.float32], NDArray[np.float32]], ...]
+
+
+def hidden_layers(prefix: str, count: int) -> list[str]:
+    """Names of the linear layers of a network that has an activation after each of them."""
+    return [f"{prefix}.{2 * i}" for i in range(count)]
+
+
+def exported_layers(weights: Mapping[str, NDArray[np.float32]], names: Sequence[str]) -> Layers:
+    """The weight and the bias of each layer.
+
+    Args:
+        weights: Arrays by the names of torch, ``LAYER.weight`` and ``LAYER.bias``.
+        names: Names of the layers, the output layer last.
+    """
+    return tuple((weights[f"{name}.weight"], weights[f"{name}.bias"]) for name in names)
