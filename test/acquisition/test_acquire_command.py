@@ -102,7 +102,7 @@ def test_what_a_script_said_is_never_taken_for_a_models(tmp_path, in_this_proces
         (["points", "--goal", "nope"], "no goal 'nope'"),
         (["points", "--steps", "10"], "a skill is judged after 480; give more --steps"),
         (["points", "--settings", "huge"], "unknown settings 'huge'"),
-        (["points", "--set", "sac.gamma=1"], "unknown setting 'sac.gamma'"),
+        (["points", "--set", "sac.nonsense=1"], "unknown setting 'sac.gamma'"),
         (["points", "--proposer", "oracle"], "--proposer 'oracle'"),
         (["points", "--rewarder", "none"], "--rewarder 'none'"),
         (["points", "--demonstrations", "3"], "are for --proposer induced"),

@@ -232,7 +232,7 @@ class Curriculum:
             skills.append(replace(skill, record=record))
         ordered = sorted(skills, key=lambda skill: skill.folder_name)
         record = library_record(self.source, self.settings, state, ended, fresh)
-        return SkillLibrary(self.source.domain, tuple(ordered), record)
+        return SkillLibrary(self.source.domain.name, tuple(ordered), record)
 
     def _vacuity(self, names: Sequence[str], fresh: Sequence[PlanRollout]) -> dict[str, Any]:
         """What policies that see nothing are worth in each skill's place; None where untried."""
@@ -256,7 +256,7 @@ class Curriculum:
         if self.encoder.name != METRICS:
             data["encoder"] = self.encoder.name
         if self.kept:
-            data["kept"] = SkillLibrary(self.source.domain, tuple(self.kept.values())).digest
+            data["kept"] = SkillLibrary(self.source.domain.name, tuple(self.kept.values())).digest
         return data
 
     def _run(
@@ -276,6 +276,6 @@ def require_plans(rollouts: Sequence[PlanRollout], source: TaskSource) -> None:
     if len(without) == len(rollouts):
         goal = source.goal or "its own goal"
         raise UnsolvableError(
-            f"none of {len(rollouts)} tasks of {source.domain} has a plan for {goal}: "
+            f"none of {len(rollouts)} tasks of {source.domain.name} has a plan for {goal}: "
             f"{without[0].unplanned}; give other operators, or another goal"
         )

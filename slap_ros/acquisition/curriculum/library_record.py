@@ -56,7 +56,7 @@ def library_record(
         fresh: Rollouts on tasks that training never saw.
     """
     return {
-        "preset": source.preset,
+        "preset": source.domain.preset,
         "goal": source.goal,
         "seed": source.seed,
         "ended": ended,

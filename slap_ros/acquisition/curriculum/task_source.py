@@ -12,9 +12,9 @@ from typing import Any
 
 from slap_ros.core import Domain, Task
 from slap_ros.core.goals import task_with_goal
-from slap_ros.domains import get_domain
 from slap_ros.learning.task_distribution import TRAINING_SEED
 from slap_ros.relational import LiftedOperator, RewardTemplate
+from slap_ros.skills.domain_choice import NO_SKILLS, DomainChoice
 from slap_ros.skills.operator_json import operator_data, read_operator, read_template, template_data
 
 ROLLOUTS, VALIDATION = 0, 900_000  # first task index of each use
@@ -25,15 +25,13 @@ class TaskSource:
     """Tasks of one goal in a domain, and the operators to solve them with.
 
     Args:
-        domain: Its name.
-        preset: Of the domain.
+        domain: Domain of the tasks, without skills.
         goal: A name of the domain's, or atoms; empty for each task's own.
-        seed: Of everything.
+        seed: Seed of all random numbers.
         proposal: Operators and rewards, as JSON.
     """
 
-    domain: str
-    preset: str
+    domain: DomainChoice
     goal: str
     seed: int
     proposal: str
@@ -50,18 +48,19 @@ class TaskSource:
         """The source of a domain's tasks.
 
         Args:
-            domain: Whose tasks.
+            domain: Domain of the tasks; its own skills, if any, are left out.
             goal: A name of the domain's, or atoms; empty for each task's own.
-            seed: Of everything.
+            seed: Seed of all random numbers.
             operators: To plan with.
             rewards: By operator name.
         """
         pairs = [(operator_data(o), template_data(rewards[o.name])) for o in operators]
-        return cls(domain.name, domain.preset, goal, seed, json.dumps(pairs))
+        choice = DomainChoice(domain.name, domain.preset, NO_SKILLS)
+        return cls(choice, goal, seed, json.dumps(pairs))
 
     def make_domain(self) -> Domain:
-        """The domain with its preset."""
-        return get_domain(self.domain, self.preset)
+        """The domain, in this process."""
+        return self.domain.make()
 
     def task(self, index: int) -> Task:
         """A task that evaluation never uses."""
@@ -77,7 +76,13 @@ class TaskSource:
 
     def as_json(self) -> dict[str, Any]:
         """A JSON object."""
-        return {**vars(self), "proposal": json.loads(self.proposal)}
+        return {
+            "domain": self.domain.name,
+            "preset": self.domain.preset,
+            "goal": self.goal,
+            "seed": self.seed,
+            "proposal": json.loads(self.proposal),
+        }
 
 
 def training_tasks(iteration: int, count: int) -> range:
