@@ -26,7 +26,7 @@ from slap_ros.policies.library_files import ABOUT
 from slap_ros.robot.scene_config import read_scene_config
 from slap_ros.shortcuts.shipped import require_usable
 from slap_ros.shortcuts.shortcut_library import load_library
-from slap_ros.studies.trainings import TrainingFolder, read_curve
+from slap_ros.studies.slap.trainings import TrainingFolder, read_curve
 
 pytestmark = pytest.mark.timeout(60)  # what waits for a writer waits for good
 ROOT = Path(__file__).parents[1]

@@ -37,8 +37,8 @@ from slap_ros.evaluation.experiment import Experiment
 from slap_ros.policies.shipped_models import shipped_with_siblings
 from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
 from slap_ros.skills.skill_library import read_library_record
-from slap_ros.studies import acquisition, demonstrations, induction, replanning, vacuity
-from slap_ros.studies.planning_ablation import SEARCH, VARIANTS
+from slap_ros.studies.lg_sail import acquisition, demonstrations, induction, replanning, vacuity
+from slap_ros.studies.lg_sail.planning_ablation import SEARCH, VARIANTS
 from slap_ros.studies.results import Data, describe_skills
 
 GoalNames = Annotated[

@@ -19,9 +19,9 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidCassetteError, InvalidParameterError
 from slap_ros.language.cassette import ReplayingClient, open_client, read_cassette, with_recorded
 from slap_ros.language.settings import read_settings
-from slap_ros.studies import planning_ablation, reward_ablation
 from slap_ros.studies.job_runner import JobRunner
-from slap_ros.studies.model_attempts import LanguageModel, ModelsOnly
+from slap_ros.studies.lg_sail import planning_ablation, reward_ablation
+from slap_ros.studies.lg_sail.model_attempts import LanguageModel, ModelsOnly
 from slap_ros.studies.results import StudyReport
 
 Data = dict[str, Any]
@@ -128,7 +128,7 @@ def planning(
     attempts: int,
     options: ModelOptions,
 ) -> tuple[Data, MakeReport]:
-    """Who plans with a model's operators; see :mod:`slap_ros.studies.planning_ablation`.
+    """Who plans with a model's operators; see :mod:`slap_ros.studies.lg_sail.planning_ablation`.
 
     Args:
         domain: Its name.
@@ -167,7 +167,7 @@ def planning(
 def rewards(
     domain: str, metrics: str, trials: int, options: ModelOptions
 ) -> tuple[Data, MakeReport]:
-    """What rewards are worth; see :mod:`slap_ros.studies.reward_ablation`.
+    """What rewards are worth; see :mod:`slap_ros.studies.lg_sail.reward_ablation`.
 
     Args:
         domain: Its name.

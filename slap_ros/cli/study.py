@@ -38,22 +38,22 @@ from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.shortcuts.settings import ExplorationSettings, training_settings
 from slap_ros.shortcuts.shipped import shipped_libraries, shipped_library
 from slap_ros.skills.domain_choice import DomainChoice
-from slap_ros.studies import (
+from slap_ros.studies import readme
+from slap_ros.studies.comparison import Comparison
+from slap_ros.studies.job_runner import JobRunner
+from slap_ros.studies.results import Data, StudyReport, describe_library
+from slap_ros.studies.slap import (
     ablation,
     dynamics,
     generalisation,
     perception,
     planning_time,
     pruning,
-    readme,
     table1,
 )
-from slap_ros.studies import goals as sampled
-from slap_ros.studies.comparison import Comparison
-from slap_ros.studies.job_runner import JobRunner
-from slap_ros.studies.results import Data, StudyReport, describe_library
-from slap_ros.studies.trainings import TrainingFolder
-from slap_ros.studies.variations import offered, offered_number, parse_variation
+from slap_ros.studies.slap import goals as sampled
+from slap_ros.studies.slap.trainings import TrainingFolder
+from slap_ros.studies.slap.variations import offered, offered_number, parse_variation
 
 TABLES_IN = (
     "README.md",

@@ -16,7 +16,7 @@ from slap_ros.errors import InvalidParameterError, UnknownObjectError
 from slap_ros.relational import State
 from slap_ros.skills.demonstrator import demonstrate
 from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
-from slap_ros.studies.vacuity import gather_starts, try_policies
+from slap_ros.studies.lg_sail.vacuity import gather_starts, try_policies
 
 NAME = "stack_at_target"
 DOMAIN = get_domain(NAME)

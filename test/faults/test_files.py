@@ -37,7 +37,7 @@ from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.shortcuts.training import Training
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 from slap_ros.skills.domain_choice import DomainChoice
-from slap_ros.studies.trainings import TrainingFolder
+from slap_ros.studies.slap.trainings import TrainingFolder
 
 pytestmark = pytest.mark.timeout(3600)  # for as many cases as somebody may ask for
 ROOT = Path(__file__).parents[2]

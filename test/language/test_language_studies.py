@@ -20,8 +20,8 @@ from slap_ros.cli.language_study import ModelOptions
 from slap_ros.errors import ErrorCode, InvalidCassetteError
 from slap_ros.language.cassette import open_client, read_cassette
 from slap_ros.studies.job_runner import JobRunner
-from slap_ros.studies.model_attempts import LanguageModel, ModelsOnly
-from slap_ros.studies.planning_ablation import (
+from slap_ros.studies.lg_sail.model_attempts import LanguageModel, ModelsOnly
+from slap_ros.studies.lg_sail.planning_ablation import (
     ALONE,
     ONE_SHOT,
     PAPER,
@@ -29,10 +29,10 @@ from slap_ros.studies.planning_ablation import (
     expected_attempts,
     one_shot_success,
 )
-from slap_ros.studies.planning_ablation import study as planning_ablation
+from slap_ros.studies.lg_sail.planning_ablation import study as planning_ablation
+from slap_ros.studies.lg_sail.reward_ablation import FULL, HEADERS
+from slap_ros.studies.lg_sail.reward_ablation import study as reward_ablation
 from slap_ros.studies.results import MarkdownTable, Provenance, StudyReport, write
-from slap_ros.studies.reward_ablation import FULL, HEADERS
-from slap_ros.studies.reward_ablation import study as reward_ablation
 from slap_ros.studies.study_log import StudyLog
 
 ROOT = Path(__file__).parents[2]

@@ -17,7 +17,7 @@ from slap_ros.errors import InvalidLibraryError, InvalidParameterError
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.shortcuts.signature import Signature
-from slap_ros.studies.trainings import TrainingFolder
+from slap_ros.studies.slap.trainings import TrainingFolder
 
 DATA = Path(__file__).parent / "data" / "obstacle2d"
 DOMAIN = get_domain("obstacle2d")

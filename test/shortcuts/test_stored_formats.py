@@ -21,7 +21,7 @@ from slap_ros.shortcuts.shipped import shipped_library
 from slap_ros.shortcuts.shortcut_library import load_library, save_library
 from slap_ros.shortcuts.training import Training
 from slap_ros.skills.domain_choice import DomainChoice
-from slap_ros.studies.trainings import TrainingFolder
+from slap_ros.studies.slap.trainings import TrainingFolder
 
 DATA = Path(__file__).parent / "data" / "training_of_0_1_0"
 NAME = "Clear_On-e41568a9"

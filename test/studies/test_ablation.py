@@ -13,7 +13,7 @@ from slap_ros.domains import domain_names, get_domain
 from slap_ros.errors import ErrorCode, InvalidParameterError
 from slap_ros.policies.learner_interface import learner_interface, without
 from slap_ros.shortcuts import jobs
-from slap_ros.studies import ablation
+from slap_ros.studies.slap import ablation
 
 PLAIN = "all of them (plain)"
 SMALL = ["--trainings", "1", "--steps", "4096", "--tasks", "1", "--samples", "2"]

@@ -28,13 +28,13 @@ from slap_ros.shortcuts.shortcut import Sampling
 from slap_ros.shortcuts.shortcut_library import load_library, save_shortcut
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 from slap_ros.skills.domain_choice import DomainChoice
-from slap_ros.studies import perception, pruning
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.reproducing import published
 from slap_ros.studies.results import Provenance
+from slap_ros.studies.slap import perception, pruning
+from slap_ros.studies.slap.trainings import TrainingFolder, read_curve
+from slap_ros.studies.slap.variations import Variation, offered, parse_variation
 from slap_ros.studies.study_log import StudyLog
-from slap_ros.studies.trainings import TrainingFolder, read_curve
-from slap_ros.studies.variations import Variation, offered, parse_variation
 
 PUBLISHED = Path(__file__).parent.parent.parent / "docs" / "results"
 LIBRARY = Path(__file__).parent.parent / "shortcuts" / "data" / "obstacle2d"

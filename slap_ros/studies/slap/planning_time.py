@@ -24,7 +24,7 @@ from slap_ros.studies.comparison import (
 )
 from slap_ros.studies.figures import dodged, label, legend_above, plot_spreads
 from slap_ros.studies.results import MarkdownTable, StudyReport
-from slap_ros.studies.variations import Variation
+from slap_ros.studies.slap.variations import Variation
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

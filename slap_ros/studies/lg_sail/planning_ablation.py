@@ -20,7 +20,12 @@ from slap_ros.evaluation.statistics import wilson_interval
 from slap_ros.language.budget import BudgetLimits
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
-from slap_ros.studies.model_attempts import Attempt, LanguageModel, attempt_operators, attempt_plan
+from slap_ros.studies.lg_sail.model_attempts import (
+    Attempt,
+    LanguageModel,
+    attempt_operators,
+    attempt_plan,
+)
 from slap_ros.studies.reproducing import PLANS
 from slap_ros.studies.results import MarkdownTable, StudyReport
 

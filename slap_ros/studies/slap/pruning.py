@@ -21,9 +21,9 @@ from slap_ros.shortcuts.training import problem_key
 from slap_ros.studies.comparison import Comparison, format_spread
 from slap_ros.studies.figures import legend_above
 from slap_ros.studies.job_runner import JobRunner
-from slap_ros.studies.library_plans import LibraryPlans, plan_with
 from slap_ros.studies.results import MarkdownTable, StudyReport
-from slap_ros.studies.trainings import TrainingFolder
+from slap_ros.studies.slap.library_plans import LibraryPlans, plan_with
+from slap_ros.studies.slap.trainings import TrainingFolder
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -20,7 +20,7 @@ from slap_ros.language.budget import BudgetLimits
 from slap_ros.relational import LiftedOperator
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
-from slap_ros.studies.model_attempts import Attempt, LanguageModel, attempt_rewards
+from slap_ros.studies.lg_sail.model_attempts import Attempt, LanguageModel, attempt_rewards
 from slap_ros.studies.results import MarkdownTable, StudyReport
 
 if TYPE_CHECKING:

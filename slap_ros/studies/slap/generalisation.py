@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from slap_ros.studies.comparison import ApproachResult, Comparison, format_spread
 from slap_ros.studies.figures import dodged, label, legend_above, plot_spreads, plot_values
 from slap_ros.studies.results import MarkdownTable, StudyReport
-from slap_ros.studies.variations import Variation
+from slap_ros.studies.slap.variations import Variation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -14,9 +14,9 @@ from slap_ros.evaluation.summary import Spread
 from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.studies.comparison import Comparison, format_spread, spread_of
 from slap_ros.studies.figures import LINES
-from slap_ros.studies.library_plans import LibraryPlans, plan_with
 from slap_ros.studies.results import MarkdownTable, StudyReport
-from slap_ros.studies.trainings import LearningCurve, TrainingFolder
+from slap_ros.studies.slap.library_plans import LibraryPlans, plan_with
+from slap_ros.studies.slap.trainings import LearningCurve, TrainingFolder
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
