@@ -46,7 +46,6 @@ ARRIVED = 1e-7  # m and rad, and per s: nearer and slower than this, the hand is
 PALM = BoxPart((0.0317, 0.102, 0.046), Pose((0.0, 0.0, -0.0834)))
 PAD = BoxPart((0.0090, 0.0072, 0.0100), Pose((0.0, 0.0072, -0.0011)))  # of the left finger
 STEM = BoxPart((0.0105, 0.0070, 0.0180), Pose((0.0, 0.0194, -0.0270)))  # what it is on
-PAD_FACE = 0.0  # m, the y of the side of a pad that grips, at finger position 0
 HALF_TURN = (0.0, 0.0, 1.0, 0.0)  # from the left finger to the right one
 
 
