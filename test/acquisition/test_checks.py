@@ -196,7 +196,7 @@ def test_the_printed_operators_of_peg_in_hole_do_not_chain() -> None:
         "In(peg2, hole2); HandEmpty is deleted by Pick and never added again; if it were, there "
         "would be a plan"
     )
-    assert verification.blamed == ("Insert",)
+    assert verification.culprits == ("Insert",)
     single = PEGS.with_goal("test2")  # one peg can be inserted without giving HandEmpty back
     assert len(verify([PICK, printed_insert()], single).plan or ()) == 2
 
@@ -204,7 +204,7 @@ def test_the_printed_operators_of_peg_in_hole_do_not_chain() -> None:
 def test_both_operators_of_a_circle_are_blamed() -> None:
     needs_in = operator("In(?peg, ?hole)", "", "Holding(?peg)", name="Pick")
     verification = verify([needs_in, INSERT], PEGS.problem)
-    assert verification.blamed == ("Pick", "Insert")
+    assert verification.culprits == ("Pick", "Insert")
     assert {c.kind for c in verification.complaints} == {
         C.CIRCULAR_PRECONDITIONS,
         C.GOAL_UNREACHABLE,
@@ -224,7 +224,7 @@ def test_an_operator_that_is_never_possible_is_a_warning_beside_a_plan() -> None
 def test_nothing_that_adds_the_goal_blames_everyone() -> None:
     forgetful = operator("Holding(?peg) IsClear(?hole)", "Holding(?peg)", "HandEmpty()", "Insert")
     verification = verify([PICK, forgetful], PEGS.problem)
-    assert verification.blamed == ("Pick", "Insert")
+    assert verification.culprits == ("Pick", "Insert")
     assert "no action adds In" in verification.complaints[0].fact
 
 

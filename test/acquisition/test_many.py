@@ -112,7 +112,7 @@ def judge_operator(text: str, victim: LiftedOperator, printed: Printed) -> str:
     operators = [operator if op is victim else op for op in printed.operators]
     verification = verify(operators, printed.problem)
     if verification.plan is None:
-        assert serious(verification.complaints) and verification.blamed
+        assert serious(verification.complaints) and verification.culprits
         return "no plan"
     assert not serious(verification.complaints)
     state = printed.problem.start_mask

@@ -67,7 +67,7 @@ class LanguageProposer:
         for _ in range(ROUNDS - 1):
             if verification.plan is not None:
                 break
-            for name in verification.blamed:
+            for name in verification.culprits:
                 rejected = Rejected(answers[name].text, verification.complaints)
                 answers[name] = self._inquiry.ask(questions[name], rejected)
             verification = self._verify(answers, problem)

@@ -5,7 +5,7 @@
 The paper feeds back the operators that cannot be reached. That is not enough: its own printed
 operators of PegInHole can all be reached, and each goal atom too, but never both, since nothing
 gives HandEmpty back. So all abstract states are enumerated where they are few enough, and what is
-said is what was seen there: preconditions that are never true, circles, goal atoms that are never
+said is what was seen there: preconditions that are never true, cycles, goal atoms that are never
 reached or never together, and what is taken away for good.
 """
 
@@ -46,19 +46,19 @@ class Verification:
     Args:
         plan: A shortest one; None where there is none.
         complaints: Why there is none; warnings where there is one.
-        blamed: Names of the operators to be asked for again, in order; none where there is a plan.
+        culprits: Names of operators to be asked for again, in order; none where there is a plan.
     """
 
     plan: tuple[GroundOperator, ...] | None
     complaints: tuple[Complaint, ...]
-    blamed: tuple[str, ...]
+    culprits: tuple[str, ...]
 
 
 def verify(operators: Sequence[LiftedOperator], problem: AcquisitionProblem) -> Verification:
     """Whether the operators, each sound by itself, make a plan for the problem."""
     if duplicates := _duplicates(operators):
-        complaints, blamed = duplicates
-        return Verification(None, complaints, blamed)
+        complaints, culprits = duplicates
+        return Verification(None, complaints, culprits)
     try:
         grounded = ground_operators(operators, problem.space)
         sequence = find_shortest_sequence(
@@ -70,19 +70,19 @@ def verify(operators: Sequence[LiftedOperator], problem: AcquisitionProblem) -> 
     except UnsolvableError:
         return _Diagnosis(operators, grounded, problem).verdict()
     unused = _Diagnosis(operators, grounded, problem).never_applicable()
-    warnings = tuple(replace(blame.complaint, warning=True) for blame in unused)
+    warnings = tuple(replace(one.complaint, warning=True) for one in unused)
     return Verification(tuple(grounded[i] for i in sequence), warnings, ())
 
 
 @dataclass(frozen=True)
-class _Blame:
+class _Culprits:
     """A complaint, and the names of the operators that are to be asked for again."""
 
     complaint: Complaint
     operators: frozenset[str]
 
     @classmethod
-    def of(cls, kind: ComplaintClass, fact: str, *operators: str) -> _Blame:
+    def of(cls, kind: ComplaintClass, fact: str, *operators: str) -> _Culprits:
         subject = f"operator {' and '.join(operators)}" if operators else SUBJECT
         return cls(Complaint(kind, subject, fact), frozenset(operators))
 
@@ -148,13 +148,13 @@ class _Diagnosis:
         self._never = [op for op in operators if not self._ever_applicable(op)]
 
     def verdict(self) -> Verification:
-        """All complaints, and whom they blame."""
-        never, goals = self.never_applicable(), self._goal_blame()
-        at_fault = [blame.operators for blame in never] or [goals.operators]
+        """All complaints, and the operators to be asked for again."""
+        never, goals = self.never_applicable(), self._goal_culprits()
+        at_fault = [one.operators for one in never] or [goals.operators]
         names = [op.name for op in self._operators]
         chosen = frozenset().union(*at_fault) or set(names)
         ordered = tuple(name for name in names if name in chosen)
-        complaints = (*(blame.complaint for blame in never), goals.complaint)
+        complaints = (*(one.complaint for one in never), goals.complaint)
         return Verification(None, complaints, ordered)
 
     # -- operators that can never be applied ------------------------------------------------------
@@ -166,19 +166,19 @@ class _Diagnosis:
         possible = [g for g in groundings if g.applicable(self._seen.ever_true)]
         return any(g.applicable(state) for g in possible for state in self._seen.states)
 
-    def never_applicable(self) -> list[_Blame]:
-        """What is wrong with each operator that can never be applied, and each circle of them."""
+    def never_applicable(self) -> list[_Culprits]:
+        """What is wrong with each operator that can never be applied, and each cycle of them."""
         needs = {op.name: self._missing(op) for op in self._never}
         never = set(needs)
         found, waits = [], {}
         for operator in self._never:
             missing = needs[operator.name]
-            adders = {op.name for atom in missing for op in self._adders(atom)}
-            waits[operator.name] = adders & never
+            producers = {op.name for atom in missing for op in self._producers(atom)}
+            waits[operator.name] = producers & never
             if fact := self._never_true(operator, missing):
                 kind = ComplaintClass.PRECONDITION_NEVER_TRUE
-                found.append(_Blame.of(kind, fact, operator.name))
-        return found + self._circles(waits, needs)
+                found.append(_Culprits.of(kind, fact, operator.name))
+        return found + self._cycles(waits, needs)
 
     def _missing(self, operator: LiftedOperator) -> list[LiftedAtom]:
         """The preconditions that hold of no objects, ever."""
@@ -201,7 +201,7 @@ class _Diagnosis:
             )
         )
 
-    def _adders(self, atom: LiftedAtom) -> list[LiftedOperator]:
+    def _producers(self, atom: LiftedAtom) -> list[LiftedOperator]:
         return [
             op
             for op in self._operators
@@ -210,18 +210,18 @@ class _Diagnosis:
 
     def _never_true(self, operator: LiftedOperator, missing: Sequence[LiftedAtom]) -> str:
         """Which preconditions of an operator cannot be had, by its own fault; else empty."""
-        hopeless = [
-            atom for atom in missing if not any(op in self._never for op in self._adders(atom))
+        unreachable = [
+            atom for atom in missing if not any(op in self._never for op in self._producers(atom))
         ]
-        if hopeless:
+        if unreachable:
             reasons = (
                 f"{atom} is required, but it does not hold of fitting objects at first, and "
                 + (
                     "no action adds it"
-                    if not self._adders(atom)
+                    if not self._producers(atom)
                     else "none that is possible adds it"
                 )
-                for atom in hopeless
+                for atom in unreachable
             )
             return "; ".join(reasons)
         return "" if missing else self._conflict(operator)
@@ -237,8 +237,8 @@ class _Diagnosis:
         for pair in islice(combinations(atoms, 2), pairs):
             masks = {self._mask(pair, operator, g) for g in groundings}
             if not any(state & mask == mask for mask in masks for state in self._seen.states):
-                takers = self._takers(pair)
-                return f"{pair[0]} and {pair[1]} are required, but never true together{takers}"
+                deleters = self._deleters(pair)
+                return f"{pair[0]} and {pair[1]} are required, but never true together{deleters}"
         return f"{', '.join(map(str, atoms))} are required, but never all true together"
 
     def _mask(
@@ -247,7 +247,7 @@ class _Diagnosis:
         binding = dict(zip(operator.parameters, grounding.objects, strict=True))
         return self._problem.space.mask(atom.ground(binding) for atom in atoms)
 
-    def _takers(self, pair: Sequence[LiftedAtom]) -> str:
+    def _deleters(self, pair: Sequence[LiftedAtom]) -> str:
         """Which actions delete one atom as they add the other."""
         words = [
             f"{op.name} deletes {one.predicate.name} when it adds {other.predicate.name}"
@@ -258,26 +258,26 @@ class _Diagnosis:
         ]
         return f": {', '.join(words)}" if words else ""
 
-    def _circles(
+    def _cycles(
         self, waits: dict[str, set[str]], needs: dict[str, list[LiftedAtom]]
-    ) -> list[_Blame]:
+    ) -> list[_Culprits]:
         """What is wrong with each set of operators that wait for one another."""
         reach = {name: _closure(name, waits) for name in waits}
-        circles: list[list[str]] = []
+        cycles: list[list[str]] = []
         for name in waits:
-            circle = sorted(other for other in reach[name] if name in reach[other])
-            if name in circle and circle not in circles:
-                circles.append(circle)
+            cycle = sorted(other for other in reach[name] if name in reach[other])
+            if name in cycle and cycle not in cycles:
+                cycles.append(cycle)
         found = []
-        for circle in circles:
-            parts = (f"{name} needs {', '.join(map(str, needs[name]))}" for name in circle)
-            fact = f"{'; '.join(parts)}; only {' and '.join(circle)} could make that true"
-            found.append(_Blame.of(ComplaintClass.CIRCULAR_PRECONDITIONS, fact, *circle))
+        for cycle in cycles:
+            parts = (f"{name} needs {', '.join(map(str, needs[name]))}" for name in cycle)
+            fact = f"{'; '.join(parts)}; only {' and '.join(cycle)} could make that true"
+            found.append(_Culprits.of(ComplaintClass.CIRCULAR_PRECONDITIONS, fact, *cycle))
         return found
 
     # -- the goal ---------------------------------------------------------------------------------
 
-    def _goal_blame(self) -> _Blame:
+    def _goal_culprits(self) -> _Culprits:
         unreachable = [
             atom
             for atom in self._problem.space.decode(self._problem.goal_mask)
@@ -286,10 +286,10 @@ class _Diagnosis:
         kind = ComplaintClass.GOAL_UNREACHABLE
         if unreachable:
             facts = "; ".join(map(self._unreachable_fact, unreachable))
-            return _Blame.of(kind, f"no plan reaches the goal: {facts}")
+            return _Culprits.of(kind, f"no plan reaches the goal: {facts}")
         if not self._seen.complete:
             fact = "no plan reaches the goal, though each atom could hold if nothing were deleted"
-            return _Blame.of(kind, fact)
+            return _Culprits.of(kind, fact)
         return self._never_together()
 
     def _unreachable_fact(self, atom: GroundAtom) -> str:
@@ -297,16 +297,16 @@ class _Diagnosis:
             atom.predicate,
             tuple(Variable(f"?{i}", obj.type) for i, obj in enumerate(atom.objects)),
         )
-        adders = self._adders(lifted)
-        if not adders:
+        producers = self._producers(lifted)
+        if not producers:
             return f"{atom} is never true: no action adds {atom.predicate.name}"
-        names = " and ".join(op.name for op in adders)
+        names = " and ".join(op.name for op in producers)
         possible = (
-            "is never possible" if all(op in self._never for op in adders) else "never does so"
+            "is never possible" if all(op in self._never for op in producers) else "never does so"
         )
         return f"{atom} is never true: {names} could add it, but {possible}"
 
-    def _never_together(self) -> _Blame:
+    def _never_together(self) -> _Culprits:
         """Each goal atom can be reached, all of them cannot: what is lost on the way?"""
         goal = self._problem.goal_mask
         best = max(self._seen.states, key=lambda s: ((s & goal).bit_count(), -s))
@@ -323,9 +323,9 @@ class _Diagnosis:
             fact = f"{fact}; {'; '.join(parts)}"
         if decisive:
             fact = f"{fact}; if it were, there would be a plan"
-        at_fault = {name for p in decisive or lost for name in self._restorers(lost[p])}
+        at_fault = {name for p in decisive or lost for name in self._asked_again(lost[p])}
         complaint = Complaint(ComplaintClass.GOALS_NEVER_TOGETHER, SUBJECT, fact)
-        return _Blame(complaint, frozenset(at_fault))
+        return _Culprits(complaint, frozenset(at_fault))
 
     def _never_restored(self) -> dict[str, list[LiftedOperator]]:
         """Predicates that operators need and delete but never add, with who deletes them."""
@@ -353,7 +353,7 @@ class _Diagnosis:
             return False
         return True
 
-    def _restorers(self, deleters: Sequence[LiftedOperator]) -> set[str]:
+    def _asked_again(self, deleters: Sequence[LiftedOperator]) -> set[str]:
         """Who should give back what others take: those that end what these begin, else these.
 
         Insert deletes Holding, which Pick adds as it deletes HandEmpty: so Insert is asked again.

@@ -135,10 +135,10 @@ class _Asker:
         answer = self._inquiry.ask_once(question)
         if isinstance(answer, Answer):
             return answer.value
-        self.blame(question.subject, answer.complaints)
+        self.complain(question.subject, answer.complaints)
         return None
 
-    def blame(self, subject: str, complaints: Iterable[Complaint]) -> None:
+    def complain(self, subject: str, complaints: Iterable[Complaint]) -> None:
         self._errors[subject] = tuple(sorted({str(c.kind) for c in serious(complaints)}))
 
     def attempt(self) -> Attempt:
@@ -169,7 +169,7 @@ def attempt_operators(
     if asker.attempt().passed:
         verification = verify(operators, problem)
         if verification.plan is None:
-            asker.blame(VERIFICATION, verification.complaints)
+            asker.complain(VERIFICATION, verification.complaints)
     attempt = asker.attempt()
     return attempt, tuple(operators) if attempt.passed else ()
 
