@@ -20,7 +20,8 @@ from slap_ros.skills.skill import LearnedSkill
 from slap_ros.studies.comparison import format_spread
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
-from slap_ros.studies.results import MarkdownTable, StudyReport
+from slap_ros.studies.results import Data, MarkdownTable, StudyReport
+from slap_ros.studies.study import PaperFigure, Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -263,3 +264,32 @@ def draw(figure: Figure, goals: Sequence[GoalProgress]) -> None:
     axes.set_ylim(len(goals) - 0.5, -0.5)
     axes.set_xlim(-0.03, 1.03)
     axes.set_xlabel("task progress: each library, their mean (dot), the paper's (diamond)")
+
+
+def _summary(found: Data) -> str:
+    return ", ".join(
+        f"{one['goal']}{_made_by(one)} {one['progress']['mean']:.2f}" for one in found["goals"]
+    )
+
+
+def _made_by(goal: Data) -> str:
+    origin = {goal.get("proposer", "manual"), goal.get("rewarder", "manual")}
+    return "" if origin == {"manual"} else f" ({goal['proposer']}, {goal['rewarder']})"
+
+
+STUDY = Study(
+    "acquisition",
+    summary=_summary,
+    figures=(
+        PaperFigure(
+            "LG-SAIL Table 1",
+            "task progress with acquired skills",
+            ("stow_hammer", "peg_in_hole", "stack_at_target", "make_coffee"),
+            {
+                "stow_hammer": "training 0.96, test1 0.91, test2 0.71",
+                "peg_in_hole": "training 0.92, test1 0.59, test2 0.93",
+                "stack_at_target": "1.00",
+            },
+        ),
+    ),
+)

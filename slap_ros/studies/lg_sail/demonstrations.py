@@ -18,6 +18,7 @@ from slap_ros.studies.comparison import format_spread, not_solved, spread_of
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.results import MarkdownTable, StudyReport
+from slap_ros.studies.study import Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -231,3 +232,6 @@ def draw(figure: Figure, goals: Sequence[GoalDemonstrations]) -> None:
     success.set_xlabel("success [%], with 95 % interval")
     steps.set_xlim(left=0)
     steps.set_xlabel("environment steps of solved tasks")
+
+
+STUDY = Study("demonstrations")

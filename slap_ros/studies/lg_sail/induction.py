@@ -28,6 +28,7 @@ from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.results import MarkdownTable, StudyReport
+from slap_ros.studies.study import Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -293,3 +294,6 @@ def draw(figure: Figure, found: Sequence[Induction]) -> None:
     axes.set_xlim(-3, 103)
     axes.set_xlabel("tasks with a plan as short as with hand-written operators [%]")
     figure.legend(loc="outside upper center", ncols=len(found))
+
+
+STUDY = Study("induction")

@@ -26,14 +26,15 @@ from slap_ros.studies.lg_sail.model_attempts import (
     attempt_operators,
     attempt_plan,
 )
-from slap_ros.studies.reproducing import PLANS
-from slap_ros.studies.results import MarkdownTable, StudyReport
+from slap_ros.studies.results import Data, MarkdownTable, StudyReport
+from slap_ros.studies.study import Study, not_made
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SEARCH, ALONE, ONE_SHOT = "language+search", "language", "one_shot"
 VARIANTS = (SEARCH, ALONE, ONE_SHOT)
+PLANS = 25  # of a language model
 # LG-SAIL Tables 2 and 5: operator success, planning success, overall success, attempts.
 PAPER = {
     SEARCH: (0.610, 1.000, 1.00, 1.64),
@@ -324,3 +325,42 @@ def draw(figure: Figure, tallies: Mapping[tuple[str, str], PlanTrials]) -> None:
     axes.plot([], color="0.3", label="the paper's")
     axes.legend(ncols=4, loc="upper center")
     axes.grid(visible=False, axis="x")
+
+
+def _summary(found: Data) -> str:
+    return "; ".join(
+        f"{one['model']}, {one['variant']}: operators {_percent(one['operators'])}, "
+        f"overall {_percent(one['overall'])}"
+        for one in found["tallies"]
+    )
+
+
+def _percent(counts: Sequence[int]) -> str:
+    good, every = counts
+    return f"{good / every:.0%}"
+
+
+STUDY = Study(
+    "planning_ablation",
+    summary=_summary,
+    figures=(
+        not_made(
+            "LG-SAIL Table 2",
+            "operators and plans of a language model",
+            "operators 61%, with search 100% overall, 1.64 attempts",
+            "needs a language model",
+        ),
+    ),
+    costs="attempts",
+)
+MODELS_STUDY = Study(
+    "models",
+    figures=(
+        not_made(
+            "LG-SAIL Tables 5 and 6",
+            "operators of other language models",
+            "operators 79 to 98%",
+            "needs language models",
+        ),
+    ),
+)

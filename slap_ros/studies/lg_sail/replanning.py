@@ -21,6 +21,7 @@ from slap_ros.studies.comparison import format_spread, named_tasks, not_solved, 
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.results import MarkdownTable, StudyReport
+from slap_ros.studies.study import Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -228,3 +229,6 @@ def draw(figure: Figure, goals: Sequence[ReplanningRow]) -> None:
     axes.set_ylim(len(goals) - 0.5, -0.5)
     axes.set_xlim(-3, 103)
     axes.set_xlabel("success [%]: each library, all of a row (dot) with 95 % interval")
+
+
+STUDY = Study("replanning")

@@ -22,6 +22,7 @@ from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.lg_sail.model_attempts import Attempt, LanguageModel, attempt_rewards
 from slap_ros.studies.results import MarkdownTable, StudyReport
+from slap_ros.studies.study import Study, not_made
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -196,3 +197,16 @@ def draw(figure: Figure, measured: Sequence[RewardTrials], names: Sequence[str])
     axes.set_ylabel("share of trials that are right")
     axes.legend(ncols=2, loc="lower right")
     axes.grid(visible=False, axis="x")
+
+
+STUDY = Study(
+    "reward_ablation",
+    figures=(
+        not_made(
+            "LG-SAIL Table 3, Fig. 7",
+            "rewards of a language model",
+            "20 → 92% with the metrics' source",
+            "needs a language model",
+        ),
+    ),
+)

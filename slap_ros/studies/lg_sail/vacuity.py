@@ -25,6 +25,7 @@ from slap_ros.skills.skill import LearnedSkill
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.results import MarkdownTable, StudyReport
+from slap_ros.studies.study import Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -464,3 +465,6 @@ def draw(figure: Figure, found: Sequence[OperatorVacuity]) -> None:
     which = "policy" if judged else "blind policy"
     axes.set_xlabel(f"starts from which a {which} succeeds [%], with 95 % interval")
     figure.legend(loc="outside upper center", ncols=len(names) + bool(judged))
+
+
+STUDY = Study("vacuity")

@@ -34,6 +34,7 @@ from slap_ros.studies.comparison import format_spread
 from slap_ros.studies.figures import APPROACH_STYLES, LINES, label
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.results import MarkdownTable, StudyReport
+from slap_ros.studies.study import Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -355,3 +356,6 @@ def draw(figure: Figure, results: Sequence[TermResult]) -> None:
     axes.set_ylim(len(results) - 0.5, -0.5)
     axes.set_xlabel("plan length relative to pure planning; a mark for each training")
     figure.legend(loc="outside upper center", ncols=len(SHOWN))
+
+
+STUDY = Study("ablation", costs="learning")

@@ -14,9 +14,10 @@ from slap_ros.evaluation.summary import Spread
 from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.studies.comparison import Comparison, format_spread, spread_of
 from slap_ros.studies.figures import LINES
-from slap_ros.studies.results import MarkdownTable, StudyReport
+from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.slap.library_plans import LibraryPlans, plan_with
 from slap_ros.studies.slap.trainings import LearningCurve, TrainingFolder
+from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, Study, format_steps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -273,3 +274,26 @@ def _plot(
         low = [mean - sd for mean, sd in zip(means, deviations, strict=True)]
         high = [mean + sd for mean, sd in zip(means, deviations, strict=True)]
         axes.fill_between(steps, low, high, color=pen["color"], alpha=0.2, linewidth=0)
+
+
+def _summary(found: Data) -> str:
+    ends = [one["moments"][-1] for one in found["shortcuts"]]
+    each = ", ".join(f"{end['success_mean']:.0%} in {end['length_mean']:.1f} steps" for end in ends)
+    if "plans" not in found:
+        return each
+    first, last = (format_steps(found["plans"][i]["plan_length"]) for i in (0, -1))
+    return f"{each}; plans of {first} → {last} steps"
+
+
+STUDY = Study(
+    "dynamics",
+    summary=_summary,
+    figures=(
+        PaperFigure(
+            "SLAP Fig. 4",
+            "success and length while shortcuts are learned",
+            SLAP_DOMAINS,
+            {"": "curves"},
+        ),
+    ),
+)

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 from slap_ros.studies.comparison import ApproachResult, Comparison, format_spread
 from slap_ros.studies.figures import dodged, label, legend_above, plot_spreads, plot_values
-from slap_ros.studies.results import MarkdownTable, StudyReport
+from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.slap.variations import Variation
+from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, Study
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -143,3 +144,28 @@ def _plot(
         name = summaries[0].approach
         plot_values(above, beside, [100.0 * one.success_rate for one in summaries], name)
         plot_spreads(below, beside, [one.plan_length for one in summaries], name)
+
+
+def _summary(found: Data) -> str:
+    slap = [one["approaches"][-1] for one in found["conditions"]]
+    lengths = [one["relative_length"] for one in slap if one["relative_length"] is not None]
+    least = min(one["success_rate"] for one in slap)
+    success = f"success {least:.0%}" + (" or more" if least < 1.0 else "")
+    return (
+        f"relative length {min(lengths):.2f} to {max(lengths):.2f}, {success}, "
+        f"in {len(slap)} conditions"
+    )
+
+
+STUDY = Study(
+    "generalisation",
+    summary=_summary,
+    figures=(
+        PaperFigure(
+            "SLAP Fig. 5",
+            "other obstacles, distractors, mass, friction",
+            SLAP_DOMAINS,
+            {"": "bars"},
+        ),
+    ),
+)

@@ -23,7 +23,8 @@ from slap_ros.studies.comparison import (
     named_tasks,
 )
 from slap_ros.studies.figures import APPROACH_STYLES, label
-from slap_ros.studies.results import MarkdownTable, StudyReport
+from slap_ros.studies.results import Data, MarkdownTable, StudyReport
+from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, Study, format_steps
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -208,3 +209,16 @@ def draw(figure: Figure, outcomes: Sequence[GoalTrials]) -> None:
     axes.set_xlabel("length by pure planning [steps]")
     axes.set_ylabel("length with SLAP [steps]")
     axes.legend(loc="upper left")
+
+
+def _summary(found: Data) -> str:
+    pure, slap = found["approaches"][0], found["approaches"][-1]
+    steps = f"{format_steps(pure['plan_length'])} → {format_steps(slap['plan_length'])} steps"
+    return f"{slap['success_rate']:.0%}; {steps}, {len(found['goals'])} goals in all"
+
+
+STUDY = Study(
+    "goals",
+    summary=_summary,
+    figures=(PaperFigure("SLAP Fig. 9", "15 other goals", SLAP_DOMAINS, {"": "bars"}),),
+)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from slap_ros.drawing.palette import MUTED, PLAN
@@ -21,9 +22,10 @@ from slap_ros.shortcuts.training import problem_key
 from slap_ros.studies.comparison import Comparison, format_spread
 from slap_ros.studies.figures import legend_above
 from slap_ros.studies.job_runner import JobRunner
-from slap_ros.studies.results import MarkdownTable, StudyReport
+from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.slap.library_plans import LibraryPlans, plan_with
 from slap_ros.studies.slap.trainings import TrainingFolder
+from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, Study, format_steps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -392,3 +394,30 @@ def _plot(
         label=name,
     )
     axes.set_ylim(bottom=0)
+
+
+def _summary(found: Data) -> str:
+    least = found["thresholds"][0]
+    kept = f"{least['remaining_percent']['mean']:.1f}% of candidates kept with K = {least['k']}"
+    if "plan_length" not in least:
+        return kept
+    steps = [f"{format_steps(least['plan_length'])} steps"]
+    for before, one in pairwise(found["thresholds"]):
+        if one["plan_length"] != before["plan_length"]:
+            share = 100 * one["k_over_n"]
+            steps.append(f"from K/N = {share:.2g}% on {format_steps(one['plan_length'])}")
+    return f"{kept}; {', '.join(steps)}"
+
+
+STUDY = Study(
+    "pruning",
+    summary=_summary,
+    figures=(
+        PaperFigure(
+            "SLAP Table 2, §4.2",
+            "pruning by random rollouts",
+            SLAP_DOMAINS,
+            {"": "K/N up to 25%: 167 to 202 steps; from 30% on: 333 to 349"},
+        ),
+    ),
+)

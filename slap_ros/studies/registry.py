@@ -1,0 +1,121 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""All studies, and those figures of the papers that none of them makes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from slap_ros.studies.lg_sail import (
+    acquisition,
+    demonstrations,
+    induction,
+    planning_ablation,
+    replanning,
+    reward_ablation,
+    vacuity,
+)
+from slap_ros.studies.slap import (
+    ablation,
+    dynamics,
+    generalisation,
+    goals,
+    perception,
+    planning_time,
+    pruning,
+    table1,
+)
+from slap_ros.studies.study import PaperFigure, not_made
+
+STUDIES = {
+    study.name: study
+    for study in (
+        table1.STUDY,
+        pruning.STUDY,
+        planning_time.STUDY,
+        perception.STUDY,
+        dynamics.STUDY,
+        generalisation.STUDY,
+        goals.STUDY,
+        ablation.STUDY,
+        acquisition.STUDY,
+        planning_ablation.STUDY,
+        planning_ablation.MODELS_STUDY,
+        reward_ablation.STUDY,
+        demonstrations.STUDY,
+        induction.STUDY,
+        replanning.STUDY,
+        vacuity.STUDY,
+    )
+}
+WITHOUT_STUDY = (
+    not_made(
+        "SLAP Table 1",
+        "other learners: PPO, SAC+HER, hierarchical RL, SOL",
+        "0%; hierarchical RL and SOL 100% in Obstacle 2D, 25.3 and 24.9 steps",
+        "none of them is part of this project",
+    ),
+    PaperFigure(
+        "SLAP Table 3",
+        "other algorithms that learn shortcuts",
+        domains=("cleanup_table",),
+        found={"": "PPO 113.7, SAC 160.2, SAC+HER 131.0 steps; pure planning 446"},
+        not_run="only PPO learns shortcuts here",
+    ),
+    not_made(
+        "SLAP Tables 7 and 8",
+        "another physics than in planning",
+        "65 → 78%, trained again 86%",
+        "no study perturbs the world without the planner's model",
+    ),
+    not_made(
+        "SLAP Fig. 6",
+        "independent policies against one for all",
+        "independent policies are better",
+        "this project has independent policies only",
+    ),
+    not_made(
+        "LG-SAIL Table 7",
+        "imitation with and without planning",
+        "Stack 1.00, Peg 0.95, Peg goal 2 0.90",
+        "this project has no learning by imitation",
+    ),
+    not_made(
+        "LG-SAIL Fig. 4",
+        "learning curves beside other learners",
+        "curves",
+        "none of these learners is part of this project",
+    ),
+    not_made(
+        "LG-SAIL Fig. 5", "a sequence of tasks", "curves", "no sequence of ten tasks was trained"
+    ),
+    not_made(
+        "LG-SAIL Fig. 6",
+        "skills of another domain to begin with",
+        "curves",
+        "no trainings with and without them were compared",
+    ),
+    not_made(
+        "LG-SAIL Fig. 8", "a real robot", "0.8 and 1.0 of 10 trials", "no robot was available"
+    ),
+)
+
+
+def paper_figures() -> list[tuple[str, PaperFigure]]:
+    """Every figure of the papers with the name of its study, which may be empty, in their order."""
+    return sorted(_figures(), key=lambda pair: _place(pair[1].source))
+
+
+def _figures() -> Iterator[tuple[str, PaperFigure]]:
+    for study in STUDIES.values():
+        yield from ((study.name, figure) for figure in study.figures)
+    yield from (("", figure) for figure in WITHOUT_STUDY)
+
+
+def _place(source: str) -> tuple[bool, bool, int]:
+    """SLAP before LG-SAIL, tables before pictures, then by number."""
+    number = re.search(r"\d+", source)
+    assert number is not None
+    first = source.split(",")[0]
+    return not source.startswith("SLAP"), "Fig." in first, int(number[0])
