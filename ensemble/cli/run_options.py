@@ -27,6 +27,7 @@ from slap_ros.cli.options import (
     Json,
     Planner,
     Preset,
+    at_most,
     seed_or_default,
 )
 from slap_ros.cli.render import Size, picture_size
@@ -59,7 +60,12 @@ class RunOptions:
     planner: Planner = "lazy"
     skills: Skills = SHIPPED
     max_replans: Annotated[
-        int, typer.Option(min=0, max=MAX_INDEX, help="Maximum number of plans after the first.")
+        int,
+        typer.Option(
+            min=0,
+            callback=at_most(MAX_INDEX),
+            help="Maximum number of plans after the first.",
+        ),
     ] = MAX_REPLANS
     record: Annotated[Path | None, typer.Option(help="New folder in which to record a bag.")] = None
     in_process: Annotated[
@@ -67,10 +73,14 @@ class RunOptions:
     ] = False
     pace: Annotated[
         float,
-        typer.Option(min=0.0, max=1e6, help="Steps per second, to watch a run; 0 is full speed."),
+        typer.Option(
+            min=0.0,
+            callback=at_most(1e6),
+            help="Steps per second, to watch a run; 0 is full speed.",
+        ),
     ] = 0.0
     timeout: Annotated[
-        float, typer.Option(min=0.1, max=1e9, help="Seconds after which to give up.")
+        float, typer.Option(min=0.1, callback=at_most(1e9), help="Seconds after which to give up.")
     ] = 600.0
     patience: Annotated[
         float,

@@ -11,7 +11,7 @@ import typer
 
 from slap_ros.cli.console import console, print_json, styled
 from slap_ros.cli.doctor import STYLE
-from slap_ros.cli.options import DomainName, Json, Preset, Seed
+from slap_ros.cli.options import DomainName, Json, Preset, Seed, at_most
 from slap_ros.domain_check import check_domain
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode
@@ -22,7 +22,8 @@ def check(
     preset: Preset = None,
     seed: Seed = 0,
     tasks: Annotated[
-        int, typer.Option(min=1, max=10**6, help="Number of tasks to plan and execute.")
+        int,
+        typer.Option(min=1, callback=at_most(10**6), help="Number of tasks to plan and execute."),
     ] = 50,
     states: Annotated[
         int, typer.Option(min=10, help="Number of states to reset to and to step from again.")

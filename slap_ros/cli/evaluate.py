@@ -15,7 +15,7 @@ from slap_ros.api.command_line import command_line
 from slap_ros.api.evaluation import compared_approaches, run_approaches
 from slap_ros.cli.bars import counting_bars
 from slap_ros.cli.console import console, print_json
-from slap_ros.cli.options import DomainName, Goal, Jobs, Json, Planner, Preset
+from slap_ros.cli.options import DomainName, Goal, Jobs, Json, Planner, Preset, at_most
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose
 from slap_ros.cli.skill_choice import Skills, open_chosen
 from slap_ros.core import Domain
@@ -34,8 +34,12 @@ from slap_ros.versions import versions
 
 def evaluate(
     domain: DomainName,
-    tasks: Annotated[int, typer.Option(min=1, max=10**6, help="Tasks per seed.")] = 10,
-    seeds: Annotated[int, typer.Option(min=1, max=10**6, help="Number of seeds.")] = 5,
+    tasks: Annotated[
+        int, typer.Option(min=1, callback=at_most(10**6), help="Tasks per seed.")
+    ] = 10,
+    seeds: Annotated[
+        int, typer.Option(min=1, callback=at_most(10**6), help="Number of seeds.")
+    ] = 5,
     first_seed: Annotated[
         int,
         typer.Option(

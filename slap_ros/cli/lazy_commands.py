@@ -17,6 +17,8 @@ from typer import Typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command, get_group
 
+from slap_ros.cli.help_pages import arrange
+
 
 @dataclass(frozen=True)
 class CommandEntry:
@@ -49,6 +51,7 @@ class CommandEntry:
         found = getattr(import_module(module), name)
         command = get_group(found) if isinstance(found, Typer) else _command(self.name, found)
         command.name = self.name
+        arrange(command, self.name)
         return command
 
 

@@ -22,6 +22,24 @@ MAX_SEED, MAX_INDEX = 2**63 - 1, 2**32 - 1  # as messages and bags have room for
 DEFAULT_SEED = 0
 
 
+def at_most(limit: float) -> Callable[[Any], Any]:
+    """A check of an option whose upper end is so large that its help need not name it.
+
+    Args:
+        limit: Largest value.
+
+    Returns:
+        A callback of an option, which gives the value back.
+    """
+
+    def check(value: Any) -> Any:
+        if value is not None and value > limit:
+            raise typer.BadParameter(f"{value} is too large; {limit} at most")
+        return value
+
+    return check
+
+
 def matching_domains(incomplete: str) -> list[str]:
     """The domains that a shell may complete a name to."""
     from slap_ros.domains import domain_names
@@ -57,19 +75,26 @@ Planner = Annotated[
         "astar (fewest operators; tries none in the model)."
     ),
 ]
-Seed = Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Seed from which tasks are sampled.")]
+Seed = Annotated[
+    int,
+    typer.Option(min=0, callback=at_most(MAX_SEED), help="Seed from which tasks are sampled."),
+]
 ChosenSeed = Annotated[  # of the commands that say which one they took
     int | None,
     typer.Option(
         min=0,
-        max=MAX_SEED,
+        callback=at_most(MAX_SEED),
         show_default=str(DEFAULT_SEED),
         help="Seed from which tasks are sampled.",
     ),
 ]
 Index = Annotated[
     int,
-    typer.Option(min=0, max=MAX_INDEX, help="Number of the task among the seed's tasks, from 0."),
+    typer.Option(
+        min=0,
+        callback=at_most(MAX_INDEX),
+        help="Number of the task among the seed's tasks, from 0.",
+    ),
 ]
 Goal = Annotated[
     str | None,
@@ -78,7 +103,9 @@ Goal = Annotated[
         "such as '(and (On block2 target) (GripperEmpty robot))'."
     ),
 ]
-TrainingSeed = Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Seed of all random numbers.")]
+TrainingSeed = Annotated[
+    int, typer.Option(min=0, callback=at_most(MAX_SEED), help="Seed of all random numbers.")
+]
 Ray = Annotated[
     str | None,
     typer.Option(help="Run on Ray instead of in processes: a cluster's address, or local."),

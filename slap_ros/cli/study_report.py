@@ -14,7 +14,7 @@ from rich.progress import TaskID
 from slap_ros.api.command_line import command_line
 from slap_ros.cli.bars import counting_bars
 from slap_ros.cli.console import console
-from slap_ros.cli.options import MAX_SEED
+from slap_ros.cli.options import MAX_SEED, at_most
 from slap_ros.files import require_writable
 from slap_ros.studies.figures import require_matplotlib
 from slap_ros.studies.job_runner import JobRunner
@@ -24,7 +24,9 @@ from slap_ros.studies.study_log import StudyLog
 RESULTS = Path("docs/results")
 FRESH_SEED = 500  # development looks at no task seed from here on
 
-FreshSeed = Annotated[int, typer.Option(min=0, max=MAX_SEED, help="Seed of the tasks.")]
+FreshSeed = Annotated[
+    int, typer.Option(min=0, callback=at_most(MAX_SEED), help="Seed of the tasks.")
+]
 Output = Annotated[Path, typer.Option(help="Folder for the files STUDY_DOMAIN.json, .svg and .md.")]
 
 

@@ -1,0 +1,92 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How the help of commands is laid out: panels of options, and an example for each command."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+TASK, PLANNING, SKILLS = "Task", "Planning", "Skills"
+MODEL, LEARNING = "Language model", "Learning"
+ROBOT, OUTPUT = "Robot", "Output"
+# The panel of an option by the name of its parameter; all others are in the panel "Options".
+PANELS: Mapping[str, str] = {
+    **dict.fromkeys(
+        ("seed", "index", "preset", "goal", "tasks", "seeds", "first_seed", "presets"), TASK
+    ),
+    **dict.fromkeys(
+        ("shortcuts", "samples", "planner", "max_replans", "effort", "with_shooting"), PLANNING
+    ),
+    **dict.fromkeys(
+        ("skills", "acquire", "acquisition", "proposer", "rewarder", "demonstrations", "operators"),
+        SKILLS,
+    ),
+    **dict.fromkeys(
+        ("model", "base_url", "language_settings", "cassette", "attempts", "tokens", "seconds"),
+        MODEL,
+    ),
+    **dict.fromkeys(
+        ("settings", "set", "steps", "work", "ray", "begin", "encoder", "keep"), LEARNING
+    ),
+    **dict.fromkeys(
+        ("world", "scene", "mock", "perception", "to", "robot", "dry_run", "yes"), ROBOT
+    ),
+    **dict.fromkeys(
+        ("output", "json", "record", "render", "size", "report", "live", "live_port", "watched"),
+        OUTPUT,
+    ),
+    "events": OUTPUT,
+}
+EXAMPLES: Mapping[str, str] = {
+    "run": "slap run obstacle_tower --seed 1 --record runs/tower --report runs/tower.html",
+    "plan": "slap plan obstacle_tower --seed 1 --shortcuts none",
+    "propose": "slap propose stow_hammer --proposer induced --demonstrations 3",
+    "evaluate": "slap evaluate obstacle2d --tasks 10 --seeds 5",
+    "report": "slap report runs/tower --output runs/tower.html",
+    "train": "slap train obstacle2d --output runs/models/obstacle2d",
+    "acquire": "slap acquire stow_hammer --output runs/skills/stow_hammer",
+    "skills": "slap skills models/skills/stow_hammer",
+    "check": "slap check obstacle2d",
+    "domains": "slap domains stow_hammer",
+    "list": "slap list",
+    "doctor": "slap doctor",
+    "bag info": "slap bag info runs/tower",
+    "bag evaluate": "slap bag evaluate runs/tower --json",
+    "bag render": "slap bag render runs/tower --output runs/tower.gif",
+    "bag replay": "slap bag replay runs/tower",
+    "bag export": "slap bag export runs/tower --output runs/tower.npz",
+    "study dynamics": "slap study dynamics obstacle2d --work runs/models/obstacle2d-training",
+    "study generalisation": "slap study generalisation obstacle_tower --vary obstacles=1,3,5",
+    "study goals": "slap study goals obstacle_tower",
+    "study pruning": "slap study pruning obstacle_tower --settings ours",
+    "study perception": "slap study perception cluttered_drawer",
+    "study planning_time": "slap study planning_time obstacle_tower",
+    "study table1": "slap study table1 obstacle_tower --preset fair",
+    "study ablation": "slap study ablation obstacle2d --trainings 1",
+    "study demonstrations": "slap study demonstrations stow_hammer",
+    "study vacuity": "slap study vacuity stow_hammer",
+    "study acquisition": "slap study acquisition stow_hammer",
+    "study replanning": "slap study replanning stow_hammer",
+    "study induction": "slap study induction stow_hammer --demonstrations 3",
+    "study planning_ablation": "slap study planning_ablation stow_hammer --model NAME",
+    "study models": "slap study models stow_hammer --model NAME",
+    "study reward_ablation": "slap study reward_ablation stow_hammer --model NAME",
+    "study readme": "slap study readme",
+}
+
+
+def arrange(command: Any, path: str) -> None:
+    """Put a command's options into panels and end its help with an example; groups likewise.
+
+    Args:
+        command: Click's command, or a group of commands.
+        path: Its name after ``slap``, such as ``bag info``.
+    """
+    for name, inner in getattr(command, "commands", {}).items():
+        arrange(inner, f"{path} {name}")
+    for parameter in command.params:
+        if parameter.name in PANELS and parameter.param_type_name == "option":
+            parameter.rich_help_panel = PANELS[parameter.name]
+    if path in EXAMPLES:
+        command.epilog = f"Example: {EXAMPLES[path]}"
