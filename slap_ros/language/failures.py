@@ -110,7 +110,8 @@ def unreadable(body: bytes, wanted: str) -> Failure:
         wanted: What it should have been, in words.
     """
     if body.lstrip()[:1] == b"<":
-        return Failure(f"a web page, {server_words(_text(body))}", 200, None, True, True)
+        words = f"a web page, {server_words(_text(body))}"
+        return Failure(words, 200, lasting=True, misplaced=True)
     if _STREAM.match(body):
         return _stream_failure(body)
     try:
@@ -131,11 +132,11 @@ def error_in(data: Any) -> Failure | None:
     if not _has_error(found):
         return None
     kinds = _kinds(found)
-    codes = [int(kind) for kind in kinds if _STATUS.fullmatch(kind)]
+    codes = [int(kind) for kind in sorted(kinds) if _STATUS.fullmatch(kind)]
     words = f"HTTP 200 with an error{f' {codes[0]}' if codes else ''}: {server_words(found)}"
     if codes:
-        lasting = not LASTING_KINDS.isdisjoint(kinds)
-        return Failure(words, codes[0], None, lasting, codes[0] in ELSEWHERE)
+        spent = not LASTING_KINDS.isdisjoint(kinds)
+        return Failure(words, codes[0], lasting=spent, misplaced=codes[0] in ELSEWHERE)
     if not PASSING_KINDS.isdisjoint(kinds):
         return Failure(words)
     return Failure(words, 200, lasting=True, misplaced=True)

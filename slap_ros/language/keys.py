@@ -13,6 +13,7 @@ from slap_ros.language.settings import KEY_VARIABLE, OPENAI_URL, LanguageSetting
 from slap_ros.redaction import secret_forms
 
 FIRST_VISIBLE, LAST_VISIBLE = "!", "~"  # ASCII, without blanks: what a header takes unchanged
+SHORTEST_KEY = 16  # characters; shorter ones are placeholders, such as a server's own name
 
 
 def read_key(settings: LanguageSettings, environment: Mapping[str, str]) -> str:
@@ -58,6 +59,8 @@ def _named(character: str) -> str:
 
 
 def _require_hidden(key: str, settings: LanguageSettings) -> None:
+    if len(key) < SHORTEST_KEY:
+        return
     texts = {
         "name of the model": settings.model,
         "base URL": settings.base_url,
@@ -67,5 +70,5 @@ def _require_hidden(key: str, settings: LanguageSettings) -> None:
         if any(form in text for form in secret_forms(key)):
             raise LanguageUnavailableError(
                 f"the key of {KEY_VARIABLE} stands in the {name} as well, which is written to "
-                f"logs and recordings: take it out there"
+                "logs and recordings: take it out there"
             )

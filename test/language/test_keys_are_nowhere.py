@@ -171,6 +171,11 @@ def test_a_key_among_what_is_recorded_is_refused(change: dict[str, Any], where: 
     assert KEY not in str(caught.value)
 
 
+def test_a_placeholder_may_be_the_name_of_a_server() -> None:
+    settings = replace(SETTINGS, base_url=NOWHERE, model="lm-studio/tiny")
+    OpenAIClient(settings, {"OPENAI_API_KEY": "lm-studio"}).close()
+
+
 # -- what nobody foresaw ---------------------------------------------------------------------------
 
 
