@@ -27,6 +27,7 @@ from slap_ros.robot.robot_world import RobotWorld
 from slap_ros.robot.tracking import measured_pose
 
 AHEAD = 0.05  # s, by which clocks of machines may differ
+QUIET = 10.0  # s between two log lines about joint states: a driver sends hundreds a second
 
 
 class Sensors:
@@ -67,7 +68,8 @@ class Sensors:
             self._take_arm(joints, stamp_s)
         except InvalidMeasurementError as error:
             self.joint_refusal = error
-            self._refuse(error)
+            self.counts["refused_measurements"] += 1
+            self._node.get_logger().warning(f"refused: {error}", throttle_duration_sec=QUIET)
 
     def _take_fingers(self, at: Mapping[str, float], stamp_s: float) -> None:
         if all(name in at for name in self._fingers):
