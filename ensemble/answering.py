@@ -9,6 +9,7 @@ from traceback import format_exc
 from rclpy.node import Node
 
 from slap_ros.errors import InternalError, InvalidDomainError, SlapError, error_from
+from slap_ros.redaction import without_secrets
 
 
 def error_to_answer(node: Node, error: Exception) -> SlapError:
@@ -26,7 +27,7 @@ def error_to_answer(node: Node, error: Exception) -> SlapError:
         return error
     _log_traceback(node)
     return InternalError(
-        f"{type(error).__name__}: {error} (where it was raised is in the log of {node.get_name()})"
+        f"{_named(error)} (where it was raised is in the log of {node.get_name()})"
     )
 
 
@@ -45,12 +46,15 @@ def domain_error(node: Node, domain: str, error: Exception) -> SlapError:
         return error_from(error.code, f"domain {domain}: {error}")
     _log_traceback(node)
     return InvalidDomainError(
-        f"domain {domain} raised {type(error).__name__}: {error} (the log of {node.get_name()} "
-        "says where)"
+        f"domain {domain} raised {_named(error)} (the log of {node.get_name()} says where)"
     )
+
+
+def _named(error: Exception) -> str:
+    return without_secrets(f"{type(error).__name__}: {error}")
 
 
 def _log_traceback(node: Node) -> None:
     """Of what is being handled; not so once the node is shut down: then all that goes on fails."""
     if node.context.ok():
-        node.get_logger().error(format_exc())
+        node.get_logger().error(without_secrets(format_exc()))

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from traceback import format_exc
 
 import rclpy
 from rclpy.exceptions import ParameterException
@@ -14,6 +15,7 @@ from rclpy.node import Node
 
 from ensemble.network import start_node
 from slap_ros.errors import ErrorCode, SlapError
+from slap_ros.redaction import without_secrets
 from slap_ros.signals import forget_interrupt, interrupts_in_destructors
 
 
@@ -48,7 +50,8 @@ def _run(name: str, make: Callable[[], Node]) -> int:
         # A signal shuts the context down in the middle of whatever callback runs, which then
         # cannot publish any more. That is no failure; anything else is.
         if rclpy.ok():
-            raise
+            sys.stderr.write(without_secrets(format_exc()))
+            return int(ErrorCode.UNKNOWN)
     return 0
 
 

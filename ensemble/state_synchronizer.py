@@ -19,7 +19,14 @@ from ensemble.interfaces import ATOMS, FAULT, STATE
 from ensemble.observation import Episode, Observation
 from ensemble.refusals import Refusals
 from slap_ros.errors import SlapError
-from slap_ros.messages.decode import decode_atoms, decode_fault, decode_seen, decode_state, stamp_ns
+from slap_ros.messages.decode import (
+    decode_atoms,
+    decode_fault,
+    decode_missing,
+    decode_seen,
+    decode_state,
+    stamp_ns,
+)
 from slap_ros.perception.percept import known_part
 
 WAITING = 100  # messages kept until their counterpart, or their episode, is known
@@ -171,12 +178,13 @@ class StateSynchronizer:
 def _decoded(episode: Episode, pair: Pair) -> Observation:
     state, atoms = pair
     whole = decode_seen(atoms.seen, decode_state(state, episode.domain.types_by_name))
+    missing = decode_missing(atoms.missing, whole)
     return Observation(
         episode,
         state.step,
-        known_part(whole, atoms.missing),
+        known_part(whole, missing),
         decode_atoms(atoms.atoms, episode.space),
-        frozenset(atoms.missing),
+        missing,
         bool(atoms.exact),
     )
 

@@ -77,7 +77,13 @@ class Robot:
         """
         silence = self.clock.now_s() - max(self.world.newest_joints_s, since_s)
         if silence > self._settings.joint_timeout:
-            raise NoJointStateError(f"no joint positions for {silence:.1f} s")
+            raise NoJointStateError(f"no joint positions for {silence:.1f} s{self.joint_advice}")
+
+    @property
+    def joint_advice(self) -> str:
+        """Why joint states were not used, for messages that miss them; empty where none came."""
+        refusal = self.sensors.joint_refusal
+        return f": they are refused, as {refusal}" if refusal else ""
 
     def no_detection(self, since_s: float, when: str) -> NoDetectionError:
         """The error that names what was not detected since then."""
@@ -118,7 +124,7 @@ class Robot:
         )
         if sensors.gap is None or sensors.gap_s <= done_s:
             raise NoJointStateError(
-                f"no positions of the fingers within {settings.joint_timeout} s: are they among "
-                "joint_states?"
+                f"no positions of the fingers within {settings.joint_timeout} s"
+                f"{self.joint_advice or ': are they among joint_states?'}"
             )
         return sensors.gap

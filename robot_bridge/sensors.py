@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Mapping
 
 from geometry_msgs.msg import TransformStamped
 from rclpy.node import Node
@@ -20,11 +21,13 @@ from slap_ros.errors import InvalidMeasurementError
 from slap_ros.geometry.pose import Pose
 from slap_ros.geometry.static_transforms import StaticTransforms
 from slap_ros.messages.decode import NANOSECONDS, stamp_ns
-from slap_ros.robot.joint_reading import JointReading
+from slap_ros.robot.joint_reading import JointLists, JointReading, gap_between, require_radians
+from slap_ros.robot.limits import arm_limits
 from slap_ros.robot.robot_world import RobotWorld
 from slap_ros.robot.tracking import measured_pose
 
 AHEAD = 0.05  # s, by which clocks of machines may differ
+QUIET = 10.0  # s between two log lines about joint states: a driver sends hundreds a second
 
 
 class Sensors:
@@ -38,13 +41,18 @@ class Sensors:
             world: What takes the measurements.
             arm: Prefix of the names of joints and frames.
             clock: What measurements are dated by.
+
+        Raises:
+            InvalidParameterError: An unknown arm.
         """
         self._node, self._world, self._clock = node, world, clock
         self._arm, self._fingers = arm_joints(arm), finger_joints(arm)
+        self._limits = arm_limits(arm)
         self._frames = StaticTransforms(base_frame(arm))
         self.counts: Counter[str] = Counter(readings=0, detections=0, refused_measurements=0)
         self.gap: float | None = None  # m, between the fingers
         self.gap_s = -math.inf  # when the gap was measured
+        self.joint_refusal: InvalidMeasurementError | None = None  # since the last good reading
         node.create_subscription(JOINT_STATES.type, JOINT_STATES.name, self._on_joints, SENSOR_DATA)
         node.create_subscription(TF.type, TF.name, self._on_frames, SENSOR_DATA)
         node.create_subscription(TF_STATIC.type, TF_STATIC.name, self._on_static, TF_STATIC.qos)
@@ -54,21 +62,30 @@ class Sensors:
         stamp_s = self._stamp_s(message.header)
         if stamp_s is None:
             return
-        at = dict(zip(message.name, message.position, strict=False))
-        speed = dict(zip(message.name, message.velocity, strict=False))
+        try:
+            joints = JointLists(message.name, message.position, message.velocity, message.effort)
+            self._take_fingers(joints.position, stamp_s)
+            self._take_arm(joints, stamp_s)
+        except InvalidMeasurementError as error:
+            self.joint_refusal = error
+            self.counts["refused_measurements"] += 1
+            self._node.get_logger().warning(f"refused: {error}", throttle_duration_sec=QUIET)
+
+    def _take_fingers(self, at: Mapping[str, float], stamp_s: float) -> None:
         if all(name in at for name in self._fingers):
-            self.gap, self.gap_s = sum(at[name] for name in self._fingers), stamp_s
+            self.gap = gap_between([at[name] for name in self._fingers])
+            self.gap_s = stamp_s
+
+    def _take_arm(self, joints: JointLists, stamp_s: float) -> None:
+        at, speed = joints.position, joints.velocity
         if not all(name in at for name in self._arm):
             return
+        positions = tuple(at[name] for name in self._arm)
+        require_radians(positions, self._limits.low, self._limits.high)
         velocities = tuple(speed[name] for name in self._arm if name in speed)
-        try:
-            self._world.add_joint_reading(
-                JointReading(stamp_s, tuple(at[name] for name in self._arm), velocities, self.gap)
-            )
-        except InvalidMeasurementError as error:
-            self._refuse(error)
-        else:
-            self.counts["readings"] += 1
+        self._world.add_joint_reading(JointReading(stamp_s, positions, velocities, self.gap))
+        self.joint_refusal = None
+        self.counts["readings"] += 1
 
     def _on_static(self, message: TFMessage) -> None:
         for item in message.transforms:
@@ -98,10 +115,15 @@ class Sensors:
                 self.counts["detections"] += 1
 
     def _stamp_s(self, header: Header) -> float | None:
-        """When something was measured, s of ``clock``; None where that is still to come.
+        """When something was measured, s of ``clock``; None where that is unknown or to come.
 
         From a clock that is ahead, what is older than the last motion would look newer.
         """
+        if stamp_ns(header) == 0 or not 0 <= header.stamp.nanosec < NANOSECONDS:
+            self._refuse(
+                InvalidMeasurementError(f"a measurement of {header.frame_id} has no stamp")
+            )
+            return None
         stamp_s = self._clock.of_stamp(stamp_ns(header) / NANOSECONDS)
         ahead_s = stamp_s - self._clock.now_s()
         if ahead_s <= AHEAD:

@@ -26,6 +26,7 @@ from rich.segment import Segment
 from rich.text import Text
 
 from slap_ros.errors import ErrorCode, SlapError
+from slap_ros.redaction import without_secrets
 from slap_ros.signals import TerminatedError, exit_code, forget_interrupt, signals_raised
 
 P = ParamSpec("P")
@@ -123,7 +124,7 @@ def exits(command: Callable[P, int | None]) -> Callable[P, None]:
 
 
 def _fail(code: ErrorCode, message: str, error: BaseException) -> NoReturn:
-    _say(styled("error", "bold red", f" {message}"))
+    _say(styled("error", "bold red", f" {without_secrets(message)}"))
     raise typer.Exit(int(code)) from error
 
 
@@ -148,10 +149,26 @@ def _os_complaint(error: OSError) -> str:
 
 
 def _internal_complaint(error: Exception) -> str:
-    """What happened, in a line; the rest is kept in a file, which is named."""
-    with tempfile.NamedTemporaryFile("w", prefix="slap-", suffix=".log", delete=False) as log:
-        traceback.print_exception(error, file=log)
-    return f"this is a fault of slap: {error!r}; please report it with {Path(log.name)}"
+    """What happened, in a line; the rest is kept in a file, which is named.
+
+    The line has no arguments of the exception: nobody foresaw it, so nobody knows what they are.
+    The file has its message, without the secrets of the environment.
+    """
+    told = "".join(traceback.format_exception(error))
+    with tempfile.NamedTemporaryFile(
+        "w", prefix="slap-", suffix=".log", delete=False, encoding="utf-8", errors="replace"
+    ) as log:
+        log.write(without_secrets(told))
+    return (
+        f"this is a fault of slap: {type(error).__name__}{_place(error)}; please report it with "
+        f"{Path(log.name)}"
+    )
+
+
+def _place(error: Exception) -> str:
+    """Where an exception was raised: the last line of a file that it went through."""
+    frames = traceback.extract_tb(error.__traceback__)
+    return f" in {Path(frames[-1].filename).name}, line {frames[-1].lineno}" if frames else ""
 
 
 def warn(text: str) -> None:

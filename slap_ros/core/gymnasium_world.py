@@ -10,8 +10,9 @@ What an environment needs beyond Gymnasium's own interface:
 - ``reset(options={"state": observation})`` continues from that observation, exactly;
 - actions are arrays with one entry per axis of the action space, in its order.
 
-Rewards and ends of episodes are not read: tasks have goals. Wrappers that end episodes are better
-left off (``env.unwrapped``).
+Numbers are float64: what is rounded to float32 does not come back exactly. Rewards and ends of
+episodes are not read: tasks have goals. Wrappers that end episodes, or change observations, are
+better left off (``env.unwrapped``).
 """
 
 from __future__ import annotations
@@ -22,6 +23,15 @@ from typing import Any, Protocol
 import numpy as np
 
 from slap_ros.core import Action, ActionSpace
+from slap_ros.core.environment_returns import (
+    advised,
+    described,
+    errors_of,
+    require_begun,
+    reset_observation,
+    state_from,
+    step_observation,
+)
 from slap_ros.errors import InvalidDomainError, InvalidStateError
 from slap_ros.relational import Layout, State
 
@@ -78,29 +88,34 @@ class GymnasiumWorld:
             InvalidStateError: It refuses the state, by a ``ValueError``.
         """
         state.require_finite()
-        try:
-            observation, _ = self._environment.reset(options={"state": observation_of(state)})
-        except ValueError as error:
-            raise InvalidStateError(f"the environment refuses this state: {error}") from error
-        begun = state_of(state.layout, observation)
-        if not np.array_equal(begun.data, state.data):
-            obj = next(o for o in state.layout.objects if not np.array_equal(begun[o], state[o]))
-            raise InvalidDomainError(
-                f"reset to a state in which {obj.name} is {state[obj]}, the environment begins "
-                f'with {begun[obj]}; reset(options={{"state": ...}}) must continue from it exactly'
-            )
+        observation = self._reset_to(state)
+        with advised(self._environment):
+            begun = state_of(state.layout, observation)
+            require_begun(state, begun, 'reset(options={"state": ...})')
         self._state = state
+
+    def _reset_to(self, state: State) -> Any:
+        with errors_of(self._environment, "reset"):
+            try:
+                returned = self._environment.reset(options={"state": observation_of(state)})
+            except ValueError as error:
+                raise InvalidStateError(f"the environment refuses this state: {error}") from error
+        return reset_observation(returned, self._environment)
 
     def step(self, action: Action) -> State:
         """Act for one control period.
 
         Raises:
             InvalidCommandError: The action is not in the action space; nothing moved.
-            InvalidDomainError: What the environment observes does not fit the objects.
+            InvalidDomainError: What the environment observes does not fit the objects, or it
+                raises.
         """
         self._actions.check(action)
-        observation, *_ = self._environment.step(action)
-        self._state = state_of(self._state.layout, observation)
+        with errors_of(self._environment, "step"):
+            returned = self._environment.step(action)
+        observation = step_observation(returned, self._environment)
+        with advised(self._environment):
+            self._state = state_of(self._state.layout, observation)
         return self._state
 
 
@@ -113,21 +128,11 @@ def state_of(layout: Layout, observation: Observation) -> State:
     """The state that an environment observes.
 
     Raises:
-        InvalidDomainError: Other objects, or another number of features.
+        InvalidDomainError: No dictionary, other objects, another number of features, or no numbers.
     """
-    names = [obj.name for obj in layout.objects]
-    if set(observation) != set(names):
+    if not isinstance(observation, Mapping):
         raise InvalidDomainError(
-            f"the environment observes {', '.join(sorted(observation))}; the objects are "
-            f"{', '.join(sorted(names))}"
+            f"the environment observes {described(observation)}; a dictionary is wanted that has "
+            f"the features of {', '.join(obj.name for obj in layout.objects)} by name"
         )
-    data = np.empty(layout.size)
-    for obj, part in layout.slices.items():
-        features = np.asarray(observation[obj.name], dtype=float)
-        if features.shape != (part.stop - part.start,):
-            raise InvalidDomainError(
-                f"the environment observes {obj.name} with shape {features.shape}; a {obj.type} "
-                f"has {', '.join(feature.name for feature in obj.type.features)}"
-            )
-        data[part] = features
-    return State(layout, data)
+    return state_from(layout, observation)

@@ -23,6 +23,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slap_ros.core.action_space import Action, ActionSpace, GripperAxis
+from slap_ros.core.environment_returns import (
+    described,
+    errors_of,
+    require_double,
+    reset_observation,
+    state_from,
+    step_observation,
+)
 from slap_ros.core.rebuild_each_step import MakeSimulator
 from slap_ros.errors import InvalidDomainError, InvalidStateError
 from slap_ros.relational import Feature, Layout, Object, State, Type
@@ -111,11 +119,15 @@ class KinderBridge:
             make_environment: Makes environments that have the same objects, whatever the seed.
             subtypes: KinDER tells some roles of one type apart by names alone: objects whose
                 names begin with a key get a type of their own, named by the value, below KinDER's.
+
+        Raises:
+            InvalidDomainError: It is no object-centric environment of KinDER, or is wrapped.
         """
         self._make = make_environment
         environment = make_environment()
-        self._exemplar: KinderState = environment.reset(seed=0)[0]
-        features = environment.type_features
+        self._exemplar = _sampled(environment, seed=0)
+        with errors_of(environment, "type_features"):
+            features = environment.type_features
         self._types: dict[str, Type] = {}
         objects = []
         for kinder_object in sorted(self._exemplar.data, key=lambda obj: str(obj.name)):
@@ -155,21 +167,17 @@ class KinderBridge:
 
     def sample(self, seed: int) -> State:
         """An initial state from the environment's own sampler, settled as it settles it."""
-        return self.state_of(self._make().reset(seed=seed)[0])
+        return self.state_of(_sampled(self._make(), seed))
 
     def state_of(self, observed: KinderState) -> State:
         """KinDER's state as ours.
 
         Raises:
-            InvalidDomainError: It has other objects than the first one had.
+            InvalidDomainError: It is no object-centric state, has other objects than the first one
+                had, another number of features, or no numbers.
         """
-        by_name = {obj.name: features for obj, features in observed.data.items()}
-        if set(by_name) != set(self.layout.by_name):
-            raise InvalidDomainError(
-                f"the environment observes {', '.join(sorted(by_name))}; the objects are "
-                f"{', '.join(sorted(self.layout.by_name))}"
-            )
-        return State(self.layout, np.concatenate([by_name[o.name] for o in self.layout.objects]))
+        features = _object_centric(observed).data
+        return state_from(self.layout, {str(obj.name): features[obj] for obj in features})
 
     def kinder_state(self, state: State) -> Any:
         """Our state as KinDER's.
@@ -230,19 +238,46 @@ class KinderSimulator:
 
         Raises:
             InvalidStateError: It has other objects.
+            InvalidDomainError: The environment rounds states to float32, or raises.
         """
         self._bridge, self._environment = bridge, environment
         self._low, self._high = environment.action_space.low, environment.action_space.high
         # KinDER makes walls and table the first time that somebody asks for them; a reset to a
         # given state does not, and everything would fall for ever.
         _ = environment.initial_constant_state
-        environment.reset(options={"init_state": bridge.kinder_state(state)})
+        with errors_of(environment, "reset"):
+            returned = environment.reset(options={"init_state": bridge.kinder_state(state)})
+        # Not exactly the state: KinDER reads it back from its engine, as each step does.
+        require_double(state, bridge.state_of(reset_observation(returned, environment)))
 
     def step(self, action: Action) -> State:
-        """Act for one control period."""
+        """Act for one control period.
+
+        Raises:
+            InvalidDomainError: What the environment observes does not fit the objects, or it
+                raises.
+        """
         # What rounding leaves outside the limits, KinDER refuses by an assertion.
-        observed, *_ = self._environment.step(np.clip(action, self._low, self._high))
-        return self._bridge.state_of(observed)
+        with errors_of(self._environment, "step"):
+            returned = self._environment.step(np.clip(action, self._low, self._high))
+        return self._bridge.state_of(step_observation(returned, self._environment))
+
+
+def _sampled(environment: KinderEnvironment, seed: int) -> KinderState:
+    """The state that an environment samples."""
+    with errors_of(environment, "reset"):
+        returned = environment.reset(seed=seed)
+    return _object_centric(reset_observation(returned, environment))
+
+
+def _object_centric(observed: Any) -> KinderState:
+    if isinstance(getattr(observed, "data", None), Mapping):
+        state: KinderState = observed
+        return state
+    raise InvalidDomainError(
+        f"the environment observes {described(observed)}; a state with features by object is "
+        "wanted, as the classes of KinDER named ObjectCentric... have, without wrappers"
+    )
 
 
 def unit_of(feature: str) -> str:

@@ -16,17 +16,27 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from datetime import UTC, datetime
-from email.utils import parsedate_to_datetime
+from dataclasses import replace
 from functools import partial
 from types import ModuleType
 from typing import Any, TypeVar
 
-from slap_ros.errors import LanguageRefusedError, LanguageUnavailableError
+from slap_ros.errors import LanguageRefusedError, LanguageUnavailableError, SlapError
 from slap_ros.files import parse_json
+from slap_ros.language.failures import (
+    BAD_REQUEST,
+    Failure,
+    address_advice,
+    error_in,
+    library_failure,
+    status_failure,
+    unreadable,
+)
+from slap_ros.language.keys import read_key
 from slap_ros.language.request import OutputDegree, Reply, Request, replace_unprintable
-from slap_ros.language.settings import KEY_VARIABLE, OPENAI_URL, LanguageSettings
+from slap_ros.language.route import described_route, http_library, open_client
+from slap_ros.language.settings import LanguageSettings
+from slap_ros.redaction import redacted, secret_forms, without_secrets
 
 logger = logging.getLogger(__name__)
 
@@ -35,26 +45,15 @@ Answer = TypeVar("Answer")
 MAX_BODY_BYTES = 16_000_000
 MAX_SERVER_WORDS = 300  # characters of a server's error message that are passed on
 CHARACTERS_PER_TOKEN = 4  # where a server does not count
-SHORTEST_SECRET = 8  # characters; shorter keys are placeholders for servers that want none
 NO_KEY = "none"
 SCRIPTED = "scripted"  # a server's fingerprint that says that no model answers
-REFUSED = {401: "the key", 403: "the key", 404: "the model or the address"}
-BAD_REQUEST = (400, 422)
-BUSY = (408, 409, 425, 429)
-
-
-@dataclass(frozen=True)
-class _Failure:
-    """Why a try gave no answer."""
-
-    words: str
-    status: int | None = None  # of HTTP; None where there was no answer at all
-    retry_after: float | None = None  # s, if the server says so
-
-    @property
-    def passing(self) -> bool:
-        """Whether it may be otherwise the next time."""
-        return self.status is None or self.status in BUSY or self.status >= 500
+REFUSED = {
+    200: "to answer",
+    401: "the key",
+    403: "the key, or what it is asked for",
+    404: "the model or the address",
+    407: "what the proxy passed on",
+}
 
 
 class OpenAIClient:
@@ -74,35 +73,22 @@ class OpenAIClient:
             sleep: How to pause, s.
 
         Raises:
-            LanguageUnavailableError: No model is named, no key is there where one must be, or the
-                ``openai`` package is missing.
+            LanguageUnavailableError: No model is named, no key is there where one must be, no
+                header can hold it, the proxy cannot be used, or the ``openai`` package is missing.
         """
-        key = (os.environ if environment is None else environment).get(KEY_VARIABLE, "")
         if not settings.model:
             raise LanguageUnavailableError(
                 "no language model is named; give --model or set SLAP_LANGUAGE_MODEL"
             )
-        if not key and settings.base_url == OPENAI_URL:
-            raise LanguageUnavailableError(
-                f"{OPENAI_URL} wants a key: set {KEY_VARIABLE}, or name another server by "
-                "--base-url (docs/language.md has recipes for local ones)"
-            )
+        key = read_key(settings, os.environ if environment is None else environment)
         self._openai = _import_openai()
-        self._lost = _connection_errors(self._openai)
+        self._http = http_library(self._openai)
         self._settings = settings
-        self._secret = key if len(key) >= SHORTEST_SECRET else None
+        self._secrets = secret_forms(key)
+        self._route = described_route(settings.base_url)
         self._sleep = sleep
         self._degree = settings.degree
-        self._client = self._openai.OpenAI(
-            api_key=key or NO_KEY,
-            base_url=settings.base_url,
-            max_retries=0,
-            # A key goes nowhere but to the address given: redirections are not followed. So a plain
-            # http address never comes to TLS, and reading the certificates for it is left out.
-            http_client=self._openai.DefaultHttpxClient(
-                follow_redirects=False, verify=not settings.base_url.startswith("http://")
-            ),
-        )
+        self._client = open_client(self._openai, settings.base_url, key or NO_KEY)
 
     @property
     def source(self) -> str:
@@ -131,7 +117,7 @@ class OpenAIClient:
         while degree is not None:
             body = self._body(request, degree)
             outcome = self._ask(self._client.chat.completions, body, _read_envelope, deadline)
-            if isinstance(outcome, _Failure):
+            if isinstance(outcome, Failure):
                 refusals.append(f"{degree}: {outcome.words}")
                 degree = degree.next
                 continue
@@ -159,7 +145,7 @@ class OpenAIClient:
         body = {"model": self._settings.model, "input": [*texts], "encoding_format": "float"}
         read = partial(_read_embeddings, count=len(texts))
         outcome = self._ask(self._client.embeddings, body, read, deadline)
-        if isinstance(outcome, _Failure):
+        if isinstance(outcome, Failure):
             raise LanguageRefusedError(
                 f"{self.source} makes no embeddings (model {self._settings.model!r}): "
                 f"{outcome.words}"
@@ -178,9 +164,9 @@ class OpenAIClient:
         self,
         endpoint: Any,
         body: dict[str, Any],
-        read: Callable[[bytes], Answer | _Failure],
+        read: Callable[[bytes], Answer | Failure],
         deadline: float,
-    ) -> Answer | _Failure:
+    ) -> Answer | Failure:
         """The server's answer; a failure only where it does not accept the request as such.
 
         Args:
@@ -192,24 +178,34 @@ class OpenAIClient:
         failures = 0
         while True:
             outcome = self._try(endpoint, body, read, deadline - time.monotonic())
-            if not isinstance(outcome, _Failure) or outcome.status in BAD_REQUEST:
+            if not isinstance(outcome, Failure) or outcome.status in BAD_REQUEST:
                 return outcome
             failures += 1
             if not outcome.passing:
-                at_fault = REFUSED.get(outcome.status or 0, "the request")
-                raise LanguageRefusedError(
-                    f"{self.source} refused {at_fault} (model {body['model']!r}): {outcome.words}"
-                )
+                raise self._refusal(outcome, body["model"])
             self._wait(outcome, failures, deadline)
 
-    def _wait(self, failure: _Failure, failures: int, deadline: float) -> None:
+    def _refusal(self, failure: Failure, model: str) -> SlapError:
+        """The error for what cannot be otherwise the next time."""
+        if failure.status is None:
+            return LanguageUnavailableError(
+                f"no answer from {self.source}{self._route}: {failure.words}"
+            )
+        at_fault = REFUSED.get(failure.status, "the request")
+        advice = address_advice(self.source) if failure.misplaced else ""
+        return LanguageRefusedError(
+            f"{self.source}{self._route} refused {at_fault} (model {model!r}): "
+            f"{failure.words}{advice}"
+        )
+
+    def _wait(self, failure: Failure, failures: int, deadline: float) -> None:
         retry = self._settings.retry
         pause = max(retry.pause(failures), failure.retry_after or 0.0)
         left = deadline - time.monotonic()
         if failures >= retry.tries or pause >= left:
             raise LanguageUnavailableError(
-                f"no answer from {self.source} (tried {failures} times): {failure.words}; "
-                f"{max(left, 0.0):.0f} s were left to wait"
+                f"no answer from {self.source}{self._route} (tried {failures} times): "
+                f"{failure.words}; {max(left, 0.0):.0f} s were left to wait"
                 + (f", and it asked for {pause:.0f} s" if failure.retry_after else "")
             )
         logger.info("%s: %s; asking again in %.1f s", self.source, failure.words, pause)
@@ -219,25 +215,24 @@ class OpenAIClient:
         self,
         endpoint: Any,
         body: dict[str, Any],
-        read: Callable[[bytes], Answer | _Failure],
+        read: Callable[[bytes], Answer | Failure],
         seconds: float,
-    ) -> Answer | _Failure:
+    ) -> Answer | Failure:
         """The same, once; see :meth:`_ask`, which gives it so many seconds."""
         if seconds <= 0:
-            return _Failure("the time for an answer is over")
+            return Failure("the time for an answer is over")
         try:
             received = self._receive(endpoint, body, seconds)
         except self._openai.APIStatusError as error:
-            return _Failure(
-                f"HTTP {error.status_code}: {self._clean(_server_words(error.body))}",
-                error.status_code,
-                _retry_after(error.response.headers),
-            )
-        except self._lost as error:
-            return _Failure(self._clean(f"{type(error).__name__}: {error}"))
-        return read(received)
+            received = status_failure(error.status_code, error.body, error.response.headers)
+        except Exception as error:  # the library's and those below it, of whatever kinds
+            received = library_failure(error, self._openai, self._http)
+        outcome = received if isinstance(received, Failure) else read(received)
+        if isinstance(outcome, Failure):
+            return replace(outcome, words=self._clean(outcome.words))
+        return outcome
 
-    def _receive(self, endpoint: Any, fields: dict[str, Any], seconds: float) -> bytes:
+    def _receive(self, endpoint: Any, fields: dict[str, Any], seconds: float) -> bytes | Failure:
         """The answer's bytes; as they come, since a time limit for each says nothing about all."""
         deadline = time.monotonic() + seconds
         parts, size = [], 0
@@ -246,7 +241,9 @@ class OpenAIClient:
             for part in response.iter_bytes():
                 size += len(part)
                 if size > MAX_BODY_BYTES:
-                    return b""
+                    return Failure(
+                        f"an answer of more than {MAX_BODY_BYTES} bytes", 200, lasting=True
+                    )
                 if time.monotonic() > deadline:
                     raise TimeoutError("the answer came too slowly")
                 parts.append(part)
@@ -292,11 +289,12 @@ class OpenAIClient:
 
     def _redact(self, text: str) -> str:
         """Text without the key, which some servers repeat in their messages."""
-        return text.replace(self._secret, "[key]") if self._secret else text
+        return redacted(text, self._secrets)
 
     def _clean(self, text: str) -> str:
         """A server's words for logs and errors: short, on one line, without the key."""
-        line = " ".join(replace_unprintable(self._redact(text)).split())
+        whole = without_secrets(self._redact(text))
+        line = " ".join(replace_unprintable(whole).split())
         return line if len(line) <= MAX_SERVER_WORDS else f"{line[:MAX_SERVER_WORDS]}…"
 
 
@@ -307,17 +305,6 @@ def _import_openai() -> ModuleType:
         raise LanguageUnavailableError(
             "asking a language model takes the openai package: pip install -e '.[language]'"
         ) from error
-
-
-def _connection_errors(openai: ModuleType) -> tuple[type[Exception], ...]:
-    """What is raised for lost connections: by the package, and, in a body's middle, below it.
-
-    Which library is below depends on the package's version; it is the client's base class's.
-    """
-    roots = {base.__module__.partition(".")[0] for base in openai.DefaultHttpxClient.__mro__}
-    below = [importlib.import_module(root) for root in sorted(roots) if root.startswith("httpx")]
-    errors = (library.HTTPError for library in below)
-    return (openai.APIConnectionError, openai.APIResponseValidationError, TimeoutError, *errors)
 
 
 @contextmanager
@@ -335,7 +322,7 @@ def _quiet() -> Iterator[None]:
             entry.setLevel(level)
 
 
-def _read_envelope(body: bytes) -> dict[str, Any] | _Failure:
+def _read_envelope(body: bytes) -> dict[str, Any] | Failure:
     """The server's JSON around the answer, as far as it is needed."""
     try:
         envelope = parse_json(body)
@@ -343,11 +330,11 @@ def _read_envelope(body: bytes) -> dict[str, Any] | _Failure:
         if not isinstance(message, dict):
             raise TypeError("no message")
     except (ValueError, TypeError, KeyError, IndexError):
-        return _Failure(f"an answer of {len(body)} bytes that is no chat completion")
-    return dict(envelope)
+        return unreadable(body, "chat completion")
+    return error_in(envelope) or dict(envelope)
 
 
-def _read_embeddings(body: bytes, count: int) -> list[list[float]] | _Failure:
+def _read_embeddings(body: bytes, count: int) -> list[list[float]] | Failure:
     """The vectors in a server's answer, in the order in which texts were sent."""
     try:
         data = sorted(parse_json(body)["data"], key=lambda one: int(one["index"]))
@@ -358,7 +345,7 @@ def _read_embeddings(body: bytes, count: int) -> list[list[float]] | _Failure:
         if not all(math.isfinite(number) for vector in vectors for number in vector):
             raise ValueError("not all numbers")
     except (ValueError, TypeError, KeyError, OverflowError):
-        return _Failure(f"an answer of {len(body)} bytes that is no {count} embeddings")
+        return unreadable(body, f"{count} embeddings")
     return vectors
 
 
@@ -376,27 +363,3 @@ def _count(envelope: dict[str, Any], name: str, characters: int) -> int:
     if isinstance(count, int) and not isinstance(count, bool) and count >= 0:
         return count
     return -(-characters // CHARACTERS_PER_TOKEN)
-
-
-def _server_words(body: object) -> str:
-    """The message within a server's error, however it is wrapped."""
-    for _ in range(3):
-        if not isinstance(body, dict):
-            break
-        body = body.get("error") or body.get("message") or body.get("detail") or str(body)
-    return str(body) if body else "no explanation"
-
-
-def _retry_after(headers: Mapping[str, str]) -> float | None:
-    """Seconds that a server asks to wait, given as a number or as a date."""
-    value = headers.get("retry-after", "")
-    try:
-        return max(0.0, float(value))
-    except ValueError:
-        pass
-    try:
-        moment = parsedate_to_datetime(value)
-    except ValueError:
-        return None
-    aware = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
-    return max(0.0, (aware - datetime.now(UTC)).total_seconds())

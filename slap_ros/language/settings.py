@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
@@ -80,6 +81,10 @@ class LanguageSettings:
         _check_url(self.base_url)
         if taken := sorted(RESERVED & set(self.sampling)):
             raise InvalidParameterError(f"{', '.join(taken)} cannot be given as sampling")
+        try:
+            json.dumps(dict(self.sampling), allow_nan=False)
+        except (TypeError, ValueError) as error:
+            raise InvalidParameterError(f"sampling is no JSON: {error}") from error
         if not self.answer_seconds > 0:
             raise InvalidParameterError(f"answer_seconds is {self.answer_seconds}; at least some")
 

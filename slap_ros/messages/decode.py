@@ -71,22 +71,39 @@ def decode_seen(msgs: Iterable[ObjectStateMessage], state: State) -> State:
     """A state in which some objects are as they were seen.
 
     Raises:
-        InvalidStateError: An object that the state does not have, or not with such features.
+        InvalidStateError: An object that the state does not have, or not of that type or with such
+            features; or an object that was seen twice.
     """
     seen_otherwise = list(msgs)
     if not seen_otherwise:
         return state
-    data = state.data.copy()
+    data, named = state.data.copy(), set[str]()
     for msg in seen_otherwise:
         obj = state.layout.by_name.get(msg.name)
-        if obj is None or len(msg.features) != len(obj.type.features):
+        if obj is None or (msg.type, len(msg.features)) != (obj.type.name, len(obj.type.features)):
             raise InvalidStateError(
-                f"{msg.name} was seen with {len(msg.features)} features, which the state has not"
+                f"{msg.name} was seen as a {msg.type} with {len(msg.features)} features, which the "
+                "state has not"
             )
+        if msg.name in named:
+            raise InvalidStateError(f"{msg.name} was seen twice in one state")
+        named.add(msg.name)
         data[state.layout.slices[obj]] = msg.features
     seen = State(state.layout, data)
     seen.require_finite()
     return seen
+
+
+def decode_missing(names: Iterable[str], state: State) -> frozenset[str]:
+    """Names of the objects whose place is not known.
+
+    Raises:
+        InvalidStateError: The state has no such object.
+    """
+    missing = frozenset(map(str, names))
+    if unknown := sorted(missing - set(state.layout.by_name)):
+        raise InvalidStateError(f"{', '.join(unknown)} missing, which the state has not")
+    return missing
 
 
 def decode_atoms(msgs: Iterable[GroundAtomMessage], space: AtomSpace) -> int:

@@ -152,6 +152,7 @@ def _robot_features(
     info = recording.domain_info
     layouts = {t.name: t.feature_names for t in info.types} if info is not None else {}
     for obj in state.objects:
-        if obj.type in robots and obj.type in layouts:
-            return dict(zip(layouts[obj.type], map(float, obj.features), strict=False))
+        names = layouts.get(obj.type, ())
+        if obj.type in robots and len(names) == len(obj.features):
+            return dict(zip(names, map(float, obj.features), strict=True))
     return {}

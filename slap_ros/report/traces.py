@@ -67,16 +67,19 @@ def robot_series(
         return ()
     found, robots = [], robot_types(domain)
     for message in (t for t in info.types if t.name in robots):
-        for i, (name, unit) in enumerate(
-            zip(message.feature_names, message.feature_units, strict=False)
-        ):
+        names, units = list(message.feature_names), list(message.feature_units)
+        if len(names) != len(units):
+            continue  # nobody knows which unit is missing
+        for i, (name, unit) in enumerate(zip(names, units, strict=True)):
             if unit not in DIMENSIONS or name.startswith(HELD):
                 continue
             values = {
                 step: float(obj.features[i])
                 for step in steps
                 for obj in episode.states[step].objects
-                if obj.type == message.name and i < len(obj.features) and isfinite(obj.features[i])
+                if obj.type == message.name
+                and len(obj.features) == len(names)
+                and isfinite(obj.features[i])
             }
             if values:
                 relative = tuple(step - trace.first_step for step in values)

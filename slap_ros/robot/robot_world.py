@@ -41,6 +41,7 @@ GAP_OPEN = 2.0 * FINGER_OPEN  # m, between the fingers
 GAP_SHUT = 0.0  # m
 GRASPED = 0.5  # of the expected gap; with less there is nothing between the fingers
 FOLLOWS = 0.03  # m, between a held object and where the hand has it; further away it was lost
+FARTHEST = 10.0  # m, from the base; what is detected further away is in another unit
 DRIFT = 0.02  # rad, of a joint of an arm that is taken to stand
 
 
@@ -111,12 +112,18 @@ class RobotWorld:
             seen: Pose of the child frame in its parent.
 
         Raises:
-            InvalidMeasurementError: Not finite, no pose, or not newer than the last one.
+            InvalidMeasurementError: Not finite, no pose, further away than anything a robot works
+                with, or not newer than the last one.
         """
         if frame not in self._frames:
             return
         obj, how = self._frames[frame]
         pose = base.compose(measured_pose(*seen)).compose(how.offset)
+        if math.hypot(*pose.position) > FARTHEST:
+            raise InvalidMeasurementError(
+                f"{obj.name} is detected {math.hypot(*pose.position):.6g} m away from the robot: "
+                "are positions in m?"
+            )
         self._tracks[obj].add(Detection(stamp_s, pose))
 
     def add_joint_reading(self, reading: JointReading) -> None:

@@ -19,6 +19,8 @@ from slap_ros.messages.decode import (
     decode_atoms,
     decode_command,
     decode_goal,
+    decode_missing,
+    decode_seen,
     decode_state,
     stamp_ns,
 )
@@ -98,3 +100,31 @@ def test_commands_and_stamps(script: Script) -> None:
     assert action.tolist() == [*message.deltas, message.gripper]
     stamp = SimpleNamespace(stamp=SimpleNamespace(sec=1_700_000_000, nanosec=999_999_999))
     assert stamp_ns(stamp) == 1_700_000_000_999_999_999  # type: ignore[arg-type]
+
+
+def seen(name: str, kind: str, *features: float) -> SimpleNamespace:
+    return SimpleNamespace(name=name, type=kind, features=features)
+
+
+def test_what_is_seen_otherwise_is_one_of_the_state_s_objects_once() -> None:
+    state = get_domain("obstacle2d").task(0).initial_state
+    robot = state.layout.object("robot")
+    moved = [float(value) + 1.0 for value in state[robot]]
+    decoded = decode_seen([seen("robot", robot.type.name, *moved)], state)
+    assert decoded[robot].tolist() == moved
+    for strange in (
+        [seen("robot", "block", *moved)],
+        [seen("nobody", robot.type.name, *moved)],
+        [seen("robot", robot.type.name, *moved[:-1])],
+        [seen("robot", robot.type.name, *moved), seen("robot", robot.type.name, *state[robot])],
+        [seen("robot", robot.type.name, *([float("nan")] * len(moved)))],
+    ):
+        with pytest.raises(InvalidStateError):
+            decode_seen(strange, state)  # type: ignore[arg-type]
+
+
+def test_what_is_missing_is_one_of_the_state_s_objects() -> None:
+    state = get_domain("obstacle2d").task(0).initial_state
+    assert decode_missing(["robot", "robot"], state) == {"robot"}
+    with pytest.raises(InvalidStateError, match="ghost missing"):
+        decode_missing(["robot", "ghost"], state)

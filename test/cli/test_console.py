@@ -58,7 +58,11 @@ def ended(error):
         (BrokenProcessPool(), ErrorCode.OUT_OF_MEMORY, "a worker was killed; short of memory?"),
         (PermissionError(13, "Permission denied", "/no/way"), ErrorCode.INPUT_OUTPUT, "/no/way"),
         (OSError(36, "File name too long", "x" * 300), ErrorCode.INPUT_OUTPUT, "(300 characters)"),
-        (ZeroDivisionError("odd"), ErrorCode.INTERNAL_ERROR, "ZeroDivisionError('odd')"),
+        (
+            ZeroDivisionError("odd"),
+            ErrorCode.INTERNAL_ERROR,
+            "of slap: ZeroDivisionError in test_console.py, line",
+        ),
     ],
 )
 def test_every_error_ends_in_one_line_and_a_code(error, code, told):

@@ -16,6 +16,6 @@ sys.path[:0] = [str(HERE), str(HERE.parent / "acquisition")]
 @pytest.fixture(autouse=True)
 def no_settings_of_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     names = ("OPENAI_API_KEY", "SLAP_LANGUAGE_BASE_URL", "SLAP_LANGUAGE_MODEL")
-    for name in (*names, "HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY"):
+    for name in (*names, "HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY", "NO_PROXY"):
         monkeypatch.delenv(name, raising=False)
         monkeypatch.delenv(name.lower(), raising=False)

@@ -33,6 +33,7 @@ class Step:
     status: int = 200
     headers: Mapping[str, str] = field(default_factory=dict)
     error: str = "scripted"  # message, where the status is no success
+    code: str | None = None  # of that error
     stall_s: float = 0.0  # before the answer
     trickle_s: float = 0.0  # between its bytes
     reset: bool = False  # the connection, in the middle of the answer
@@ -74,7 +75,7 @@ class ScriptedServer:
 
     def next_step(self, body: dict[str, Any], headers: dict[str, str]) -> Step:
         """What the script says to a request, which is kept."""
-        subject = subject_of(body["messages"])
+        subject = subject_of(body["messages"]) if "messages" in body else "embeddings"
         with self._lock:
             self.requests.append(body)
             self.headers.append(headers)
@@ -103,7 +104,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_POST(self) -> None:
         body = json.loads(self.rfile.read(int(self.headers["content-length"])))
-        if not self.path.endswith("/chat/completions"):
+        if not self.path.endswith(("/chat/completions", "/embeddings")):
             self._send(404, {}, b"{}")
             return
         step = self.server.scripted.next_step(body, dict(self.headers))
@@ -111,7 +112,7 @@ class _Handler(BaseHTTPRequestHandler):
         if not step.schema and body.get("response_format", {}).get("type") == "json_schema":
             step = Step(status=400, error="response_format json_schema is not supported")
         if step.status != 200:
-            error = json.dumps({"error": {"message": step.error}}).encode()
+            error = json.dumps({"error": {"message": step.error, "code": step.code}}).encode()
             self._send(step.status, step.headers, error)
             return
         data = step.raw if step.raw is not None else envelope(step, body)

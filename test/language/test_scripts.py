@@ -296,7 +296,8 @@ SERVERS = {
     "never free": (Step(status=429), "LANGUAGE_UNAVAILABLE", 4),
     "an hour": (Step(status=429, headers={"retry-after": "3600"}), "LANGUAGE_UNAVAILABLE", 1),
     "bad request": (Step(status=400, error="context too long"), "LANGUAGE_REFUSED", 3),
-    "no json": (Step(raw=b"<html>proxy</html>"), "LANGUAGE_UNAVAILABLE", 4),
+    "no json": (Step(raw=b"not an answer"), "LANGUAGE_UNAVAILABLE", 4),
+    "a page": (Step(raw=b"<html>proxy</html>"), "LANGUAGE_REFUSED", 1),
     "no choices": (Step(raw=b'{"choices": []}'), "LANGUAGE_UNAVAILABLE", 4),
     "reset": (Step("x" * 10_000, reset=True), "LANGUAGE_UNAVAILABLE", 4),
 }

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from builtin_interfaces.msg import Time
 from clocks import BY_THE_CLOCK, SettableClock
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TransformStamped
@@ -241,6 +242,46 @@ def test_poses_that_are_none_are_refused_and_counted(network):
         bench.until(lambda: int(bench.health.get("refused_measurements", 0)) > 0)
         bench.step()
         assert bench.states[-1].objects[1].features == bench.states[0].objects[1].features
+
+
+ARM = [f"panda_joint{i + 1}" for i in range(7)]
+FINGERS = ["panda_finger_joint1", "panda_finger_joint2"]
+ELSEWHERE = [0.4, 0.3, 0.2, -1.4, 0.5, 1.6, 0.7]
+UNUSABLE = {
+    "a finger without its position": (FINGERS[:1] + ARM, ELSEWHERE, []),
+    "positions without names": (ARM[:6], ELSEWHERE, []),
+    "velocities of some": (ARM, ELSEWHERE, [0.0] * 3),
+    "a name twice": (ARM + ARM[:1], [*ELSEWHERE, 0.4], []),
+    "not a number": (ARM, [float("nan"), *ELSEWHERE[1:]], []),
+    "a velocity that is none": (ARM, ELSEWHERE, [float("inf")] * 7),
+    "degrees": (ARM, [57.3 * q for q in ELSEWHERE], []),
+    "fingers in mm": (ARM + FINGERS, [*ELSEWHERE, 40.0, 40.0], []),
+    "a finger that is none": (ARM + FINGERS, [*ELSEWHERE, 0.04, float("nan")], []),
+}
+
+
+def test_joint_states_that_cannot_be_read_for_sure_are_refused_and_counted(network):
+    with lab() as bench:
+        publisher = bench.client.create_publisher(JOINT_STATES.type, JOINT_STATES.name, 10)
+        bench.until(lambda: publisher.get_subscription_count() >= 1)
+
+        (bridge,) = [
+            n for n in bench.spinner.executor.get_nodes() if n.get_name() == "robot_bridge"
+        ]
+        refused = bridge._robot.sensors.counts  # diagnostics have them once a second
+
+        def refuses(names, positions, velocities, stamp):
+            before = refused["refused_measurements"]
+            header = Header(stamp=stamp)
+            lists = {"name": names, "position": positions, "velocity": velocities}
+            publisher.publish(JointState(header=header, **lists))
+            bench.until(lambda: refused["refused_measurements"] > before)
+
+        for lists in UNUSABLE.values():
+            refuses(*lists, stamp=bench.client.get_clock().now().to_msg())
+        refuses(ARM, ELSEWHERE, [], stamp=Time())  # nobody knows when that was
+        bench.step()
+        assert bench.states[-1].objects[0].features == bench.states[0].objects[0].features
 
 
 def test_a_clock_that_is_ahead_is_not_believed(network):

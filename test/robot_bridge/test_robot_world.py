@@ -297,3 +297,11 @@ def test_a_scene_file_with_a_mistake_is_refused(tmp_path, before, after, words):
 def test_a_scene_file_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(InvalidSceneError, match="cannot be read"):
         read_scene_config(tmp_path / "none.yaml", DOMAIN)
+
+
+def test_a_detection_in_another_unit_is_refused():
+    bench = Bench()
+    bench.now = 1.0
+    in_mm = Pose((450.0, 0.0, 20.0), IDENTITY.quaternion)
+    with pytest.raises(InvalidMeasurementError, match=r"block1 is detected 450\.\d+ m away"):
+        bench.robot_world.add_detection("detected_block1", 1.0, IDENTITY, in_mm)

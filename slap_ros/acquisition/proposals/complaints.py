@@ -141,17 +141,20 @@ class Complaint:
         subject: What it is about, as ``operator Insert``.
         fact: What is wrong with it.
         warning: Whether the proposal can be used in spite of it.
+        advice: Words for people alone: what they can change, and the model cannot.
     """
 
     kind: ComplaintClass
     subject: str
     fact: str
     warning: bool = False
+    advice: str = ""
 
     @property
     def for_people(self) -> str:
         """One line, with the class."""
-        return f"{self.subject}: {self.fact} [{self.kind}{', a warning' if self.warning else ''}]"
+        told = f"{self.fact}{self.advice and '; '}{self.advice}"
+        return f"{self.subject}: {told} [{self.kind}{', a warning' if self.warning else ''}]"
 
     @property
     def for_model(self) -> str:

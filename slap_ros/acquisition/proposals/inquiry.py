@@ -16,7 +16,7 @@ from slap_ros.language.budget import Budget, BudgetLimits
 from slap_ros.language.cassette import ReplayingClient, open_client, with_recorded
 from slap_ros.language.formats import Parsed
 from slap_ros.language.prompts import conversation, feedback
-from slap_ros.language.request import Client, Reply, Request, Schema
+from slap_ros.language.request import Client, JsonObject, Reply, Request, Schema
 from slap_ros.language.settings import LanguageSettings
 
 D = TypeVar("D")
@@ -26,6 +26,7 @@ MAX_COMPLAINTS = 8  # that a model is told at once
 
 REFUSED = ("content_filter", "refusal")  # finish reasons
 CUT_SHORT = "length"
+TOKEN_LIMITS = ("max_completion_tokens", "max_tokens", "max_output_tokens")  # fields of sampling
 
 
 @dataclass(frozen=True)
@@ -164,7 +165,7 @@ class Inquiry:
         """
         request = self._request(question, rejected)
         reply = self._complete(question.subject, request, rejected)
-        judged = _judge(question, reply)
+        judged = _judge(question, request, reply)
         self.budget.book(reply)
         self._answers[question.subject] += 1
         self._scripted |= reply.scripted
@@ -221,18 +222,34 @@ class _Judgement(Generic[T]):
     cut: int  # characters
 
 
-def _judge(question: Question[D, T], reply: Reply) -> _Judgement[T]:
-    def refuse(kind: ComplaintClass, fact: str) -> _Judgement[T]:
-        return _Judgement(None, [Complaint(kind, question.subject, fact)], 0)
+def _judge(question: Question[D, T], request: Request, reply: Reply) -> _Judgement[T]:
+    def refuse(kind: ComplaintClass, fact: str, advice: str = "") -> _Judgement[T]:
+        return _Judgement(None, [Complaint(kind, question.subject, fact, advice=advice)], 0)
+
+    cut = reply.finish_reason == CUT_SHORT
+    raising = _how_to_raise_the_limit(request.sampling, reply) if cut else ""
 
     if reply.refusal is not None or reply.finish_reason in REFUSED:
         return refuse(ComplaintClass.REFUSAL, f"the model refused: {reply.refusal or 'no reason'}")
     if not reply.text.strip():
-        return refuse(ComplaintClass.EMPTY_ANSWER, "the answer is empty")
+        begun = f"it was cut at the limit of tokens before it began: {raising}" if cut else ""
+        return refuse(ComplaintClass.EMPTY_ANSWER, "the answer is empty", begun)
     try:
         parsed = question.parse(reply.text)
     except MalformedAnswerError as error:
-        short = "; it was cut at the limit of tokens" if reply.finish_reason == CUT_SHORT else ""
-        return refuse(ComplaintClass.SYNTAX, f"{error}{short}")
+        short = "; it was cut at the limit of tokens" if cut else ""
+        return refuse(ComplaintClass.SYNTAX, f"{error}{short}", raising)
     value, complaints = question.check(parsed.draft)
     return _Judgement(value, complaints, parsed.cut)
+
+
+def _how_to_raise_the_limit(sampling: JsonObject, reply: Reply) -> str:
+    """What to change so that an answer has room for all its tokens, thoughts among them."""
+    given = [f"{name} ({sampling[name]})" for name in TOKEN_LIMITS if name in sampling]
+    spent = f"{reply.completion_tokens} tokens were spent, a model's thoughts among them"
+    if given:
+        return f"{spent}; raise {' and '.join(given)} in the sampling of --language-settings"
+    return (
+        f"{spent}; give more by max_tokens in the sampling of --language-settings, or by the "
+        "server's own limit or context length"
+    )

@@ -1,0 +1,112 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Joint states spoilt at random: what the world is told is where the arm is, or nothing."""
+
+import math
+import random
+
+import pytest
+import rclpy
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+
+from ensemble.steady_time import JumpFreeClock
+from slap_ros.domains import get_domain
+from slap_ros.robot.limits import PANDA, Workspace
+
+pytest.importorskip("pybullet")
+from robot_bridge.sensors import Sensors
+from slap_ros.robot.robot_world import RobotWorld
+from slap_ros.robot.scene_config import sampled_scene_config
+
+pytestmark = pytest.mark.timeout(3600)  # for as many cases as somebody may ask for
+ARM = [f"panda_joint{i + 1}" for i in range(7)]
+FINGERS = ["panda_finger_joint1", "panda_finger_joint2"]
+TRUE = dict(zip(ARM, (0.4, 0.3, 0.2, -1.4, 0.5, 1.6, 0.7), strict=True)) | dict.fromkeys(
+    FINGERS, 0.03
+)
+LISTS = ("name", "position", "velocity", "effort")
+
+
+def shortened(rng, lists):
+    what = rng.choice([what for what in LISTS if lists[what]])
+    lists[what].pop(rng.randrange(len(lists[what])))
+
+
+def lengthened(rng, lists):
+    what = rng.choice(LISTS)
+    value = "odd_joint" if what == "name" else 0.0
+    lists[what].insert(rng.randint(0, len(lists[what])), value)
+
+
+def named_twice(rng, lists):
+    one, other = rng.sample(range(len(lists["name"])), 2)
+    lists["name"][one] = lists["name"][other]
+
+
+def no_number(rng, lists):
+    what = rng.choice(LISTS[1:3])
+    lists[what] = lists[what] or [0.0] * len(lists["name"])
+    lists[what][rng.randrange(len(lists[what]))] = rng.choice((math.nan, math.inf, -math.inf))
+
+
+def other_unit(rng, lists):
+    lists["position"] = [rng.choice((1e3, math.degrees(1.0))) * q for q in lists["position"]]
+
+
+def emptied(rng, lists):
+    lists[rng.choice(LISTS[1:])] = []
+
+
+def others_between(rng, lists):
+    """Another robot's joints, some of which measure nothing."""
+    at = rng.randint(0, len(lists["name"]))
+    lists["name"].insert(at, f"rail_{len(lists['name'])}")
+    lists["position"].insert(at, rng.choice((1.0, math.nan)))
+    for what in LISTS[2:]:
+        if lists[what]:
+            lists[what].insert(at, 0.0)
+
+
+SPOILING = (shortened, lengthened, named_twice, no_number, other_unit, emptied)
+
+
+@pytest.fixture
+def sensors(network):
+    domain = get_domain("obstacle_tower", "fair")
+    scene = sampled_scene_config(domain.task(1).initial_state)
+    world = RobotWorld(domain, scene, PANDA.scaled(0.5, Workspace()))
+    rclpy.init()
+    node = rclpy.create_node("listener")
+    try:
+        yield Sensors(node, world, "panda", JumpFreeClock(node))
+    finally:
+        node.destroy_node()
+        world.close()
+        rclpy.shutdown()
+
+
+def joint_state(sensors, lists):
+    stamp = sensors._node.get_clock().now().to_msg()
+    return JointState(header=Header(stamp=stamp), **lists)
+
+
+def test_no_joint_state_is_taken_for_another(sensors, request):
+    rng = random.Random(4)
+    taken = refused = 0
+    for _ in range(300 * (1 + request.config.getoption("--fault-cases"))):
+        names = rng.sample(list(TRUE), len(TRUE))
+        lists = {"name": names, "position": [TRUE[name] for name in names]}
+        lists |= {what: [0.0] * len(names) if rng.random() < 0.5 else [] for what in LISTS[2:]}
+        # One of them: a second may hide the first, as an entry less and an entry more.
+        spoiling = [rng.choice(SPOILING)] if rng.random() < 0.7 else []
+        for change in (*spoiling, *[others_between] * rng.randint(0, 2)):
+            change(rng, lists)
+        before = sensors.counts["readings"], sensors.counts["refused_measurements"]
+        sensors._on_joints(joint_state(sensors, lists))
+        taken += sensors.counts["readings"] - before[0]
+        refused += sensors.counts["refused_measurements"] - before[1]
+        if taken:
+            assert sensors._world.joint_distance(list(TRUE.values())[:7]) == 0.0
+        assert sensors.gap is None or sensors.gap == pytest.approx(0.06)
+    assert taken > 50 and refused > 50
