@@ -31,15 +31,14 @@ from slap_ros.skills.domain_choice import SHIPPED
 from slap_ros.studies.results import describe_library, describe_skills
 from slap_ros.versions import versions
 
+Tasks = Annotated[int, typer.Option(min=1, callback=at_most(10**6), help="Tasks per seed.")]
+Seeds = Annotated[int, typer.Option(min=1, callback=at_most(10**6), help="Number of seeds.")]
+
 
 def evaluate(
     domain: DomainName,
-    tasks: Annotated[
-        int, typer.Option(min=1, callback=at_most(10**6), help="Tasks per seed.")
-    ] = 10,
-    seeds: Annotated[
-        int, typer.Option(min=1, callback=at_most(10**6), help="Number of seeds.")
-    ] = 5,
+    tasks: Tasks = 10,
+    seeds: Seeds = 5,
     first_seed: Annotated[
         int,
         typer.Option(
