@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import typer
 
 from slap_ros.acquisition.proposals.problem import AcquisitionProblem
-from slap_ros.cli.options import Preset
+from slap_ros.cli.options import LanguageFile, Preset
 from slap_ros.core import Domain, task_with_goal
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidCassetteError, InvalidParameterError
@@ -42,10 +42,7 @@ class ModelOptions:
     base_url: Annotated[
         str | None, typer.Option(help="URL of the server. Default: SLAP_LANGUAGE_BASE_URL.")
     ] = None
-    language_settings: Annotated[
-        Path | None,
-        typer.Option(help="JSON file of settings for the language model; see docs/language.md."),
-    ] = None
+    language_settings: LanguageFile = None
     cassette: Annotated[
         str,
         typer.Option(

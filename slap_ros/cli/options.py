@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from functools import wraps
 from inspect import Parameter, signature
+from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_type_hints
 
 import typer
@@ -112,6 +113,11 @@ Ray = Annotated[
 ]
 Jobs = Annotated[
     int, typer.Option(min=1, help="Number of processes. It does not change the results.")
+]
+
+LanguageFile = Annotated[
+    Path | None,
+    typer.Option(help="JSON file of settings for the language model; see docs/language.md."),
 ]
 
 

@@ -25,6 +25,7 @@ from slap_ros.acquisition.proposals.proposer_names import (
 )
 from slap_ros.api.proposing import answer, request_for
 from slap_ros.cli.console import console, print_json
+from slap_ros.cli.operators import print_operator
 from slap_ros.cli.options import DomainOrFile, Goal, Index, Json, Preset, Seed
 from slap_ros.cli.proposer_options import ProposerOptions
 from slap_ros.core import task_with_goal
@@ -139,16 +140,7 @@ def show_entry(entry: Entry) -> None:
 
 def _show(proposal: Proposal) -> None:
     for operator in proposal.operators:
-        console.print(f"{operator}")
-        for label, atoms in (
-            ("PRE", operator.preconditions),
-            ("EFF-", operator.delete_effects),
-            ("EFF+", operator.add_effects),
-        ):
-            console.print(f"  {label:5}{', '.join(sorted(map(str, atoms))) or '-'}")
-        if operator.name in proposal.rewards:
-            terms = " + ".join(map(str, proposal.rewards[operator.name].terms))
-            console.print(f"  {'R':5}{terms}")
+        print_operator(operator, proposal.rewards.get(operator.name))
     for remark in proposal.remarks:
         console.print(f"remark: {remark}")
     console.print(f"plan: {', '.join(proposal.plan or ()) or 'nothing to do'}")

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -15,6 +14,7 @@ from slap_ros.acquisition.proposals.proposer_names import MANUAL
 from slap_ros.api.left_out import Tell
 from slap_ros.api.proposers import DEMONSTRATIONS, Proposers, Status
 from slap_ros.cli.console import console
+from slap_ros.cli.options import LanguageFile
 from slap_ros.core import Domain
 from slap_ros.language.budget import BudgetLimits
 
@@ -56,10 +56,7 @@ class ProposerOptions(Proposers):
             "OPENAI_API_KEY. Default: SLAP_LANGUAGE_BASE_URL, else as in the settings."
         ),
     ] = None
-    language_settings: Annotated[
-        Path | None,
-        typer.Option(help="JSON file of settings for the language model; see docs/language.md."),
-    ] = None
+    language_settings: LanguageFile = None
     cassette: Annotated[
         str,
         typer.Option(

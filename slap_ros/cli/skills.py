@@ -12,6 +12,7 @@ import typer
 
 from slap_ros.acquisition.proposals.inquiry import described
 from slap_ros.cli.console import console, print_json, warn
+from slap_ros.cli.operators import print_operator
 from slap_ros.cli.options import Json
 from slap_ros.domains import get_domain
 from slap_ros.skills.operator_json import operator_data, template_data
@@ -65,15 +66,8 @@ def _data(library: SkillLibrary) -> dict[str, Any]:
 
 
 def _show(skill: AcquiredSkill) -> None:
-    operator, record = skill.operator, skill.record
-    console.print(f"{operator}")
-    for label, atoms in (
-        ("PRE", operator.preconditions),
-        ("EFF-", operator.delete_effects),
-        ("EFF+", operator.add_effects),
-    ):
-        console.print(f"  {label:5}{', '.join(sorted(map(str, atoms))) or '-'}")
-    console.print(f"  {'R':5}{' + '.join(map(str, skill.template.terms))}")
+    record = skill.record
+    print_operator(skill.operator, skill.template)
     if "success" not in record:
         return
     blind = record.get("vacuity") or {}

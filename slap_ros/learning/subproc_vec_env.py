@@ -18,28 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slap_ros.learning.linked_process import linked_process, receive, send
-from slap_ros.learning.vec_env import VecEnv, VecEnvStep
-from slap_ros.policies.action_map import ActionMap
+from slap_ros.learning.vec_env import VecEnv, VecEnvShape, VecEnvStep
 from slap_ros.relational.state import Array
 
 
-class VecEnvSpec(Protocol):
+class VecEnvSpec(VecEnvShape, Protocol):
     """What environments are made from, as data that other processes can be sent."""
-
-    @property
-    def num_envs(self) -> int:
-        """How many environments."""
-        ...
-
-    @property
-    def horizon(self) -> int:
-        """Environment steps after which an episode is truncated."""
-        ...
-
-    @property
-    def action_map(self) -> ActionMap:
-        """From the policy's actions to the robot's."""
-        ...
 
     def make(self) -> VecEnv:
         """The environments themselves, in this process."""

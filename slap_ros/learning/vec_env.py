@@ -43,8 +43,8 @@ class VecEnvStep:
         return self.success | self.failure | self.truncated
 
 
-class VecEnv(Protocol):
-    """Environments that are stepped together, in this process or in others."""
+class VecEnvShape(Protocol):
+    """What is known of environments before they are made."""
 
     @property
     def num_envs(self) -> int:
@@ -58,8 +58,12 @@ class VecEnv(Protocol):
 
     @property
     def action_map(self) -> ActionMap:
-        """From the policy's actions to the robot's."""
+        """The map from the policy's actions to the robot's."""
         ...
+
+
+class VecEnv(VecEnvShape, Protocol):
+    """Environments that are stepped together, in this process or in others."""
 
     @property
     def observations(self) -> NDArray[np.float32]:

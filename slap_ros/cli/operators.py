@@ -1,0 +1,21 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Lifted operators on the terminal."""
+
+from __future__ import annotations
+
+from slap_ros.cli.console import console
+from slap_ros.relational import LiftedOperator, RewardTemplate
+
+
+def print_operator(operator: LiftedOperator, reward: RewardTemplate | None) -> None:
+    """Print an operator's preconditions and effects, and its reward if it has one."""
+    console.print(f"{operator}")
+    for label, atoms in (
+        ("PRE", operator.preconditions),
+        ("EFF-", operator.delete_effects),
+        ("EFF+", operator.add_effects),
+    ):
+        console.print(f"  {label:5}{', '.join(sorted(map(str, atoms))) or '-'}")
+    if reward is not None:
+        console.print(f"  {'R':5}{' + '.join(map(str, reward.terms))}")
