@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is compared: planning with given options alone, and with shortcuts."""
+"""The approaches that are compared: planning with given options alone, and with shortcuts."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class Approach:
     """A way to plan.
 
     Args:
-        name: In reports and results.
-        shortcuts: What may be used besides the given options.
-        sampling: How shortcuts are tried out in the model.
+        name: Name of the approach in reports and results.
+        shortcuts: Shortcuts that may be used besides the given options.
+        sampling: Settings of how shortcuts are tried out in the model.
     """
 
     name: str
@@ -33,9 +33,9 @@ class Approach:
         """A planner that plans in this way.
 
         Args:
-            name: One of :data:`slap_ros.planning.planner.PLANNERS`.
-            domain: For whose tasks.
-            initial: A state with the objects of the tasks.
+            name: Name of the planner, one of :data:`slap_ros.planning.planner.PLANNERS`.
+            domain: Domain of the tasks.
+            initial: State with the objects of the tasks.
 
         Returns:
             The planner, with a model of its own.
@@ -56,9 +56,9 @@ def shooting(library: ShortcutLibrary, domain: Domain, sampling: Sampling) -> Ap
     """Planning-time search alone, with as many rollouts as SLAP makes; nothing in it is learned.
 
     Args:
-        library: Its shortcuts say between which abstract states to search.
-        domain: Of the library.
-        sampling: SLAP's.
+        library: Library whose shortcuts say between which abstract states to search.
+        domain: Domain of the library.
+        sampling: Settings of how SLAP tries shortcuts out in the model.
 
     Returns:
         The approach, with the library's signatures and none of its policies.
@@ -68,7 +68,7 @@ def shooting(library: ShortcutLibrary, domain: Domain, sampling: Sampling) -> Ap
 
 
 def approaches(library: ShortcutLibrary | None, sampling: Sampling) -> tuple[Approach, ...]:
-    """What to compare: the baseline first, planning with all samples last."""
+    """The approaches to compare: the baseline first, planning with all samples last."""
     if library is None:
         return (PURE_PLANNING,)
     return (

@@ -12,7 +12,7 @@ AtomNames = frozenset[tuple[str, tuple[str, ...]]]  # (predicate, objects)
 
 
 def atom_names(msgs: Iterable[GroundAtomMessage]) -> AtomNames:
-    """The atoms by their names alone."""
+    """The names of the predicate and the objects of each atom in messages."""
     return frozenset((msg.predicate, tuple(msg.objects)) for msg in msgs)
 
 

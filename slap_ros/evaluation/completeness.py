@@ -26,8 +26,8 @@ def is_complete(run: RecordedRun, executed: Iterable[ExecutedOption]) -> bool:
     """Whether a run has ended and all that its events refer to is here as well.
 
     Args:
-        run: What was recorded of it.
-        executed: All options that were executed in its episode.
+        run: Record of the run.
+        executed: Options that were executed in the run's episode, all of them.
     """
     end = run.events.end
     if end is None:
@@ -44,11 +44,11 @@ def is_complete(run: RecordedRun, executed: Iterable[ExecutedOption]) -> bool:
 
 
 def gaps_of(run: RecordedRun, executed: Iterable[ExecutedOption]) -> Iterator[str]:
-    """What is missing of a run, in words; nothing for that reason alone that it has not ended.
+    """Yield what is missing of a run, in words; a missing end is not reported.
 
     Args:
-        run: What was recorded of it.
-        executed: All options that were executed in its episode.
+        run: Record of the run.
+        executed: Options that were executed in the run's episode, all of them.
     """
     if states := missing_states(run.first_step, run.last_step, run.episode.steps):
         yield states
@@ -62,12 +62,12 @@ def gaps_of(run: RecordedRun, executed: Iterable[ExecutedOption]) -> Iterator[st
 
 
 def missing_states(first: int, last: int, recorded: Collection[int]) -> str | None:
-    """Which states of a run are missing.
+    """Say which states of a run are missing.
 
     Args:
-        first: The run's first environment step.
-        last: Its last.
-        recorded: The steps of the states that there are, of the whole episode.
+        first: First environment step of the run.
+        last: Last environment step of the run.
+        recorded: Steps of the states that were recorded, of the whole episode.
 
     Returns:
         How many of how many, and which is the first; None if all are there.
@@ -82,10 +82,10 @@ def missing_states(first: int, last: int, recorded: Collection[int]) -> str | No
 
 
 def missing_events(events: Sequence[PlanEventMessage]) -> Iterator[str]:
-    """Each place of a run at which a plan event is missing, in order.
+    """Yield each place of a run at which a plan event is missing, in order.
 
     Args:
-        events: The run's plan events, in order; the first is PLANNING_STARTED.
+        events: Plan events of the run, in order; the first is PLANNING_STARTED.
     """
     for before, after in pairwise(events):
         if not _may_follow(before, after):
@@ -93,7 +93,7 @@ def missing_events(events: Sequence[PlanEventMessage]) -> Iterator[str]:
 
 
 def planning_is_whole(events: Sequence[PlanEventMessage]) -> bool:
-    """Whether a run's plan events tell of each plan when it was begun and when it was there."""
+    """Whether a run's plan events have the start and the end of planning for each plan."""
     for before, after in pairwise(events):
         begins = after.kind == Kind.PLANNING_STARTED
         if (after.kind == Kind.PLANNED) > (before.kind == Kind.PLANNING_STARTED):

@@ -27,8 +27,8 @@ class DistinctEvents(Generic[Event]):
         """Take an event.
 
         Args:
-            event: The message.
-            about: What tells it from others of its kind at the same time.
+            event: Message of the event.
+            about: Values that tell the event from others of its kind at the same time.
         """
         stamp = stamp_ns(event.header)
         key = (type(event), stamp, event.episode, event.step, event.kind, *about)

@@ -23,12 +23,12 @@ def write_evaluation(
     origin: Mapping[str, Any],
     results: Sequence[tuple[Summary, Sequence[Trial]]],
 ) -> None:
-    """Write every trial of an evaluation, in place of those of the same one before.
+    """Write every trial of an evaluation, in place of an earlier file of the same evaluation.
 
     Args:
-        path: Of the file, JSON.
-        origin: From what it was made: command, settings, library, as JSON has them.
-        results: Each approach, pure planning first.
+        path: Path of the file, which is JSON.
+        origin: Facts about how the evaluation was made: command, settings, library, as JSON.
+        results: Summary and trials of each approach, pure planning first.
 
     Raises:
         OSError: It cannot be written; what was there before is untouched.
@@ -50,8 +50,8 @@ def require_replaceable(path: Path, command: str) -> None:
     """Check that a file may be replaced by an evaluation: there is none, or that of a command.
 
     Args:
-        path: Of the file.
-        command: That makes the new one.
+        path: Path of the file.
+        command: Command that makes the new evaluation.
 
     Raises:
         InvalidParameterError: It is another evaluation, or something else.

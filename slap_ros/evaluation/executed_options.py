@@ -28,12 +28,12 @@ class ExecutedOption:
 
     @property
     def outcome(self) -> str:
-        """Reached, failed, canceled or unfinished."""
+        """How the option ended: reached, failed, canceled or unfinished."""
         return OUTCOMES[self.end.kind] if self.end is not None else UNFINISHED
 
     @property
     def reached(self) -> bool:
-        """Whether it has reached its target."""
+        """Whether the option has reached its target."""
         return self.end is not None and self.end.kind == SkillEventKind.REACHED
 
 

@@ -17,24 +17,25 @@ from slap_ros.planning.execution import EpisodeResult, ExecutedEdge, Executor
 from slap_ros.relational import GroundAtom
 from slap_ros.skills.domain_choice import SHIPPED, DomainChoice, open_domain
 
-# What is true of most edges is left out of their JSON, which would be twice as large with it.
+# Values that most edges have; left out of their JSON, which would else be twice as large.
 MOST_EDGES: Mapping[str, Any] = MappingProxyType({"kind": "operator", "reached": True})
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """Which tasks: ``tasks`` of each of ``seeds`` seeds, the first of which is ``first_seed``.
+    """Tasks to solve: ``tasks`` of each of ``seeds`` seeds, the first being ``first_seed``.
 
     Args:
-        domain: Whose tasks, with the skills that are meant.
-        tasks: Of each seed.
-        seeds: How many.
-        first_seed: The first of them.
-        planner: By name.
+        domain: Domain of the tasks, with the skills of the experiment.
+        tasks: Number of tasks of each seed.
+        seeds: Number of seeds.
+        first_seed: First of the seeds; the others follow it.
+        planner: Name of the planner, one of :data:`slap_ros.planning.planner.PLANNERS`.
         left_out: Seeds and indices of tasks that are not solved.
-        goal: By name or as atoms, as :func:`~slap_ros.core.task_with_goal` takes it; None for the
-            goal that comes with each task.
-        skills: Whose they are, as :class:`~slap_ros.skills.domain_choice.DomainChoice` has it.
+        goal: Goal by name or as atoms, as :func:`~slap_ros.core.task_with_goal` takes it; None for
+            the goal that comes with each task.
+        skills: Choice of the domain's skills, as in
+            :class:`~slap_ros.skills.domain_choice.DomainChoice`.
     """
 
     domain: Domain
@@ -61,7 +62,7 @@ class Experiment:
         return task_with_goal(self.domain, seed, index, self.goal)
 
     def without_repetitions(self) -> Experiment:
-        """The same without tasks that are equal to an earlier one, in state and goal."""
+        """The experiment without tasks that are equal to an earlier one, in state and goal."""
         known: set[tuple[bytes, frozenset[GroundAtom]]] = set()
         left_out = set(self.left_out)
         for seed, index in self:
@@ -76,9 +77,9 @@ class Experiment:
         """Solve one task, in a world of its own.
 
         Args:
-            seed: Of the task.
-            index: Of the task.
-            approach: How to plan.
+            seed: Seed of the task.
+            index: Index of the task.
+            approach: Approach to planning.
 
         Returns:
             What happened.
@@ -90,10 +91,10 @@ def solve(domain: Domain, task: Task, approach: Approach, planner: str = "lazy")
     """Plan for any task of a domain and execute the plan, in a world of its own.
 
     Args:
-        domain: Of the task.
-        task: What to solve.
-        approach: How to plan.
-        planner: One of :data:`slap_ros.planning.planner.PLANNERS`.
+        domain: Domain of the task.
+        task: Task to solve.
+        approach: Approach to planning.
+        planner: Name of the planner, one of :data:`slap_ros.planning.planner.PLANNERS`.
 
     Returns:
         What happened.
@@ -111,20 +112,21 @@ def solve(domain: Domain, task: Task, approach: Approach, planner: str = "lazy")
 
 @dataclass(frozen=True)
 class Trial:
-    """The figures of one task that was solved, or not.
+    """The figures of one task, whether it was solved or not.
 
     Args:
-        seed: Of the task.
-        index: Of the task.
+        seed: Seed of the task.
+        index: Index of the task.
         success: Whether the goal was reached.
-        plan_length: Environment steps executed.
-        shortcut_steps: Of them, those that shortcuts took.
-        planning_seconds: Of all plans together, s.
-        edges_rolled_out: Options simulated while planning.
-        reason: Why it failed; empty where it is a success.
-        replans: Plans that replaced a diverged one.
-        error_code: Why it failed, as the ensemble's messages have it; 0 where it is a success.
-        edges: What was executed, in order.
+        plan_length: Number of environment steps executed.
+        shortcut_steps: Number of environment steps that shortcuts took, out of ``plan_length``.
+        planning_seconds: Planning time of all plans together, s.
+        edges_rolled_out: Number of options simulated while planning.
+        reason: Reason of the failure, in words; empty where the task was solved.
+        replans: Number of plans that replaced a diverged one.
+        error_code: Error code of the failure, as in the ensemble's messages; 0 where the task was
+            solved.
+        edges: Edges that were executed, in order.
     """
 
     seed: int
@@ -141,7 +143,7 @@ class Trial:
 
     @property
     def at_step_limit(self) -> bool:
-        """Whether it was given up at the task's step limit."""
+        """Whether the task was given up at its step limit."""
         return self.error_code == ErrorCode.STEP_LIMIT
 
     @classmethod
@@ -149,9 +151,9 @@ class Trial:
         """The figures of an episode.
 
         Args:
-            seed: Of its task.
-            index: Of its task.
-            episode: What happened.
+            seed: Seed of the task.
+            index: Index of the task.
+            episode: Result of the episode.
 
         Returns:
             The figures.
@@ -196,9 +198,9 @@ def run_all(experiment: Experiment, approach: Approach, jobs: int) -> Iterator[T
     another approach would make planning look faster than it is.
 
     Args:
-        experiment: Which tasks.
-        approach: How to plan.
-        jobs: Tasks solved at a time, in as many processes.
+        experiment: Experiment whose tasks are solved.
+        approach: Approach to planning.
+        jobs: Number of tasks solved at a time, in as many processes.
 
     Yields:
         The figures of each task, as it ends.
@@ -211,9 +213,9 @@ def run_with(workers: Workers, experiment: Experiment, approach: Approach) -> It
     """Solve every task of an experiment; see :func:`run_all`.
 
     Args:
-        workers: Where the tasks are solved.
-        experiment: Which tasks.
-        approach: How to plan.
+        workers: Workers that solve the tasks.
+        experiment: Experiment whose tasks are solved.
+        approach: Approach to planning.
 
     Yields:
         The figures of each task, as it ends.
@@ -230,10 +232,10 @@ def task_job(experiment: Experiment, approach: Approach, seed: int, index: int) 
     """The arguments of :func:`try_task` for a task of an experiment.
 
     Args:
-        experiment: Whose task.
-        approach: How to plan.
-        seed: Of the task.
-        index: Of the task.
+        experiment: Experiment whose task is solved.
+        approach: Approach to planning.
+        seed: Seed of the task.
+        index: Index of the task.
     """
     choice = DomainChoice.of(experiment.domain, experiment.skills)
     return choice, experiment.goal, experiment.planner, approach, seed, index
@@ -245,12 +247,12 @@ def try_task(
     """Solve one task, in whichever process this runs.
 
     Args:
-        choice: Of the domain, which is made here.
-        goal: By name or as atoms; None for the goal that comes with the task.
-        planner: By name.
-        approach: How to plan.
-        seed: Of the task.
-        index: Of the task.
+        choice: Choice of the domain, which is made in this process.
+        goal: Goal by name or as atoms; None for the goal that comes with the task.
+        planner: Name of the planner, one of :data:`slap_ros.planning.planner.PLANNERS`.
+        approach: Approach to planning.
+        seed: Seed of the task.
+        index: Index of the task.
 
     Returns:
         The figures of the task.

@@ -27,8 +27,8 @@ def measure(run: RecordedRun, options: Iterable[ExecutedOption]) -> RunMetrics:
     """The metrics of a run.
 
     Args:
-        run: What was recorded of it.
-        options: That were executed in it, in order.
+        run: Record of the run.
+        options: Options that were executed in the run, in order.
     """
     task, events = run.episode.task, run.events
     success, error_code, error_msg = _verdict(run)
@@ -80,7 +80,7 @@ def _error_code(value: int) -> ErrorCode:
 
 
 def _unknown(run: RecordedRun) -> dict[str, str]:
-    """The metrics that cannot be had, and why."""
+    """The metrics that cannot be computed, and why."""
     reasons: dict[str, str] = {}
     if run.episode.task is None:
         reasons |= dict.fromkeys(("seed", "index"), "the task is missing")

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The metrics of runs: what a run was like, and how each of its options went.
+"""The metrics of runs: how a run went, and how each of its options went.
 
 A metric that the messages do not give is None, with the reason in ``RunMetrics.unknown``.
 """
@@ -20,7 +20,7 @@ OPERATOR, SHORTCUT, UNKNOWN = "operator", "shortcut", "unknown"  # kinds of opti
 class OptionMetrics:
     """One option as it was executed."""
 
-    name: str  # of the operator or shortcut
+    name: str  # name of the operator or shortcut
     kind: str  # operator or shortcut; unknown without the plan
     objects: tuple[str, ...]
     steps: int  # environment steps
@@ -34,20 +34,20 @@ class RunMetrics:
     domain: str
     preset: str
     seed: int | None  # -1: the initial state was given explicitly
-    index: int | None  # which of the seed's tasks
+    index: int | None  # index of the task among those of the seed
     success: bool  # the run was SOLVED and the goal atoms hold in its last state, as perceived
     plan_length: int  # environment steps
-    shortcut_steps: int | None  # of them, those that shortcuts took
-    planning_seconds: float | None  # s, all plans together
+    shortcut_steps: int | None  # environment steps that shortcuts took, out of plan_length
+    planning_seconds: float | None  # planning time of all plans together, s
     replans: int | None
     edges_rolled_out: int | None  # options simulated while planning
     error_code: ErrorCode
     error_msg: str
     options: tuple[OptionMetrics, ...]
-    planner: str | None  # of the first plan, like what follows; empty: there was no plan
+    planner: str | None  # planner of the first plan, as library and samples are; empty: no plan
     library: str | None  # digest of the shortcuts that it knew
     samples: int | None  # attempts of a shortcut in its model
-    unknown: Mapping[str, str] = field(default_factory=dict)  # by metric: why it is None
+    unknown: Mapping[str, str] = field(default_factory=dict)  # why a metric is None, by metric
 
     def as_json(self) -> dict[str, Any]:
         """The JSON object of ``--json``, keys in the order of the fields."""
@@ -61,5 +61,5 @@ class RunMetrics:
 
 
 def known(value: float | str | None, form: str = "") -> str:
-    """A metric for people: by a format specification, or ``unknown``."""
+    """A metric as text, by a format specification, or ``unknown``."""
     return "unknown" if value is None else format(value, form)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""All that was recorded of a run: its events, its plans, and the messages of its episode."""
+"""The record of a run: its events, its plans, and the messages of its episode."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from slap_ros.messages.protocols import PlanEventMessage, PlanMessage, TaskMessa
 
 @dataclass
 class EpisodeLog:
-    """What was recorded of an episode, events left out; one episode may have several runs.
+    """The record of an episode, events left out; one episode may have several runs.
 
     Args:
-        task: The newest; None where it is missing.
-        steps: Of the states.
-        atoms: Perceived atoms, by step.
-        plans: In the order in which they were made.
+        task: Newest task of the episode; None where it is missing.
+        steps: Environment steps of the states that were recorded.
+        atoms: Perceived atoms, by environment step.
+        plans: Plans in the order in which they were made.
     """
 
     task: TaskMessage | None = None
@@ -35,11 +35,11 @@ class RecordedRun:
     """A run as far as it was recorded.
 
     Args:
-        domain: The domain's name; empty where it is not known.
-        preset: Of the domain; empty where it is not known.
-        events: Its plan events.
-        episode: The messages of its episode, of which it may be a part.
-        announced: The plan that each of its PLANNED events announced; None where it is missing.
+        domain: Name of the domain; empty where it is not known.
+        preset: Preset of the domain; empty where it is not known.
+        events: Plan events of the run.
+        episode: Record of the run's episode, of which the run may be a part.
+        announced: Plan that each PLANNED event of the run announced; None where it is missing.
     """
 
     domain: str
@@ -50,24 +50,24 @@ class RecordedRun:
 
     @property
     def first_step(self) -> int:
-        """The step of its first event."""
+        """The environment step of the run's first event."""
         return self.events.start.step
 
     @property
     def last_step(self) -> int:
-        """The step of its last event, or of the last state where it has not ended."""
+        """The environment step of the last event, or of the last state if the run goes on."""
         if self.events.end is not None:
             return self.events.end.step
         return max(self.events.messages[-1].step, *self.episode.steps, self.first_step)
 
     @property
     def plans(self) -> list[PlanMessage]:
-        """The plans made in it, in order, as far as they are here."""
+        """The plans made in the run, in order, without those that are missing."""
         return [plan for plan in self.announced if plan is not None]
 
     @property
     def goal(self) -> AtomNames | None:
-        """What it was to reach: the goal of its plans, or else the task's own."""
+        """The atoms that the run was to reach: the goal of its plans, or else the task's own."""
         for plan in reversed(self.plans):
             if len(plan.goal):
                 return atom_names(plan.goal)
@@ -75,20 +75,20 @@ class RecordedRun:
         return atom_names(task.goal) if task is not None else None
 
     def spans(self, episode: int, step: int) -> bool:
-        """Whether a step of an episode is one of its steps."""
+        """Whether a step of an episode is a step of this run."""
         return self.events.episode == episode and self.first_step <= step <= self.last_step
 
 
 def announced_plans(
     events: Iterable[PlanEventMessage], plans: Iterable[PlanMessage]
 ) -> dict[int, PlanMessage]:
-    """The plans that the PLANNED events of an episode announced, as far as they are here.
+    """The plans that the PLANNED events of an episode announced, without those that are missing.
 
     By number and order, not by stamps: clocks are set back, and each run counts from 0.
 
     Args:
-        events: All plan events of the episode, in order.
-        plans: All its plans, in order.
+        events: Plan events of the episode, all of them in order.
+        plans: Plans of the episode, all of them in order.
 
     Returns:
         By the ``id`` of the event, since messages have no hash.

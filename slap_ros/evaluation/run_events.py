@@ -28,17 +28,17 @@ class RunEvents:
 
     @property
     def start(self) -> PlanEventMessage:
-        """The event that began it."""
+        """The event that began the run."""
         return self.messages[0]
 
     @property
     def episode(self) -> int:
-        """The number of its episode."""
+        """The number of the run's episode."""
         return self.start.episode
 
     @property
     def end(self) -> PlanEventMessage | None:
-        """The event that ended it; None where it is under way, or breaks off."""
+        """The event that ended the run; None where the run goes on, or breaks off."""
         return self.messages[-1] if self.messages[-1].kind in RUN_ENDS else None
 
     @property
@@ -47,7 +47,7 @@ class RunEvents:
         return [event for event in self.messages if event.kind == PlanEventKind.PLANNED]
 
     def planning_ns(self) -> int:
-        """How long planning took, all plans together, ns."""
+        """The planning time of all plans together, ns."""
         total, started = 0, None
         for event in self.messages:
             if event.kind == PlanEventKind.PLANNING_STARTED:
@@ -58,21 +58,21 @@ class RunEvents:
         return total
 
     def count(self, kind: PlanEventKind) -> int:
-        """How many of its events are of a kind."""
+        """The number of events of a kind."""
         return sum(event.kind == kind for event in self.messages)
 
     def edges_begun(self) -> Counter[int]:
-        """How many edges of its plans began at each step."""
+        """The number of edges of plans that began at each environment step."""
         started = (event for event in self.messages if event.kind == PlanEventKind.EDGE_STARTED)
         return Counter(event.step for event in started)
 
     def edges_rolled_out(self) -> int:
-        """How many options were simulated while planning."""
+        """The number of options that were simulated while planning."""
         return sum(event.edges_rolled_out for event in self.messages if event.kind in PLANNING_ENDS)
 
 
 def split_into_runs(events: Iterable[PlanEventMessage]) -> list[RunEvents]:
-    """The runs among plan events. What precedes the first start belongs to none."""
+    """Split plan events into runs. Events before the first start belong to no run."""
     runs: list[list[PlanEventMessage]] = []
     under_way = False
     for event in events:
@@ -89,7 +89,7 @@ def split_into_runs(events: Iterable[PlanEventMessage]) -> list[RunEvents]:
 
 
 def count_without_start(events: Iterable[PlanEventMessage]) -> int:
-    """How many plan events precede the start of the run that they belong to."""
+    """The number of plan events that precede the start of the run that they belong to."""
     count, under_way, episode = 0, False, None
     for event in events:
         under_way = event.kind == PlanEventKind.PLANNING_STARTED or (

@@ -37,13 +37,13 @@ from slap_ros.messages.protocols import (
 
 
 class RunLog:
-    """Collects the messages of an ensemble and tells what its runs were like.
+    """Collects the messages of an ensemble, and gives the metrics of its runs.
 
     Messages of one topic are added in order; how the topics interleave does not matter.
     """
 
     def __init__(self) -> None:
-        self._presets: dict[str, str] = {}  # by domain
+        self._presets: dict[str, str] = {}  # preset by domain
         self._episodes: defaultdict[int, EpisodeLog] = defaultdict(EpisodeLog)
         self._same: dict[AtomNames, AtomNames] = {}  # abstract states recur: keep each once
         self._plan_events = DistinctEvents[PlanEventMessage]()
@@ -59,7 +59,7 @@ class RunLog:
         }
 
     def add(self, type_name: str, message: object) -> None:
-        """Take a message, such as one of type ``slap_msgs/msg/Task``. Other types do not count."""
+        """Add a message, such as one of type ``slap_msgs/msg/Task``; unknown types are ignored."""
         if type_name in self._add:
             self._add[type_name](message)
 
@@ -85,7 +85,7 @@ class RunLog:
         return bool(runs) and is_complete(runs[-1], self.executed_in(runs[-1].events.episode))
 
     def gaps(self) -> list[str]:
-        """What is missing of the runs so far, or there twice, in words; empty for a whole log.
+        """What is missing or repeated in the runs so far, in words; empty for a whole log.
 
         A run that is still under way, or breaks off, lacks nothing for that reason alone.
         """
@@ -102,7 +102,7 @@ class RunLog:
         return found
 
     def _recorded(self) -> list[RecordedRun]:
-        """All that was recorded of each run so far."""
+        """The record of each run so far."""
         by_episode: defaultdict[int, list[PlanEventMessage]] = defaultdict(list)
         for event in self._plan_events.messages:
             by_episode[event.episode].append(event)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A run's metrics with the messages that tell when what happened in it, for reports."""
+"""A run's metrics with the messages that say what happened when, for reports."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from slap_ros.messages.protocols import PlanEventMessage, PlanMessage
 
 @dataclass(frozen=True)
 class RunTrace:
-    """A run together with the messages that tell when what happened in it."""
+    """The metrics of a run with the messages that say what happened when."""
 
     metrics: RunMetrics
     episode: int
     first_step: int
     last_step: int
     starts: tuple[int, ...]  # the step at which each of the metrics' options began
-    goal: AtomNames | None  # None: neither a plan nor the task is known
-    plans: tuple[PlanMessage, ...]  # in order
-    events: tuple[PlanEventMessage, ...]  # in order
+    goal: AtomNames | None  # atoms to reach; None: neither a plan nor the task is known
+    plans: tuple[PlanMessage, ...]  # plans of the run, in order
+    events: tuple[PlanEventMessage, ...]  # plan events of the run, in order
 
     @classmethod
     def of(cls, run: RecordedRun, options: Sequence[ExecutedOption]) -> RunTrace:
         """The trace of a run.
 
         Args:
-            run: What was recorded of it.
-            options: That were executed in it, in order.
+            run: Record of the run.
+            options: Options that were executed in the run, in order.
         """
         return cls(
             metrics=measure(run, options),

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How sure a figure is: intervals that hold the true one with 95 % confidence."""
+"""The uncertainty of figures: intervals that hold the true value with 95 % confidence."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ import numpy as np
 
 NORMAL_95 = 1.959963984540054  # within so many standard deviations are 95 % of a normal variable
 RESAMPLES = 10_000
-SEED = 95  # of the resampling: the same trials give the same interval
+SEED = 95  # seed of the resampling: the same trials give the same interval
 
 
 @dataclass(frozen=True)
 class Interval:
-    """The lower and the upper bound."""
+    """An interval: the lower and the upper bound."""
 
     low: float
     high: float
@@ -27,8 +27,8 @@ def wilson_interval(successes: int, trials: int) -> Interval:
     """Wilson's 95 % score interval of a success rate.
 
     Args:
-        successes: How many trials succeeded.
-        trials: At least 1.
+        successes: Number of trials that succeeded.
+        trials: Number of trials, at least 1.
 
     Returns:
         Bounds in [0, 1].
@@ -48,8 +48,8 @@ def ratio_interval(numerators: Sequence[float], denominators: Sequence[float]) -
     """The bootstrap's 95 % interval of a ratio of two sums over the same tasks.
 
     Args:
-        numerators: One for each task.
-        denominators: One for each task, above 0.
+        numerators: Numerator of each task.
+        denominators: Denominator of each task, above 0.
 
     Returns:
         The 2.5th and 97.5th percentile over resampled tasks; None with fewer than two tasks.

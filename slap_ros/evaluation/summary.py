@@ -31,17 +31,18 @@ class Summary:
     """The figures of an approach over all tasks of an experiment.
 
     Args:
-        experiment: Which tasks.
-        approach: Its name.
-        success_rate: Share of tasks that were solved.
-        success_interval: Its 95 % interval.
-        at_step_limit: Tasks that were given up at their step limit.
-        plan_length: Environment steps executed, over solved tasks; None where there is none.
+        experiment: Experiment whose tasks are solved.
+        approach: Name of the approach.
+        success_rate: Share of the tasks that were solved.
+        success_interval: 95 % interval of the success rate.
+        at_step_limit: Number of tasks that were given up at their step limit.
+        plan_length: Environment steps executed, over solved tasks; None where no task was solved.
         relative_length: Plan length over that of pure planning, on tasks that both solved; None
-            where there is none.
-        relative_interval: Its 95 % interval over tasks; None with fewer than two.
-        planning_seconds: Per task, s.
-        edges_rolled_out: Options simulated while planning, mean per task.
+            where there are none.
+        relative_interval: 95 % interval of the relative length, over tasks; None with fewer than
+            two tasks.
+        planning_seconds: Planning time per task, s.
+        edges_rolled_out: Number of options simulated while planning, mean per task.
         shortcut_share: Share of the environment steps executed that shortcuts took.
     """
 
@@ -68,10 +69,10 @@ class Summary:
         """Summarise an approach.
 
         Args:
-            experiment: Which tasks.
-            approach: Its name.
-            trials: Of this approach.
-            baseline: Of pure planning, in the same order.
+            experiment: Experiment whose tasks are solved.
+            approach: Name of the approach.
+            trials: Trials of this approach.
+            baseline: Trials of pure planning, in the same order.
 
         Returns:
             The summary.
@@ -128,7 +129,7 @@ class Summary:
 def lengths_of_both(
     trials: Sequence[Trial], baseline: Sequence[Trial]
 ) -> tuple[list[int], list[int]]:
-    """The lengths of both, on the tasks that both solved and that took a step."""
+    """Plan lengths of an approach and of the baseline, on tasks that both solved in some steps."""
     pairs = [
         (trial.plan_length, other.plan_length)
         for trial, other in zip(trials, baseline, strict=True)

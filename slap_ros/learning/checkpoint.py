@@ -23,8 +23,8 @@ def save_checkpoint(path: Path, state: Mapping[str, Any]) -> None:
     """Write a checkpoint. One that is there stays whole until the new one is.
 
     Args:
-        path: File to write.
-        state: Tensors and plain data, by name.
+        path: Path of the file to write.
+        state: State of the learner: tensors and plain data, by name.
 
     Raises:
         OSError: It cannot be written; a full disk leaves the checkpoint before it.
@@ -40,9 +40,9 @@ def load_checkpoint(
     """What :func:`save_checkpoint` wrote. Only tensors and plain data are read, never code.
 
     Args:
-        path: File to read.
-        restore: Makes of the state what is returned; may fail in any way.
-        advice: What to do where it is damaged.
+        path: Path of the file to read.
+        restore: Function that converts the state into what is returned; it may raise any error.
+        advice: Advice for a damaged file, in words.
 
     Raises:
         InvalidParameterError: It is damaged.

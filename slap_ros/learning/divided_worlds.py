@@ -24,11 +24,12 @@ from slap_ros.relational.state import Array
 
 @contextmanager
 def divided_worlds(domain: Domain, make_domain: Callable[[], Domain]) -> Iterator[MakeVectorWorld]:
-    """What makes a domain's worlds, divided, as long as the other process is there.
+    """Yield the function that makes divided worlds, as long as the other process runs.
 
     Args:
-        domain: Whose worlds.
-        make_domain: Makes the same domain in the other process; importable by its name.
+        domain: Domain of the worlds.
+        make_domain: Function that makes the same domain in the other process; importable by its
+            name.
     """
     numbers = count()
 
@@ -50,13 +51,13 @@ class _DividedWorlds:
     def __init__(
         self, here: VectorWorld, there: Sequence[State], link: Connection, number: int
     ) -> None:
-        """Join them.
+        """Join the worlds of both processes.
 
         Args:
-            here: The first ones.
-            there: The states that the others are in.
-            link: To the process that has them.
-            number: Theirs, in that process.
+            here: First worlds, in this process.
+            there: States of the other worlds.
+            link: Connection to the process that has the other worlds.
+            number: Number under which that process knows the other worlds.
         """
         self._here, self._link, self._number = here, link, number
         self._layout = here.states.layout
@@ -117,7 +118,7 @@ class _Stepped:
 
 
 def _serve(link: Connection, make_domain: Callable[[], Domain]) -> None:
-    """What the other process does, until its link is closed."""
+    """Serve the other process's worlds until the link is closed."""
     domain, worlds = make_domain(), list[VectorWorld]()
     while True:
         match link.recv():

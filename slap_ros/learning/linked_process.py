@@ -18,7 +18,7 @@ from slap_ros.errors import SlapError
 from slap_ros.learning.workers import exit_with_parent
 from slap_ros.signals import signals_held_back
 
-PATIENCE_S = 5.0  # for a process to end by itself
+PATIENCE_S = 5.0  # time for a process to end by itself
 CLOSED = (EOFError, ConnectionError)  # raised by a pipe whose other end is closed
 
 
@@ -27,9 +27,10 @@ def linked_process(serve: Callable[..., None], *arguments: Any) -> Iterator[Conn
     """Start a process, and end it with the context.
 
     Args:
-        serve: What it does, called with its end of the pipe and the arguments; importable by its
-            name. It is over when the pipe is closed. An error of ours is sent through the pipe.
-        arguments: Those that follow.
+        serve: Function of the process, called with its end of the pipe and the arguments;
+            importable by its name. It returns when the pipe is closed. An error of ours is sent
+            through the pipe.
+        arguments: Further arguments of the function.
 
     Yields:
         This end of the pipe.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""From torch's networks to policies that run without torch."""
+"""Exporting torch's networks to policies that run without torch."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def exported_layers(weights: Mapping[str, NDArray[np.float32]], names: Sequence[
     """The weight and the bias of each layer.
 
     Args:
-        weights: Arrays by the names of torch, ``LAYER.weight`` and ``LAYER.bias``.
+        weights: Arrays by their names in torch, ``LAYER.weight`` and ``LAYER.bias``.
         names: Names of the layers, the output layer last.
     """
     return tuple((weights[f"{name}.weight"], weights[f"{name}.bias"]) for name in names)

@@ -24,7 +24,7 @@ from slap_ros.skills.domain_choice import DomainChoice
 
 Goal = tuple[GroundAtom, ...]
 
-MOST_ATOMS = 2  # of a goal
+MOST_ATOMS = 2  # largest number of atoms of a goal
 
 
 def sample_goals(domain: Domain, task: Task, count: int, rng: np.random.Generator) -> list[Goal]:
@@ -35,10 +35,10 @@ def sample_goals(domain: Domain, task: Task, count: int, rng: np.random.Generato
     no node has another.
 
     Args:
-        domain: The task's.
-        task: Its initial state is where goals are reached from.
-        count: How many goals at most.
-        rng: Chooses nodes and atoms.
+        domain: Domain of the task.
+        task: Task whose initial state the goals are reached from.
+        count: Number of goals at most.
+        rng: Generator that chooses nodes and atoms.
 
     Returns:
         The goals, in the order in which they were found.
@@ -78,7 +78,7 @@ class RandomGoalsChoice(DomainChoice):
     """A domain, some of whose tasks have another goal than their own.
 
     Args:
-        share: Share of these tasks, between 0 and 1.
+        share: Share of the tasks that have another goal, from 0 to 1.
     """
 
     share: float
@@ -88,8 +88,8 @@ class RandomGoalsChoice(DomainChoice):
         """The same domain with random goals.
 
         Args:
-            choice: Domain whose tasks they are.
-            share: Share of the tasks that have another goal, between 0 and 1.
+            choice: Domain of the tasks.
+            share: Share of the tasks that have another goal, from 0 to 1.
         """
         return cls(choice.name, choice.preset, choice.skills, choice.digest, share=share)
 

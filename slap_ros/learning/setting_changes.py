@@ -20,11 +20,11 @@ from slap_ros.errors import InvalidParameterError
 from slap_ros.learning.stored_keys import field_name
 
 S = TypeVar("S")
-OFF = "none"  # on the command line: a part that is left out
-LARGEST = 10**9  # of a whole number
+OFF = "none"  # text on the command line for a part that is left out
+LARGEST = 10**9  # largest value of a whole number
 ZERO_TOO = frozenset({"alternatives", "refinements", "shortcuts"})  # other counts begin at 1
 BELOW_1 = math.nextafter(1.0, 0.0)
-RANGES: Mapping[str, tuple[float, float]] = {  # of fractions; all others are finite
+RANGES: Mapping[str, tuple[float, float]] = {  # least and greatest value; all others are finite
     "gamma": (0.0, BELOW_1),
     "enough": (0.0, 1.0),
     "ent_coef": (0.0, sys.float_info.max),
@@ -72,9 +72,9 @@ def changed(settings: S, changes: Mapping[str, SettingValue]) -> S:
     """Settings with some changed, one after the other.
 
     Args:
-        settings: A dataclass of settings, with parts that are dataclasses of settings.
-        changes: Values by dotted name. None leaves a part out that may be left out; a setting of a
-            part that is left out puts it back, with its defaults.
+        settings: Settings, a dataclass with parts that are dataclasses of settings.
+        changes: New values by dotted name. None leaves a part out that may be left out; a setting
+            of a part that is left out puts it back, with its defaults.
 
     Returns:
         The settings.
@@ -94,14 +94,14 @@ def changed(settings: S, changes: Mapping[str, SettingValue]) -> S:
 
 
 def parse_changes(texts: Sequence[str], kind: type) -> dict[str, SettingValue]:
-    """Changes as the command line has them, ``exploration.rollouts=16``.
+    """Parse changes as the command line gives them, ``exploration.rollouts=16``.
 
     Commands that libraries record may have the names of an earlier version, which files still have
     (:mod:`slap_ros.learning.stored_keys`).
 
     Args:
-        texts: One per setting.
-        kind: The dataclass whose settings they are.
+        texts: Texts of the changes, one per setting.
+        kind: Dataclass of the settings.
 
     Returns:
         Values by dotted name, each of the type of its setting.
@@ -179,7 +179,7 @@ def _is_possible(name: str, kind: Any, value: object) -> bool:
 
 
 def _in_words(name: str, kind: Any) -> str:
-    """What a setting can be."""
+    """The values that a setting can have, in words."""
     if kind is NoneType:
         return f"{OFF}, or be set part by part: {name}...."
     if kind is bool:
@@ -192,7 +192,7 @@ def _in_words(name: str, kind: Any) -> str:
 
 
 def _parsed(text: str, kind: Any) -> SettingValue:
-    """A text as a value of a type; raises ``ValueError``."""
+    """The value of a type that a text stands for; raises ``ValueError``."""
     words: dict[str, SettingValue] = {}
     if kind is NoneType:
         words = {OFF: None}

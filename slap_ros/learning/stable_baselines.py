@@ -31,11 +31,11 @@ class StableBaselinesVecEnv(Sb3VecEnv):
         return self.normalisation(self.env.observations)
 
     def step_async(self, actions: Any) -> None:
-        """Take note of the actions."""
+        """Keep the actions for :meth:`step_wait`."""
         self._actions = actions
 
     def step_wait(self) -> Any:
-        """Act; see :meth:`slap_ros.learning.vec_env.VecEnv.step`."""
+        """Step the environments; see :meth:`slap_ros.learning.vec_env.VecEnv.step`."""
         step = self.env.step(self._actions)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         final = self.normalisation(step.final_observations)
@@ -47,22 +47,22 @@ class StableBaselinesVecEnv(Sb3VecEnv):
         return observations, step.rewards.astype(np.float32), step.dones, infos
 
     def count(self, step: VecEnvStep, i: int) -> None:
-        """Take note of an episode that ended, in environment ``i``; here nothing is."""
+        """Take note of an episode that ended, in environment ``i``; does nothing here."""
 
     def close(self) -> None:
-        """Whoever made the environments closes them."""
+        """Do nothing: the environments are closed where they were made."""
         return
 
     def get_attr(self, attr_name: str, _: Any = None) -> list[Any]:
-        """An attribute of each environment, as far as all have it in common."""
+        """The value of an attribute for each environment; None if it is not one of all of them."""
         return [getattr(self, attr_name, None)] * self.num_envs
 
     def set_attr(self, attr_name: str, *_: Any) -> None:
-        """There is nothing to be set."""
+        """Refuse to set an attribute: the environments have none."""
         raise NotImplementedError(f"the environments have no attribute {attr_name} to be set")
 
     def env_method(self, method_name: str, *_: Any, **__: Any) -> list[Any]:
-        """There is nothing to be called."""
+        """Refuse to call a method: the environments have none."""
         raise NotImplementedError(f"the environments have no method {method_name}")
 
     def env_is_wrapped(self, *_: Any) -> list[bool]:

@@ -37,8 +37,8 @@ class SubprocVecEnv:
         """Wait for the first observations.
 
         Args:
-            links: To each process.
-            shares: What each of them steps.
+            links: Connections to each process.
+            shares: Specifications of the environments that each process steps.
 
         Raises:
             ChildProcessError: One of the processes has ended.
@@ -72,8 +72,8 @@ def make_vec_env(specs: Sequence[VecEnvSpec], processes: int) -> Iterator[VecEnv
     """All parts as one vectorised environment; a single part runs in this process.
 
     Args:
-        specs: The parts, alike in horizon and actions.
-        processes: How many at most; they end with the context.
+        specs: Parts of the environment, alike in horizon and actions.
+        processes: Number of processes at most; they end with the context.
 
     Raises:
         ChildProcessError: One of the processes has ended before.
@@ -89,7 +89,7 @@ def make_vec_env(specs: Sequence[VecEnvSpec], processes: int) -> Iterator[VecEnv
 
 
 def _step_until_closed(link: Connection, specs: Sequence[VecEnvSpec]) -> None:
-    """What such a process does, until the other end of its link is closed."""
+    """Step environments in a process of their own, until the other end of the link is closed."""
     envs = [spec.make() for spec in specs]
     bounds = np.cumsum([env.num_envs for env in envs])[:-1]
     link.send(np.concatenate([env.observations for env in envs]))

@@ -10,7 +10,7 @@ from typing import Any
 from slap_ros.core import Domain
 from slap_ros.skills.domain_choice import DomainChoice
 
-TRAINING_SEED = 1_000_000  # added to the seed: training never sees the tasks of evaluation
+TRAINING_SEED = 1_000_000  # number added to the seed: training never sees the tasks of evaluation
 
 
 @dataclass(frozen=True)

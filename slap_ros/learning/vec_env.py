@@ -20,13 +20,13 @@ class VecEnvStep:
     """The outcome of one step in all of n environments; those whose episode ended were reset.
 
     Args:
-        observations: The present ones, after resets, shape (n, size).
-        rewards: Shape (n,).
+        observations: Observations after resets, shape (n, size).
+        rewards: Rewards of the step, shape (n,).
         success: Whether the target was reached, shape (n,).
-        failure: Whether it cannot be reached any more, shape (n,).
+        failure: Whether the target cannot be reached any more, shape (n,).
         truncated: Whether the horizon was reached first, shape (n,).
-        lengths: Steps of the episode so far, or until its end, shape (n,).
-        final_observations: The ones before resets, shape (n, size).
+        lengths: Number of steps of the episode so far, or until its end, shape (n,).
+        final_observations: Observations before resets, shape (n, size).
     """
 
     observations: NDArray[np.float32]
@@ -67,14 +67,14 @@ class VecEnv(VecEnvShape, Protocol):
 
     @property
     def observations(self) -> NDArray[np.float32]:
-        """The present ones, shape (n, size)."""
+        """The present observations, shape (n, size)."""
         ...
 
     def step(self, actions: Array) -> VecEnvStep:
         """Act in every environment and reset those whose episode ended.
 
         Args:
-            actions: The policy's, from -1 to 1, shape (n, action_map.size).
+            actions: Actions of the policy, from -1 to 1, shape (n, action_map.size).
 
         Returns:
             The outcome.

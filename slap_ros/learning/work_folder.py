@@ -14,7 +14,7 @@ from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, read_text, write_whole
 
 Result = TypeVar("Result")
-# What decoding raises where JSON is not what was written.
+# Errors that decoding raises where JSON is not what was written.
 DECODING_ERRORS = (OSError, AttributeError, LookupError, TypeError, ValueError, OverflowError)
 
 
@@ -23,8 +23,8 @@ def damaged(path: Path | str, what: Exception | str, advice: str) -> InvalidPara
 
     Args:
         path: Path of the file, maybe with the place in it.
-        what: What is wrong with it.
-        advice: What to do.
+        what: Description of what is wrong with the file, or the error that it caused.
+        advice: Advice for the reader of the message, in words.
     """
     what = repr(what) if isinstance(what, Exception) else what
     return InvalidParameterError(f"{path}: damaged: {what}; {advice}")
@@ -42,9 +42,9 @@ class WorkFolder:
         """A result from the folder, or computed and put there.
 
         Args:
-            name: Of the file, without its ending; may name a folder in front.
-            compute: Makes the result as JSON.
-            decode: Makes of the JSON what is returned.
+            name: Name of the result's file, without its ending; a folder may precede it.
+            compute: Function that computes the result, as JSON.
+            decode: Function that converts the JSON into the result.
 
         Returns:
             The result, decoded.
@@ -67,7 +67,7 @@ class WorkFolder:
         """Refuse a folder with another training; an empty one becomes this one's.
 
         Args:
-            settings: All that its results depend on, as JSON.
+            settings: Settings that the results depend on, as JSON.
 
         Raises:
             InvalidParameterError: The folder has another training, or is damaged.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where jobs run: local processes, or a Ray cluster."""
+"""The workers that run jobs: local processes, or a Ray cluster."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Workers(Protocol):
 
     @property
     def processes(self) -> int:
-        """How many cores a job may use where it is the only one."""
+        """The number of cores that a job may use where it is the only one."""
         ...
 
     def run(
@@ -35,8 +35,8 @@ class Workers(Protocol):
         """Run a function once per job.
 
         Args:
-            function: What to run; importable by its name, for other processes.
-            jobs: Its arguments.
+            function: Function to run; importable by its name, for other processes.
+            jobs: Arguments of the function, one tuple per job.
 
         Yields:
             The number and the result of each job, as they end.
@@ -132,7 +132,7 @@ def local_workers(count: int) -> Iterator[LocalWorkers]:
 
 @contextmanager
 def ray_workers(address: str) -> Iterator[RayWorkers]:
-    """The cluster at an address; ``local`` starts one on this machine.
+    """The workers of the cluster at an address; ``local`` starts one on this machine.
 
     Raises:
         InvalidParameterError: Ray is not installed, or nothing answers there.
@@ -160,10 +160,11 @@ def run_in_order(
     """Run a function once per job, wherever and in whichever order they end.
 
     Args:
-        workers: Where jobs run.
-        function: What to run; importable by its name, for other processes.
-        jobs: Its arguments.
-        on_progress: Called with the number of jobs done and of all: before the first, after each.
+        workers: Workers that run the jobs.
+        function: Function to run; importable by its name, for other processes.
+        jobs: Arguments of the function, one tuple per job.
+        on_progress: Function that is called with the number of jobs done and of all: before the
+            first, after each.
 
     Returns:
         The results in the order of the jobs.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""From a policy's actions to the robot's."""
+"""The map from a policy's actions to the robot's."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class ActionMap:
     """Scales actions from [-1, 1] to the range of the learned axes of a domain."""
 
     def __init__(self, domain: Domain, gripper: bool) -> None:
-        """``gripper``: whether the policy commands the gripper too, where there is one."""
+        """Map to a domain's axes; ``gripper`` says whether the policy commands a gripper too."""
         space = domain.learned_actions
         low, high = np.array(space.low), np.array(space.high)
         self._middle, self._half = (low + high) / 2, (high - low) / 2

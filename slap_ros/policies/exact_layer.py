@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from slap_ros.portable_math import RESOLUTION
 
 Values = NDArray[np.float64]
-MANTISSA_BITS = 53  # of a 64-bit float
-PARTS = 2  # of the weights: with the second, the sums are as good as those of 64-bit floats
+MANTISSA_BITS = 53  # bits of a 64-bit float's mantissa
+PARTS = 2  # parts of the weights: with two, the sums are as good as those of 64-bit floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class ExactLayer:
 
     Args:
         parts: Parts of the weights, the coarse one first, each of shape (in, out).
-        bias: Shape (out,).
+        bias: Bias of each output, shape (out,).
         bound: Largest magnitude that an output can have.
     """
 
@@ -46,8 +46,8 @@ class ExactLayer:
         """Split weights into parts whose sums are exact.
 
         Args:
-            weights: Shape (out, in), finite.
-            bias: Shape (out,), finite.
+            weights: Weights, shape (out, in), finite.
+            bias: Bias of each output, shape (out,), finite.
             input_bound: Largest magnitude of an input.
 
         Returns:
@@ -65,7 +65,7 @@ class ExactLayer:
         """Outputs of the layer, shape (n, out).
 
         Args:
-            inputs: Multiples of ``RESOLUTION`` within the bound, shape (n, in).
+            inputs: Inputs, multiples of ``RESOLUTION`` within the bound, shape (n, in).
         """
         coarse, fine = (inputs @ part for part in self.parts)
         outputs: Values = coarse + fine + self.bias
@@ -81,7 +81,7 @@ def _coarsened(weights: Values, bound: float) -> Values:
     """The nearest weights whose sums are exact.
 
     Args:
-        weights: Shape (in, out).
+        weights: Weights, shape (in, out).
         bound: Largest magnitude of a sum of products with inputs.
     """
     _, exponent = math.frexp(2.0 * bound)  # twice, as weights may be rounded up

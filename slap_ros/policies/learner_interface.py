@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a domain offers to learners, or that it offers nothing."""
+"""The learner's interface of a domain, or the error where there is none."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from slap_ros.errors import InvalidDomainError, InvalidParameterError
 
 
 def learner_interface(domain: Domain) -> LearnerInterface:
-    """What the domain offers to learners.
+    """The learner's interface of a domain.
 
     Raises:
-        InvalidDomainError: Nothing: ``Domain.learning`` is None.
+        InvalidDomainError: It has none: ``Domain.learning`` is None.
     """
     if domain.learning is None:
         raise InvalidDomainError(
@@ -25,7 +25,7 @@ def learner_interface(domain: Domain) -> LearnerInterface:
 
 
 def without(domain: Domain, term: str) -> Domain:
-    """The domain as learners have it without one of the terms that were made by hand.
+    """The domain with a learner's interface that lacks one of the terms made by hand.
 
     Raises:
         InvalidParameterError: There is no such term.

@@ -24,7 +24,7 @@ from slap_ros.files import parse_json, read_bytes, read_text
 from slap_ros.policies.mlp_policy import MlpPolicy, ObservationNormalisation, Weights
 
 ABOUT = "library.json"
-SKILL, SHORTCUT = "skill.json", "shortcut.json"  # what is known of a member, by its kind
+SKILL, SHORTCUT = "skill.json", "shortcut.json"  # files with facts about a member, by its kind
 KINDS = {SKILL: "skills", SHORTCUT: "shortcuts"}
 
 Member = TypeVar("Member")
@@ -36,8 +36,8 @@ def replace_folder(path: Path, write: Callable[[Path], None]) -> None:
     It is written beside and then moved, so that there always is a whole one.
 
     Args:
-        path: Of the folder.
-        write: Fills the folder whose path it is given, which is empty.
+        path: Path of the folder.
+        write: Function that fills the folder whose path it is given, which is empty.
     """
     path = path.resolve()
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -66,10 +66,10 @@ def write_library(
     """Write a library as a folder, in place of the one that may be there.
 
     Args:
-        path: Of the folder.
-        about: What it says of itself: format, domain, how it was made.
-        members: By the names of their folders.
-        save_member: Writes one into its folder.
+        path: Path of the folder.
+        about: Facts about the library: format, domain, how it was made.
+        members: Members of the library, by the names of their folders.
+        save_member: Function that writes a member into its folder.
     """
 
     def write(folder: Path) -> None:
@@ -81,7 +81,7 @@ def write_library(
 
 
 def policy_tensors(policy: MlpPolicy) -> dict[str, Weights]:
-    """The policy's numbers by name."""
+    """The arrays of a policy, by name."""
     tensors = {
         "normalisation.mean": policy.normalisation.mean,
         "normalisation.deviation": policy.normalisation.deviation,
@@ -104,9 +104,9 @@ def load_policy(path: Path, checksum: str, recorded_in: str) -> MlpPolicy:
     """Read a policy.
 
     Args:
-        path: Of its file.
-        checksum: That it must have.
-        recorded_in: Name of the file that says so.
+        path: Path of the policy's file.
+        checksum: Checksum that the file must have, a sha256 in hexadecimal digits.
+        recorded_in: Name of the file that has the checksum, for messages.
 
     Returns:
         The policy, its tensors of 32-bit floats that are finite and fit together.
@@ -155,14 +155,14 @@ def _check(path: Path, policy: MlpPolicy) -> None:
 
 
 def read_about(path: Path, member: str, version: int, maker: str, remedy: str) -> dict[str, Any]:
-    """What a library says of itself, in its :data:`ABOUT`.
+    """Read the facts about a library, which are in its :data:`ABOUT`.
 
     Args:
-        path: Of its folder.
-        member: :data:`SKILL` or :data:`SHORTCUT`: what it is to be a library of.
-        version: Of the format that is read.
-        maker: The command that makes such a library.
-        remedy: What to do about one of another format, in words.
+        path: Path of the library's folder.
+        member: Kind of the library's members: :data:`SKILL` or :data:`SHORTCUT`.
+        version: Version of the format that is read.
+        maker: Command that makes such a library.
+        remedy: Advice for a library of another format, in words.
 
     Returns:
         Format, domain and how it was made.
@@ -191,18 +191,19 @@ def read_about(path: Path, member: str, version: int, maker: str, remedy: str) -
 
 
 def record_of(about: Mapping[str, Any]) -> dict[str, Any]:
-    """How a library was made, without its format and domain."""
+    """The record of how a library was made, without its format and domain."""
     return {key: value for key, value in about.items() if key not in ("format", "domain")}
 
 
 def read_members(
     path: Path, load: Callable[[Path], Member]
 ) -> tuple[tuple[Member, ...], tuple[InvalidLibraryError, ...]]:
-    """What is in the folders of a library, in order of their names.
+    """Read the members of a library, in order of their folders' names.
 
     Args:
-        path: Of the library.
-        load: Reads a folder; what it refuses with an ``InvalidLibraryError`` is left out.
+        path: Path of the library's folder.
+        load: Function that reads a member's folder; a member that it refuses with an
+            ``InvalidLibraryError`` is left out.
 
     Returns:
         What could be read, and why the rest could not.

@@ -21,8 +21,8 @@ from slap_ros.policies.exact_layer import ExactLayer
 from slap_ros.portable_math import RESOLUTION, exp, on_grid, tanh
 
 LEAST_DEVIATION = 0.3  # features are of magnitude 1 or so
-# Observations at once. OpenBLAS spreads larger products over threads, which wait for one another
-# where cores are busy.
+# Largest number of observations at once. OpenBLAS spreads larger products over threads, which
+# wait for one another where cores are busy.
 MAX_BATCH = 64
 Weights = NDArray[np.float32]
 Values = NDArray[np.float64]
@@ -41,11 +41,11 @@ class SampledPolicy(Protocol):
     def sampler(
         self, rng: np.random.Generator, temperature: float | Weights = 1.0
     ) -> ActionSampler:
-        """What samples actions through one rollout.
+        """The function that samples actions through one rollout.
 
         Args:
-            rng: Draws the noise.
-            temperature: Scale of the noise, a number or of shape (n, 1); 0 is none.
+            rng: Generator that draws the noise.
+            temperature: Scale of the noise, a number or of shape (n, 1); 0 for no noise.
         """
         ...
 
@@ -62,13 +62,13 @@ ACTIVATIONS: Mapping[str, Callable[[Values], Values]] = {"tanh": tanh, "relu": _
 class ObservationNormalisation:
     """Makes each observed feature one of mean 0 and deviation 1 or so."""
 
-    mean: Weights  # (size,)
-    deviation: Weights  # (size,)
+    mean: Weights  # mean of each feature, shape (size,)
+    deviation: Weights  # standard deviation of each feature, shape (size,)
     clip: float = 10.0
 
     @classmethod
     def of(cls, observations: Weights) -> ObservationNormalisation:
-        """From observations, shape (n, size).
+        """The normalisation of observations, shape (n, size).
 
         The deviation is never below ``LEAST_DEVIATION``: a feature that hardly varies under random
         actions, like the speed of a tower that is not hit, would outweigh all others once it does.
@@ -88,10 +88,10 @@ class MlpPolicy:
     """A multi-layer perceptron, and Gaussian noise on its output.
 
     Args:
-        normalisation: Of observations.
-        layers: Weights, shape (out, in), and biases, shape (out,).
-        log_std: Of each action, shape (actions,).
-        activation: Between its layers, one of ``ACTIVATIONS``.
+        normalisation: Normalisation of observations.
+        layers: Layers of the network: weights, shape (out, in), and biases, shape (out,).
+        log_std: Logarithm of the noise's standard deviation for each action, shape (actions,).
+        activation: Activation between layers, one of ``ACTIVATIONS``.
         squashed: Whether the most likely actions are kept within (-1, 1) by tanh.
     """
 
@@ -130,9 +130,9 @@ class MlpPolicy:
         """Actions with Gaussian noise.
 
         Args:
-            observations: Shape (n, size).
-            rng: Draws the noise.
-            temperature: Scale of the noise, a number or of shape (n, 1); 0 is none.
+            observations: Observations, shape (n, size).
+            rng: Generator that draws the noise.
+            temperature: Scale of the noise, a number or of shape (n, 1); 0 for no noise.
 
         Returns:
             Shape (n, actions), not yet clipped to [-1, 1].

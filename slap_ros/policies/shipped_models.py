@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where the libraries are that ship with the package."""
+"""The folders of the libraries that ship with the package."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from pathlib import Path
 
 import slap_ros
 
-SHARE = Path("share") / "slap_ros"  # under an installation's prefix
+SHARE = Path("share") / "slap_ros"  # folder of shared files under an installation's prefix
 
 
 def model_roots() -> Iterator[Path]:
-    """Where ``models`` may be: beside the package in a checkout, else installed."""
+    """The folders ``models`` that may exist: beside the package in a checkout, else installed."""
     yield Path(slap_ros.__file__).resolve().parent.parent / "models"
     overlays = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
     for prefix in [*filter(None, overlays), sys.prefix]:

@@ -34,7 +34,7 @@ from slap_ros.shortcuts.settings import ExplorationSettings
 from slap_ros.shortcuts.signature import Change, Signature, context_of
 
 OperatorPath = tuple[str, ...]  # operators by which a shortcut's source was reached
-ABSORBED_MOTION = 0.5  # of a motion's steps that remain where it is part of a shortcut
+ABSORBED_MOTION = 0.5  # share of a motion's steps that remain where it is part of a shortcut
 UNBATCHED_WORLDS = 4  # worlds where a domain's cannot be stepped together
 KEEPS = 3  # times that a gripper stays as it is, for each that it closes and each that it opens
 
@@ -44,13 +44,13 @@ class ShortcutCandidate:
     """A pair of abstract states, up to objects, that random rollouts joined.
 
     Args:
-        signature: The lifted change from the one to the other.
+        signature: Lifted change from the first abstract state to the second.
         operator_path: Names of the operators by which the source was reached.
-        hits: Rollouts that reached the target.
-        steps: Environment steps of the shortest of them, and of the options before it that the
-            shortcut would replace.
-        plan_steps: Environment steps of the plan without it.
-        expected_saving: Environment steps by which it is expected to shorten the plan.
+        hits: Number of rollouts that reached the target.
+        steps: Environment steps of the shortest of these rollouts, and of the options before it
+            that the shortcut would replace.
+        plan_steps: Environment steps of the plan without the shortcut.
+        expected_saving: Environment steps by which the shortcut is expected to shorten the plan.
     """
 
     signature: Signature
@@ -85,9 +85,9 @@ class ExplorationResult:
     """The outcome of exploring one task.
 
     Args:
-        candidates: What was not pruned and is expected to shorten the plan.
-        pairs: How many pairs of abstract states no option joins: the paper's candidates.
-        environment_steps: Simulated while exploring.
+        candidates: Candidates that were not pruned and are expected to shorten the plan.
+        pairs: Number of pairs of abstract states that no option joins: the paper's candidates.
+        environment_steps: Environment steps simulated while exploring.
         operator_steps: Mean environment steps of each operator, by name.
     """
 
@@ -135,8 +135,9 @@ class Explorer:
             problem: Operators and model over the task's objects.
             task: Task to explore.
             plan: Plan without shortcuts for the task.
-            settings: Number of rollouts, and of nodes that they begin in.
-            rng: Draws the random actions.
+            settings: Number of rollouts, number of nodes that they begin in, and other settings of
+                exploration.
+            rng: Generator that draws the random actions.
         """
         self.task = task
         self._domain, self._problem, self._plan = domain, problem, plan
@@ -170,8 +171,9 @@ class Explorer:
             domain: Domain of the task.
             seed: Seed of the task.
             index: Index of the task.
-            settings: Number of rollouts, and of nodes that they begin in.
-            rng: Draws the random actions.
+            settings: Number of rollouts, number of nodes that they begin in, and other settings of
+                exploration.
+            rng: Generator that draws the random actions.
 
         Raises:
             UnsolvableError: The task has no plan.
@@ -206,7 +208,7 @@ class Explorer:
         )
 
     def _sources(self, vertex: Vertex) -> Iterator[Vertex]:
-        """Where a shortcut may begin that does what rollouts from a vertex did.
+        """Yield the vertices where a shortcut may begin that does what rollouts from a vertex did.
 
         At the vertex itself, or before the options that led there as far as they change nothing
         in what is held: a shortcut may well learn to move there by itself.
@@ -222,14 +224,15 @@ class Explorer:
     def _candidate(
         self, source: Vertex, vertex: Vertex, j: int, lengths: list[int], to_go: float
     ) -> ShortcutCandidate:
-        """What rollouts from a vertex reached, as a shortcut that begins at ``source``.
+        """The candidate: a shortcut from ``source`` to what rollouts from a vertex reached.
 
         Args:
-            source: The vertex itself, or one before it; see :meth:`_sources`.
-            vertex: From where rollouts were made.
-            j: The node that they reached.
-            lengths: Environment steps of each of them.
-            to_go: Environment steps from that node to a goal, as estimated.
+            source: Vertex in which the shortcut begins: ``vertex`` or one before it; see
+                :meth:`_sources`.
+            vertex: Vertex from which the rollouts were made.
+            j: Index of the node that the rollouts reached.
+            lengths: Environment steps of each rollout until it reached the node.
+            to_go: Estimated environment steps from the node to a goal.
 
         Returns:
             The candidate, whose expected saving may be negative.
@@ -265,7 +268,7 @@ class Explorer:
         return vertices, {name: float(np.mean(steps)) for name, steps in costs.items()}
 
     def _cheapest_first(self) -> Iterator[Vertex]:
-        """Each node once, in the state in which it is reached first (Dijkstra)."""
+        """Yield each node once, in the state in which it is reached first (Dijkstra)."""
         forward, goals = self.graph.forward_edges(), set(self.graph.goal_nodes)
         tie = count()
         queue = [(0, next(tie), Vertex(0, self.task.initial_state, 0))]
@@ -282,7 +285,7 @@ class Explorer:
                     heapq.heappush(queue, (reached.g, next(tie), reached))
 
     def _follow(self, vertex: Vertex, edge: Edge) -> Vertex | None:
-        """Where an edge leads to from a vertex; None where it cannot be executed."""
+        """The vertex that an edge leads to from another; None where it cannot be executed."""
         target = edge.option.target(self.graph.nodes[edge.target])
         rollout = self._problem.model.roll_out(edge.option, vertex.state, target)
         self._steps += rollout.steps
@@ -309,7 +312,7 @@ class Explorer:
         return reached
 
     def _roll_out_batch(self, state: State, index: Mapping[int, int]) -> list[dict[int, int]]:
-        """In every world: the first step at which each node was reached, with all at rest."""
+        """The first step at which each node was reached, with all at rest, in every world."""
         learner, to_action = learner_interface(self._domain), ActionMap(self._domain, gripper=True)
         worlds = len(self._grips)
         for world in range(worlds):
@@ -334,7 +337,7 @@ class Explorer:
         return first
 
     def _random_actions(self, to_action: ActionMap) -> NDArray[np.float64]:
-        """One for every world, shape (worlds, axes); in every second one the gripper acts too."""
+        """Random actions, shape (worlds, axes); in every second world the gripper acts too."""
         actions = to_action(self._rng.uniform(-1.0, 1.0, (len(self._grips), to_action.size)))
         space = self._domain.learned_actions
         if space.gripper is not None:

@@ -27,11 +27,11 @@ class GroundShortcut:
     """A shortcut for given objects: the skill behind a shortcut edge.
 
     Args:
-        shortcut: What was learned.
-        change: What it changes in this task.
-        attempt: Which of its successful rollouts it follows, the shortest first.
-        encoder: Of that change.
-        rollouts: Where it is tried out.
+        shortcut: Learned shortcut that is applied to the objects.
+        change: Change of atoms that the shortcut makes in this task.
+        attempt: Number of the successful rollout that it follows, from 0, the shortest first.
+        encoder: Encoder of observations for that change.
+        rollouts: Rollouts in the model, in which the shortcut is tried out.
     """
 
     shortcut: Shortcut
@@ -59,16 +59,16 @@ class GroundShortcut:
         return max(1, self.shortcut.shortest // 2)
 
     def lower_bound(self, state: State, objects: tuple[Object, ...]) -> int:
-        """The same from every state; see :attr:`least_steps`."""
+        """A number of environment steps, the same from every state; see :attr:`least_steps`."""
         del state, objects
         return self.least_steps
 
     def start(self, state: State, objects: tuple[Object, ...]) -> Policy:
-        """Try it out, and follow a successful rollout.
+        """Try the shortcut out, and follow a successful rollout.
 
         Args:
-            state: Where it begins.
-            objects: What it is applied to, for the message.
+            state: State in which the shortcut begins.
+            objects: Objects that the shortcut is applied to, for the message.
 
         Returns:
             The policy that follows the rollout.

@@ -34,10 +34,10 @@ class GroundedShortcuts:
         """Ground shortcuts over the objects of a task.
 
         Args:
-            domain: For which they were learned.
-            shortcuts: What was learned.
-            initial: A state with the objects of the task.
-            sampling: How shortcuts are tried out in the model.
+            domain: Domain for which the shortcuts were learned.
+            shortcuts: Learned shortcuts.
+            initial: State with the objects of the task.
+            sampling: Settings of how shortcuts are tried out in the model.
         """
         self.shortcuts = tuple(shortcuts)
         self._domain = domain
@@ -73,10 +73,10 @@ class GroundedShortcuts:
         """A shortcut from an abstract state to a target.
 
         Args:
-            name: Of the shortcut.
-            source: Abstract state in which it begins, a mask.
-            target: Where it shall end.
-            attempt: Which of its successful rollouts to follow, the shortest first.
+            name: Name of the shortcut.
+            source: Abstract state in which the shortcut begins, a mask.
+            target: Target that the shortcut shall reach.
+            attempt: Number of the successful rollout to follow, from 0, the shortest first.
 
         Returns:
             The option; None where there is no such shortcut, or it does not match the change.

@@ -41,9 +41,9 @@ def explore(
     """Explore one task.
 
     Args:
-        distribution: Whose task.
-        index: Of the task.
-        settings: How to explore.
+        distribution: Distribution from which the task is drawn.
+        index: Index of the task.
+        settings: Settings of exploration.
 
     Returns:
         An :class:`~slap_ros.shortcuts.explore.ExplorationResult` as JSON, with ``cpu_s``.
@@ -63,12 +63,12 @@ def explore(
 def try_to_explore(
     distribution: TaskDistribution, index: int, settings: ExplorationSettings
 ) -> dict[str, Any] | str:
-    """The same, or why the task has no plan, in words.
+    """What :func:`explore` returns, or why the task has no plan, in words.
 
     Args:
-        distribution: Whose task.
-        index: Of the task.
-        settings: How to explore.
+        distribution: Distribution from which the task is drawn.
+        index: Index of the task.
+        settings: Settings of exploration.
     """
     try:
         return explore(distribution, index, settings)
@@ -83,12 +83,12 @@ def start(
     operator_path: OperatorPath,
     operator_steps: Mapping[str, float],
 ) -> dict[str, Any] | None:
-    """A start in one task; see :func:`~slap_ros.shortcuts.starts.find_start`.
+    """The start of a shortcut in one task; see :func:`~slap_ros.shortcuts.starts.find_start`.
 
     Args:
-        distribution: Whose task.
-        index: Of the task among those that starts are collected from.
-        signature: Of the shortcut.
+        distribution: Distribution from which the task is drawn.
+        index: Index of the task among those that starts are collected from, from 0.
+        signature: Signature of the shortcut.
         operator_path: Names of the operators that lead to the start.
         operator_steps: Mean environment steps of each operator, by name.
 
@@ -112,10 +112,10 @@ def plan_length(
     """Plan for one validation task.
 
     Args:
-        distribution: Whose task.
-        index: Of the task among those of validation.
-        shortcuts: What may be used besides the given options.
-        sampling: How they are tried out.
+        distribution: Distribution from which the task is drawn.
+        index: Index of the task among the validation tasks, from 0.
+        shortcuts: Shortcuts that may be used besides the given options.
+        sampling: Settings of how shortcuts are tried out in the model.
 
     Returns:
         Environment steps of the plan in the model; or why there is none, in words.
@@ -137,12 +137,12 @@ class LearningAttempt:
     """One attempt to learn a shortcut, as data that other processes can be sent.
 
     Args:
-        distribution: Whose tasks the starts are from.
-        signature: Of the shortcut.
+        distribution: Distribution of the tasks that the starts are from.
+        signature: Signature of the shortcut.
         starts: Initial states of episodes.
-        settings: All hyper-parameters.
-        folder: Where the shortcut, checkpoints and progress are kept.
-        number: Counted from 0; each has other initial weights and noise.
+        settings: All hyper-parameters of the training.
+        folder: Folder of the shortcut, its checkpoints and its progress.
+        number: Number of the attempt, counted from 0; each has other initial weights and noise.
     """
 
     distribution: TaskDistribution
@@ -154,19 +154,19 @@ class LearningAttempt:
 
     @property
     def work(self) -> ShortcutWorkFolder:
-        """Its folder, which is made where there is none."""
+        """The folder of the attempt, which is made where there is none."""
         return ShortcutWorkFolder(Path(self.folder))
 
     @property
     def seed(self) -> int:
-        """Of weights and noise; the first attempt has that of the training."""
+        """Seed of weights and noise; the first attempt has that of the training."""
         seed = self.distribution.seed
         if not self.number:
             return seed
         return int(np.random.SeedSequence([seed, self.number]).generate_state(1)[0])
 
     def recorder(self) -> ProgressRecorder:
-        """Writes down how it goes."""
+        """The recorder of the attempt's progress."""
         return ProgressRecorder(self.work, self.signature, self.settings.total_steps)
 
     def parts(self, stage: int) -> list[ShortcutEnvSpec]:
@@ -191,8 +191,8 @@ def learn_first_stage(attempt: LearningAttempt, processes: int) -> Progress:
     """Train a shortcut in the first stage alone; :func:`learn` continues from there.
 
     Args:
-        attempt: What is learned.
-        processes: How many may step environments.
+        attempt: Attempt to learn a shortcut.
+        processes: Number of processes that may step environments.
 
     Returns:
         The last figures of the stage.
@@ -212,8 +212,8 @@ def learn(attempt: LearningAttempt, processes: int) -> Shortcut:
     of processes makes no difference to what is learned.
 
     Args:
-        attempt: What is learned.
-        processes: How many may step environments.
+        attempt: Attempt to learn a shortcut.
+        processes: Number of processes that may step environments.
 
     Returns:
         The shortcut.
@@ -237,7 +237,7 @@ def learn(attempt: LearningAttempt, processes: int) -> Shortcut:
 def _learn_stages(
     attempt: LearningAttempt, stages: int, recorder: ProgressRecorder, processes: int
 ) -> Learner:
-    """Each stage begins with the weights of the one before it."""
+    """Learn some stages, each beginning with the weights of the one before it."""
     from slap_ros.shortcuts.ppo import Learner, normalisation_of  # torch, here alone
 
     work = attempt.work

@@ -68,10 +68,10 @@ class _Atoms:
     predicate: Predicate
     wanted: bool
     columns: tuple[Column, ...]
-    tolerance: Array  # of each
+    tolerance: Array  # success tolerance of each atom, shape (atoms,)
 
     def deficits(self, state: State, length: float) -> Array:
-        """0 where achieved, towards 1 the further away, shape (n, atoms)."""
+        """Deficits of the atoms, 0 where achieved, towards 1 the further away, shape (n, atoms)."""
         if self.predicate.margin is None:
             holds = self.predicate.classifier(state, *self.columns)
             return np.where(holds == self.wanted, 0.0, 1.0)
@@ -83,15 +83,15 @@ class _Atoms:
 
 @dataclass(frozen=True)
 class Encoding:
-    """What there is to know of each of n states.
+    """Observations, potential and outcome of each of n states.
 
     Args:
-        observations: For the policy, shape (n, size); of the same size for all changes that the
-            signature matches.
-        potential: About minus the steps to go, shape (n,), for shaping rewards. Four terms: the
-            deficits of the changed atoms, through the metric behind each predicate; the way to
-            the lowest object with a deficit, as it carries the others; where everything is in
-            place but still moves, how close the hand is; and the joint limit penalty.
+        observations: Observations for the policy, shape (n, size); of the same size for all changes
+            that the signature matches.
+        potential: Potential for shaping rewards, about minus the steps to go, shape (n,). Four
+            terms: the deficits of the changed atoms, through the metric behind each predicate; the
+            way to the lowest object with a deficit, as it carries the others; where everything is
+            in place but still moves, how close the hand is; and the joint limit penalty.
         achieved: Whether all changed atoms are achieved, past their thresholds by the success
             tolerance, and nothing moves, shape (n,).
         failure: Whether something happened that cannot be undone, shape (n,): the domain says
@@ -113,10 +113,10 @@ class ObservationEncoder:
         """Work out which atoms are about which objects.
 
         Args:
-            domain: Whose learner's interface is used.
-            space: The task's atoms.
-            signature: Of the shortcut: its slots.
-            change: What the shortcut changes in this task.
+            domain: Domain whose learner's interface is used.
+            space: Atoms of the task.
+            signature: Signature of the shortcut, whose slots the observation has.
+            change: Change of atoms that the shortcut makes in this task.
 
         Raises:
             InvalidDomainError: The domain has no learner's interface.
@@ -161,7 +161,7 @@ class ObservationEncoder:
         return incidence, placing, releasing
 
     def _of_kinds(self) -> list[tuple[int, Column, NDArray[np.intp]]]:
-        """For each kind: slots, objects, and their numbers."""
+        """The slots, the objects and their numbers, for each kind."""
         kind: dict[Kind, list[Object]] = {name: [] for name in self.signature.slots}
         for obj in self.objects:
             kind[kinds(self.space)[obj]].append(obj)
@@ -197,9 +197,9 @@ class ObservationEncoder:
         """Whether each state is one in which the shortcut ends.
 
         Args:
-            state: A batch of n states.
-            encoding: Of them.
-            targets: The abstract state that each shall reach, n masks.
+            state: Batch of n states.
+            encoding: Encoding of these states.
+            targets: Abstract state that each state shall reach, n masks.
 
         Returns:
             Shape (n,).
@@ -215,7 +215,7 @@ class ObservationEncoder:
         return bool(self.encode(state.alone()).achieved[0])
 
     def _distances(self, state: State, hand: Array) -> Array:
-        """From the hand to each object, m, shape (n, objects); infinite to a fixed place."""
+        """Distances to each object from the hand, m, shape (n, objects); infinite to a place."""
         distances = np.full((len(state.data), len(self.objects)), np.inf)
         for _, column, numbers in self._kinds:
             distances[:, numbers] = self.interface.distance(state, hand, column)
@@ -243,7 +243,7 @@ class ObservationEncoder:
         return own
 
     def _potential(self, deficits: Array, object_deficits: Array, distances: Array) -> Array:
-        """Objects one after the other, in their order; each that is done is a step forward."""
+        """The potential: one object after the other, in order; each in place is a step forward."""
         # The grasp comes last: a release counts for nothing before everything is in place.
         due = np.where(self._placing, deficits, 0.0).max(axis=-1, keepdims=True)
         deficits = np.where(self._placing, deficits, np.maximum(deficits, due))
@@ -273,7 +273,7 @@ class ObservationEncoder:
 
 
 def _robot_columns(domain: Domain, space: AtomSpace) -> NDArray[np.intp]:
-    """Where a state has the features of the robot itself."""
+    """The columns of a state that have the features of the robot itself."""
     layout = space.layout
     return np.array(
         [
@@ -287,7 +287,10 @@ def _robot_columns(domain: Domain, space: AtomSpace) -> NDArray[np.intp]:
 
 
 def _into_slots(features: Array, slots: int) -> Array:
-    """Shape (n, objects, f) into (n, slots, f): zeros where absent; of too many, those not done."""
+    """Put features, shape (n, objects, f), into slots, shape (n, slots, f).
+
+    Empty slots are zeros. Of too many objects, those that are done are left out first.
+    """
     count = features.shape[1]
     if count <= slots:
         padded = np.zeros((len(features), slots, features.shape[2]))  # np.pad is 40 times slower

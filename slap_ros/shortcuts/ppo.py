@@ -75,12 +75,12 @@ class _ProgressCallback(BaseCallback):
 
 
 def normalisation_of(env: VecEnv, rng: np.random.Generator, steps: int) -> ObservationNormalisation:
-    """Mean and deviation of what random actions lead to.
+    """Mean and deviation of the observations that random actions lead to.
 
     Args:
-        env: Is stepped.
-        rng: Draws the actions, each of which is repeated for a while.
-        steps: In each environment.
+        env: Environments that random actions step.
+        rng: Generator that draws the actions, each of which is repeated for a while.
+        steps: Number of steps in each environment.
 
     Returns:
         The normalisation.
@@ -102,10 +102,10 @@ class Learner:
         """Begin with random weights.
 
         Args:
-            env: Of the shortcut.
-            normalisation: Of observations.
+            env: Environments of the shortcut.
+            normalisation: Normalisation of observations.
             settings: PPO's hyper-parameters.
-            seed: Of weights and noise.
+            seed: Seed of weights and noise.
         """
         torch.set_num_threads(1)  # tiny networks: more threads only wait for one another
         self.settings = settings
@@ -137,8 +137,9 @@ class Learner:
         """Train until the steps are used up or ``report`` answers no.
 
         Args:
-            report: Called after each rollout.
-            logs: Folder for TensorBoard.
+            report: Function that is called after each rollout; it returns whether learning
+                continues.
+            logs: Folder for TensorBoard's files; None for no files.
         """
         if logs is not None:
             self._ppo.set_logger(configure(str(logs), ["tensorboard"]))
@@ -195,7 +196,7 @@ class Learner:
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:
-    """What :meth:`Learner.save` wrote.
+    """Read what :meth:`Learner.save` wrote.
 
     Raises:
         InvalidParameterError: It is damaged.
@@ -204,7 +205,7 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
 
 
 def _restored(saved: Mapping[str, Any]) -> dict[str, Any]:
-    """What :meth:`Learner.save` wrote."""
+    """The checkpoint that :meth:`Learner.save` wrote, with values of the right types."""
     return {
         "steps": int(saved["steps"]),
         "shortest": int(saved["shortest"]),

@@ -14,12 +14,12 @@ class PpoSettings:
     """PPO's hyper-parameters, under the names of stable-baselines3."""
 
     n_envs: int = 16
-    parts: int = 1  # that the environments are divided into, for processes of their own
-    n_steps: int = 64  # in each environment between updates
+    parts: int = 1  # parts that the environments are divided into, for processes of their own
+    n_steps: int = 64  # steps in each environment between updates
     batch_size: int = 256
     n_epochs: int = 10
     learning_rate: float = 1e-3
-    anneal: bool = True  # the learning rate, linearly, to a twentieth
+    anneal: bool = True  # whether the learning rate falls, linearly, to a twentieth
     gamma: float = 0.97
     gae_lambda: float = 0.9
     ent_coef: float = 0.0

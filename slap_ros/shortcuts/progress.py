@@ -22,8 +22,8 @@ from slap_ros.shortcuts.shortcut_library import save_shortcut
 from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 
-CHECKPOINT_S = 30.0  # between checkpoints
-SNAPSHOTS = 12  # of a shortcut while it is learned, about
+CHECKPOINT_S = 30.0  # time between checkpoints
+SNAPSHOTS = 12  # approximate number of snapshots of a shortcut while it is learned
 
 
 @dataclass(frozen=True)
@@ -98,8 +98,8 @@ class ProgressRecorder:
         """Go on from what is in a folder.
 
         Args:
-            folder: Where to write.
-            signature: Of the shortcut that is learned.
+            folder: Folder to write to.
+            signature: Signature of the shortcut that is learned.
             total_steps: Environment steps of all stages.
         """
         self._folder = folder
@@ -111,7 +111,7 @@ class ProgressRecorder:
         self._latest = latest(folder)
 
     def of(self, stage: int, learner: SavableLearner) -> Callable[[Progress], bool]:
-        """What is called after each rollout of a stage; it answers yes: learning continues."""
+        """The function to call after each rollout of a stage; it returns that learning goes on."""
 
         def report(progress: Progress) -> bool:
             self._latest[stage] = progress
@@ -140,7 +140,7 @@ class ProgressRecorder:
         return sum(progress.steps for progress in self._latest.values())
 
     def record(self) -> dict[str, str | int | float]:
-        """Figures by name; success and length are those of the last episodes, with noise."""
+        """The figures by name; success and length are those of the last episodes, with noise."""
         last = self._latest[max(self._latest)]
         return {
             "environment_steps": self._steps,
@@ -152,5 +152,5 @@ class ProgressRecorder:
 
 
 def _cpu_s() -> float:
-    """Of this process, and of those that it started and that have ended."""
+    """Processor time of this process, and of those that it started and that have ended, s."""
     return sum(os.times()[:4])

@@ -12,20 +12,20 @@ from slap_ros.relational.state import Array
 
 @dataclass(frozen=True)
 class Rewards:
-    """What a step is worth, in environment steps; the sum is multiplied by ``scale``.
+    """The rewards of a step, in environment steps; the sum is multiplied by ``scale``.
 
-    The paper's -1 per step, for ever, adds up to -1 / (1 - discount). Our default has the same
+    The paper's -1 per step, for ever, adds up to -1 / (1 - gamma). Our default has the same
     optimum, but 0 for standing still and that much more for success: a critic that begins at 0
     is then right about doing nothing, and the policy does not learn to avoid the first contact.
 
     Args:
-        step: Of every step.
-        success: Of the step that reaches the target.
-        failure: Of the step after which the target cannot be reached any more, on top of ``step``
-            for ever.
+        step: Reward of every step.
+        success: Reward of the step that reaches the target.
+        failure: Reward of the step after which the target cannot be reached any more, on top of
+            ``step`` for ever.
         shaping: Weight of the difference of the potential.
-        gamma: Per step; here, for what ``step`` comes to for ever.
-        scale: Of the whole, which gives returns a magnitude that critics learn well.
+        gamma: Discount per step; here, for what ``step`` adds up to for ever.
+        scale: Factor of all rewards, which gives returns a magnitude that critics learn well.
     """
 
     step: float = 0.0
@@ -46,10 +46,10 @@ class Rewards:
         A failure ends the episode, so it must cost more than all the steps that it saves.
 
         Args:
-            gain: By how much each step raised the potential, shape (n,).
-            success: Whether it reached the target, shape (n,).
-            failure: Whether the target cannot be reached any more, shape (n,); a success counts
-                as one even then.
+            gain: Increase of the potential in each step, shape (n,).
+            success: Whether each step reached the target, shape (n,).
+            failure: Whether the target cannot be reached any more after each step, shape (n,); a
+                success counts as one even then.
 
         Returns:
             Shape (n,).

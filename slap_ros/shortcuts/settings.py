@@ -22,13 +22,14 @@ class ExplorationSettings:
     """Collecting states and pruning candidates (SLAP §4.2, B.1).
 
     Args:
-        tasks: Tasks that are explored.
-        rollouts: Random rollouts from each recorded state (N_rollout).
-        length: Environment steps of each at most (T_rollout).
-        hits: A pair of abstract states reached less often is pruned (K_rollout).
+        tasks: Number of tasks that are explored.
+        rollouts: Number of random rollouts from each recorded state (N_rollout).
+        length: Environment steps of each rollout at most (T_rollout).
+        hits: Number of rollouts that must reach a pair of abstract states, which else is pruned
+            (K_rollout).
         action_repeat: Environment steps for which a random action is repeated: 1 jitters on the
             spot.
-        nodes: Abstract states explored in a task, the cheapest to reach first.
+        nodes: Number of abstract states explored in a task, the cheapest to reach first.
     """
 
     tasks: int = 4
@@ -69,21 +70,24 @@ class TrainingSettings:
     """All hyper-parameters of a training.
 
     Args:
-        exploration: How candidates are found.
-        ppo: How a shortcut is learned.
-        polish: How it is then made shorter, with less noise; None: not at all.
-        rewards: What it is learned from.
-        polish_rewards: What it is made shorter from; None: the same. A failure may cost more
-            then, since those that noise still causes can be avoided.
+        exploration: Settings of how candidates are found.
+        ppo: Settings of PPO in the first stage, which learns a shortcut.
+        polish: Settings of PPO in the second stage, which makes the shortcut shorter, with less
+            noise; None for no such stage.
+        rewards: Rewards that the shortcut is learned from.
+        polish_rewards: Rewards of the second stage; None for the same as in the first. A failure
+            may cost more then, since those that noise still causes can be avoided.
         horizon: Environment steps after which an episode is truncated.
-        starts: Tasks in which an initial state is looked for.
-        shortcuts: How many are trained at most, those with the largest expected saving first.
+        starts: Number of tasks in which an initial state is looked for.
+        shortcuts: Number of shortcuts that are trained at most, those with the largest expected
+            saving first.
         least_saving: Share of a plan's length that a shortcut must be expected to save, and then
             save on validation tasks, to be kept.
-        validation: Validation tasks.
-        sampling: How shortcuts are tried out when planning.
-        attempts: How often the first stage is learned at most, each time with other random
-            numbers, until ``ENOUGH_SUCCESS`` is reached. The most successful attempt is polished.
+        validation: Number of validation tasks.
+        sampling: Settings of how shortcuts are tried out when planning.
+        attempts: Number of times that the first stage is learned at most, each time with other
+            random numbers, until ``ENOUGH_SUCCESS`` is reached. The most successful attempt is
+            polished.
         random_goals: Share of the tasks for exploration and validation that have another goal than
             their own.
     """
@@ -170,7 +174,7 @@ _PAPER = replace(
     horizon=100,
     sampling=PAPER,
 )
-SEVERAL = "ours_several"  # shortcuts, that serve different tasks and goals
+SEVERAL = "ours_several"  # settings for several shortcuts, which serve different tasks and goals
 _SEVERAL: Mapping[str, SettingValue] = {
     "exploration.tasks": 24,
     "random_goals": 0.5,
@@ -189,8 +193,10 @@ def training_settings(name: str, domain: Domain) -> TrainingSettings:
     """Settings by name, as they are in a domain.
 
     Args:
-        name: One of ``GENERAL``, or of the domain's own, which differ from the general ``ours``.
-        domain: Its ``Learning.settings`` say what differs. For ``SEVERAL``, its ``ours`` do too.
+        name: Name of the settings: one of ``GENERAL``, or of the domain's own, which differ from
+            the general ``ours``.
+        domain: Domain whose ``Learning.settings`` give the differences. For ``SEVERAL``, its
+            ``ours`` do too.
 
     Raises:
         InvalidParameterError: There are none of that name.

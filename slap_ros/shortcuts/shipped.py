@@ -35,10 +35,10 @@ def chosen_library(
     """Load the library that was chosen.
 
     Args:
-        choice: A library's folder; ``none``; or nothing, for the shipped one, if there is one and
-            the planner can use it.
-        domain: For which it was learned.
-        planner: Its name.
+        choice: Folder of a library; or ``none``; or nothing, for the shipped library, if there is
+            one and the planner can use it.
+        domain: Domain for which the library was learned.
+        planner: Name of the planner.
 
     Returns:
         The library; None to plan without shortcuts.

@@ -22,18 +22,18 @@ HOLD = 4  # steps that a random action is kept, as in exploration: noise of sing
 
 @dataclass(frozen=True)
 class RandomActions:
-    """A policy that knows nothing.
+    """A policy of random actions, which has learned nothing.
 
     Args:
-        actions: How many there are.
-        hold: Steps for which an action is kept.
+        actions: Number of the policy's actions.
+        hold: Number of steps for which a random action is kept.
     """
 
     actions: int
     hold: int = HOLD
 
     def mean(self, observations: Weights) -> Weights:
-        """No motion at all, shape (n, actions)."""
+        """Actions that do not move the robot, shape (n, actions)."""
         return np.zeros((len(observations), self.actions), dtype=np.float32)
 
     def sampler(
@@ -41,7 +41,7 @@ class RandomActions:
         rng: np.random.Generator,
         temperature: float | Weights = 1.0,  # noqa: ARG002 -- uniform actions have no scale
     ) -> ActionSampler:
-        """As :class:`~slap_ros.policies.mlp_policy.SampledPolicy` has it: uniform, then held."""
+        """See :class:`~slap_ros.policies.mlp_policy.SampledPolicy`; random actions are held."""
         held = np.zeros((0, self.actions), dtype=np.float32)
 
         def sample(step: int, observations: Weights) -> Weights:
@@ -58,13 +58,13 @@ def unlearned(shortcut: Shortcut, domain: Domain) -> Shortcut:
     """A shortcut between the same abstract states, without its policy and what training knew.
 
     Args:
-        shortcut: As it was learned.
-        domain: In which it is used.
+        shortcut: Learned shortcut.
+        domain: Domain in which the shortcut is used.
     """
     actions = make_action_map(domain, shortcut.signature).size
     return Shortcut(shortcut.signature, RandomActions(actions), shortest=1)
 
 
 def exhaustive(sampling: Sampling) -> Sampling:
-    """The same number of rollouts, all of which are made whether or not the first succeed."""
+    """Sampling with the same number of rollouts, all made whether or not the first succeed."""
     return replace(sampling, patience=sampling.samples * sampling.batch + 1)

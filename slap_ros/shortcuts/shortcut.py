@@ -13,14 +13,14 @@ from slap_ros.shortcuts.signature import Signature
 
 @dataclass(frozen=True)
 class Shortcut:
-    """What was learned, for any objects.
+    """A learned shortcut, for any objects.
 
     Args:
-        signature: The lifted change that it makes.
-        policy: What it does.
+        signature: Lifted change that the shortcut makes.
+        policy: Policy that makes the change.
         shortest: Environment steps of the shortest success in training; half of them is the
             lower bound that search assumes.
-        record: How it was trained: figures by name.
+        record: Record of the training: figures by name.
     """
 
     signature: Signature
@@ -36,19 +36,20 @@ class Shortcut:
 
 @dataclass(frozen=True)
 class Sampling:
-    """How a shortcut is tried out when planning; ``PAPER`` is what the paper does.
+    """Settings of how a shortcut is tried out when planning; ``PAPER`` is what the paper does.
 
     Args:
-        samples: Rollouts, the first without noise.
-        batch: Rollouts in place of each further one, all at once, where a domain's worlds can be
-            stepped together.
-        alternatives: Successful rollouts kept besides the one without noise: each ends in a state
-            of its own, and the next option may take less from where a longer one ends.
-        refinements: Rounds of random variations of the shortest, as in the last iterations of a
-            cross-entropy search.
-        temperature: Scale of the noise, against training's: risks cost nothing in a model.
+        samples: Number of rollouts, the first without noise.
+        batch: Number of rollouts in place of each further one, all at once, where a domain's worlds
+            can be stepped together.
+        alternatives: Number of successful rollouts kept besides the one without noise: each ends in
+            another state, and the next option may take less from where a longer one ends.
+        refinements: Number of rounds of random variations of the shortest rollout, as in the last
+            iterations of a cross-entropy search.
+        temperature: Scale of the noise, relative to that of training: risks cost nothing in a
+            model.
         horizon: Environment steps of a rollout at most (the paper's T_eval).
-        patience: Failed rollouts after which, without any success, no more are made.
+        patience: Number of failed rollouts after which, without any success, no more are made.
         spread: Standard deviation of the first refinement, of actions from -1 to 1.
     """
 

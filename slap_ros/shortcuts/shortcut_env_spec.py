@@ -22,13 +22,13 @@ class ShortcutEnvSpec:
     """What a :class:`ShortcutVecEnv` is made from, as data that other processes can be sent.
 
     Args:
-        domain: Whose worlds they are.
-        signature: Of the shortcut.
-        starts: From which episodes draw.
-        num_envs: How many environments.
+        domain: Domain of the worlds.
+        signature: Signature of the shortcut.
+        starts: Starts that episodes draw from.
+        num_envs: Number of environments.
         horizon: Environment steps after which an episode is truncated.
-        rewards: The reward function.
-        seed: Of the generator that draws the starts.
+        rewards: Reward function.
+        seed: Seed of the generator that draws the starts.
     """
 
     domain: DomainChoice
@@ -41,7 +41,7 @@ class ShortcutEnvSpec:
 
     @property
     def action_map(self) -> ActionMap:
-        """From the policy's actions to the robot's."""
+        """The map from the policy's actions to the robot's."""
         return make_action_map(self.domain.make(), self.signature)
 
     def make(self) -> ShortcutVecEnv:

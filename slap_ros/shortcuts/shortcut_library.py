@@ -56,10 +56,10 @@ class ShortcutLibrary:
     """Shortcuts of a domain.
 
     Args:
-        domain: Its name.
-        shortcuts: Those that could be read, in order of their names.
-        record: How the library was made.
-        refused: Why the others were not read.
+        domain: Name of the domain.
+        shortcuts: Shortcuts that could be read, in order of their names.
+        record: Record of how the library was made.
+        refused: Errors that say why the other shortcuts were not read.
     """
 
     domain: str
@@ -69,7 +69,7 @@ class ShortcutLibrary:
 
     @property
     def digest(self) -> str:
-        """What was learned, as 16 hexadecimal digits; empty where that is nothing."""
+        """A hash of what was learned, 16 hexadecimal digits; empty where that is nothing."""
         if not self.shortcuts:
             return ""
         whole = sha256()
@@ -126,7 +126,7 @@ def _require_fit(shortcut: Shortcut, folder: Path, domain: Domain) -> None:
 
 
 def _learned(shortcut: Shortcut) -> MlpPolicy:
-    """Its policy, which libraries have only if it was learned."""
+    """The policy of a shortcut, which libraries have only if it was learned."""
     if not isinstance(shortcut.policy, MlpPolicy):
         raise InvalidLibraryError(f"{shortcut.name} has no learned policy that could be stored")
     return shortcut.policy

@@ -19,9 +19,9 @@ from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.shortcut import Sampling, Shortcut
 from slap_ros.shortcuts.signature import Change
 
-MAX_NET_FAILURES = 3  # failures, beyond as many for each success, before a shortcut is given up
+MAX_NET_FAILURES = 3  # failures, less as many for each success, before a shortcut is given up
 MAX_NOISE_SCALE = 2.0  # temperature of the last rollout of a batch against that of the first
-SPREAD_DECAY = 0.7  # of the spread of variations from one round to the next
+SPREAD_DECAY = 0.7  # ratio of the spread of variations in one round to that in the round before
 
 
 @dataclass(frozen=True)
@@ -29,8 +29,8 @@ class ShortcutRollout:
     """A successful rollout of a shortcut in the model.
 
     Args:
-        actions: The policy's actions, from -1 to 1, one per step.
-        states: The states in which they were chosen.
+        actions: Actions of the policy, from -1 to 1, one per step.
+        states: States in which the actions were chosen, one per step.
     """
 
     actions: tuple[Weights, ...]
@@ -50,13 +50,13 @@ def _steps(rollout: ShortcutRollout) -> int:
 class _BestRollouts:
     """Successful rollouts: the one without noise, and the shortest others."""
 
-    alternatives: int  # others at most
+    alternatives: int  # number of others at most
     deterministic: ShortcutRollout | None
     others: list[ShortcutRollout] = field(default_factory=list)  # the shortest first
 
     @property
     def all(self) -> list[ShortcutRollout]:
-        """All of them, the shortest first."""
+        """All rollouts, the shortest first."""
         deterministic = [] if self.deterministic is None else [self.deterministic]
         return sorted((*deterministic, *self.others), key=_steps)
 
@@ -67,7 +67,7 @@ class _BestRollouts:
         return min(most, self.others[-1].steps - 1)
 
     def add(self, rollouts: Sequence[ShortcutRollout]) -> None:
-        """Keep the shortest."""
+        """Keep the shortest of these rollouts and those kept so far."""
         self.others = sorted((*self.others, *rollouts), key=_steps)[: self.alternatives]
 
 
@@ -82,9 +82,9 @@ class ShortcutRollouts:
         """Make the worlds.
 
         Args:
-            domain: Whose worlds.
-            initial: A state with the objects of the task.
-            sampling: How shortcuts are tried out.
+            domain: Domain of the worlds.
+            initial: State with the objects of the task.
+            sampling: Settings of how shortcuts are tried out.
         """
         self.sampling = sampling
         together = domain.steps_together
@@ -103,9 +103,9 @@ class ShortcutRollouts:
         """Try a shortcut out.
 
         Args:
-            shortcut: What to try.
-            encoder: Of the change to be made.
-            state: Where to begin.
+            shortcut: Shortcut to try out.
+            encoder: Encoder of observations for the change to be made.
+            state: State to begin in.
 
         Returns:
             The successful rollouts that are kept, the shortest first; none of a shortcut that
@@ -129,7 +129,7 @@ class ShortcutRollouts:
             yield name, successes
 
     def given_up(self, shortcut: Shortcut) -> bool:
-        """Whether it failed so often in this task that it is not tried any more."""
+        """Whether a shortcut failed so often in this task that it is not tried any more."""
         return self._failures[shortcut.name] >= MAX_NET_FAILURES
 
     def _sample(
@@ -210,7 +210,7 @@ class ShortcutRollouts:
 
 
 def _rollout(past: Sequence[tuple[State, Weights]], world: int) -> ShortcutRollout:
-    """What happened in one of the worlds."""
+    """The rollout that was made in one of the worlds."""
     return ShortcutRollout(
         tuple(actions[world] for _, actions in past),
         tuple(State(states.layout, states.data[world]) for states, _ in past),

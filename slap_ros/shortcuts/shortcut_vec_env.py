@@ -43,13 +43,13 @@ class ShortcutVecEnv:
         """Begin an episode in each environment.
 
         Args:
-            domain: Whose worlds are stepped.
-            signature: Of the shortcut.
-            starts: From which every episode draws one.
-            num_envs: How many environments.
+            domain: Domain of the worlds.
+            signature: Signature of the shortcut.
+            starts: Starts, of which every episode draws one.
+            num_envs: Number of environments.
             horizon: Environment steps after which an episode is truncated.
-            rewards: The reward function.
-            rng: Draws the starts.
+            rewards: Reward function.
+            rng: Generator that draws the starts.
         """
         self.horizon, self._rewards = horizon, rewards
         pools = _pools(starts)
@@ -126,7 +126,7 @@ class _Group:
         return self._pool[int(self._rng.integers(len(self._pool)))]
 
     def step(self, commands: Array, truncated: Bools) -> _GroupStep:
-        """Act, shape (size, axes), and reset where an episode ended."""
+        """Step with commands, shape (size, axes), and reset where an episode ended."""
         before = self._potential
         state = self._worlds.step(commands)
         encoding = self.encoder.encode(state)

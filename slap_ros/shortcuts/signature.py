@@ -27,14 +27,14 @@ _KINDS: WeakKeyDictionary[AtomSpace, Mapping[Object, Kind]] = WeakKeyDictionary(
 
 @dataclass(frozen=True)
 class Change:
-    """From an abstract state to another: masks over a task's atoms."""
+    """A change from an abstract state to another: masks over a task's atoms."""
 
     add: int
     delete: int
 
     @classmethod
     def between(cls, source: int, target: int) -> Change:
-        """What is different in ``target``."""
+        """The change from one abstract state to another."""
         return cls(target & ~source, source & ~target)
 
     def apply(self, abstract: int) -> int:
@@ -52,12 +52,12 @@ class Change:
 def context_of(
     abstract: int, predicates: Collection[Predicate], space: AtomSpace
 ) -> frozenset[str]:
-    """Which predicates have an atom that holds in an abstract state.
+    """The predicates of which an atom holds in an abstract state.
 
     Args:
-        abstract: The abstract state, a mask.
-        predicates: Those that are looked at.
-        space: The task's atoms.
+        abstract: Abstract state, a mask.
+        predicates: Predicates that are looked at.
+        space: Atoms of the task.
 
     Returns:
         Names of predicates.
@@ -129,9 +129,9 @@ class Signature:
     """A lifted change, as a shortcut was trained on.
 
     Args:
-        roles: The kind of each role.
-        add: Atoms added: predicate and the roles that are its arguments.
-        delete: Atoms deleted, likewise.
+        roles: Kind of each role.
+        add: Atoms added: the predicate, and the roles that are its arguments.
+        delete: Atoms deleted: the predicate, and the roles that are its arguments.
         context: Names of the predicates about what is held that hold where it was learned: a slap
             with a block in the hand is another one than with the hand empty.
     """
@@ -148,9 +148,9 @@ class Signature:
         """Lift a change.
 
         Args:
-            change: Of abstract states of the task.
-            space: The task's atoms.
-            context: Names of predicates; see the class.
+            change: Change from an abstract state of the task to another.
+            space: Atoms of the task.
+            context: Names of predicates about what is held; see the class.
 
         Returns:
             The signature, in which objects are roles.
@@ -215,14 +215,14 @@ class Signature:
 
     @cached_property
     def name(self) -> str:
-        """The predicates that it adds, and a hash that tells different signatures apart."""
+        """The predicates that are added, and a hash that tells different signatures apart."""
         parts = (self.roles, sorted(self.add), sorted(self.delete), sorted(self.context))
         text = repr(parts)
         words = "_".join(sorted({predicate for predicate, _ in self.add})) or "nothing"
         return f"{words}-{sha256(text.encode()).hexdigest()[:8]}"
 
     def matches(self, change: Change, space: AtomSpace) -> bool:
-        """Whether the change has all of its patterns, with any number of objects.
+        """Whether a change has all patterns of the signature, with any number of objects.
 
         As in Alg. 3 the change may delete more atoms, but about these objects only, and, unlike
         there, it adds no others: nothing that was not to be achieved in training. Beyond it, the

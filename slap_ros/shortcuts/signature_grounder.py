@@ -11,8 +11,8 @@ from itertools import islice
 from slap_ros.relational import AtomSpace, Object, Predicate
 from slap_ros.shortcuts.signature import Change, Kind, Signature, context_of, instances, kinds
 
-Chosen = dict[int, Object]  # by role
-# Of an abstract state. Roles that are alike can be filled in many ways, which come to the same.
+Chosen = dict[int, Object]  # the objects that fill roles, by role
+# In one abstract state. Roles that are alike can be filled in many ways, which come to the same.
 MOST_SUBSTITUTIONS = 1_000
 
 
@@ -21,9 +21,9 @@ class _RoleAtom:
     """An atom of a signature.
 
     Args:
-        predicate: Its name.
-        roles: That are its arguments.
-        holds: Whether it holds before the change, which then deletes it, or else adds it.
+        predicate: Name of the predicate.
+        roles: Roles that are the arguments of the predicate.
+        holds: Whether the atom holds before the change, which then deletes it, or else adds it.
     """
 
     predicate: str
@@ -44,9 +44,9 @@ class SignatureGrounder:
         """Order the roles: those of rare kinds first, since they tell which objects the others are.
 
         Args:
-            signature: What to ground.
-            space: The task's atoms.
-            grasping: The predicates about what is held; see :attr:`Signature.context`.
+            signature: Signature to ground.
+            space: Atoms of the task.
+            grasping: Predicates about what is held; see :attr:`Signature.context`.
         """
         self._signature, self._space, self._grasping = signature, space, grasping
         self._of_kind = _by_kind(kinds(space))
@@ -60,7 +60,7 @@ class SignatureGrounder:
         lifted = [_RoleAtom(*atom, holds=False) for atom in sorted(signature.add)]
         lifted += [_RoleAtom(*atom, holds=True) for atom in sorted(signature.delete)]
         turn = {role: i for i, role in enumerate(self._order)}
-        self._decided: list[list[_RoleAtom]] = [[] for _ in roles]  # once so many are filled
+        self._decided: list[list[_RoleAtom]] = [[] for _ in roles]  # by roles filled
         for atom in lifted:
             self._decided[max((turn[role] for role in atom.roles), default=0)].append(atom)
 
@@ -72,7 +72,7 @@ class SignatureGrounder:
             yield from (change for change in found if self._is_whole(abstract, change))
 
     def _is_whole(self, abstract: int, change: Change) -> bool:
-        """Whether nothing is left to delete about the objects that it deletes something of."""
+        """Whether nothing is left to delete about the objects that the change deletes atoms of."""
         objects = {obj for atom in self._space.decode(change.delete) for obj in atom.objects}
         left = self._space.decode(change.apply(abstract) & self._may_be_deleted)
         return all(objects.isdisjoint(atom.objects) for atom in left)
@@ -91,7 +91,7 @@ class SignatureGrounder:
                     yield from self._fill(abstract, longer, more)
 
     def _with_decided(self, abstract: int, chosen: Chosen, change: Change) -> Change | None:
-        """With the atoms whose last role was just filled; None where one is not as it must be."""
+        """Add the atoms whose last role was just filled; None where one is not as it must be."""
         add, delete = change.add, change.delete
         for atom in self._decided[len(chosen) - 1]:
             bit = self._bits.get((atom.predicate, tuple(chosen[role] for role in atom.roles)), 0)

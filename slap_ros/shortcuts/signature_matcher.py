@@ -19,9 +19,9 @@ class SignatureMatcher:
         """Prepare the masks of the signature's patterns.
 
         Args:
-            signature: What to match.
-            space: The task's atoms.
-            grasping: The predicates about what is held; see :attr:`Signature.context`.
+            signature: Signature to match.
+            space: Atoms of the task.
+            grasping: Predicates about what is held; see :attr:`Signature.context`.
         """
         self._signature, self._space, self._grasping = signature, space, grasping
         ordered = sorted(signature.patterns)
@@ -33,13 +33,13 @@ class SignatureMatcher:
         )
 
     def pairs(self, nodes: Sequence[int]) -> Iterator[tuple[int, int]]:
-        """Indices of the nodes that it may join, the later one second."""
+        """Yield the pairs of nodes that a shortcut may join, as indices, the later one second."""
         for i, targets in self._by_source(nodes):
             for j in self._maximal(nodes, i, targets):
                 yield i, j
 
     def _by_source(self, nodes: Sequence[int]) -> Iterator[tuple[int, Sequence[int]]]:
-        """Each node in which it may begin, with the later ones that match.
+        """Yield each node in which a shortcut may begin, with the later ones that match.
 
         Only nodes that agree in what the signature leaves alone are compared, which are few.
         """
@@ -52,7 +52,7 @@ class SignatureMatcher:
                     yield i, [j for j in group[number + 1 :] if self._matches(nodes[i], nodes[j])]
 
     def targets(self, nodes: Sequence[int], source: int) -> list[int]:
-        """Indices of the later nodes that it may reach from the node with index ``source``."""
+        """The indices of the later nodes that a shortcut may reach from the node ``source``."""
         if not self._may_begin(nodes[source]):
             return []
         later = range(source + 1, len(nodes))

@@ -44,7 +44,7 @@ class StartRecord:
     """A start as it is written to files and sent to other processes."""
 
     seed: int
-    index: int  # of the task
+    index: int  # index of the task, drawn with that seed
     features: tuple[float, ...]
     add: int
     delete: int
@@ -92,16 +92,16 @@ def find_start(
     operator_path: OperatorPath,
     operator_steps: Mapping[str, float],
 ) -> StartRecord | None:
-    """Where a shortcut of this signature would begin in a task.
+    """The start of a shortcut of this signature in a task.
 
     Of all sources that the operators of ``operator_path`` lead to, it is the one from which the
     shortcut gets nearest to the goal.
 
     Args:
-        domain: Whose task.
-        seed: Of the task.
-        index: Of the task.
-        signature: Of the shortcut.
+        domain: Domain of the task.
+        seed: Seed of the task.
+        index: Index of the task.
+        signature: Signature of the shortcut.
         operator_path: Names of the operators that lead from the initial state to the start.
         operator_steps: Mean environment steps of each operator, by name.
 

@@ -43,9 +43,9 @@ class TrainingCallback(Protocol):
         """Some of a step's jobs are done.
 
         Args:
-            what: The step, in words.
-            done: Jobs done so far; 0 as the step begins.
-            total: Jobs of the step.
+            what: Name of the step, in words.
+            done: Number of jobs done so far; 0 as the step begins.
+            total: Number of jobs of the step.
         """
         ...
 
@@ -53,9 +53,9 @@ class TrainingCallback(Protocol):
         """A task has no plan, and training goes on without it.
 
         Args:
-            use: What it was for: validation or exploration.
-            index: Of the task, with the seed of training tasks.
-            reason: Why it has no plan.
+            use: Purpose of the task: validation or exploration.
+            index: Index of the task, with the seed of training tasks.
+            reason: Reason why the task has no plan, in words.
         """
         ...
 
@@ -67,10 +67,10 @@ class TrainingCallback(Protocol):
         """A shortcut is about to be learned.
 
         Args:
-            name: Of the shortcut.
-            folder: Where its progress is; see
+            name: Name of the shortcut.
+            folder: Folder with the progress of the shortcut; see
                 :class:`~slap_ros.shortcuts.work_folder.ShortcutWorkFolder`.
-            total_steps: Environment steps that it takes.
+            total_steps: Environment steps that learning the shortcut takes.
         """
         ...
 
@@ -78,10 +78,11 @@ class TrainingCallback(Protocol):
         """A shortcut was learned, and tried on validation tasks.
 
         Args:
-            name: Of the shortcut.
-            before: Mean plan length without it, environment steps.
-            after: With it; infinite where a task was not solved.
-            kept: Whether it becomes part of the library.
+            name: Name of the shortcut.
+            before: Mean plan length without the shortcut, environment steps.
+            after: Mean plan length with the shortcut, environment steps; infinite where a task was
+                not solved.
+            kept: Whether the shortcut becomes part of the library.
         """
         ...
 
@@ -91,10 +92,10 @@ class CandidateGroup:
     """Candidates of several tasks that are the same up to objects: one learning problem.
 
     Args:
-        signature: Of the candidate with the largest expected saving.
-        operator_path: Names of the operators by which their sources were reached.
-        savings: Share of the plan's length that it is expected to save in each explored task; 0
-            where there was none.
+        signature: Signature of the candidate with the largest expected saving.
+        operator_path: Names of the operators by which the candidates' sources were reached.
+        savings: Share of the plan's length that the candidate is expected to save in each explored
+            task; 0 where there was none.
     """
 
     signature: Signature
@@ -103,19 +104,19 @@ class CandidateGroup:
 
     @property
     def tasks(self) -> int:
-        """In how many explored tasks there was one."""
+        """The number of explored tasks that have a candidate of the group."""
         return sum(saving > 0.0 for saving in self.savings)
 
     @property
     def relative_saving(self) -> float:
-        """Share of a plan's length that it is expected to save, mean over all explored tasks."""
+        """The expected saving as a share of a plan's length, mean over all explored tasks."""
         return fmean(self.savings)
 
     def saving_beside(self, others: Sequence[CandidateGroup]) -> float:
-        """What it is expected to save more than the best of others in each task, mean over tasks.
+        """The expected saving beyond the best of others in each task, mean over tasks.
 
         Args:
-            others: Those that are learned already.
+            others: Groups that are learned already.
         """
         return fmean(
             max(0.0, own - max(best, default=0.0))
@@ -127,7 +128,7 @@ ProblemKey = tuple[frozenset[Pattern], frozenset[str]]  # equal for equal learni
 
 
 def problem_key(signature: Signature) -> ProblemKey:
-    """What is the same for signatures that a single policy is learned for."""
+    """A key that is the same for signatures that a single policy is learned for."""
     return signature.patterns, signature.context
 
 
@@ -149,14 +150,14 @@ def rank(explored: Sequence[ExplorationResult]) -> list[CandidateGroup]:
 
 
 def _saving(candidate: ShortcutCandidate | None) -> float:
-    """Share of the plan's length."""
+    """The expected saving of a candidate as a share of the plan's length; 0 without one."""
     return candidate.expected_saving / candidate.plan_steps if candidate is not None else 0.0
 
 
 def _best_by_key(
     result: ExplorationResult,
 ) -> dict[tuple[ProblemKey, OperatorPath], ShortcutCandidate]:
-    """Of one task's candidates that are the same up to objects, the one that saves most."""
+    """The candidate that saves most, of one task's candidates that are the same up to objects."""
     best: dict[tuple[ProblemKey, OperatorPath], ShortcutCandidate] = {}
     for candidate in result.candidates:
         key = (problem_key(candidate.signature), candidate.operator_path)
@@ -170,11 +171,11 @@ class Training:
     """One training of a library.
 
     Args:
-        distribution: Whose tasks it is for.
-        settings: All hyper-parameters.
-        folder: Its work folder; see :mod:`slap_ros.shortcuts.work_folder`.
-        workers: Where jobs run.
-        callback: Receives its events.
+        distribution: Distribution of the tasks that the shortcuts are for.
+        settings: All hyper-parameters of the training.
+        folder: Work folder of the training; see :mod:`slap_ros.shortcuts.work_folder`.
+        workers: Workers that run the jobs.
+        callback: Callback that receives the events of the training.
     """
 
     distribution: TaskDistribution
@@ -218,7 +219,7 @@ class Training:
     def _most_promising(
         self, groups: Sequence[CandidateGroup], kept: Sequence[CandidateGroup]
     ) -> CandidateGroup | None:
-        """Who saves most beside what is learned already; None where nobody saves enough.
+        """The group that saves most beside those learned already; None where none saves enough.
 
         Shortcuts are worth having together where they serve different tasks. The first of those
         that save the same is taken.
@@ -237,9 +238,9 @@ class Training:
         """Learn a shortcut and keep it if it shortens plans.
 
         Args:
-            group: What to learn.
+            group: Candidates to learn a shortcut from.
             operator_steps: Mean environment steps of each operator, by name.
-            length: Mean plan length before, environment steps.
+            length: Mean plan length without the shortcut, environment steps.
 
         Returns:
             Mean plan length with what is kept.
@@ -286,15 +287,15 @@ class Training:
         return [result for result in found if not isinstance(result, str)]
 
     def _leave_out(self, use: str, first: int, found: Sequence[Any]) -> None:
-        """Name the tasks of which no more is found than why they have no plan.
+        """Report the tasks that have no plan, and why.
 
         Args:
-            use: What the tasks are for.
-            first: Index of the first of them.
-            found: What was found of each, or why nothing was.
+            use: Purpose of the tasks: validation or exploration.
+            first: Index of the first of these tasks.
+            found: Result of each task, or why there is none, in words.
 
         Raises:
-            UnsolvableError: That is so for all.
+            UnsolvableError: None of the tasks has a plan.
         """
         reasons = {i: reason for i, reason in enumerate(found) if isinstance(reason, str)}
         for i, reason in reasons.items():
@@ -354,9 +355,9 @@ class Training:
         """An attempt to learn a shortcut.
 
         Args:
-            signature: Of the shortcut.
+            signature: Signature of the shortcut.
             starts: Initial states of episodes.
-            number: Counted from 0.
+            number: Number of the attempt, counted from 0.
         """
         folder = attempt_folder(self.folder, signature.name, number)
         return jobs.LearningAttempt(
@@ -373,12 +374,12 @@ class Training:
         return result
 
     def _plan_length(self, shortcuts: tuple[Shortcut, ...]) -> float:
-        """Mean on validation tasks, environment steps; infinite where one was not solved."""
+        """Mean plan length on validation tasks, environment steps; infinite if one has no plan."""
         lengths = self._plan(self._validation, shortcuts)
         return fmean(length if isinstance(length, int) else math.inf for length in lengths)
 
     def _plan(self, tasks: Sequence[int], shortcuts: tuple[Shortcut, ...]) -> list[int | str]:
-        """Steps of a plan for each of these validation tasks, or why it has none."""
+        """Steps of a plan for each of these validation tasks, or why there is none."""
         work = [(self._any_goal, i, shortcuts, self.settings.sampling) for i in tasks]
         name = "+".join(["plans", *(shortcut.name for shortcut in shortcuts)])
         return self._work.cached(
@@ -411,7 +412,7 @@ class Training:
 
 
 def _decode_lengths(data: Any, count: int) -> list[int | str]:
-    """Plan lengths, or why there is none; no more than that there is none in version 0.1.0."""
+    """Plan lengths, or why there is none, which version 0.1.0 did not record."""
     if not isinstance(data, list) or len(data) != count:
         raise TypeError(f"{data!r} is no list of {count} plan lengths")
     lengths = [UNRECORDED if length is None else length for length in data]

@@ -26,12 +26,12 @@ from typing import Any
 
 
 def attempt_folder(folder: Path, name: str, attempt: int) -> Path:
-    """Where a shortcut is learned.
+    """The folder in which a shortcut is learned.
 
     Args:
-        folder: The work folder of the training.
-        name: Of the shortcut.
-        attempt: Counted from 0.
+        folder: Work folder of the training.
+        name: Name of the shortcut.
+        attempt: Number of the attempt, counted from 0.
     """
     return folder / f"attempt{attempt + 1}" / name if attempt else folder / name
 
@@ -47,7 +47,7 @@ class ShortcutWorkFolder:
 
     @property
     def shortcut(self) -> Path:
-        """What was learned, as in a library, where a folder is named after the signature."""
+        """The learned shortcut, as in a library, where a folder is named after the signature."""
         return self.path / self.path.name
 
     def checkpoint(self, stage: int) -> Path:
@@ -60,17 +60,17 @@ class ShortcutWorkFolder:
 
     @property
     def snapshots(self) -> list[int]:
-        """The environment steps after which there is one."""
+        """The environment steps after which there is a snapshot, in ascending order."""
         return sorted(int(folder.name) for folder in self.path.glob("snapshots/[0-9]*"))
 
     @property
     def finished(self) -> Path:
-        """Exists once the shortcut is learned."""
+        """A file that exists once the shortcut is learned."""
         return self.path / "finished"
 
     @property
     def progress(self) -> Path:
-        """A JSON object per line, one for each rollout."""
+        """The file of progress: a JSON object per line, one for each rollout."""
         return self.path / "progress.jsonl"
 
     def append(self, progress: Mapping[str, Any]) -> None:

@@ -14,8 +14,8 @@ def acquired_domain(domain: Domain, library: SkillLibrary) -> Domain:
     """The domain with a library's operators and skills in the place of its own.
 
     Args:
-        domain: Whose predicates, worlds and approach are used.
-        library: Of that domain.
+        domain: Domain whose predicates, worlds and approach are used.
+        library: Library of skills of that domain.
 
     Returns:
         The domain; what is static in it is what was static before, and of the operators written by

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The demonstrator: solves tasks with hand-written operators and scripts, and is learned by none.
+"""The demonstrator, which solves tasks with hand-written operators and scripts.
 
 It plans with A* over the operators alone, and again from wherever a script has left the robot. So
-it proves that a task can be solved, and records how.
+it proves that a task can be solved, and records how. No skill learns from it.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from slap_ros.planning.symbolic_planner import SymbolicPlanner
 from slap_ros.relational import AtomSpace, GroundAtom
 
 DEMONSTRATION_SEED = 3_000_000  # neither evaluation nor training sees these tasks
-MOST_FAILED = 20  # demonstrations in a row, of which none solves its task
+MOST_FAILED = 20  # number of demonstrations in a row of which none solves its task
 
-AtomTrace = tuple[frozenset[GroundAtom], ...]  # the atoms that hold, by step
+AtomTrace = tuple[frozenset[GroundAtom], ...]  # atoms that hold in each step
 
 
 @dataclass(frozen=True)
 class Demonstration:
-    """What the demonstrator did for one task."""
+    """A demonstration: what the demonstrator did for one task."""
 
     space: AtomSpace
     episode: EpisodeResult
@@ -43,10 +43,10 @@ def demonstrate(
     """Solve a task in a world of its own.
 
     Args:
-        domain: With scripts for skills, as
+        domain: Domain with scripts for skills, as
             :func:`~slap_ros.skills.domain_choice.open_domain` makes it.
-        task: Where to start, and in how many steps at most.
-        goal: What to reach; None for the task's own goal.
+        task: Task with the initial state and the step limit.
+        goal: Goal to reach; None for the task's own goal.
 
     Returns:
         What happened; its episode says whether the goal was reached.
@@ -71,9 +71,9 @@ def record_traces(domain: Domain, count: int, goal: str | None = None) -> list[A
     """Demonstrations that solve their tasks, as atoms step by step.
 
     Args:
-        domain: With scripts for skills.
-        count: How many.
-        goal: By name; None for the goals that come with tasks.
+        domain: Domain with scripts for skills.
+        count: Number of demonstrations.
+        goal: Name of the goal; None for the goals that come with tasks.
 
     Returns:
         As many, of different tasks, always the same.

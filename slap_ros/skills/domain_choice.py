@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which domain is meant: its name, its preset, and whose skills it has.
+"""The choice of a domain: its name, its preset, and its skills.
 
 Operators decide what is planned and skills what is executed, so a domain with other skills is
 another domain. One value names it, wherever it has to be made again: in other processes, nodes and
@@ -21,13 +21,13 @@ if TYPE_CHECKING:  # a choice is named wherever options are read, and costs no i
     from slap_ros.messages.protocols import DomainInfoMessage
     from slap_ros.skills.skill_library import SkillLibrary
 
-SHIPPED = ""  # the library that ships for the domain, if there is one; else its own skills
+SHIPPED = ""  # choice of the library that ships for the domain, else of its own skills
 NO_SKILLS = "none"
 DEMONSTRATOR = "demonstrator"
 WORDS = (SHIPPED, NO_SKILLS, DEMONSTRATOR)
-# In a domain's configuration, which worlds announce and bags have; not there for its own skills.
+# Keys of a domain's configuration, which worlds announce and bags have; absent for its own skills.
 SKILLS_KEY, DIGEST_KEY = "skills", "skills_digest"
-# The skills as they were given, by the digest of the library that was found there: a domain has no
+# The choice of skills, by the digest of the library that was found there: a domain has no
 # path in its configuration, which goes into bags.
 _OPENED: dict[str, str] = {}
 
@@ -37,12 +37,12 @@ class DomainChoice:
     """A domain by name.
 
     Args:
-        name: One of :func:`slap_ros.domains.domain_names`.
-        preset: One of the domain's, maybe with settings; empty: its first.
-        skills: Empty for what ships, ``none`` for no operators and no skills, ``demonstrator`` for
-            the hand-written operators with scripts in the place of skills, or the folder of a
-            library of acquired skills.
-        digest: Of the library that is meant; empty: whichever is there.
+        name: Name of the domain, one of :func:`slap_ros.domains.domain_names`.
+        preset: Preset of the domain, maybe with settings; empty for its first.
+        skills: Choice of skills: empty for what ships, ``none`` for no operators and no skills,
+            ``demonstrator`` for the hand-written operators with scripts in the place of skills, or
+            the folder of a library of acquired skills.
+        digest: Digest of the library that must be found; empty for any library.
 
     Raises:
         InvalidParameterError: Skills that are none of these.
@@ -65,18 +65,20 @@ class DomainChoice:
         """The choice by which a domain was opened.
 
         Args:
-            domain: Opened.
-            skills: As they were given; their digest is the domain's.
+            domain: Domain that was opened.
+            skills: Choice of skills with which the domain was opened; their digest is taken from
+                the domain.
         """
         digest = str(domain.configuration.get(DIGEST_KEY, ""))
         return cls(domain.name, domain.preset, skills, digest)
 
     @classmethod
     def opened_as(cls, domain: Domain) -> DomainChoice:
-        """The choice by which a domain was opened in this process, from what it says of itself.
+        """The choice by which a domain was opened in this process, from the domain's configuration.
 
         Args:
-            domain: Opened by :func:`open_domain`; or made otherwise, and then without a library.
+            domain: Domain that was opened by :func:`open_domain`; or made otherwise, and then
+                without a library.
         """
         said = domain.configuration
         digest = str(said.get(DIGEST_KEY, ""))
@@ -85,7 +87,7 @@ class DomainChoice:
 
     @property
     def identity(self) -> dict[str, str]:
-        """What tells it from other domains: name, preset, and whose skills unless its own.
+        """The values that tell the domain from others: name, preset, and skills unless its own.
 
         A library counts by its digest, which a choice has that was made by :meth:`of`.
         """
@@ -93,7 +95,7 @@ class DomainChoice:
         return {"domain": self.name, "preset": self.preset} | ({"skills": whose} if whose else {})
 
     def make(self) -> Domain:
-        """See :func:`open_domain`; for jobs that are sent a choice."""
+        """Open the domain; see :func:`open_domain`. For jobs that receive a choice."""
         return open_domain(self)
 
     @classmethod
@@ -109,11 +111,11 @@ class DomainChoice:
         return cls(str(info.name), str(info.preset), skills, digest)
 
     def with_skills_of(self, name: str, given: str) -> DomainChoice:
-        """The same as a node opens it that was given skills of its own.
+        """The choice of a node that was given skills of its own.
 
         Args:
-            name: Of the node.
-            given: Its parameter; empty where it takes whatever is announced.
+            name: Name of the node.
+            given: Value of the node's parameter skills; empty where it takes whatever is announced.
 
         Returns:
             The choice; whether a folder has the digest that is announced is seen once it is
@@ -133,16 +135,16 @@ class DomainChoice:
 
     @property
     def library_folder(self) -> Path | None:
-        """Where the library is; None where no library is meant, or none ships."""
+        """The folder of the library; None where no library is chosen, or none ships."""
         if self.skills == SHIPPED:
             return shipped_folder("skills", self.name)
         return None if self.skills in WORDS else Path(self.skills)
 
     def require_digest(self, found: str) -> None:
-        """Refuse another library than the one that is meant, if one is.
+        """Refuse another library than the one that is chosen, if one is.
 
         Raises:
-            SkillsChangedError: Has both digests.
+            SkillsChangedError: Another library is there, or none.
         """
         if self.digest in ("", found):
             return
@@ -161,10 +163,10 @@ class DomainChoice:
 
 
 def open_domain(choice: DomainChoice) -> Domain:
-    """Make the domain that is meant.
+    """Make the domain of a choice.
 
     Args:
-        choice: Which one.
+        choice: Choice of the domain.
 
     Returns:
         The domain; its configuration says whose skills it has, unless they are its own. Its
@@ -176,7 +178,7 @@ def open_domain(choice: DomainChoice) -> Domain:
         InvalidParameterError: No such preset or setting; or the domain has no demonstrator.
         InvalidDomainError: The domain's own code fails or is inconsistent.
         InvalidLibraryError: The folder has no library of this domain that can be read.
-        SkillsChangedError: It has another library than the one that is meant.
+        SkillsChangedError: The folder has another library than the one that is chosen.
     """
     domain = _with_own_skills(choice)
     library = _library(choice, domain)
@@ -201,7 +203,7 @@ def open_domain(choice: DomainChoice) -> Domain:
 
 
 def chosen_skills(choice: DomainChoice) -> SkillLibrary | None:
-    """The library of skills that is meant; None where the domain has others, or none.
+    """The library of skills of a choice; None where the domain has other skills, or none.
 
     Raises:
         SlapError: As :func:`open_domain`.

@@ -27,11 +27,11 @@ Indices = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class Grounding:
-    """What a skill is applied to.
+    """The objects that a skill is applied to.
 
     Args:
-        layout: The objects that there are.
-        objects: Those for the operator's parameters, in order.
+        layout: Layout of the objects that there are.
+        objects: Objects for the operator's parameters, in order.
     """
 
     layout: Layout
@@ -43,11 +43,11 @@ class GroundedStates:
     """States over the same objects, and what the operator is applied to in each.
 
     Args:
-        rows: Which rows of the whole batch these are, shape (n,).
-        state: A batch of n states.
-        columns: For each of the operator's parameters the objects of g groundings, all of one
-            type.
-        choice: Which of these groundings is that of each state, shape (n,).
+        rows: Indices of these rows in the whole batch, shape (n,).
+        state: Batch of n states.
+        columns: Objects of g groundings for each of the operator's parameters, all of one type per
+            parameter.
+        choice: Index of the grounding of each state among these groundings, shape (n,).
     """
 
     rows: Indices
@@ -71,14 +71,14 @@ class _Kind:
 
     layout: Layout
     columns: tuple[Column, ...]
-    numbers: Indices  # of these groundings, ascending
+    numbers: Indices  # numbers of these groundings, ascending
 
 
 class Groundings:
     """The groundings that one skill is learned for, by number."""
 
     def __init__(self, groundings: Sequence[Grounding]) -> None:
-        """Number them in their order, which must be without repetition."""
+        """Number groundings in their order, which must be without repetition."""
         self.groundings = tuple(groundings)
         self._numbers = {grounding: i for i, grounding in enumerate(self.groundings)}
 
@@ -88,7 +88,7 @@ class Groundings:
 
     @cached_property
     def width(self) -> int:
-        """Numbers in a row: features of the state with the most."""
+        """The length of a row: the number of features of the state with the most."""
         return max(grounding.layout.size for grounding in self.groundings)
 
     @cached_property
@@ -115,11 +115,11 @@ class Groundings:
         return np.pad(states, ((0, 0), (0, missing))) if missing else states
 
     def split(self, rows: Array, numbers: Indices) -> Iterator[GroundedStates]:
-        """Rows of states by what they are about.
+        """Split rows of states by the objects that they are about.
 
         Args:
-            rows: Shape (n, width).
-            numbers: Of the grounding of each, shape (n,).
+            rows: States as rows, shape (n, width).
+            numbers: Number of the grounding of each state, shape (n,).
 
         Yields:
             The parts; together they have every row once.

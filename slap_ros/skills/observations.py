@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a skill observes: the robot, the objects that it is applied to, and nothing else.
+"""The observations of a skill: the robot, the objects that it is applied to, and nothing else.
 
 This is the state abstraction of LG-SAIL's Eq. 5. Every skill of every domain observes arrays of the
 same size, so that a new skill can begin with the weights of any other: there are slots for the
@@ -23,14 +23,14 @@ from slap_ros.relational import Column
 from slap_ros.relational.state import Array
 from slap_ros.skills.groundings import GroundedStates
 
-SLOTS = 3  # for the objects of an operator, the robot itself not among them
-ROBOT_FEATURES = 16  # at most
-OBJECT_FEATURES = 16  # of each object, at most
+SLOTS = 3  # slots for the objects of an operator, the robot itself not among them
+ROBOT_FEATURES = 16  # features of the robot, at most
+OBJECT_FEATURES = 16  # features of each object, at most
 PAIRS = tuple(combinations(range(SLOTS), 2))
-RELATION_FEATURES = 10  # of each pair
-RELATIONS = ROBOT_FEATURES + SLOTS * (1 + OBJECT_FEATURES)  # where they begin
+RELATION_FEATURES = 10  # features of each pair of objects
+RELATIONS = ROBOT_FEATURES + SLOTS * (1 + OBJECT_FEATURES)  # index of the first relation feature
 SIZE = RELATIONS + len(PAIRS) * RELATION_FEATURES
-FINE = 0.2  # of the interface's length: below, a relative position is observed linearly
+FINE = 0.2  # share of the interface's length below which a relative position is observed linearly
 
 
 class SkillObserver:
@@ -45,7 +45,7 @@ class SkillObserver:
         self._interface, self._domain = learner_interface(domain), domain
 
     def __call__(self, states: GroundedStates) -> NDArray[np.float32]:
-        """What is observed in each state, shape (n, SIZE).
+        """The observation in each state, shape (n, SIZE).
 
         Raises:
             InvalidDomainError: The operator has more objects than there are slots, or the domain
@@ -90,7 +90,7 @@ class SkillObserver:
         observed[:, at : at + features.shape[-1]] = features
 
     def _relation(self, states: GroundedStates, one: Column, other: Column) -> Array:
-        """How far one object is from the other, in which direction, and turned how in its frame.
+        """The distance, direction and orientation of one object relative to the other.
 
         The direction is along the axes of the base, as actions are.
 
@@ -98,9 +98,9 @@ class SkillObserver:
         are the same either way round, as many things may be.
 
         Args:
-            states: Of some groundings.
-            one: For each of these, the one.
-            other: For each of these, the other.
+            states: Grounded states, of some groundings.
+            one: First object of each grounding.
+            other: Second object of each grounding.
 
         Returns:
             Shape (n, RELATION_FEATURES), or (n, 1) where the interface has no frames.
@@ -119,7 +119,7 @@ class SkillObserver:
         return np.concatenate([separation, fine, axis, either_way], axis=-1)
 
     def _separation(self, states: GroundedStates, one: Column, other: Column) -> Array:
-        """Between two slots, from 0 to 1 at infinity."""
+        """Separation of the objects in two slots, from 0 to 1 at infinity, shape (n,)."""
         length = self._interface.length_m
         distances = np.empty(len(states.choice))
         for number, obj in enumerate(one.objects):

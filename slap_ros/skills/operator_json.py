@@ -20,7 +20,7 @@ from slap_ros.relational import (
 
 
 def operator_data(operator: LiftedOperator) -> dict[str, Any]:
-    """What JSON can hold of an operator."""
+    """An operator as data that JSON can hold."""
     return {
         "name": operator.name,
         "parameters": [{"name": v.name, "type": v.type.name} for v in operator.parameters],
@@ -39,7 +39,7 @@ def _atoms_data(atoms: frozenset[LiftedAtom]) -> list[dict[str, Any]]:
 
 
 def template_data(template: RewardTemplate) -> dict[str, Any]:
-    """What JSON can hold of a reward."""
+    """A reward template as data that JSON can hold."""
     return {
         "operator": template.operator,
         "terms": [
@@ -54,7 +54,7 @@ def template_data(template: RewardTemplate) -> dict[str, Any]:
 
 
 def read_operator(data: Any, domain: Domain) -> LiftedOperator:
-    """The operator of :func:`operator_data`, in a domain's words.
+    """The operator of :func:`operator_data`, with the types and predicates of a domain.
 
     Raises:
         LookupError, TypeError, AttributeError: It is not of that form, or of another domain.
@@ -82,12 +82,12 @@ def read_operator(data: Any, domain: Domain) -> LiftedOperator:
 
 
 def read_template(data: Any, operator: LiftedOperator, domain: Domain) -> RewardTemplate:
-    """The reward of :func:`template_data`, in a domain's words.
+    """The reward template of :func:`template_data`, with the metrics of a domain.
 
     Args:
-        data: As JSON has it.
-        operator: Whose reward it is.
-        domain: Whose metrics it uses.
+        data: Data of the reward, as :func:`template_data` makes it.
+        operator: Operator of the reward.
+        domain: Domain whose metrics the reward uses.
 
     Raises:
         LookupError, TypeError, ValueError: It is not of that form, or of another domain.
@@ -106,7 +106,7 @@ def read_template(data: Any, operator: LiftedOperator, domain: Domain) -> Reward
 
 
 def rewarded_metrics(domain: Domain) -> tuple[Metric, ...]:
-    """What rewards can be made of in a domain, those of its hand-written rewards included."""
+    """The metrics that a domain's rewards can use, those of its hand-written rewards included."""
     written = domain.acquisition.rewards.values() if domain.acquisition else ()
     used = (term.metric for template in written for term in template.terms)
     return tuple(dict.fromkeys((*metrics_of(domain.predicates), *domain.metrics, *used)))

@@ -32,11 +32,11 @@ from slap_ros.skills.groundings import GroundedStates, N
 
 
 def check_template(template: RewardTemplate, operator: LiftedOperator) -> None:
-    """Refuse a template that is not of an operator, or cannot be weighed.
+    """Refuse a template that is not of an operator, or whose terms do not fit it.
 
     Args:
-        template: The dense part of its reward.
-        operator: Whose skill is to be learned.
+        template: Template of the dense part of the operator's reward.
+        operator: Operator whose skill is to be learned.
 
     Raises:
         InvalidRewardError: Names the term, and what is wrong with it.
@@ -72,7 +72,7 @@ def _check_term(term: RewardTerm, operator: LiftedOperator) -> None:
 
 @dataclass(frozen=True)
 class _Positions:
-    """Which parameters of an operator a metric or an atom is about."""
+    """The parameters of an operator that a metric or an atom is about."""
 
     numbers: tuple[int, ...]
 
@@ -95,8 +95,8 @@ class OperatorEffects:
         """Bind the effects to the operator's parameters.
 
         Args:
-            operator: Whose effects.
-            interface: Of the domain.
+            operator: Operator whose effects are checked.
+            interface: Learner's interface of the domain.
         """
         self.operator, self._interface = operator, interface
         self._added = self._positions(operator.add_effects)
@@ -142,12 +142,12 @@ class SkillReward:
         """Bind the template to the operator's parameters.
 
         Args:
-            operator: Whose skill is to be learned.
-            template: The dense part of its reward.
-            interface: Of the domain.
+            operator: Operator whose skill is to be learned.
+            template: Template of the dense part of the operator's reward.
+            interface: Learner's interface of the domain.
 
         Raises:
-            InvalidRewardError: They do not fit.
+            InvalidRewardError: Template and operator do not fit.
         """
         check_template(template, operator)
         self.operator, self.template = operator, template
@@ -167,7 +167,7 @@ class SkillReward:
         return total
 
     def success(self, states: GroundedStates) -> Bools:
-        """As :meth:`OperatorEffects.hold`, shape (n,)."""
+        """Whether the effects hold, as :meth:`OperatorEffects.hold` says, shape (n,)."""
         return self._effects.hold(states)
 
 

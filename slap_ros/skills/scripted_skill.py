@@ -10,7 +10,7 @@ from slap_ros.core import Domain, Policy, Script
 from slap_ros.errors import InvalidParameterError
 from slap_ros.relational import Object, State
 
-STEP_LIMIT = 500  # environment steps of one script, the way to what it is about included
+STEP_LIMIT = 500  # environment steps of one script, the way to its objects included
 
 
 @dataclass(frozen=True)
@@ -20,9 +20,9 @@ class ScriptedSkill:
     It shows that a task can be solved, and how; nothing is learned from its success.
 
     Args:
-        name: Of the operator that it carries out.
-        script: Makes the policy.
-        step_limit: Environment steps after which it counts as failed.
+        name: Name of the operator that the script carries out.
+        script: Script that makes the policy.
+        step_limit: Environment steps after which the skill counts as failed.
     """
 
     name: str
@@ -44,7 +44,7 @@ def with_scripts(domain: Domain) -> Domain:
     """The domain with its hand-written operators, and with scripts for skills.
 
     Args:
-        domain: Its own operators and skills, if any, are left out.
+        domain: Domain whose own operators and skills, if any, are left out.
 
     Raises:
         InvalidParameterError: It has none written by hand, or an operator has no script.

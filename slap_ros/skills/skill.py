@@ -42,9 +42,9 @@ class LearnedSkill:
     """The skill of an operator, for any objects of the operator's types.
 
     Args:
-        operator: What it does.
-        policy: What was learned.
-        domain: In which it acts.
+        operator: Operator that the skill carries out.
+        policy: Policy that was learned.
+        domain: Domain in which the skill acts.
         horizon: Environment steps of the policy at most, approach not counted.
     """
 
@@ -65,7 +65,7 @@ class LearnedSkill:
 
     @property
     def least_steps(self) -> int:
-        """One: what was learned tells nothing about its steps beforehand."""
+        """One environment step: a learned policy does not say how many it will take."""
         return 1
 
     def lower_bound(self, state: State, objects: tuple[Object, ...]) -> int:
@@ -74,11 +74,11 @@ class LearnedSkill:
         return self.least_steps
 
     def start(self, state: State, objects: tuple[Object, ...]) -> Policy:
-        """Begin in a state; everything that follows is a function of it and of those after it.
+        """Begin in a state; all actions are a function of this state and of those after it.
 
         Args:
-            state: Where it begins.
-            objects: What it is applied to.
+            state: State in which the skill begins.
+            objects: Objects that the skill is applied to.
 
         Returns:
             The approach and then the policy; None once the horizon is reached.
@@ -86,11 +86,11 @@ class LearnedSkill:
         return _PolicyExecution(self, state, objects)
 
     def accepts(self, state: State, objects: tuple[Object, ...]) -> bool:
-        """Whether what it does is done as surely as it was learned.
+        """Whether the operator's effects hold for good, as the skill learned to achieve them.
 
         Args:
-            state: As things are.
-            objects: What it is applied to.
+            state: Present state.
+            objects: Objects that the skill is applied to.
         """
         (part,) = Groundings([Grounding(state.layout, objects)]).split(state.data[None], NOBODY)
         return bool(OperatorEffects(self.operator, learner_interface(self.domain)).hold(part)[0])
@@ -99,7 +99,7 @@ class LearnedSkill:
         """The policy alone, from where the approach ends.
 
         Args:
-            objects: What it is applied to.
+            objects: Objects that the skill is applied to.
 
         Returns:
             What it does in a state, at any time.

@@ -66,14 +66,15 @@ def skill_folder_name(operator: LiftedOperator) -> str:
 
 @dataclass(frozen=True)
 class AcquiredSkill:
-    """What was learned for an operator, and how.
+    """A skill that was learned for an operator, and how it was learned.
 
     Args:
-        operator: What it does.
-        template: The dense part of its reward.
-        policy: What was learned.
+        operator: Operator that the skill carries out.
+        template: Template of the dense part of the skill's reward.
+        policy: Policy that was learned.
         horizon: Environment steps of the policy at most.
-        record: Figures by name: success, vacuity, steps, seed, what it began from.
+        record: Record of the training, figures by name: success, vacuity, steps, seed, what it
+            began from.
     """
 
     operator: LiftedOperator
@@ -84,7 +85,7 @@ class AcquiredSkill:
 
     @property
     def folder_name(self) -> str:
-        """The operator's name and digest."""
+        """The name of the skill's folder: the operator's name and digest."""
         return skill_folder_name(self.operator)
 
     def in_domain(self, domain: Domain) -> LearnedSkill:
@@ -97,10 +98,10 @@ class SkillLibrary:
     """Skills of a domain.
 
     Args:
-        domain: Its name.
-        skills: Those that could be read, in order of their folders.
-        record: How the library was made: preset, goal, command, settings, progress.
-        refused: Why the others were not read.
+        domain: Name of the domain.
+        skills: Skills that could be read, in order of their folders.
+        record: Record of how the library was made: preset, goal, command, settings, progress.
+        refused: Errors that say why the other skills were not read.
     """
 
     domain: str
@@ -110,7 +111,7 @@ class SkillLibrary:
 
     @property
     def digest(self) -> str:
-        """What was learned, as 16 hexadecimal digits; empty where that is nothing."""
+        """A hash of what was learned, 16 hexadecimal digits; empty where that is nothing."""
         if not self.skills:
             return ""
         whole = sha256()
@@ -145,7 +146,7 @@ def load_skill_library(path: Path, domain: Domain) -> SkillLibrary:
 
 
 def read_library_record(path: Path) -> dict[str, Any]:
-    """What is said of a library, without its skills.
+    """Read the facts about a library, without its skills.
 
     Raises:
         InvalidLibraryError: There is none, or it is damaged, newer than this version, or a library
@@ -180,8 +181,8 @@ def load_skill(folder: Path, domain: Domain) -> AcquiredSkill:
     """Read one skill.
 
     Args:
-        folder: Named after it, where it is part of a library.
-        domain: Whose words its operator is in.
+        folder: Folder of the skill, named after it where it is part of a library.
+        domain: Domain whose types, predicates and metrics the skill uses.
 
     Raises:
         InvalidLibraryError: It is damaged, or of another domain.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a skill does, by the metrics that its operator moves: the key of a skill in a library.
+"""The key of a skill in a library: the metrics that its operator changes.
 
 Names of operators, predicates and objects play no part, metrics do: opening a drawer and opening a
 cabinet move the same one.
@@ -16,7 +16,7 @@ from typing import Any
 from slap_ros.relational import LiftedAtom, LiftedOperator
 from slap_ros.relational.metrics import Condition
 
-PARTS = {"EFF+": 1.0, "EFF-": 0.5, "PRE": 0.25}  # what counts most is what a skill brings about
+PARTS = {"EFF+": 1.0, "EFF-": 0.5, "PRE": 0.25}  # weights: what a skill brings about counts most
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class SkillSignature:
         """The signature of :meth:`as_json`.
 
         Raises:
-            AttributeError, TypeError, ValueError: It is none.
+            AttributeError, TypeError, ValueError: The data is no signature.
         """
         return cls({str(name): float(weight) for name, weight in data.items()})
 

@@ -38,9 +38,9 @@ class StageTargets:
         """Whether stages are done.
 
         Args:
-            states: As things are now, n of them.
-            begun: The states in which the stages began, shape (n, layout.size).
-            where: Which of them are asked for, shape (n,).
+            states: Present states, n of them.
+            begun: States in which the stages began, shape (n, layout.size).
+            where: Whether each stage is asked for, shape (n,).
 
         Returns:
             Shape (n,); not done where it is not asked for.
@@ -57,7 +57,7 @@ class StageTargets:
         return reached
 
     def _space(self, layout: Layout, row: Array) -> AtomSpace:
-        """The atoms over these objects; static ones are required by nothing."""
+        """The atoms over the objects of a layout; no target requires static ones."""
         if layout not in self._spaces:
             self._spaces[layout] = self._domain.atom_space(State(layout, row))
         return self._spaces[layout]
@@ -65,13 +65,13 @@ class StageTargets:
     def _target(
         self, space: AtomSpace, layout: Layout, objects: tuple[Object, ...], row: Array
     ) -> Target:
-        """What is expected of a stage.
+        """The target of a stage.
 
         Args:
-            space: The atoms.
-            layout: Of the objects that there are.
-            objects: What the operator is applied to.
-            row: The state in which the stage began.
+            space: Atoms of the task.
+            layout: Layout of the objects that there are.
+            objects: Objects that the operator is applied to.
+            row: State in which the stage began, shape (layout.size,).
         """
         key = layout, objects, row.tobytes()
         if key not in self._targets:

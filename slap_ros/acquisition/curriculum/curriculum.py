@@ -50,23 +50,23 @@ from slap_ros.learning.stored_keys import stored
 from slap_ros.learning.workers import Workers, run_in_order
 from slap_ros.skills.skill_library import AcquiredSkill, SkillLibrary, load_skill
 
-TWICE = 2  # enough progress in a row
+TWICE = 2  # iterations in a row with enough progress that end a curriculum
 
 
 @dataclass
 class Curriculum:
-    """The acquisition of all skills that the tasks of a source take.
+    """The acquisition of all skills that the tasks of a source need.
 
     Args:
-        source: Of tasks, operators and rewards.
-        settings: All hyper-parameters.
-        folder: Its work folder.
-        workers: Where jobs run.
-        callback: Receives its events.
+        source: Source of tasks, operators and rewards.
+        settings: All hyper-parameters of the curriculum.
+        folder: Work folder of the curriculum.
+        workers: Workers that run the jobs.
+        callback: Callback that receives the events of the curriculum.
         known: Skills that new ones may begin with, by the path of their folders.
         kept: Skills that are there already, by the path of their folders. They are used as they
             are, and learned further only where they fail.
-        encoder: Gives operators the keys by which these are found.
+        encoder: Encoder that gives operators the keys by which known skills are found.
     """
 
     source: TaskSource
@@ -89,10 +89,10 @@ class Curriculum:
         self._warm_starts = WarmStarts(self._kept, self.known, self.encoder, least)
 
     def run(self) -> SkillLibrary:
-        """Acquire until nothing fails, progress is enough twice, or the budget is spent.
+        """Acquire skills until nothing fails, progress is enough twice, or the budget is spent.
 
         Returns:
-            The skills; the record says why it ended.
+            The library of skills; its record says why the curriculum ended.
 
         Raises:
             InvalidParameterError: The folder has another curriculum, or is damaged.
@@ -109,8 +109,8 @@ class Curriculum:
         """Carry out plans, and train what fails from where it fails.
 
         Args:
-            iteration: From 0.
-            state: Takes note of what comes of it.
+            iteration: Number of the iteration, from 0.
+            state: State of the curriculum, which is updated.
 
         Returns:
             Why the curriculum is over; empty where it is not.
@@ -182,10 +182,10 @@ class Curriculum:
         """A round of training per selected skill; the first one of a skill begins warm.
 
         Args:
-            selection: Which skills, and for how long.
-            rollouts: On training tasks.
-            fresh: On tasks that training never sees.
-            state: Of the curriculum.
+            selection: Skills to train, and the environment steps for each.
+            rollouts: Rollouts on training tasks.
+            fresh: Rollouts on tasks that training never sees.
+            state: State of the curriculum.
         """
         settings = replace(self.settings, skill_steps=selection.steps)
         rounds = []
@@ -221,7 +221,7 @@ class Curriculum:
     # -- the result -------------------------------------------------------------------------------
 
     def _library(self, ended: str, iteration: int, state: CurriculumState) -> SkillLibrary:
-        """What was learned, and what was kept as it was."""
+        """The library of the skills that were learned, and of those that were kept."""
         unseen = fresh_tasks(iteration, self.settings.validation)
         fresh = self._roll_out(iteration, "final", unseen, state)
         vacuity = self._vacuity(state.learned, fresh)
@@ -250,7 +250,7 @@ class Curriculum:
         return self.settings.total_steps - state.steps
 
     def _as_json(self) -> dict[str, Any]:
-        """All that the results depend on."""
+        """All that the results depend on, as JSON."""
         known = sorted(skill.folder_name for skill in self.known.values())
         data = {"source": self.source.as_json(), **stored(self.settings), "known": known}
         if self.encoder.name != METRICS:
@@ -270,7 +270,7 @@ def require_plans(rollouts: Sequence[PlanRollout], source: TaskSource) -> None:
     """Refuse tasks of which none has a plan; where some have one, the others are left out.
 
     Raises:
-        UnsolvableError: None has a plan.
+        UnsolvableError: No task has a plan.
     """
     without = [rollout for rollout in rollouts if rollout.unplanned]
     if len(without) == len(rollouts):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The events of a curriculum, for whoever shows or records them."""
+"""The events of a curriculum, to be shown or recorded."""
 
 from __future__ import annotations
 
@@ -20,9 +20,10 @@ class OngoingRound:
     """A round of a skill's training that has begun, maybe in another process.
 
     Args:
-        skill: The operator's name.
-        number: Of the skill's round, from 0.
-        folder: Where it is learned; see :mod:`slap_ros.acquisition.training.skill_training`.
+        skill: Name of the skill's operator.
+        number: Number of the skill's round, from 0.
+        folder: Folder of the skill's training; see
+            :mod:`slap_ros.acquisition.training.skill_training`.
         steps: Environment steps of the round at most.
         segment_steps: Environment steps between two judgements.
     """
@@ -39,7 +40,7 @@ class OngoingRound:
         return cls(job.operator, job.number, job.folder, job.steps, job.segment_steps)
 
     def so_far(self) -> Round | None:
-        """How far it got; None before its first judgement.
+        """The round as far as it got; None before its first judgement.
 
         Raises:
             InvalidParameterError: The folder is damaged.
@@ -55,9 +56,9 @@ class CurriculumCallback(Protocol):
         """Some of a step's jobs are done.
 
         Args:
-            what: The step, in words.
-            done: Jobs done so far; 0 as the step begins.
-            total: Jobs of the step.
+            what: Name of the step, in words.
+            done: Number of jobs done so far; 0 as the step begins.
+            total: Number of jobs of the step.
         """
         ...
 
@@ -65,8 +66,8 @@ class CurriculumCallback(Protocol):
         """Plans were carried out.
 
         Args:
-            iteration: From 0.
-            rollouts: One per task.
+            iteration: Number of the iteration, from 0.
+            rollouts: Rollouts of plans, one per task.
         """
         ...
 
@@ -74,8 +75,8 @@ class CurriculumCallback(Protocol):
         """Two skills are about to be learned from scratch.
 
         Args:
-            iteration: From 0.
-            dead_end: Names them.
+            iteration: Number of the iteration, from 0.
+            dead_end: Dead end, with the names of both skills.
         """
         ...
 
@@ -83,8 +84,8 @@ class CurriculumCallback(Protocol):
         """Skills are about to be learned, all of them at a time where there are the processes.
 
         Args:
-            iteration: From 0.
-            rounds: One per skill.
+            iteration: Number of the iteration, from 0.
+            rounds: Rounds that begin, one per skill.
             steps_left: Environment steps that all skills together may still learn for.
         """
         ...
@@ -93,8 +94,8 @@ class CurriculumCallback(Protocol):
         """A skill was trained for a round.
 
         Args:
-            iteration: From 0.
-            skill: The operator's name.
-            outcome: How it went.
+            iteration: Number of the iteration, from 0.
+            skill: Name of the skill's operator.
+            outcome: Outcome of the round.
         """
         ...

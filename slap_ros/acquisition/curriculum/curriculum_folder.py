@@ -27,7 +27,7 @@ from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.relational import LiftedOperator
 from slap_ros.skills.skill_library import skill_folder_name
 
-Compute = Callable[[], list[Any]]  # makes a result as JSON, where the folder has none
+Compute = Callable[[], list[Any]]  # computes a result as JSON, where the folder has none
 
 
 class CurriculumFolder:
@@ -41,7 +41,7 @@ class CurriculumFolder:
         """Refuse a folder with another curriculum; an empty one becomes this one's.
 
         Args:
-            curriculum: All that its results depend on, as JSON.
+            curriculum: Description of the curriculum, all that its results depend on, as JSON.
 
         Raises:
             InvalidParameterError: The folder has another curriculum, or is damaged.
@@ -52,9 +52,9 @@ class CurriculumFolder:
         """The plans that were carried out in an iteration.
 
         Args:
-            iteration: From 0.
-            name: What they are for: ``rollouts``, ``fresh`` or ``final``.
-            compute: Carries them out.
+            iteration: Number of the iteration, from 0.
+            name: Purpose of the plans: ``rollouts``, ``fresh`` or ``final``.
+            compute: Function that carries the plans out.
 
         Raises:
             InvalidParameterError: What is in the folder is damaged.
@@ -66,7 +66,7 @@ class CurriculumFolder:
         )
 
     def rounds(self, iteration: int, compute: Compute) -> list[Round]:
-        """How the rounds of an iteration went, in the order of its skills.
+        """The rounds of an iteration, in the order of its skills.
 
         Raises:
             InvalidParameterError: What is in the folder is damaged.
@@ -78,7 +78,7 @@ class CurriculumFolder:
         )
 
     def vacuity(self, compute: Compute) -> list[Any]:
-        """What policies that see nothing are worth, as JSON, in the order of the skills.
+        """The vacuity of each skill, how well blind policies do, as JSON, in order of the skills.
 
         Raises:
             InvalidParameterError: What is in the folder is damaged.
@@ -86,19 +86,19 @@ class CurriculumFolder:
         return self._work.cached("vacuity", compute, list)
 
     def training(self, operator: str, attempt: int) -> Path:
-        """Where the skill of an operator is trained; see ``skill_training``.
+        """The folder in which the skill of an operator is trained; see ``skill_training``.
 
         Args:
-            operator: Its name.
-            attempt: How often it was learned from scratch before.
+            operator: Name of the operator.
+            attempt: Number of times that the skill was learned from scratch before.
         """
         return self._path / (f"{operator}-{attempt}" if attempt else operator)
 
     def skill(self, operator: LiftedOperator, attempt: int) -> Path:
-        """Where the best policy of a training is, as in a library.
+        """The folder of the best policy of a training, as in a library.
 
         Args:
-            operator: Whose skill.
-            attempt: How often it was learned from scratch before.
+            operator: Operator whose skill is trained.
+            attempt: Number of times that the skill was learned from scratch before.
         """
         return self.training(operator.name, attempt) / skill_folder_name(operator)

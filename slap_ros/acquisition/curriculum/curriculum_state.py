@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a curriculum knows between two iterations.
+"""The state of a curriculum between two iterations.
 
 All of it follows from the rollouts and rounds in the work folder. So it is not written: a
 curriculum that goes on reads these and comes to the same state.
@@ -20,16 +20,17 @@ NEVER_JUDGED = -1.0  # below every success
 
 @dataclass(frozen=True)
 class SkillProgress:
-    """How far the skill of one operator is.
+    """The progress of the skill of one operator.
 
     Args:
-        rounds: Learned so far.
-        success: Of the best checkpoint, as last judged; below 0 before the first judgement.
-        stale: Rounds in a row without progress.
+        rounds: Number of rounds learned so far.
+        success: Success rate of the best checkpoint, as last judged; below 0 before the first
+            judgement.
+        stale: Number of rounds in a row without progress.
         learned_from: Digest of the initiation states of the last round.
-        steps: Environment steps learned.
-        began_with: The known skill that its first round began with, for the record.
-        attempt: How often it was learned from scratch before.
+        steps: Number of environment steps learned.
+        began_with: Known skill that the first round began with, for the record.
+        attempt: Number of times that the skill was learned from scratch before.
     """
 
     rounds: int = 0
@@ -57,18 +58,19 @@ class SkillProgress:
         )
 
     def from_scratch(self) -> SkillProgress:
-        """None, but for the steps that were spent."""
+        """No progress, but for the steps that were spent: the skill is learned from scratch."""
         return SkillProgress(steps=self.steps, attempt=self.attempt + 1)
 
 
 @dataclass
 class CurriculumState:
-    """What all iterations so far have come to.
+    """The results of all iterations so far.
 
     Args:
-        skills: By the name of the operator, in the order of the operators.
-        task_progress: Of the rollouts of each iteration, the mean over tasks.
-        not_trained: Why skills that failed in the last iteration were not trained, by operator.
+        skills: Progress of each skill by the name of its operator, in the order of the operators.
+        task_progress: Task progress of the rollouts of each iteration, mean over tasks.
+        not_trained: Reasons why skills that failed in the last iteration were not trained, by
+            operator.
     """
 
     skills: dict[str, SkillProgress]

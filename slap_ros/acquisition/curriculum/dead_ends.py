@@ -17,16 +17,16 @@ from dataclasses import dataclass
 from slap_ros.acquisition.curriculum.curriculum_state import CurriculumState
 from slap_ros.acquisition.curriculum.rollouts import PlanRollout
 
-MOST_ATTEMPTS = 3  # at learning a skill from scratch
+MOST_ATTEMPTS = 3  # attempts at learning a skill from scratch
 
 
 @dataclass(frozen=True)
 class DeadEnd:
-    """Where plans end always.
+    """Two skills in a row at which plans always end.
 
     Args:
-        skill: Which never succeeded.
-        before: The skill that leaves the states from which it fails.
+        skill: Name of the skill that never succeeded.
+        before: Name of the skill that leaves the states from which the other fails.
     """
 
     skill: str
@@ -36,15 +36,15 @@ class DeadEnd:
 def find_dead_ends(
     hopeless: Iterable[str], rollouts: Sequence[PlanRollout], state: CurriculumState
 ) -> list[DeadEnd]:
-    """Skills that never succeeded, behind others that were learned and may be learned differently.
+    """Find skills that never succeeded after others that may be learned from scratch once more.
 
     Args:
-        hopeless: Skills that rounds of training did not improve.
-        rollouts: Of this iteration.
-        state: Of the curriculum.
+        hopeless: Names of the skills that rounds of training did not improve.
+        rollouts: Rollouts of this iteration.
+        state: State of the curriculum.
 
     Returns:
-        One for each such skill.
+        One dead end for each such skill.
     """
     found = []
     for skill in hopeless:

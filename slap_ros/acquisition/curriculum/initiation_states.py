@@ -18,20 +18,20 @@ from slap_ros.acquisition.curriculum.rollouts import PlanRollout
 
 
 class InitiationRecord(NamedTuple):
-    """Where a skill began, as data that other processes can be sent."""
+    """An initiation state of a skill, as data that other processes can be sent."""
 
-    task: int  # its index
-    objects: tuple[str, ...]  # names of what the skill was applied to
-    state: tuple[float, ...]  # the approach done
+    task: int  # index of the task
+    objects: tuple[str, ...]  # names of the objects that the skill was applied to
+    state: tuple[float, ...]  # features of the state after the approach
 
 
 @dataclass(frozen=True)
 class InitiationStates:
-    """Where the skill of one operator began in some rollouts.
+    """The initiation states of the skill of one operator in some rollouts.
 
     Args:
-        failed: Where its stage failed then.
-        succeeded: Where its stage was done.
+        failed: Initiation states from which the stage failed.
+        succeeded: Initiation states from which the stage was done.
     """
 
     failed: tuple[InitiationRecord, ...]
@@ -39,10 +39,10 @@ class InitiationStates:
 
     @classmethod
     def of(cls, operator: str, rollouts: Iterable[PlanRollout]) -> InitiationStates:
-        """Those in rollouts, in order; stages whose approach did not arrive have none.
+        """The initiation states in rollouts, in order; none where the approach did not arrive.
 
         Args:
-            operator: Its name.
+            operator: Name of the operator.
             rollouts: Plans that were carried out.
         """
         begun = [
@@ -58,24 +58,24 @@ class InitiationStates:
 
     @property
     def all(self) -> tuple[InitiationRecord, ...]:
-        """Those where it failed first."""
+        """All initiation states, those from which the skill failed first."""
         return self.failed + self.succeeded
 
     @property
     def for_another(self) -> InitiationStates:
-        """The same for a skill that is learned from scratch: it has succeeded in none."""
+        """The same states for a skill that is learned from scratch: it has succeeded from none."""
         return InitiationStates(self.all, ())
 
     @property
     def digest(self) -> str:
-        """What tells them from others, whatever their order."""
+        """A hash of the states, the same whatever their order."""
         return sha256(json.dumps(sorted(self.all)).encode()).hexdigest()
 
     def with_rehearsal(self, share: float) -> tuple[InitiationRecord, ...]:
-        """Those where it failed, and so many where it did not that these are a share of all.
+        """The states of failures, and so many of successes that these are a share of all.
 
         Args:
-            share: Of the states in which the skill succeeded; below 1.
+            share: Share of the returned states that the skill succeeded from; below 1.
         """
         rehearsed = round(len(self.failed) * share / (1.0 - share))
         return self.failed + self.succeeded[:rehearsed]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What acquiring skills consists of: functions of plain data, run anywhere in any order."""
+"""The jobs of acquiring skills: functions of plain data, run anywhere in any order."""
 
 from __future__ import annotations
 
@@ -43,15 +43,16 @@ class LearningJob:
     """A round of training of one skill, as data that other processes can be sent.
 
     Args:
-        source: Of tasks.
-        operator: Name of the skill's.
-        number: Of the round, from 0.
-        initiations: Of rollouts on training tasks, where episodes begin.
-        fresh: Of rollouts on tasks that training never sees, where checkpoints are judged from.
-        settings: All hyper-parameters.
-        folder: Where the skill is learned.
-        warm_start: What the skill's first round begins with.
-        attempt: How often the skill was learned from scratch before.
+        source: Source of the tasks.
+        operator: Name of the skill's operator.
+        number: Number of the round, from 0.
+        initiations: Initiation states of rollouts on training tasks, where episodes begin.
+        fresh: Initiation states of rollouts on tasks that training never sees, where checkpoints
+            are judged from.
+        settings: All hyper-parameters of the curriculum.
+        folder: Folder in which the skill is learned.
+        warm_start: Known skill that the first round begins with; None for no warm start.
+        attempt: Number of times that the skill was learned from scratch before.
     """
 
     source: TaskSource
@@ -79,8 +80,8 @@ def carry_out(source: TaskSource, index: int, skills: Mapping[str, str]) -> dict
     """Carry out the plan for one task.
 
     Args:
-        source: Of tasks.
-        index: Of the task.
+        source: Source of the tasks.
+        index: Index of the task.
         skills: Folders of the skills at hand, by operator name.
 
     Returns:
@@ -96,9 +97,10 @@ def learn(job: LearningJob, cores: int = 1) -> dict[str, Any]:
     """Learn one skill for one round.
 
     Args:
-        job: What to learn.
-        cores: How many it may use; from two on, other processes judge checkpoints and step half
-            of the worlds, and large critics are divided. The result does not depend on it.
+        job: Round of training to carry out.
+        cores: Number of cores that the job may use; from two on, other processes judge checkpoints
+            and step half of the worlds, and large critics are divided. The result does not depend
+            on it.
 
     Returns:
         The :class:`~slap_ros.acquisition.training.skill_training.Round` as JSON, with the number
@@ -131,7 +133,7 @@ def learn(job: LearningJob, cores: int = 1) -> dict[str, Any]:
 
 @contextmanager
 def _judge(job: LearningJob, domain: Domain, cores: int) -> Iterator[Judge]:
-    """Who judges the checkpoints of a round."""
+    """The judge of the checkpoints of a round."""
     if cores == 1:
         yield JudgeHere(_trials(job, domain))
         return
@@ -141,7 +143,7 @@ def _judge(job: LearningJob, domain: Domain, cores: int) -> Iterator[Judge]:
 
 @contextmanager
 def _worlds(job: LearningJob, domain: Domain, cores: int) -> Iterator[MakeVectorWorld]:
-    """What makes the worlds that a round is learned in."""
+    """The function that makes the worlds in which a round is learned."""
     if cores == 1:
         yield domain.make_vector_world
         return
@@ -154,7 +156,7 @@ def _judge_until_closed(link: Connection, job: LearningJob) -> None:
 
 
 def _trials(job: LearningJob, domain: Domain) -> SkillTrials:
-    """From states of fresh tasks; where there are none, from those that are learned from."""
+    """Trials from states of fresh tasks; where there are none, from those that are learned from."""
     judged, _ = _accepted(job.source, domain, job.fresh.all[: job.settings.judged])
     reward = _reward(job.source, job.operator, domain)
     return SkillTrials(domain, reward, judged or _starts(job, domain)[0], horizon_of(domain))
@@ -182,10 +184,10 @@ def vacuity(
     """How well constant and random actions do what a skill does.
 
     Args:
-        source: Of tasks.
-        operator: Name of the skill's.
-        fresh: Where it begins.
-        most: Of these states, the first.
+        source: Source of the tasks.
+        operator: Name of the skill's operator.
+        fresh: Initiation states of the skill on fresh tasks.
+        most: Number of these states that are used at most, the first ones.
 
     Returns:
         The :class:`~slap_ros.acquisition.training.validation.Vacuity` as JSON.
@@ -198,7 +200,7 @@ def vacuity(
 
 
 def horizon_of(domain: Domain) -> int:
-    """Environment steps of a learned skill."""
+    """Environment steps of a learned skill in a domain."""
     assert domain.acquisition is not None
     return domain.acquisition.horizon
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a library of skills says of how it was acquired: figures by name, in its JSON files."""
+"""The records of how a library of skills was acquired: figures by name, in its JSON files."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ def skill_record(
     """The record of a skill that was trained.
 
     Args:
-        progress: In the end.
-        vacuity: What policies that see nothing are worth, as JSON; None where no fresh task has
-            come to the skill.
-        seed: Of the curriculum.
+        progress: Progress of the skill in the end.
+        vacuity: Vacuity of the skill, how well blind policies do, as JSON; None where no fresh task
+            has come to the skill.
+        seed: Seed of the curriculum.
     """
     return {
         "success": progress.success,
@@ -49,10 +49,10 @@ def library_record(
     """The record of a library.
 
     Args:
-        source: Of tasks.
-        settings: All hyper-parameters.
-        state: In the end.
-        ended: Why the curriculum is over.
+        source: Source of the tasks.
+        settings: All hyper-parameters of the curriculum.
+        state: State of the curriculum in the end.
+        ended: Reason why the curriculum is over, in words.
         fresh: Rollouts on tasks that training never saw.
     """
     return {

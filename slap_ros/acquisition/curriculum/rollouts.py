@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Plans carried out with the skills at hand: how far they get, and from where they fail.
+"""Plans carried out with the skills at hand: how far they get, and where they fail.
 
 A stage of a plan is done once T(x, ω) ⊆ x' and nothing that ω deletes holds (LG-SAIL Alg. 1,
 Eq. 4). Nothing is planned again, and the stages after a failed one are not run.
@@ -41,14 +41,14 @@ class Stage:
     """One operator of a plan that was carried out.
 
     Args:
-        operator: Its name.
-        objects: Names of what it was applied to.
-        state: Where its skill began, the approach done, as numbers; none where the approach did
-            not arrive.
-        end: How it ended, a value of :class:`StageEnd`.
+        operator: Name of the operator.
+        objects: Names of the objects that the operator was applied to.
+        state: Features of the state in which the skill began, after the approach; empty where the
+            approach did not arrive.
+        end: End of the stage, a value of :class:`StageEnd`.
         steps: Environment steps of the skill, approach not counted.
-        atoms: Where it failed: the required atoms that did not hold in the end, and the forbidden
-            ones that did.
+        atoms: Atoms that are wrong in the end of a failed stage: required ones that do not hold,
+            and forbidden ones that do.
     """
 
     operator: str
@@ -60,7 +60,7 @@ class Stage:
 
     @property
     def done(self) -> bool:
-        """Whether it reached its target."""
+        """Whether the stage reached its target."""
         return self.end == StageEnd.DONE.value
 
 
@@ -69,10 +69,10 @@ class PlanRollout:
     """A task's plan, carried out as far as it went.
 
     Args:
-        task: The task's index.
-        plan: The ground operators.
-        stages: Those that were begun, in order.
-        unplanned: Why there is no plan; empty where there is one.
+        task: Index of the task.
+        plan: Ground operators of the plan, as text.
+        stages: Stages that were begun, in order.
+        unplanned: Reason why there is no plan, in words; empty where there is one.
     """
 
     task: int
@@ -101,7 +101,7 @@ class PlanRollout:
         """The rollout of :meth:`as_json`.
 
         Raises:
-            LookupError, TypeError, ValueError: It is none.
+            LookupError, TypeError, ValueError: The data is no rollout.
         """
         stages = tuple(
             Stage(
@@ -129,9 +129,9 @@ def plan_operators(
     """A shortest plan of operators, the same every time.
 
     Args:
-        domain: The task's.
-        task: Where to start, and what to reach.
-        operators: To plan with.
+        domain: Domain of the task.
+        task: Task to plan for: where to start, and what to reach.
+        operators: Operators to plan with.
 
     Returns:
         The task's atoms, and the plan.
@@ -156,11 +156,11 @@ def roll_out(
     """Plan for a task, and carry the plan out until a stage fails.
 
     Args:
-        domain: The task's.
-        task: Where to start, and what to reach.
-        index: The task's.
-        operators: To plan with.
-        skills: Those that were learned, by operator name.
+        domain: Domain of the task.
+        task: Task to plan for: where to start, and what to reach.
+        index: Index of the task.
+        operators: Operators to plan with.
+        skills: Skills that were learned, by operator name.
 
     Returns:
         How far it went.
@@ -188,11 +188,11 @@ def _carry_out(
     """Carry out one stage.
 
     Args:
-        domain: The world's.
-        world: In which the stage begins.
-        space: The task's atoms.
-        operator: Of the stage.
-        skill: Its skill, if there is one.
+        domain: Domain of the world.
+        world: World in which the stage begins.
+        space: Atoms of the task.
+        operator: Operator of the stage.
+        skill: Skill of the operator; None where there is none.
 
     Returns:
         How it went.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which skills are trained next: those that fail often, for which there is hope and budget.
+"""The selection of the skills to train next: those that fail often and may still improve.
 
 LG-SAIL's Algorithm 1 trains every skill that failed. Two rules are ours. What fails rarely waits
 for what fails often. And a skill that rounds of training did not improve is left for others, until
@@ -20,20 +20,21 @@ from slap_ros.acquisition.curriculum.initiation_states import InitiationStates
 from slap_ros.acquisition.curriculum.rollouts import PlanRollout, StageEnd, failed_stages
 from slap_ros.acquisition.training.settings import AcquisitionSettings
 
-NO_PROGRESS = "no progress"  # why a skill is not trained, and how a curriculum ends by that
-RARELY = 0.25  # of how often the worst skill fails: what fails less than that waits
+NO_PROGRESS = "no progress"  # reason why a skill is not trained, and why a curriculum then ends
+RARELY = 0.25  # share of the worst skill's failure rate below which a skill waits
 
 
 @dataclass(frozen=True)
 class SkillSelection:
-    """Skills that are to be trained in an iteration.
+    """The skills that are to be trained in an iteration.
 
     Args:
-        operators: Their names, in alphabetical order; empty where nothing is left to be trained.
-        steps: Environment steps that each may learn for.
-        not_trained: Why others that fail are not trained, by operator.
-        dead_ends: Whose skills are to be learned from scratch: those before are among
-            ``operators``, the others' turn comes once these were learned.
+        operators: Names of the skills' operators, in alphabetical order; empty where nothing is
+            left to be trained.
+        steps: Environment steps that each skill may learn for.
+        not_trained: Reasons why other skills that fail are not trained, by operator.
+        dead_ends: Dead ends whose skills are to be learned from scratch: the skills before are
+            among ``operators``; the skills that never succeeded follow once these were learned.
     """
 
     operators: tuple[str, ...]
@@ -45,12 +46,12 @@ class SkillSelection:
 def select_skills(
     rollouts: Sequence[PlanRollout], state: CurriculumState, settings: AcquisitionSettings
 ) -> SkillSelection:
-    """Choose what is trained next, as many skills as the budget has whole rounds for.
+    """Choose the skills to train next, as many as the budget has whole rounds for.
 
     Args:
-        rollouts: Of this iteration.
-        state: Of the curriculum.
-        settings: All hyper-parameters.
+        rollouts: Rollouts of this iteration.
+        state: State of the curriculum.
+        settings: All hyper-parameters of the curriculum.
 
     Returns:
         The skills, and how long each may learn.
@@ -74,15 +75,15 @@ def select_skills(
 
 
 def failing_often(failures: Counter[str], tried: Counter[str], enough: float) -> list[str]:
-    """What fails, most often first; what fails rarely waits until the rest is better.
+    """The skills that fail often, most often first; those that fail rarely wait for these.
 
     Else a few failures of many would cost a whole round, and more training can make good skills
     worse.
 
     Args:
-        failures: How often each skill failed, where it did.
-        tried: How often each was tried.
-        enough: Success from which on a skill is good.
+        failures: Number of failures of each skill that failed.
+        tried: Number of tries of each skill.
+        enough: Success rate from which on a skill is good.
     """
     shares = {name: count / tried[name] for name, count in failures.most_common()}
     rare = max(1.0 - enough, RARELY * max(shares.values(), default=0.0))
@@ -92,9 +93,10 @@ def failing_often(failures: Counter[str], tried: Counter[str], enough: float) ->
 def _why_not(
     name: str, rollouts: Sequence[PlanRollout], state: CurriculumState, patience: int
 ) -> dict[str, Any] | None:
-    """Why a skill that fails is not trained, as JSON; None where it is.
+    """The reason why a skill that fails is not trained, as JSON; None where it is trained.
 
-    It needs states to learn from, and a hope that it is worth while.
+    A skill is trained if there are states to learn from, and fewer stale rounds than ``patience``
+    or new states.
     """
     initiations = InitiationStates.of(name, rollouts)
     if not initiations.failed:

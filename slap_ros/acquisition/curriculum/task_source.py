@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What skills are acquired for, as data that other processes can be sent."""
+"""The source of the tasks that skills are acquired for, as data for other processes."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ class TaskSource:
 
     Args:
         domain: Domain of the tasks, without skills.
-        goal: A name of the domain's, or atoms; empty for each task's own.
+        goal: Goal of the tasks, a name of the domain's or atoms; empty for each task's own.
         seed: Seed of all random numbers.
-        proposal: Operators and rewards, as JSON.
+        proposal: Operators and rewards of the proposal, as JSON.
     """
 
     domain: DomainChoice
@@ -49,10 +49,10 @@ class TaskSource:
 
         Args:
             domain: Domain of the tasks; its own skills, if any, are left out.
-            goal: A name of the domain's, or atoms; empty for each task's own.
+            goal: Goal of the tasks, a name of the domain's or atoms; empty for each task's own.
             seed: Seed of all random numbers.
-            operators: To plan with.
-            rewards: By operator name.
+            operators: Operators to plan with.
+            rewards: Reward templates by operator name.
         """
         pairs = [(operator_data(o), template_data(rewards[o.name])) for o in operators]
         choice = DomainChoice(domain.name, domain.preset, NO_SKILLS)

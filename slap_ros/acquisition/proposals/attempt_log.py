@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What was asked, answered and complained about, as JSON lines; the same in replay to the byte."""
+"""The log of questions, answers and complaints, as JSON lines; the same bytes in a replay."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from slap_ros.errors import SlapError, StorageFullError
 from slap_ros.language.budget import Budget
 from slap_ros.language.request import Reply, Request
 
-MAX_ANSWER = 16_000  # characters of an answer that are kept
+MAX_ANSWER = 16_000  # number of characters of an answer that are kept
 
 Entry = dict[str, Any]
 
 
 class AttemptLog:
-    """Lines about one proposal; kept, and written to a file and shown as they come."""
+    """The log of one proposal: lines that are kept, written to a file and shown as they come."""
 
     def __init__(
         self, path: Path | None = None, show: Callable[[Entry], None] | None = None
     ) -> None:
-        """Begin without lines.
+        """Begin an empty log.
 
         Args:
-            path: A file of JSON lines, which is replaced; none if left out.
-            show: Called with each line, if given.
+            path: Path of a file of JSON lines, which is replaced; None for no file.
+            show: Function that is called with each line; None for no function.
 
         Raises:
             StorageFullError: The file cannot be written.
@@ -50,15 +50,15 @@ class AttemptLog:
         complaints: Sequence[Complaint],
         budget: Budget,
     ) -> None:
-        """An answer, and what is wrong with it by itself.
+        """Log an answer, and what is wrong with it by itself.
 
         Args:
-            subject: What was asked for, as ``operator Insert``.
-            request: What was asked.
-            reply: What came back.
-            cut: Characters around the answer that were cut off.
-            complaints: Warnings among them.
-            budget: After it.
+            subject: Subject of the question, as ``operator Insert``.
+            request: Request that was sent.
+            reply: Reply that came back.
+            cut: Number of characters around the answer that were cut off.
+            complaints: Complaints about the answer, warnings among them.
+            budget: Budget after the answer.
         """
         text = reply.text
         self._add(
@@ -80,12 +80,12 @@ class AttemptLog:
     def verification(
         self, plan: Sequence[str] | None, complaints: Sequence[Complaint], budget: Budget
     ) -> None:
-        """What the planner says of all operators together.
+        """Log what the planner finds for all operators together.
 
         Args:
-            plan: A shortest one; None where there is none.
-            complaints: Warnings among them.
-            budget: As it is.
+            plan: Steps of a shortest plan; None where there is no plan.
+            complaints: Complaints about the operators, warnings among them.
+            budget: Budget that is left.
         """
         self._add(
             {
@@ -97,12 +97,12 @@ class AttemptLog:
         )
 
     def failure(self, subject: str, error: SlapError, budget: Budget) -> None:
-        """Why no answer could be had, or no more may be asked for.
+        """Log why there is no answer, or no further question.
 
         Args:
-            subject: What was asked for.
-            error: What ended it.
-            budget: As it is.
+            subject: Subject of the question, as ``operator Insert``.
+            error: Error that ended the conversation.
+            budget: Budget that is left.
         """
         self._add(
             {
@@ -115,7 +115,7 @@ class AttemptLog:
         )
 
     def classes(self) -> Counter[str]:
-        """How often each class of complaint occurs, warnings too."""
+        """The number of entries with each class of complaint, warnings too."""
         return Counter(name for entry in self.entries for name in entry.get("errors", ()))
 
     def _add(self, entry: Entry) -> None:

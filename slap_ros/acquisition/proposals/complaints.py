@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What can be wrong with a proposal: a class for each, words for people and for the model."""
+"""Complaints about proposals: a class for each, words for people and for the model."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class ComplaintClass(StrEnum):
 
     @property
     def remedy(self) -> str:
-        """What the model is told to do."""
+        """The instruction to the model for complaints of this class."""
         return _REMEDIES[self]
 
 
@@ -134,13 +134,13 @@ _REMEDIES = {
 
 @dataclass(frozen=True)
 class Complaint:
-    """Something that is wrong.
+    """A complaint: something that is wrong with a proposal.
 
     Args:
-        kind: Its class.
-        subject: What it is about, as ``operator Insert``.
-        fact: What is wrong with it.
-        warning: Whether the proposal can be used in spite of it.
+        kind: Class of the complaint.
+        subject: Subject of the complaint, as ``operator Insert``.
+        fact: Description of what is wrong.
+        warning: Whether the proposal can be used in spite of the complaint.
         advice: Words for people alone: what they can change, and the model cannot.
     """
 
@@ -152,13 +152,13 @@ class Complaint:
 
     @property
     def for_people(self) -> str:
-        """One line, with the class."""
+        """One line for people, with the class."""
         told = f"{self.fact}{self.advice and '; '}{self.advice}"
         return f"{self.subject}: {told} [{self.kind}{', a warning' if self.warning else ''}]"
 
     @property
     def for_model(self) -> str:
-        """What is wrong, and what to do."""
+        """A text for the model: what is wrong, and what to do."""
         return f"{self.fact[:1].upper()}{self.fact[1:]}. {self.kind.remedy}"
 
     def __str__(self) -> str:
@@ -166,5 +166,5 @@ class Complaint:
 
 
 def serious(complaints: Iterable[Complaint]) -> list[Complaint]:
-    """Those that are no warnings."""
+    """The complaints that are no warnings."""
     return [complaint for complaint in complaints if not complaint.warning]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""From what is written to what is meant: decompositions and operators, each checked by itself.
+"""Checking drafts of decompositions and operators, each by itself.
 
 Nothing is repaired: a draft becomes exactly the operator that it says, or a list of complaints.
 """
@@ -25,7 +25,7 @@ from slap_ros.relational import LiftedAtom, LiftedOperator, Predicate, Type, Var
 from slap_ros.relational.pddl.names import check_name
 
 MAX_ACTIONS = 32
-MAX_GROUNDINGS = 5_000  # of one operator; more would keep the planner busy, not the robot
+MAX_GROUNDINGS = 5_000  # groundings of one operator; more would only keep the planner busy
 DECOMPOSITION = "decomposition"
 
 _VARIABLE = re.compile(r"\?[A-Za-z][A-Za-z0-9_-]{0,63}")
@@ -102,9 +102,9 @@ class _Checker:
         """The atoms that can be made of a list.
 
         Args:
-            part: Where they stand: PRE, EFF- or EFF+.
-            drafts: As they are written.
-            variables: The operator's, by name.
+            part: Part of the operator in which the atoms stand: PRE, EFF- or EFF+.
+            drafts: Drafts of the atoms, as they are written.
+            variables: Variables of the operator, by name.
             given: Names of all parameters, those of unknown types too.
         """
         found: list[LiftedAtom] = []
@@ -176,8 +176,8 @@ def check_decomposition(
     """Check the actions that a task is said to be made of.
 
     Args:
-        drafts: As they are written.
-        problem: What they are for.
+        drafts: Drafts of the actions, as they are written.
+        problem: Problem that the actions are for.
 
     Returns:
         The actions as prompts show them, ``Insert(?peg: peg, ?hole: hole)``, and complaints; the
@@ -207,9 +207,9 @@ def check_operator(
     """Check one operator by itself.
 
     Args:
-        draft: As it is written.
-        name: What it should be called.
-        problem: What it is for.
+        draft: Draft of the operator, as it is written.
+        name: Name that the operator should have.
+        problem: Problem that the operator is for.
 
     Returns:
         The operator, None where something serious is wrong, and complaints.

@@ -36,8 +36,8 @@ from slap_ros.relational import (
 from slap_ros.relational.metrics import variable_names
 
 HOLD_STEPS = 3  # environment steps that atoms must stay as they are for a change to count
-HOLD_S = 0.3  # for which they must as well: steps of some domains are short
-MAX_OBJECTS = 6  # of one change; more are compared in too many orders
+HOLD_S = 0.3  # time for which atoms must stay as well: steps of some domains are short
+MAX_OBJECTS = 6  # objects of one change; more would be compared in too many orders
 
 Trace = Sequence[frozenset[GroundAtom]]  # the atoms that hold, step by step
 NumberedAtom = tuple[Predicate, tuple[int, ...]]  # a predicate, and which objects of a change
@@ -45,11 +45,11 @@ NumberedAtom = tuple[Predicate, tuple[int, ...]]  # a predicate, and which objec
 
 @dataclass(frozen=True)
 class InducedOperator:
-    """An operator, and how much is known of it.
+    """An operator from demonstrations, and how many changes it is made from.
 
     Args:
-        operator: As it is proposed.
-        seen: Changes that it was made from.
+        operator: Operator that is proposed.
+        seen: Number of changes that the operator was made from.
         dropped: Preconditions of the first change that did not hold before all others.
     """
 
@@ -67,14 +67,14 @@ class InducedProposer:
         """Induce from demonstrations.
 
         Args:
-            source: Where they are from, for provenance.
-            hold_steps: Steps that atoms must stay as they are for a change to count.
+            source: Description of where the demonstrations are from, for provenance.
+            hold_steps: Environment steps that atoms must stay as they are for a change to count.
         """
         self._source = source
         self._hold_steps = hold_steps
 
     def operators(self, problem: AcquisitionProblem) -> Proposal:
-        """The operators, checked; what is known of each is among the remarks.
+        """The operators, checked; the remarks say how often each was seen.
 
         Raises:
             ProposalRejectedError: Nothing changes in the demonstrations, or the operators make no
@@ -105,11 +105,11 @@ def induce_operators(
     """The operators that demonstrations show, in the order in which they first occur.
 
     Args:
-        demonstrations: Of any tasks of one domain.
-        hold_steps: Steps that atoms must stay as they are for a change to count.
+        demonstrations: Demonstrations of any tasks of one domain.
+        hold_steps: Environment steps that atoms must stay as they are for a change to count.
 
     Returns:
-        One for each kind of change.
+        One operator for each kind of change.
 
     Raises:
         InvalidParameterError: ``hold_steps`` is below 1.
@@ -130,9 +130,10 @@ def stable_states(trace: Trace, hold_steps: int = HOLD_STEPS) -> list[frozenset[
     """The abstract states that last, each once in a row.
 
     Args:
-        trace: The atoms that hold, step by step.
-        hold_steps: Shorter ones are passages between others; but the first and the last count
-            however short, since a recording may begin and end anywhere.
+        trace: Atoms that hold, step by step.
+        hold_steps: Environment steps that a state must last, since shorter ones are passages
+            between others; but the first and the last count however short, since a recording may
+            begin and end anywhere.
 
     Raises:
         InvalidParameterError: ``hold_steps`` is below 1.
@@ -165,10 +166,10 @@ def _without_passages(states: Sequence[frozenset[GroundAtom]]) -> list[frozenset
 class _ObservedEffect:
     """What changed from one stable state to the next."""
 
-    objects: tuple[Object, ...]  # of the changes, in order
+    objects: tuple[Object, ...]  # objects of the changes, in order
     added: frozenset[GroundAtom]
     deleted: frozenset[GroundAtom]
-    before: frozenset[GroundAtom]  # what held of these objects, and of none
+    before: frozenset[GroundAtom]  # atoms before the changes, about these objects or none
 
     @classmethod
     def of(cls, before: frozenset[GroundAtom], after: frozenset[GroundAtom]) -> _ObservedEffect:
@@ -180,7 +181,7 @@ class _ObservedEffect:
 
     @property
     def kind(self) -> tuple[object, ...]:
-        """The same for all changes that may be alike."""
+        """A key that is the same for all changes that may be alike."""
         return (
             sorted(obj.type.name for obj in self.objects),
             sorted(atom.predicate.name for atom in self.added),
@@ -201,7 +202,7 @@ class _Cluster:
         self.seen = 1
 
     def take(self, change: _ObservedEffect) -> bool:
-        """Join a change, if it is alike."""
+        """Add a change to the cluster, if it is alike."""
         if change.kind != self.kind:
             return False
         for order in self._orders(change.objects):
@@ -244,7 +245,7 @@ def _numbered(atoms: frozenset[GroundAtom], objects: tuple[Object, ...]) -> froz
 
 
 def _names(clusters: Sequence[_Cluster]) -> list[str]:
-    """A name for each, after what it achieves; with a number where several achieve the same."""
+    """A name for each cluster, after what it achieves; numbered where several do the same."""
     names: list[str] = []
     for cluster in clusters:
         verb, changed = ("Achieve", cluster.added) if cluster.added else ("End", cluster.deleted)
@@ -257,7 +258,7 @@ def _names(clusters: Sequence[_Cluster]) -> list[str]:
 
 
 def _remark(induced: InducedOperator) -> str:
-    """What people should know of an induced operator."""
+    """A remark for people about an induced operator."""
     name = induced.operator.name
     if induced.seen == 1:
         listed = ", ".join(sorted(map(str, induced.operator.preconditions)))

@@ -22,25 +22,26 @@ from slap_ros.language.settings import LanguageSettings
 D = TypeVar("D")
 T = TypeVar("T")
 
-MAX_COMPLAINTS = 8  # that a model is told at once
+MAX_COMPLAINTS = 8  # complaints that a model is told at once
 
-REFUSED = ("content_filter", "refusal")  # finish reasons
+REFUSED = ("content_filter", "refusal")  # finish reasons of refusals
 CUT_SHORT = "length"
 TOKEN_LIMITS = ("max_completion_tokens", "max_tokens", "max_output_tokens")  # fields of sampling
 
 
 @dataclass(frozen=True)
 class Question(Generic[D, T]):
-    """What is asked, and how an answer is judged.
+    """A question to a model, and how an answer is judged.
 
     Args:
-        subject: What is asked for, in logs and complaints: ``operator Insert``.
-        template: Of the feedback: ``decomposition``, ``operator``, ``reward``.
-        name: Of what is asked for, in the feedback.
-        text: The question.
-        schema: Of the answer.
-        parse: From text to a draft.
-        check: From a draft to what it means, None where something serious is wrong.
+        subject: Subject of the question, in logs and complaints: ``operator Insert``.
+        template: Name of the feedback's template: ``decomposition``, ``operator``, ``reward``.
+        name: Name of what is asked for, in the feedback.
+        text: Text of the question.
+        schema: Schema of the answer.
+        parse: Function that converts the text of an answer into a draft.
+        check: Function that converts a draft into its meaning, None where something serious is
+            wrong, and complaints.
     """
 
     subject: str
@@ -58,7 +59,7 @@ class Answer(Generic[T]):
 
     value: T
     text: str
-    request: str  # sha256
+    request: str  # sha256 of the request
     warnings: tuple[Complaint, ...]
 
 
@@ -76,19 +77,19 @@ class Inquiry:
     def __init__(
         self, client: Client, settings: LanguageSettings, budget: Budget, log: AttemptLog
     ) -> None:
-        """Nothing is asked yet.
+        """Begin a conversation in which nothing is asked yet.
 
         Args:
-            client: Whoever answers.
-            settings: Which model, and how it samples.
-            budget: What may be spent.
-            log: Where everything is written down.
+            client: Client that answers.
+            settings: Settings of the language model, and of how it samples.
+            budget: Budget of the conversation.
+            log: Log in which everything is written down.
         """
         self.client = client
         self.settings = settings
         self.budget = budget
         self.log = log
-        self._answers = Counter[str]()  # by subject
+        self._answers = Counter[str]()  # number of answers by subject
         self._scripted = False  # whether an answer was a script's
 
     @classmethod
@@ -99,13 +100,14 @@ class Inquiry:
         limits: BudgetLimits,
         log: AttemptLog,
     ) -> Inquiry:
-        """A conversation with whoever answers by the mode of the cassette.
+        """A conversation with the client that the mode of the cassette asks for.
 
         Args:
-            settings: Which model, where, how; a replay without a model takes the recorded ones.
-            cassette: ``live``, ``off``, ``record:FILE`` or ``replay:FILE``.
-            limits: What may be spent.
-            log: Where everything is written down.
+            settings: Settings of the language model and its server; a replay without a model takes
+                the recorded ones.
+            cassette: Mode of the cassette: ``live``, ``off``, ``record:FILE`` or ``replay:FILE``.
+            limits: Limits of the budget.
+            log: Log in which everything is written down.
 
         Raises:
             InvalidParameterError: Another mode.
@@ -117,7 +119,7 @@ class Inquiry:
 
     @property
     def answered_by(self) -> dict[str, Any]:
-        """Who answered, for records: a model now, a recording of one, or a script."""
+        """The source of the answers, for records: a model now, a recording of one, or a script."""
         client = self.client
         return {
             "source": client.source,
@@ -131,8 +133,8 @@ class Inquiry:
         """Ask until an answer passes.
 
         Args:
-            question: What is asked.
-            rejected: An earlier answer, and why it will not do.
+            question: Question to ask.
+            rejected: Earlier answer with the complaints about it; None for no earlier answer.
 
         Returns:
             The answer that passed.
@@ -153,8 +155,8 @@ class Inquiry:
         """Ask for one answer, whether it passes or not.
 
         Args:
-            question: What is asked.
-            rejected: An earlier answer, and why it will not do.
+            question: Question to ask.
+            rejected: Earlier answer with the complaints about it; None for no earlier answer.
 
         Returns:
             The answer that passed, or the one that did not.
@@ -197,7 +199,7 @@ class Inquiry:
 
 
 def described(answered_by: Mapping[str, Any]) -> str:
-    """Who answered, in words, from what records say of it."""
+    """The source of the answers in words, from a record of :attr:`Inquiry.answered_by`."""
     source = answered_by.get("source", "an unknown source")
     who = f"a script's ({source})" if answered_by.get("scripted") else f"a model's ({source})"
     cassette = str(answered_by.get("replayed_cassette", ""))
@@ -215,11 +217,11 @@ def rejection(budget: Budget, complaints: Sequence[Complaint]) -> ProposalReject
 
 @dataclass(frozen=True)
 class _Judgement(Generic[T]):
-    """What an answer means, what is wrong with it, and how much around it was cut off."""
+    """The judgement of an answer: its meaning, complaints, and how much around it was cut off."""
 
     value: T | None
     complaints: list[Complaint]
-    cut: int  # characters
+    cut: int  # number of characters
 
 
 def _judge(question: Question[D, T], request: Request, reply: Reply) -> _Judgement[T]:

@@ -26,7 +26,7 @@ from slap_ros.acquisition.proposals.verification import Verification, verify
 from slap_ros.errors import InvalidDomainError
 from slap_ros.relational import LiftedOperator
 
-ROUNDS = 4  # verifications of one decomposition in a row that may fail
+ROUNDS = 4  # number of verifications of one decomposition in a row that may fail
 
 Operators = dict[str, Answer[LiftedOperator]]  # by name, in the order of the actions
 
@@ -37,7 +37,7 @@ class LanguageProposer:
     name = "language"
 
     def __init__(self, inquiry: Inquiry) -> None:
-        """Ask by this conversation."""
+        """Ask a model in a conversation."""
         self._inquiry = inquiry
 
     def operators(self, problem: AcquisitionProblem) -> Proposal:
@@ -58,7 +58,7 @@ class LanguageProposer:
     def _operators_of(
         self, actions: Actions, problem: AcquisitionProblem
     ) -> tuple[Operators, Verification]:
-        """Operators of a decomposition; without a plan if the actions are likely to be wrong."""
+        """Ask for a decomposition's operators; there is no plan if the actions may be wrong."""
         questions = {
             action_name(action): about_operator(action, actions, problem) for action in actions
         }
@@ -112,11 +112,13 @@ class LanguageRewarder:
     name = "language"
 
     def __init__(self, inquiry: Inquiry, with_definitions: bool = True) -> None:
-        """Ask by this conversation.
+        """Ask a model in a conversation.
 
         Args:
-            inquiry: With a budget of its own, or the one that operators were asked for with.
-            with_definitions: Whether the metrics' source is quoted, or their signatures alone.
+            inquiry: Conversation with a model; it has a budget of its own, or that of the
+                operators.
+            with_definitions: Whether the question quotes the metrics' source, or has their
+                signatures alone.
         """
         self._inquiry = inquiry
         self._with_definitions = with_definitions

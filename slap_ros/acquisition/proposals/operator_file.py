@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Operators that anyone wrote to a file, checked as a model's are: PDDL, JSON, plain text."""
+"""Operators from a file, checked as a model's are: PDDL, JSON, plain text."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ _TITLE = re.compile(r"([A-Za-z][\w-]*)(\([^()]*\))?:?")  # Pick, Pick: or Pick(?
 
 
 def read_operators(path: Path, problem: AcquisitionProblem) -> tuple[LiftedOperator, ...]:
-    """The operators of a file, each sound by itself.
+    """Read the operators of a file, each sound by itself.
 
     Args:
-        path: A PDDL domain, the JSON of a proposal, or blocks of PAR, PRE, EFF- and EFF+, each
-            below a line with the operator's name.
-        problem: Whose predicates and types they use.
+        path: Path of the file: a PDDL domain, the JSON of a proposal, or blocks of PAR, PRE, EFF-
+            and EFF+, each below a line with the operator's name.
+        problem: Problem whose predicates and types the operators use.
 
     Raises:
         InvalidParameterError: The file cannot be read.
@@ -107,7 +107,7 @@ def _parse(text: str, where: str) -> OperatorDraft:
 
 
 def _draft(operator: LiftedOperator) -> OperatorDraft:
-    """Names alone: the types and predicates of a PDDL file are not those of a world."""
+    """A draft with names alone: types and predicates of a PDDL file are not those of a world."""
     return OperatorDraft(
         operator.name,
         tuple(ParameterDraft(v.name, v.type.name) for v in operator.parameters),

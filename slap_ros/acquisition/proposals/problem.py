@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What operators and rewards are proposed for: words, objects, where to start, what to reach."""
+"""The problem that operators and rewards are proposed for: names, objects, start, goal."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ class AcquisitionProblem:
     """A task without operators.
 
     Args:
-        name: Of the domain.
-        types: Its types.
-        predicates: Its predicates.
-        metrics: What rewards can be made of; none for problems without a world.
+        name: Name of the domain.
+        types: Types of the domain.
+        predicates: Predicates of the domain.
+        metrics: Metrics that rewards can be made of; none for problems without a world.
         static: Predicates that nothing changes.
-        layout: The task's objects.
-        init: The atoms that hold at first.
-        goal: The atoms that shall hold in the end.
+        layout: Layout of the task's objects.
+        init: Atoms that hold at first.
+        goal: Atoms that shall hold in the end.
         shown: Abstract states that demonstrations went through, in order, for each demonstration;
             none where there are none.
-        start: The task's initial state; None for problems without a world.
+        start: Initial state of the task; None for problems without a world.
     """
 
     name: str
@@ -72,9 +72,9 @@ class AcquisitionProblem:
         """The problem of a domain's task.
 
         Args:
-            domain: With a world; its operators are left out.
-            task: Where to start.
-            goal: What to reach; the task's goal if left out.
+            domain: Domain with a world; its operators are left out.
+            task: Task to start from.
+            goal: Atoms to reach; the task's goal if left out.
         """
         space = domain.atom_space(task.initial_state)
         return cls(
@@ -96,12 +96,12 @@ class AcquisitionProblem:
 
     @cached_property
     def start_mask(self) -> int:
-        """The abstract state to start from."""
+        """The abstract state to start from, a mask."""
         return self.space.mask(self.init)
 
     @cached_property
     def goal_mask(self) -> int:
-        """The atoms to reach."""
+        """The atoms to reach, a mask."""
         return self.space.mask(self.goal)
 
     @cached_property

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A proposal: operators, a reward template for each, a plan, and where it all comes from."""
+"""A proposal: operators, a reward template for each, a plan, and the provenance."""
 
 from __future__ import annotations
 
@@ -28,13 +28,15 @@ class ProposalProvenance:
     """Where a proposal comes from.
 
     Args:
-        proposer: By name: manual, induced, language.
-        rewarder: By name: manual, composed, language; empty while there are no rewards.
-        source: What was asked: the address of a server, the folders of demonstrations, a file.
-        model: As it was asked for; empty where none was.
-        requests: The sha256 of the requests whose answers are in the proposal.
-        attempts: Answers that it took.
-        tokens: That it took.
+        proposer: Name of the proposer: manual, induced, language.
+        rewarder: Name of the rewarder: manual, composed, language; empty while there are no
+            rewards.
+        source: Source of the operators: the address of a server, the folders of demonstrations, a
+            file.
+        model: Name of the model, as it was asked for; empty where no model was asked.
+        requests: Hashes (sha256) of the requests whose answers are in the proposal.
+        attempts: Number of answers that the proposal took.
+        tokens: Number of tokens that the proposal took.
     """
 
     proposer: str
@@ -51,12 +53,12 @@ class Proposal:
     """Operators for a problem, with everything that learning their skills takes.
 
     Args:
-        problem: The domain's name.
-        operators: In the order of the decomposition.
-        plan: The ground operators of a shortest plan, as text; None where none was looked for.
-        provenance: Where it comes from.
-        rewards: By operator name.
-        remarks: What people should know: warnings of the checks, preconditions seen only once.
+        problem: Name of the domain.
+        operators: Operators in the order of the decomposition.
+        plan: Ground operators of a shortest plan, as text; None where none was looked for.
+        provenance: Provenance of operators and rewards.
+        rewards: Reward templates by operator name.
+        remarks: Remarks for people: warnings of the checks, preconditions seen only once.
     """
 
     problem: str
@@ -67,7 +69,7 @@ class Proposal:
     remarks: tuple[str, ...] = ()
 
     def to_data(self) -> dict[str, Any]:
-        """What JSON can hold, in the same order for the same proposal."""
+        """The proposal as data that JSON can hold, in the same order for the same proposal."""
         return {
             "format": "slap_ros proposal",
             "version": VERSION,
@@ -84,7 +86,7 @@ class Proposal:
         }
 
     def to_json(self) -> str:
-        """JSON, the same bytes for the same proposal."""
+        """The proposal as JSON, the same bytes for the same proposal."""
         return json.dumps(self.to_data(), indent=2, allow_nan=False) + "\n"
 
     def to_pddl(self, problem: AcquisitionProblem) -> tuple[str, str]:
@@ -100,7 +102,7 @@ class Proposal:
 
 
 def read_proposal(data: Any, domain: Domain) -> Proposal:
-    """The proposal of :meth:`Proposal.to_data`, in a domain's words.
+    """Read the proposal of :meth:`Proposal.to_data` with the types and predicates of a domain.
 
     Raises:
         LookupError, TypeError, ValueError, AttributeError: It is not of that form, or of another

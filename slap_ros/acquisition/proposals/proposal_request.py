@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a proposal is asked for, by whom, and from what: the same for commands and for the node."""
+"""Requests for proposals: for which problem, by which proposer, from which material."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ from slap_ros.skills.demonstrator import AtomTrace
 
 @dataclass(frozen=True)
 class Demonstrations:
-    """What was shown.
+    """Demonstrations, and where they are from.
 
     Args:
-        traces: The atoms that held, for each demonstration by step.
-        source: Where they are from, for people.
+        traces: Atoms that held in each step, for each demonstration.
+        source: Description of where the demonstrations are from, for people.
     """
 
     traces: tuple[AtomTrace, ...] = ()
@@ -52,16 +52,16 @@ class Demonstrations:
 
 @dataclass(frozen=True)
 class ProposalRequest:
-    """What a proposal is asked for, by whom, and from what.
+    """A request for a proposal: for which problem, by which proposer, from which material.
 
     Args:
-        problem: What it is for.
-        proposer: Of operators, by name.
-        rewarder: Of rewards, by name, or ``none``.
-        operators: Written by hand.
-        rewards: Written by hand, by operator name.
+        problem: Problem that the proposal is for.
+        proposer: Name of the proposer of operators.
+        rewarder: Name of the rewarder, or ``none``.
+        operators: Operators written by hand.
+        rewards: Reward templates written by hand, by operator name.
         hold_steps: Environment steps that atoms must stay for a demonstrated change to count.
-        source: Where written operators or demonstrations are from, for provenance.
+        source: Description of where written operators or demonstrations are from, for provenance.
 
     Raises:
         InvalidParameterError: There is no proposer or rewarder of that name, or it lacks what it
@@ -94,11 +94,11 @@ class ProposalRequest:
         """A request for operators that solve a domain's task.
 
         Args:
-            domain: With what people wrote for it.
-            task: Where to start, and what to reach.
-            proposer: Of operators, by name.
-            rewarder: Of rewards, by name, or ``none``.
-            shown: What the proposer ``induced`` works from.
+            domain: Domain, with the operators and rewards that people wrote for it.
+            task: Task to solve: where to start, and what to reach.
+            proposer: Name of the proposer of operators.
+            rewarder: Name of the rewarder, or ``none``.
+            shown: Demonstrations that the proposer ``induced`` works from.
 
         Raises:
             InvalidParameterError: As for the class.
@@ -126,10 +126,10 @@ class ProposalRequest:
         """Make the proposal.
 
         Args:
-            inquiry: The conversation with a model, where one has to be asked.
+            inquiry: Conversation with a model, where a model has to be asked.
 
         Raises:
-            ProposalRejectedError: None passed the checks.
+            ProposalRejectedError: No proposal passed the checks.
             InvalidDomainError: Nothing was written by hand, or no reward can be composed.
             SlapError: Why no model could be asked.
         """

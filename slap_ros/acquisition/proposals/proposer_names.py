@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Names of those who propose operators and rewards, as options and parameters have them."""
+"""Names of proposers and rewarders, as options and parameters have them."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from slap_ros.errors import InvalidParameterError
 MANUAL, INDUCED, COMPOSED, LANGUAGE = "manual", "induced", "composed", "language"
 PROPOSERS = (MANUAL, INDUCED, LANGUAGE)
 REWARDERS = (MANUAL, COMPOSED, LANGUAGE)
-NO_REWARDER = "none"  # where no skill is to be learned
+NO_REWARDER = "none"  # name for no rewarder, where no skill is to be learned
 
 
 def require_known(what: str, name: str, known: Sequence[str]) -> None:
     """Refuse a name that is not among those that there are.
 
     Args:
-        what: Whose name it is.
-        name: As it was given.
-        known: All that there are.
+        what: Word for what has the name, such as ``proposer``.
+        name: Name that was given.
+        known: Names that there are.
 
     Raises:
         InvalidParameterError: It lists them.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where operators and rewards come from, each behind the same two methods."""
+"""Proposers of operators and rewarders, each kind behind one method."""
 
 from __future__ import annotations
 
@@ -16,34 +16,34 @@ from slap_ros.acquisition.proposals.verification import verify
 from slap_ros.errors import InvalidDomainError, ProposalRejectedError
 from slap_ros.relational import LiftedOperator, RewardTemplate
 
-Templates = Mapping[str, RewardTemplate]  # by operator name
+Templates = Mapping[str, RewardTemplate]  # reward templates by operator name
 
 
 class Proposer(Protocol):
-    """Whoever says which operators a task is made of."""
+    """A source of the operators that a task is made of."""
 
     name: str
 
     def operators(self, problem: AcquisitionProblem) -> Proposal:
-        """Operators with a plan, no rewards yet.
+        """Propose operators with a plan, no rewards yet.
 
         Raises:
-            ProposalRejectedError: None that pass the checks.
+            ProposalRejectedError: No proposal passes the checks.
         """
 
 
 class Rewarder(Protocol):
-    """Whoever says which metrics lead to an operator's effects."""
+    """A source of rewards: the metrics that lead to an operator's effects."""
 
     name: str
 
     def rewards(
         self, operators: Sequence[LiftedOperator], problem: AcquisitionProblem
     ) -> Templates:
-        """A template for each operator.
+        """Propose a reward template for each operator.
 
         Raises:
-            ProposalRejectedError: None that pass the checks.
+            ProposalRejectedError: No proposal passes the checks.
             InvalidDomainError: The problem's predicates rest on no metrics that would do.
         """
 
@@ -51,12 +51,12 @@ class Rewarder(Protocol):
 def propose(
     problem: AcquisitionProblem, proposer: Proposer, rewarder: Rewarder | None = None
 ) -> Proposal:
-    """Operators from one, rewards from the other.
+    """Ask the proposer for operators and the rewarder for rewards.
 
     Args:
-        problem: What they are for.
-        proposer: Of operators.
-        rewarder: Of rewards; none where no skill is to be learned.
+        problem: Problem that operators and rewards are for.
+        proposer: Proposer of operators.
+        rewarder: Rewarder; None where no skill is to be learned.
 
     Returns:
         The proposal, its provenance naming both.
@@ -78,11 +78,11 @@ class ManualProposer:
         """Propose these operators.
 
         Args:
-            operators: Of the domain.
-            source: Where they are from, for provenance.
+            operators: Operators of the domain or of a file.
+            source: Description of where the operators are from, for provenance.
 
         Raises:
-            InvalidDomainError: There are none.
+            InvalidDomainError: There are no operators.
         """
         if not operators:
             raise InvalidDomainError(
@@ -130,7 +130,7 @@ class ComposedRewarder:
     def rewards(
         self, operators: Sequence[LiftedOperator], problem: AcquisitionProblem
     ) -> Templates:
-        """A template for each operator."""
+        """See :class:`Rewarder`; templates are composed from metrics."""
         return {operator.name: compose_reward(operator, problem) for operator in operators}
 
 
@@ -142,9 +142,9 @@ def checked(
     """A proposal of operators that no model will be asked about again.
 
     Args:
-        operators: Each sound by itself.
-        problem: What they are for.
-        provenance: Where they come from.
+        operators: Operators, each sound by itself.
+        problem: Problem that operators and rewards are for.
+        provenance: Provenance of the operators.
 
     Raises:
         ProposalRejectedError: They make no plan.

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a model is asked about a problem, and how its answers are judged (LG-SAIL B, C)."""
+"""The questions to a model about a problem, and how answers are judged (LG-SAIL B, C)."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ Plan = tuple[GroundOperator, ...]
 def about_decomposition(
     problem: AcquisitionProblem,
 ) -> Question[tuple[ActionDraft, ...], Actions]:
-    """Which actions the task is made of."""
+    """The question which actions a task is made of."""
     text = decomposition_question(problem.types, problem.predicates, problem.init, problem.goal)
     return Question(
         DECOMPOSITION,
@@ -67,12 +67,12 @@ def about_decomposition(
 def about_operator(
     action: str, actions: Actions, problem: AcquisitionProblem
 ) -> Question[OperatorDraft, LiftedOperator]:
-    """What an action needs and changes.
+    """The question what an action needs and changes.
 
     Args:
-        action: One of the actions, as in ``Insert(?peg: peg, ?hole: hole)``.
-        actions: All of the decomposition.
-        problem: What they are for.
+        action: Action in question, as in ``Insert(?peg: peg, ?hole: hole)``.
+        actions: All actions of the decomposition.
+        problem: Problem that the actions are for.
     """
     name = action_name(action)
     text = operator_question(action, actions, problem.types, problem.predicates, problem.goal)
@@ -90,12 +90,13 @@ def about_operator(
 def about_reward(
     operator: LiftedOperator, problem: AcquisitionProblem, with_definitions: bool = True
 ) -> Question[RewardDraft, RewardTemplate]:
-    """Which metrics lead to an operator's effects.
+    """The question which metrics lead to an operator's effects.
 
     Args:
-        operator: In question.
-        problem: Whose metrics there are to choose among.
-        with_definitions: Whether the metrics' source is quoted, or their signatures alone.
+        operator: Operator whose reward is asked for.
+        problem: Problem with the metrics to choose among.
+        with_definitions: Whether the question quotes the metrics' source, or has their signatures
+            alone.
     """
     text = reward_question(operator, problem.metrics, problem.predicates, with_definitions)
     return Question(
@@ -112,11 +113,11 @@ def about_reward(
 def about_plan(
     operators: Sequence[LiftedOperator], problem: AcquisitionProblem
 ) -> Question[tuple[AtomDraft, ...], Plan]:
-    """A plan by the model itself, for comparison with the planner's.
+    """The question for a plan by the model itself, for comparison with the planner's.
 
     Args:
-        operators: That it may use.
-        problem: Where to start, and what to reach.
+        operators: Operators that the plan may use.
+        problem: Problem to solve: where to start, and what to reach.
     """
     objects = problem.layout.objects
     text = plan_question(operators, objects, problem.init, problem.goal)
@@ -139,9 +140,9 @@ def check_plan(
     """Check a plan by carrying it out in the abstract.
 
     Args:
-        draft: Its steps as they are written.
-        operators: That it may use.
-        problem: Where it starts, and what it shall reach.
+        draft: Steps of the plan, as they are written.
+        operators: Operators that the plan may use.
+        problem: Problem to solve: where the plan starts, and what it shall reach.
 
     Returns:
         The plan, None where a step cannot be taken or the goal is not reached, and why.
@@ -165,5 +166,5 @@ def check_plan(
 
 
 def action_name(action: str) -> str:
-    """Of ``Insert(?peg: peg, ?hole: hole)``, ``Insert``."""
+    """The name of an action: ``Insert`` of ``Insert(?peg: peg, ?hole: hole)``."""
     return action.partition("(")[0]

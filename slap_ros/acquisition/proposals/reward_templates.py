@@ -22,8 +22,8 @@ from slap_ros.relational import (
     Variable,
 )
 
-DENSE_SUM = 0.8  # of composed weights: success itself, which is paid 1, stays the best
-FULL = 0.99  # of a normalised metric: there is nothing more to be had
+DENSE_SUM = 0.8  # sum of composed weights: success itself, which is paid 1, stays the best
+FULL = 0.99  # value of a normalised metric from which on it cannot pay more
 METRES = "m"
 
 Bound = tuple[Metric, tuple[Variable, ...]]
@@ -35,9 +35,9 @@ def check_rewards(
     """Check the dense reward of one operator.
 
     Args:
-        draft: As it is written.
-        operator: Whose reward it is.
-        problem: Whose metrics it may use.
+        draft: Draft of the reward, as it is written.
+        operator: Operator of the reward.
+        problem: Problem whose metrics the reward may use.
 
     Returns:
         The template, None where something serious is wrong, and complaints.
@@ -60,8 +60,8 @@ def compose_reward(operator: LiftedOperator, problem: AcquisitionProblem) -> Rew
     So it is left out, unless the operator begins where it is another.
 
     Args:
-        operator: Whose reward it is.
-        problem: Whose metrics it may use.
+        operator: Operator of the reward.
+        problem: Problem whose metrics the reward may use.
 
     Raises:
         InvalidDomainError: No atom that it adds rests on a metric that grows towards it.
@@ -86,9 +86,9 @@ def _leading(
     """The metrics behind added atoms that have a way to go; all of them where none has.
 
     Args:
-        added: By the operator.
-        operator: What it asks for and deletes may rest on the same metric.
-        problem: With the state that tasks start from.
+        added: Atoms that the operator adds.
+        operator: Operator, whose required and deleted atoms may rest on the same metrics.
+        problem: Problem with the state that tasks start from.
     """
     before = operator.preconditions | operator.delete_effects
     changed = {bound for atom in before for bound in _behind(atom)}
@@ -107,8 +107,8 @@ def _is_full(metric: Metric, problem: AcquisitionProblem) -> bool:
     """Whether a metric pays all it can at the start, whatever objects it is of.
 
     Args:
-        metric: Of a condition.
-        problem: With the state that tasks start from, if there is one.
+        metric: Metric of a condition.
+        problem: Problem with the state that tasks start from, if there is one.
     """
     if problem.start is None:
         return False
@@ -169,7 +169,7 @@ class _RewardChecker:
         self.complaints.append(Complaint(kind, subject, fact, warning))
 
     def check(self, draft: TermDraft) -> None:
-        """One term."""
+        """Check one term."""
         weighed = self._weight_is_sound(draft)
         metric = self._problem.metrics_by_name.get(draft.metric)
         if metric is None:
@@ -249,7 +249,7 @@ class _RewardChecker:
         return chosen
 
     def check_all(self, draft: RewardDraft) -> None:
-        """All terms together."""
+        """Check all terms together."""
         if not draft.terms:
             self._complain(ComplaintClass.EMPTY_ANSWER, "the reward has no terms")
         if serious(self.complaints):

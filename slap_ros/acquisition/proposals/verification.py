@@ -34,18 +34,18 @@ from slap_ros.relational import (
 # abstract state. So the work is bounded, to some seconds, and not the states alone.
 MAX_WORK = 10_000_000  # ground operators looked at, in all states together
 MAX_STATES = 20_000  # abstract states
-MAX_PREDICATES = 8  # whose loss is tried to be undone
+MAX_PREDICATES = 8  # number of predicates for which a plan without deletions is tried
 MAX_COMPARED = 6  # parameters of operators that are compared in every order
 SUBJECT = "operators"
 
 
 @dataclass(frozen=True)
 class Verification:
-    """What came of it.
+    """The result of a verification.
 
     Args:
-        plan: A shortest one; None where there is none.
-        complaints: Why there is none; warnings where there is one.
+        plan: Shortest plan; None where there is none.
+        complaints: Complaints that say why there is no plan; warnings where there is one.
         culprits: Names of operators to be asked for again, in order; none where there is a plan.
     """
 
@@ -89,7 +89,7 @@ class _Culprits:
 
 @dataclass(frozen=True)
 class _Exploration:
-    """The abstract states that can be reached."""
+    """The abstract states that can be reached from the initial one."""
 
     states: frozenset[int]
     ever_true: int  # mask: atoms that hold in one of them

@@ -34,11 +34,11 @@ class EmbeddingEncoder:
     """
 
     def __init__(self, settings: LanguageSettings, work: WorkFolder) -> None:
-        """Ask nothing yet.
+        """Prepare an encoder that has asked nothing yet.
 
         Args:
-            settings: Which model, where.
-            work: Where vectors are kept.
+            settings: Settings of the model and its server.
+            work: Work folder in which vectors are kept.
 
         Raises:
             LanguageUnavailableError: See :class:`~slap_ros.language.client.OpenAIClient`.
@@ -47,14 +47,14 @@ class EmbeddingEncoder:
 
     @property
     def name(self) -> str:
-        """The model, and where it is."""
+        """The name of the model and the address of its server."""
         return f"{self._settings.model} at {self._settings.base_url}"
 
     def encode(self, operator: LiftedOperator) -> SkillSignature:
         """The key of an operator.
 
         Raises:
-            LanguageUnavailableError: No answer could be had.
+            LanguageUnavailableError: The server gave no answer.
             LanguageRefusedError: The server does not accept the request: key, model, address.
             InvalidParameterError: A vector that was kept is damaged.
         """

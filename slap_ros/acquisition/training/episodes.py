@@ -25,19 +25,20 @@ from slap_ros.relational import Layout, Object, Type
 from slap_ros.relational.state import Array
 from slap_ros.skills.groundings import Grounding, Groundings, Indices
 
-ABOUT = "groundings"  # a tensor of the file: its bytes are JSON
+ABOUT = "groundings"  # name of a tensor of the file whose bytes are JSON
 MAX_EPISODE_BYTES = 2**30
 
 
 @dataclass(frozen=True)
 class Episodes:
-    """What happened in e whole episodes of a skill.
+    """The states and actions of e whole episodes of a skill.
 
     Args:
-        states: Shape (e, steps + 1, width), rows as the groundings have them.
-        actions: The policy's, from -1 to 1, shape (e, steps, actions).
-        numbers: Of the grounding of each, shape (e,).
-        groundings: That they are numbers of.
+        states: States, shape (e, steps + 1, width), rows as in
+            :class:`~slap_ros.skills.groundings.Groundings`.
+        actions: Actions of the policy, from -1 to 1, shape (e, steps, actions).
+        numbers: Number of the grounding of each episode, shape (e,).
+        groundings: Groundings to which the numbers belong.
     """
 
     states: Array
@@ -73,11 +74,11 @@ def load_episodes(path: Path, types: Mapping[str, Type]) -> Episodes:
     """Read what :func:`save_episodes` wrote.
 
     Args:
-        path: Of the file.
-        types: The domain's, by name.
+        path: Path of the file.
+        types: Types of the domain, by name.
 
     Returns:
-        What :func:`save_episodes` wrote.
+        The episodes.
 
     Raises:
         InvalidParameterError: The file is damaged, or of another domain.
@@ -95,7 +96,7 @@ def load_episodes(path: Path, types: Mapping[str, Type]) -> Episodes:
 
 
 def _require_fit(episodes: Episodes) -> None:
-    """Raises ``ValueError`` where the parts do not fit together."""
+    """Raise ``ValueError`` where the parts of episodes do not fit together."""
     count, steps, _ = episodes.actions.shape
     if episodes.states.shape != (count, steps + 1, episodes.groundings.width):
         raise ValueError(f"states of shape {episodes.states.shape}")

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Who judges checkpoints: this process, or another one, so that this one can learn on meanwhile.
+"""The judges of checkpoints: this process, or another one, so that this one can learn on.
 
 The verdicts are the same, since each trial is a function of its state and the policy.
 """
@@ -22,7 +22,7 @@ class Judge(Protocol):
         """Begin to judge a policy.
 
         Args:
-            policy: Weights that nobody changes any more.
+            policy: Policy to judge, whose weights do not change any more.
         """
         ...
 
@@ -54,7 +54,7 @@ class JudgeHere:
         return self._trials.success(self._policy.mean)
 
     def core_to_spare(self) -> bool:
-        """See :class:`Judge`: there is this process's own alone."""
+        """See :class:`Judge`: the only core is this process's own."""
         return False
 
 
@@ -81,7 +81,7 @@ class JudgeElsewhere:
 
 
 def judge_until_closed(link: Connection, trials: SkillTrials) -> None:
-    """What such a process does, until the other end of its link is closed."""
+    """Judge policies that arrive by a link, until its other end is closed."""
     while True:
         policy: MlpPolicy = link.recv()
         link.send(trials.success(policy.mean))

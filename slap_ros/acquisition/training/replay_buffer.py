@@ -36,16 +36,16 @@ class SkillReplayBuffer(ReplayBuffer):
         seed: int,
         **others: Any,
     ) -> None:
-        """An empty buffer.
+        """Make an empty buffer.
 
         Args:
-            buffer_size: Transitions that are kept at most.
-            observation_space: Of the policy.
-            action_space: Of the policy.
-            mdp: What is observed and paid for.
-            normalisation: Of observations.
-            seed: Of the generator that draws batches.
-            others: What stable-baselines3 also hands to a buffer.
+            buffer_size: Number of transitions that are kept at most.
+            observation_space: Observation space of the policy.
+            action_space: Action space of the policy.
+            mdp: MDP that gives observations and rewards.
+            normalisation: Normalisation of observations.
+            seed: Seed of the generator that draws batches.
+            others: Other arguments that stable-baselines3 gives to a buffer.
         """
         others["n_envs"] = 1  # transitions side by side are rows like any others
         super().__init__(buffer_size, observation_space, action_space, **others)
@@ -62,15 +62,16 @@ class SkillReplayBuffer(ReplayBuffer):
         done: Any,
         infos: Any,
     ) -> None:
-        """Take transitions of episodes that are under way, until these come as a whole.
+        """Add transitions of episodes that are under way, until these come as a whole.
 
         Args:
-            obs: What was observed, shape (n, size).
-            next_obs: What was observed then.
-            action: What was done, shape (n, actions).
-            reward: What was paid, shape (n,).
-            done: Whether the episode's horizon was reached, which ends nothing for a critic.
-            infos: Of stable-baselines3.
+            obs: Observations before the step, shape (n, size).
+            next_obs: Observations after the step, shape (n, size).
+            action: Actions of the step, shape (n, actions).
+            reward: Rewards of the step, shape (n,).
+            done: Whether the episode's horizon was reached, which ends nothing for a critic; not
+                used.
+            infos: Information of stable-baselines3, which is not used.
         """
         del done, infos
         rows = self._room(len(reward))
@@ -79,7 +80,7 @@ class SkillReplayBuffer(ReplayBuffer):
         self.pos = rows.stop
 
     def add_episodes(self, episodes: Episodes) -> None:
-        """Take whole episodes, in the place of the transitions that were added one by one."""
+        """Add whole episodes, in the place of the transitions that were added one by one."""
         self.pos = self._whole
         rows = self._room(episodes.transitions)
         mdp = self._mdp.over(episodes.groundings)
@@ -100,11 +101,12 @@ class SkillReplayBuffer(ReplayBuffer):
         return self.pos
 
     def sample(self, batch_size: int, env: Any = None) -> ReplayBufferSamples:
-        """A batch, drawn with replacement.
+        """Draw a batch with replacement.
 
         Args:
-            batch_size: Transitions.
-            env: Of stable-baselines3; nothing is normalised here again.
+            batch_size: Number of transitions.
+            env: Environment of stable-baselines3, which is not used: observations are normalised
+                already.
         """
         del env
         rows = self.generator.integers(self.pos, size=batch_size)
@@ -128,7 +130,7 @@ class SkillReplayBuffer(ReplayBuffer):
         self.generator.bit_generator.state = json.loads(text)
 
     def _room(self, count: int) -> slice:
-        """Where the next transitions go; the oldest are forgotten where there is no room."""
+        """The rows for the next transitions; the oldest are forgotten where there is no room."""
         if self.pos + count > self.buffer_size:
             kept = max(self.buffer_size - count, 0)
             lost = self.pos - kept

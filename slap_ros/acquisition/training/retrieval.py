@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which known skill a new one begins with: the nearest key of a library (LG-SAIL §4.3).
+"""The retrieval of the known skill that a new one begins with, by its key (LG-SAIL §4.3).
 
 The paper's key is a text embedding of ⟨PRE, EFF+, EFF-⟩, which
 :class:`~slap_ros.acquisition.training.embedding_encoder.EmbeddingEncoder` makes. Ours is the metric
@@ -23,7 +23,7 @@ class SkillEncoder(Protocol):
 
     @property
     def name(self) -> str:
-        """What tells it from other encoders, for work folders and records."""
+        """A name that tells the encoder from others, for work folders and records."""
         ...
 
     def encode(self, operator: LiftedOperator) -> SkillSignature:
@@ -45,11 +45,12 @@ def nearest(key: SkillSignature, known: Mapping[str, SkillSignature]) -> tuple[s
     """The name of the nearest of the known keys, and its similarity.
 
     Args:
-        key: Of the new skill.
-        known: By name.
+        key: Key of the new skill.
+        known: Keys of the known skills, by name.
 
     Returns:
-        The first by name of those that are equally near; None where none has anything in common.
+        Name and similarity, the first by name of keys that are equally near; None where no key has
+        anything in common.
     """
     best: tuple[str, float] | None = None
     for name in sorted(known):

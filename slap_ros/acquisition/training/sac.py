@@ -44,7 +44,7 @@ class ExploringSac(LeanSac):
     needs to be kept.
     """
 
-    longest_hold = 1  # environment steps
+    longest_hold = 1  # longest time that noise is held, environment steps
 
     def _sample_action(
         self, learning_starts: int, action_noise: Any = None, n_envs: int = 1
@@ -95,9 +95,9 @@ class SkillLearner:
         """Begin with random weights and an empty buffer.
 
         Args:
-            env: Of the skill.
-            settings: SAC's hyper-parameters.
-            seed: Of weights, noise and batches.
+            env: Environments of the skill.
+            settings: Hyper-parameters of SAC.
+            seed: Seed of weights, noise and batches.
             core_to_spare: Whether there is a second core to learn with just now. What is learned
                 does not depend on it.
         """
@@ -136,23 +136,23 @@ class SkillLearner:
 
     @property
     def buffer(self) -> SkillReplayBuffer:
-        """What is learned from."""
+        """The replay buffer that is learned from."""
         assert isinstance(self._sac.replay_buffer, SkillReplayBuffer)
         return self._sac.replay_buffer
 
     @property
     def steps(self) -> int:
-        """Environment steps so far."""
+        """The number of environment steps so far."""
         return self._sac.num_timesteps
 
     def learn(self, rounds: int) -> Episodes:
         """Run whole episodes in all environments, and learn meanwhile.
 
         Args:
-            rounds: Episodes in each environment.
+            rounds: Number of episodes in each environment.
 
         Returns:
-            These episodes; the buffer has them.
+            These episodes, which are in the buffer.
         """
         self._sac.learn(
             rounds * self._env.horizon * self._env.num_envs,
@@ -220,8 +220,8 @@ class SkillLearner:
         """Go on from a checkpoint.
 
         Args:
-            path: Of the checkpoint.
-            episodes: All that were run before it, in their order.
+            path: Path of the checkpoint.
+            episodes: Episodes that were run before the checkpoint, all of them in order.
 
         Raises:
             InvalidParameterError: It is damaged.
@@ -245,7 +245,7 @@ class SkillLearner:
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:
-    """What :meth:`SkillLearner.save` wrote.
+    """Read what :meth:`SkillLearner.save` wrote.
 
     Raises:
         InvalidParameterError: It is damaged.
@@ -254,5 +254,5 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
 
 
 def _restored(saved: Mapping[str, Any]) -> dict[str, Any]:
-    """What :meth:`SkillLearner.save` wrote."""
+    """The checkpoint that :meth:`SkillLearner.save` wrote, with values of the right types."""
     return {**saved, "averaged": dict(saved["averaged"]), "steps": int(saved["steps"])}

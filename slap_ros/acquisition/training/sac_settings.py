@@ -18,25 +18,25 @@ class SacSettings:
     """SAC's hyper-parameters, under the names of stable-baselines3 where it has them.
 
     Args:
-        n_envs: Episodes side by side.
+        n_envs: Number of environments, whose episodes run side by side.
         net_arch: Units of each hidden layer of the actor, which is what a library ships.
-        critic_net_arch: Of the critics, where they differ. Larger ones cost time in training, and
-            nothing where the skill is used.
+        critic_net_arch: Units of each hidden layer of the critics, where they differ from the
+            actor's. Larger ones cost time in training, and nothing where the skill is used.
         critic_layer_norm: Whether hidden layers of the critics are normalised. Without, the value
             of what was never tried runs ahead of what is known, and success swings late.
-        batch_size: Transitions of an update.
-        train_freq: Environment steps for each update.
-        learning_rate: Of actor, critics and the entropy's weight.
-        gamma: Of rewards, per environment step.
-        tau: How far target networks, and the policy that is judged, follow in each update.
+        batch_size: Number of transitions of an update.
+        train_freq: Number of environment steps for each update.
+        learning_rate: Learning rate of actor, critics and the entropy's weight.
+        gamma: Discount of rewards, per environment step.
+        tau: Share by which target networks, and the policy that is judged, follow in each update.
         entropy_per_action: Target entropy, for each action.
-        ent_coef: What entropy is worth in the beginning. The library's 1 outweighs a reward
-            of at most 1 for the first 5,000 steps or so.
-        learning_starts: Environment steps with random actions, before the first update.
+        ent_coef: Weight of the entropy in the beginning. The library's 1 outweighs a reward of at
+            most 1 for the first 5,000 steps or so.
+        learning_starts: Number of environment steps with random actions, before the first update.
         longest_hold: Environment steps for which the last environment holds its noise; each one
             before it holds it half as long, one step at least. Random actions of the beginning
             are held for 1, 2, 3 steps and so on, at most this.
-        buffer_size: Transitions that are kept; the oldest episodes are forgotten first.
+        buffer_size: Number of transitions that are kept; the oldest episodes are forgotten first.
 
     Raises:
         InvalidParameterError: Environments that no whole number of updates can follow.

@@ -28,7 +28,7 @@ from slap_ros.acquisition.training.twin_critics import (
 )
 
 LOG_SQRT_TAU = 0.5 * math.log(2.0 * math.pi)
-SQUASH_EPSILON = 1e-6  # against log 0, as the library has it
+SQUASH_EPSILON = 1e-6  # term that avoids log 0, as in stable-baselines3
 
 
 class LeanSac(SAC):
@@ -64,8 +64,8 @@ class LeanSac(SAC):
         """Update the networks so many times, each with a batch of its own.
 
         Args:
-            gradient_steps: Updates.
-            batch_size: Transitions of each.
+            gradient_steps: Number of updates.
+            batch_size: Number of transitions of each update.
         """
         online = [*self._online.tensors, *self._actor_weights]
         following = [*self._target.tensors, *self.averaged.values()]
@@ -140,13 +140,13 @@ class LeanSac(SAC):
         log_prob: torch.Tensor,
         ent_coef: torch.Tensor,
     ) -> None:
-        """Towards actions of more value and entropy: less (weight · log_prob - min value).mean().
+        """Raise value and entropy of actions: lower (weight · log_prob - min value).mean().
 
         Args:
-            observations: Shape (n, size).
-            actions: Drawn from the policy in each, with its gradient, shape (n, axes).
-            log_prob: Logarithm of their density, with its gradient, shape (n, 1).
-            ent_coef: What entropy is worth.
+            observations: Observations, shape (n, size).
+            actions: Actions drawn from the policy, with their gradient, shape (n, axes).
+            log_prob: Logarithm of the actions' density, with its gradient, shape (n, 1).
+            ent_coef: Weight of the entropy.
         """
         n, axes = actions.shape
         with torch.no_grad(), self._threads():
@@ -172,7 +172,7 @@ def _descend(
     weights: Sequence[torch.Tensor],
     gradients: Sequence[torch.Tensor],
 ) -> None:
-    """A step along gradients."""
+    """Take a step of the optimizer along gradients."""
     for weight, gradient in zip(weights, gradients, strict=True):
         weight.grad = gradient
     optimizer.step()

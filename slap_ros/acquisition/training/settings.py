@@ -16,21 +16,23 @@ class AcquisitionSettings:
     """All hyper-parameters of a curriculum.
 
     Args:
-        sac: How a skill is learned.
-        dense_share: What the weighted metrics are paid by. The paper's weights pay .8 or .9 for
-            being near and 1 for success: so small a margin is learned late, if at all.
-        rollouts: Tasks that the plan is carried out in, new ones in each iteration.
-        validation: Tasks that an iteration judges skills on, others in each; training never sees
-            them.
-        judged: States at most, from these tasks, that a checkpoint is judged from.
-        segment_episodes: Episodes in each environment between two judgements.
+        sac: Settings of SAC, with which skills are learned.
+        dense_share: Factor of the weighted metrics in the reward. The paper's weights pay .8 or .9
+            for being near and 1 for success: so small a margin is learned late, if at all.
+        rollouts: Number of tasks that the plan is carried out in, new ones in each iteration.
+        validation: Number of tasks that an iteration judges skills on, others in each; training
+            never sees them.
+        judged: Number of states at most, from these tasks, that a checkpoint is judged from.
+        segment_episodes: Number of episodes in each environment between two judgements.
         skill_steps: Environment steps that a skill learns for in one iteration.
         total_steps: Environment steps that all skills together learn for, at most.
-        enough: Success from which on a checkpoint is good, as two in a row are to be.
+        enough: Success rate from which on a checkpoint is good, as two in a row are to be.
         progress: Task progress from which on a curriculum is over, as two in a row are to be.
-        patience: Rounds without progress after which a skill is left for others.
-        rehearsal: Share of the states learned from in which the skill succeeded before.
-        least_similarity: Of a known skill to a new one that begins with its weights.
+        patience: Number of rounds without progress after which a skill is left for others.
+        rehearsal: Share of the states learned from that are states in which the skill succeeded
+            before.
+        least_similarity: Least similarity of a known skill to a new one that begins with its
+            weights.
     """
 
     sac: SacSettings = field(default_factory=SacSettings)
@@ -63,7 +65,7 @@ class AcquisitionSettings:
         return max(1, self.skill_steps // self.segment_steps(horizon))
 
     def segment_steps(self, horizon: int) -> int:
-        """Environment steps of a segment."""
+        """The number of environment steps of a segment."""
         return self.segment_episodes * self.sac.n_envs * horizon
 
 

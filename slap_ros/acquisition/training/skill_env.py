@@ -34,8 +34,8 @@ class Initiation:
     """A state in which a skill begins, the hand where the approach brought it.
 
     Args:
-        state: In which it begins.
-        objects: What it is applied to.
+        state: State in which the skill begins.
+        objects: Objects that the skill is applied to.
     """
 
     state: State
@@ -43,12 +43,12 @@ class Initiation:
 
     @property
     def grounding(self) -> Grounding:
-        """What the skill is applied to, among which objects."""
+        """The objects that the skill is applied to, and the layout of all objects."""
         return Grounding(self.state.layout, self.objects)
 
 
 class SkillMdp:
-    """What is observed and paid for in states of an operator's skill."""
+    """The MDP of an operator's skill: observations and rewards of states."""
 
     def __init__(
         self,
@@ -60,10 +60,10 @@ class SkillMdp:
         """Bind a reward to a domain's features and a choice of groundings.
 
         Args:
-            domain: Whose learner's interface is used.
-            reward: Of the operator.
-            groundings: Those that states are of.
-            dense_share: What the weighted metrics are paid by; success is paid 1.
+            domain: Domain whose learner's interface is used.
+            reward: Reward of the operator's skill.
+            groundings: Groundings that states may belong to.
+            dense_share: Factor of the weighted metrics in the reward; success is paid 1.
 
         Raises:
             InvalidDomainError: The domain has no learner's interface.
@@ -74,15 +74,15 @@ class SkillMdp:
         self.action_map = ActionMap(domain, gripper=True)
 
     def over(self, groundings: Groundings) -> SkillMdp:
-        """The same for states of other groundings."""
+        """The same MDP for states of other groundings."""
         return SkillMdp(self.domain, self.reward, groundings, self.dense_share)
 
     def observe(self, rows: Array, numbers: Indices) -> NDArray[np.float32]:
-        """What is observed in states.
+        """The observations in states.
 
         Args:
-            rows: Shape (n, width).
-            numbers: Of the grounding of each, shape (n,).
+            rows: States as rows, shape (n, width).
+            numbers: Number of the grounding of each state, shape (n,).
 
         Returns:
             Shape (n, SIZE).
@@ -93,12 +93,12 @@ class SkillMdp:
         return observed
 
     def rewards(self, rows: Array, numbers: Indices, begun: Array) -> tuple[Array, Bools]:
-        """What arriving in states is paid, and whether they are successes.
+        """The rewards of arriving in states, and whether they are successes.
 
         Args:
-            rows: Shape (n, width).
-            numbers: Of the grounding of each, shape (n,).
-            begun: The states in which their episodes began, shape (n, width).
+            rows: States as rows, shape (n, width).
+            numbers: Number of the grounding of each state, shape (n,).
+            begun: States in which their episodes began, as rows, shape (n, width).
 
         Returns:
             Two arrays of shape (n,).
@@ -128,14 +128,14 @@ class SkillVecEnv:
         """Begin an episode in each environment.
 
         Args:
-            mdp: What is observed and paid for.
-            initiations: From which every episode draws one.
-            num_envs: How many environments.
+            mdp: MDP that gives observations and rewards.
+            initiations: Initiation states, of which every episode draws one.
+            num_envs: Number of environments.
             horizon: Environment steps of every episode.
-            seed: Of the draws.
-            first_round: Episodes that were run before in each environment: which ones are drawn
-                next depends on it and the seed alone, so that training can be resumed here.
-            make_worlds: Makes the domain's worlds; by default as the domain itself does.
+            seed: Seed of the draws.
+            first_round: Number of episodes that were run before in each environment: which ones are
+                drawn next depends on it and the seed alone, so that training can be resumed here.
+            make_worlds: Function that makes the domain's worlds; None for the domain's own.
         """
         self.mdp, self.num_envs, self.horizon = mdp, num_envs, horizon
         self.action_map = mdp.action_map
@@ -152,7 +152,7 @@ class SkillVecEnv:
         self._numbers = np.zeros(num_envs, dtype=np.intp)
         self._worlds: list[VectorWorld] = []
         self._finished: list[Episodes] = []
-        self.succeeded: Bools = np.zeros(num_envs, dtype=bool)  # in the episodes that ended last
+        self.succeeded: Bools = np.zeros(num_envs, dtype=bool)  # by the episodes that ended last
         self._begin_round()
 
     def step(self, actions: Array) -> VecEnvStep:
@@ -199,7 +199,7 @@ class SkillVecEnv:
         self._begin_round()
 
     def _begin_round(self) -> None:
-        """Draw where every environment begins its next episode."""
+        """Draw the state in which every environment begins its next episode."""
         rng = np.random.default_rng((*self._seed, self.rounds))
         fresh = not self._worlds
         for number, (pool, part) in enumerate(zip(self._pools, self._parts, strict=True)):

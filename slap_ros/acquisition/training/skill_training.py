@@ -43,12 +43,13 @@ IN_A_ROW = 2  # good judgements after which a round is over
 
 @dataclass(frozen=True)
 class Round:
-    """What became of a skill in one round.
+    """The judgements of a skill in one round.
 
     Args:
-        initial: Success of what the round began with, from fresh states.
-        segments: Success after each segment.
-        best: After which segment it was highest; 0 for what the round began with.
+        initial: Success rate of what the round began with, from fresh states.
+        segments: Success rate after each segment.
+        best: Number of the segment after which success was highest; 0 for what the round began
+            with.
         over: Whether the round is over.
     """
 
@@ -59,13 +60,13 @@ class Round:
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> Round:
-        """The inverse of ``asdict``, once it has been through JSON."""
+        """The round of ``asdict``, read from JSON."""
         segments = tuple(map(float, data["segments"]))
         return cls(float(data["initial"]), segments, int(data["best"]), bool(data["over"]))
 
     @property
     def success(self) -> float:
-        """The success of the checkpoint that stays."""
+        """The success rate of the checkpoint that stays."""
         return (self.initial, *self.segments)[self.best]
 
     @property
@@ -74,7 +75,7 @@ class Round:
         return self.best == len(self.segments)
 
     def with_segment(self, success: float) -> Round:
-        """With one more segment; of equally good ones the earlier stays."""
+        """The round with one more segment; of equally good checkpoints the earlier one stays."""
         segments = (*self.segments, success)
         better = success > self.success
         return replace(self, segments=segments, best=len(segments) if better else self.best)
@@ -86,10 +87,10 @@ class Round:
 
 
 def rounds_in(folder: Path) -> list[Round]:
-    """How a skill's rounds went so far; none before the first judgement.
+    """The rounds of a skill so far; none before the first judgement.
 
     Args:
-        folder: Of its training.
+        folder: Folder of the skill's training.
 
     Raises:
         InvalidParameterError: What is there is damaged.
@@ -108,14 +109,14 @@ class SkillTraining:
     """The training of one skill, round after round in the same folder.
 
     Args:
-        domain: Whose worlds are stepped.
-        reward: Of the operator.
+        domain: Domain of the worlds.
+        reward: Reward of the operator's skill.
         horizon: Environment steps of an episode.
-        settings: All hyper-parameters.
-        seed: Of the whole curriculum.
-        folder: Where everything is kept.
-        make_worlds: Makes the domain's worlds that are learned in.
-        attempt: How often the skill was learned from scratch before.
+        settings: All hyper-parameters of the curriculum.
+        seed: Seed of the whole curriculum.
+        folder: Folder of the skill's training.
+        make_worlds: Function that makes the domain's worlds that are learned in.
+        attempt: Number of times that the skill was learned from scratch before.
     """
 
     domain: Domain
@@ -135,16 +136,17 @@ class SkillTraining:
         judge: Judge,
         beginning: MlpPolicy | None = None,
     ) -> Round:
-        """One round; read where it is over, gone on with where it was interrupted.
+        """Carry out one round; read it where it is over, resume it where it was interrupted.
 
         Args:
-            number: Of the round, from 0; all before it are over.
-            initiations: States that episodes begin in.
-            judge: Of checkpoints, from states of other tasks.
-            beginning: The policy of another skill that the first round begins with.
+            number: Number of the round, from 0; all before it are over.
+            initiations: Initiation states, in which episodes begin.
+            judge: Judge of checkpoints, from states of other tasks.
+            beginning: Policy of another skill that the first round begins with; None for random
+                weights.
 
         Returns:
-            How it went; the folder has the best policy.
+            The round with its judgements; the folder has the best policy.
 
         Raises:
             ChildProcessError: A process that judged or stepped worlds has ended.
@@ -189,7 +191,7 @@ class SkillTraining:
         return SkillLearner(env, self.settings.sac, seed, judge.core_to_spare)
 
     def _seed(self, number: int) -> int:
-        """Every skill, attempt and round draws from streams of its own."""
+        """The seed of a round: every skill, attempt and round draws from a stream of its own."""
         text = f"{self.seed} {self.reward.operator.name} {number}"
         if self.attempt:
             text += f" {self.attempt}"
@@ -205,10 +207,11 @@ class SkillTraining:
         """Go on from the last checkpoint; a round begins with the best one where it is better.
 
         Args:
-            learner: To go on with.
-            number: Of the round.
-            done: Segments so far, of all rounds.
-            beginning: What a first round begins with.
+            learner: Learner that continues.
+            number: Number of the round, from 0.
+            done: Number of segments so far, of all rounds.
+            beginning: Policy of another skill that the first round begins with; None for random
+                weights.
         """
         types = self.domain.types_by_name
         earlier = [load_episodes(self._episodes(i), types) for i in range(done)]
@@ -228,10 +231,10 @@ class SkillTraining:
         """Judge what was learned so far, and learn on meanwhile where that cannot be in vain.
 
         Args:
-            learner: After its latest segment.
-            judge: Of its policy.
-            done: Segments so far, of all rounds.
-            before: The round without this judgement; None where it is the round's first.
+            learner: Learner after its latest segment.
+            judge: Judge of the learner's policy.
+            done: Number of segments so far, of all rounds.
+            before: Round without this judgement; None where it is the round's first.
 
         Returns:
             The next segment's episodes; None where it was not learned yet.
@@ -264,7 +267,7 @@ class SkillTraining:
         self._rounds[-1] = replace(now, over=over or now.good(self.settings.enough))
 
     def _keep_best(self, policy: MlpPolicy, done: int) -> None:
-        """Keep a policy, and the checkpoint that it is of."""
+        """Keep a policy as the best one, with its checkpoint."""
         draft = self.folder / "best.draft"
         shutil.copyfile(self._checkpoint(done), draft)
         draft.rename(self.folder / "best.pt")

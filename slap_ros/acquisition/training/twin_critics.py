@@ -14,23 +14,23 @@ from typing import Protocol
 
 import torch
 
-Layers = list[tuple[torch.Tensor, torch.Tensor]]  # weights and bias of each
+Layers = list[tuple[torch.Tensor, torch.Tensor]]  # weights and bias of each layer
 Tensors = tuple[torch.Tensor, ...]
-LAYER_NORM_EPSILON = 1e-5  # of torch.nn.functional.layer_norm
+LAYER_NORM_EPSILON = 1e-5  # default of torch.nn.functional.layer_norm
 
 
 class Activation(Protocol):
-    """What is between two layers."""
+    """An activation function between two layers."""
 
     def forward(self, inputs: torch.Tensor) -> tuple[torch.Tensor, Tensors]:
-        """Outputs, and what :meth:`backward` needs."""
+        """The outputs, and the tensors that :meth:`backward` needs."""
 
     def backward(self, gradient: torch.Tensor, kept: Tensors) -> torch.Tensor:
         """The gradient by the inputs, from the one by the outputs."""
 
 
 class Rectifier:
-    """max(x, 0)."""
+    """The rectifier, max(x, 0)."""
 
     def forward(self, inputs: torch.Tensor) -> tuple[torch.Tensor, Tensors]:
         """See :class:`Activation`."""
@@ -70,12 +70,12 @@ class NormalisedRectifier:
 
 @dataclass(frozen=True)
 class ForwardPass:
-    """A forward pass.
+    """The results of a forward pass through both critics.
 
     Args:
-        values: Of both critics, shape (2, n, 1).
-        inputs: Of each layer, shape (2, n, width).
-        kept: By the activation before each layer but the first.
+        values: Values of both critics, shape (2, n, 1).
+        inputs: Inputs of each layer, shape (2, n, width).
+        kept: Tensors kept by the activation before each layer but the first.
     """
 
     values: torch.Tensor
@@ -92,7 +92,7 @@ class TwinCritics:
         """Make the networks' layers views of one, so that what one changes the other has as well.
 
         Args:
-            networks: Linear layers, and whatever activation.
+            networks: Networks of linear layers, with any activation.
         """
         self.layers: Layers = []  # weights (networks, in, out), bias (networks, 1, out)
         for layers in zip(*map(linear_layers, networks), strict=True):
@@ -104,15 +104,15 @@ class TwinCritics:
 
     @property
     def tensors(self) -> list[torch.Tensor]:
-        """Weights and bias of the first layer, and of the next."""
+        """The weights and bias of the first layer, then of the next, and so on."""
         return [tensor for layer in self.layers for tensor in layer]
 
     def __call__(self, observations: torch.Tensor, actions: torch.Tensor) -> ForwardPass:
-        """Value actions.
+        """Compute the values of actions.
 
         Args:
-            observations: Shape (n, size).
-            actions: Shape (n, axes).
+            observations: Observations, shape (n, size).
+            actions: Actions, shape (n, axes).
         """
         inputs, kept = [torch.cat([observations, actions], dim=1).expand(2, -1, -1)], []
         (weights, bias), *others = self.layers
@@ -125,11 +125,11 @@ class TwinCritics:
         return ForwardPass(outputs, inputs, kept)
 
     def weight_gradients(self, forward: ForwardPass, by_values: torch.Tensor) -> list[torch.Tensor]:
-        """Gradients by :attr:`tensors`.
+        """Compute the gradients by :attr:`tensors`.
 
         Args:
-            forward: What the values came from.
-            by_values: The gradient by the values, shape (2, n, 1).
+            forward: Forward pass that gave the values.
+            by_values: Gradient by the values, shape (2, n, 1).
         """
         gradients, gradient = [], by_values
         for number in reversed(range(len(self.layers))):
@@ -145,9 +145,9 @@ class TwinCritics:
         """The gradient by the actions, shape (n, axes).
 
         Args:
-            forward: What the values came from.
-            by_values: The gradient by the values, shape (2, n, 1).
-            axes: Of an action.
+            forward: Forward pass that gave the values.
+            by_values: Gradient by the values, shape (2, n, 1).
+            axes: Number of axes of an action.
         """
         gradient = by_values
         for number in reversed(range(1, len(self.layers))):
@@ -156,7 +156,7 @@ class TwinCritics:
         return gradient.bmm(weights.transpose(1, 2)).sum(0)[:, -axes:]
 
     def _through(self, number: int, forward: ForwardPass, by_outputs: torch.Tensor) -> torch.Tensor:
-        """By the outputs of the layer before, from the gradient by a layer's own."""
+        """The gradient by the outputs of the layer before, from the gradient by a layer's own."""
         weights, _ = self.layers[number]
         by_inputs = by_outputs.bmm(weights.transpose(1, 2))
         return self.activation.backward(by_inputs, forward.kept[number - 1])

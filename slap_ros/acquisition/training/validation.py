@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a policy is worth: its success from given states, and whether constant actions do as well.
+"""The success of a policy from given states, and whether constant actions do as well.
 
 Success is that of a stage of a plan: everything that is expected holds in some step of the horizon,
 and nothing that the operator deletes.
@@ -21,21 +21,22 @@ from slap_ros.relational.state import Array
 from slap_ros.skills.groundings import Groundings
 from slap_ros.skills.reward import SkillReward
 
-SIDE_BY_SIDE = 8  # trials that a policy acts in together
-RANDOM = "random"  # the policy's name
-RANDOM_ROUNDS = 5  # from every state, so that 30 or 40 states do not decide by chance
-# Observations, shape (n, size), to actions, shape (n, actions).
+SIDE_BY_SIDE = 8  # number of trials that a policy acts in together
+RANDOM = "random"  # name of the policy of random actions
+RANDOM_ROUNDS = 5  # random trials from each state, so that 30 or 40 states do not decide by chance
+# A function from observations, shape (n, size), to actions, shape (n, actions).
 Act = Callable[[NDArray[np.float32]], Array | NDArray[np.float32]]
 
 
 @dataclass(frozen=True)
 class Vacuity:
-    """How well the best policy does that knows nothing.
+    """The success of the best blind policy, which observes nothing.
 
     Args:
-        success: Share of its trials in which it succeeds.
-        policy: Its name; empty where none succeeds.
-        trials: How many: one per state, ``RANDOM_ROUNDS`` of random actions; 0 where none succeeds.
+        success: Share of the trials in which the blind policy succeeds.
+        policy: Name of the blind policy; empty where none succeeds.
+        trials: Number of trials: one per state, ``RANDOM_ROUNDS`` of random actions; 0 where none
+            succeeds.
     """
 
     success: float
@@ -56,10 +57,10 @@ class SkillTrials:
         """Prepare the trials.
 
         Args:
-            domain: Whose worlds are stepped.
-            reward: Of the skill.
-            initiations: Where it begins, one for each trial.
-            horizon: Environment steps of each.
+            domain: Domain of the worlds.
+            reward: Reward of the skill.
+            initiations: Initiation states, one for each trial.
+            horizon: Environment steps of each trial.
         """
         self._domain, self._initiations, self._horizon = domain, initiations, horizon
         groundings = list(dict.fromkeys(one.grounding for one in initiations))
@@ -81,7 +82,7 @@ class SkillTrials:
                 yield from zip(some, self._run(some, act), strict=True)
 
     def vacuity(self, rng: np.random.Generator) -> Vacuity:
-        """The best of constant and random actions.
+        """Find the best policy of constant or random actions.
 
         Random actions are other ones in every round; constant ones would do the same again.
         """
@@ -114,7 +115,7 @@ class SkillTrials:
         return [i not in going for i in range(len(begun))]
 
     def _worlds_in(self, states: Sequence[State]) -> list[World]:
-        """Worlds of the same objects, one in each state; those of earlier trials, set anew."""
+        """Worlds of the same objects, one in each state; those of earlier trials, reset."""
         worlds = self._worlds.setdefault(states[0].layout, [])
         for world, state in zip(worlds, states, strict=False):
             world.reset(state)
@@ -126,8 +127,8 @@ def blind_policies(actions: int, rng: np.random.Generator) -> Mapping[str, Act]:
     """Policies that see nothing: every action's extremes, nothing at all, and random actions.
 
     Args:
-        actions: How many a policy has.
-        rng: Draws the random ones.
+        actions: Number of the policy's actions.
+        rng: Generator that draws the random actions.
     """
 
     def constant(action: Array) -> Act:

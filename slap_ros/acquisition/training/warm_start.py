@@ -16,12 +16,13 @@ from slap_ros.skills.skill_library import AcquiredSkill
 
 @dataclass(frozen=True)
 class WarmStart:
-    """What a new skill begins with.
+    """The start of a new skill with the weights of a known one.
 
     Args:
         skill: Name and digest of the known skill.
-        similarity: Of its operator to the new one's; 1 for the same operator.
-        policy: Its weights.
+        similarity: Similarity of the known skill's operator to the new one's; 1 for the same
+            operator.
+        policy: Policy of the known skill, with its weights.
     """
 
     skill: str
@@ -45,8 +46,8 @@ class WarmStarts:
     Args:
         own: Skills that are there already, by the names of their operators.
         known: Skills of other libraries, by the paths of their folders.
-        encoder: Gives operators the keys by which these are found.
-        least_similarity: Of a known skill that is worth beginning with.
+        encoder: Encoder that gives operators the keys by which known skills are found.
+        least_similarity: Least similarity of a known skill that is worth beginning with.
     """
 
     own: Mapping[str, AcquiredSkill]
