@@ -37,8 +37,8 @@ class Camera:
         """Look at an arm and what is around it.
 
         Args:
-            visuals: What is around it.
-            view: From where; by default from the front right, from above the arm.
+            visuals: Shapes around the arm, and where they are.
+            view: Viewpoint; by default from the front right, from above the arm.
         """
         view = view or Viewpoint()
         self._visuals = visuals
@@ -147,9 +147,9 @@ def write_animation(
 
     Args:
         path: The file; its ending says the format, see ``slap_ros.worlds.animation``.
-        camera: Draws the frames.
-        states: One per control step; not empty.
-        period_s: What a control step takes.
+        camera: Camera that draws the frames.
+        states: States, one per control step; not empty.
+        period_s: Duration of a control step, s.
         progress: Told the number of frames drawn so far, after each.
     """
 

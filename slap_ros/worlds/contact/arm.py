@@ -115,8 +115,8 @@ def share_in_time(joints: Sequence[float], goal: Sequence[float]) -> float:
     """How much of the way to a configuration the arm can well go in a control period, up to 1.
 
     Args:
-        joints: Where it is, rad.
-        goal: Where it is to be, rad.
+        joints: Present joint positions, rad.
+        goal: Joint positions to go to, rad.
     """
     share = 1.0
     for q, wanted, step in zip(joints, goal, MAX_JOINT_STEP, strict=True):

@@ -92,8 +92,8 @@ class ContactDynamics:
         """How everything is after a control period, and what touches what.
 
         Args:
-            now: How everything is, with what the hand was told now.
-            pull: Where the hand is pulled in this period.
+            now: Present snapshot, with the hand's new command.
+            pull: Pose that the hand is pulled to in this period.
         """
         far = self._is_far(now, pull)
         involved = NOTHING if far else self._involved(now, self._sweep(now.hand, pull))
@@ -276,7 +276,7 @@ class ContactDynamics:
 
 
 def _alone(now: ContactSnapshot, members: tuple[int, ...]) -> ContactSnapshot:
-    """The same with all else as it always is, so that what is known of these holds for ever."""
+    """The snapshot of some bodies alone; all others, and the hand, always have the same state."""
     count = len(now.bodies)
     return now._replace(
         hand=SOMEWHERE,
@@ -288,7 +288,7 @@ def _alone(now: ContactSnapshot, members: tuple[int, ...]) -> ContactSnapshot:
 
 
 def _all(now: ContactSnapshot) -> tuple[Moving, ...]:
-    """What moves, by number."""
+    """The motion of every free body, then the opening of every jointed one, by number."""
     return (*now.bodies, *now.openings)
 
 

@@ -27,7 +27,7 @@ FLAT = 0.5  # sine up to which an axis counts as horizontal
 
 
 class Piece(NamedTuple):
-    """A part where it is."""
+    """A part of a body at its pose in the scene."""
 
     part: Part
     pose: Pose
@@ -77,8 +77,8 @@ def settled(scene: ContactScene, state: State) -> State:
     """The state with everything that lies still where physics would have it.
 
     Args:
-        scene: What there is.
-        state: As measured; the hand, what it holds, drawers and lids are where they are.
+        scene: Bodies of the scene.
+        state: Measured state; the hand, what it holds, drawers and lids are where they are.
 
     Returns:
         The state in which nothing is in anything else, as far as there is room, and in which bodies

@@ -23,7 +23,7 @@ class Box(RigidBody):
     """A body in the shape of a cuboid.
 
     Args:
-        half_extents_m: Half its edges along x, y, z of its own frame.
+        half_extents_m: Half the edges along x, y, z of the box's own frame, m.
     """
 
     half_extents_m: Vector
@@ -52,7 +52,7 @@ class Mesh(RigidBody):
     """A body of convex pieces, whose origin is its centre of mass; the mass is spread evenly.
 
     Args:
-        shape: Its pieces; alike for meshes of one shape.
+        shape: Solid of the body: its pieces. Meshes of one shape share it.
     """
 
     shape: Solid

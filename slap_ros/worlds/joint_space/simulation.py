@@ -157,12 +157,13 @@ class Simulation:
         held: int | None = None,
         drives: Sequence[Drive] = (),
     ) -> list[BodyState]:
-        """One control period.
+        """Simulate one control period.
 
         Args:
-            bodies: The scene's free bodies.
-            held: Which of them moves with the hand, if any; its motion is not computed.
-            drives: One for each of ``LINK_SHAPES``, then the held body's; none without an arm.
+            bodies: Poses and velocities of the scene's free bodies.
+            held: Index of the free body that moves with the hand, if any; its motion is not
+                computed.
+            drives: Motion of each of ``LINK_SHAPES``, then of the held body; none without an arm.
 
         Returns:
             The free bodies afterwards; the held one as it was.
