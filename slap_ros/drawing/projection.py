@@ -101,9 +101,9 @@ def box_paths(body: VisibleBody, view: Projection, canvas: Canvas) -> tuple[str,
     """The visible faces of a box as paths: all of them, those in the light, those in the shade.
 
     Args:
-        body: Drawn as a box.
-        view: From where it is seen.
-        canvas: The part of the view that is drawn, with the scale.
+        body: Body that is drawn as a box.
+        view: Projection that the body is seen in.
+        canvas: Part of the view that is drawn, with the scale.
     """
     drawn = [
         (light, canvas.path(map(view.project, corners))) for light, corners in _seen(body, view)
