@@ -49,9 +49,9 @@ def prism(radius_m: float, length_m: float, sides: int) -> ConvexPiece:
     """A prism about z in place of a cylinder, with the origin in its middle.
 
     Args:
-        radius_m: Of the circle that its corners are on.
-        length_m: From end to end.
-        sides: How many, three or more.
+        radius_m: Radius of the circle that the corners are on, m.
+        length_m: Length from end to end, m.
+        sides: Number of sides, three or more.
 
     Returns:
         The prism; its corners at the lower end come before those at the upper end.
@@ -121,16 +121,16 @@ class Solid:
 
     @cached_property
     def bounds(self) -> OrientedBox:
-        """The smallest box around it along its own axes."""
+        """The smallest box around the solid along its own axes."""
         return _around(self.points)
 
     @cached_property
     def radius(self) -> float:
-        """How far it reaches from its centre of mass, m."""
+        """How far the solid reaches from its centre of mass, m."""
         return float(np.linalg.norm(self.points, axis=1).max())
 
     def extent(self, axis: Vector) -> float:
-        """How far it reaches from its centre of mass along an axis, to either side, m."""
+        """How far the solid reaches from its centre of mass along an axis, to either side, m."""
         return float(np.abs(self.points @ np.array(axis)).max())
 
     @cached_property
