@@ -193,8 +193,8 @@ class KinderBridge:
         """The environment's action space.
 
         Args:
-            axes: Names and units, which KinDER states only in its descriptions.
-            gripper: Which of them is a gripper; None: the robot has none.
+            axes: Names and units of the axes, which KinDER states only in its descriptions.
+            gripper: Axis of the gripper, one of ``axes``; None: the robot has none.
 
         Returns:
             It, with the environment's own limits.
@@ -224,9 +224,9 @@ class KinderSimulator:
         """Continue from ``state``.
 
         Args:
-            bridge: Translates states.
-            environment: What is stepped; nobody else may use it.
-            state: Where to begin.
+            bridge: Bridge that translates states.
+            environment: Simulator to step; nothing else may use it.
+            state: State to begin in.
 
         Raises:
             InvalidStateError: It has other objects.

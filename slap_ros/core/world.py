@@ -49,7 +49,7 @@ class VectorWorld(Protocol):
         """Act in each of them for one control period.
 
         Args:
-            actions: One per world, shape (worlds, axes).
+            actions: Action of each world, shape (worlds, axes).
 
         Returns:
             Their states, a batch of shape (worlds, layout.size).
