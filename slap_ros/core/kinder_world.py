@@ -46,12 +46,12 @@ class KinderType(Protocol):
 
     @property
     def name(self) -> str:
-        """Such as ``dyn_rectangle``."""
+        """The type's name, such as ``dyn_rectangle``."""
         ...
 
     @property
     def parent(self) -> Any:
-        """The type above, if any."""
+        """The type above this one, if any."""
         ...
 
 
@@ -154,7 +154,7 @@ class KinderBridge:
         return self._types[name]
 
     def sample(self, seed: int) -> State:
-        """An initial state from the environment's own sampler, settled as it settles it."""
+        """An initial state from the environment's own sampler, settled as the environment does."""
         return self.state_of(self._make().reset(seed=seed)[0])
 
     def state_of(self, observed: KinderState) -> State:

@@ -46,7 +46,7 @@ class VectorWorld(Protocol):
         ...
 
     def step(self, actions: Array) -> State:
-        """Act in each of them for one control period.
+        """Act in each of the worlds for one control period.
 
         Args:
             actions: Action of each world, shape (worlds, axes).

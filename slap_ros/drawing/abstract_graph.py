@@ -78,7 +78,7 @@ def compose(graph: AbstractGraph, space: AtomSpace, plan: Plan | None, title: st
 
 
 def _cards(selection: Selection, words: AtomNaming, start: int, many: bool) -> list[Card]:
-    """Of many, only the plan's have room for everything."""
+    """The cards of nodes; of many nodes, only the plan's have room for all lines."""
     bodies = list_bodies(selection, words, start)
     common = Counter(line.content for body in bodies for line in body)
     cards = []

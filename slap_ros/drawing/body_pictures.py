@@ -87,7 +87,7 @@ def visible(display: Display, state: State) -> list[VisibleBody]:
 
 
 def viewpoint(scenes: Sequence[Sequence[VisibleBody]]) -> Projection:
-    """From the front right; a world that is itself flat is looked at squarely."""
+    """The view from the front right; a world that is itself flat is seen squarely."""
     places = np.array([body.position for bodies in scenes for body in bodies])
     if len(places) and np.ptp(places[:, 1]) < STILL:
         return SIDE
@@ -200,14 +200,14 @@ class _Sheet:
 
     @classmethod
     def empty(cls, width: int, height: int) -> _Sheet:
-        """Nothing but background."""
+        """A sheet with nothing but background."""
         shape = (height, width)
         colours = np.full((*shape, 3), PAPER, dtype=np.float32)
         return cls(colours, np.full(shape, -np.inf), np.zeros(shape, dtype=int))
 
     @property
     def width(self) -> int:
-        """In pixels."""
+        """The width in pixels."""
         return int(self.depths.shape[1])
 
     def next_face(self, count: int) -> int:

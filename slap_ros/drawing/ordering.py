@@ -64,7 +64,7 @@ def _sweep(ranks: Ranks, before: Neighbours, after: Neighbours, rightwards: bool
 
 
 def _by_barycentre(rank: list[int], neighbours: Neighbours, fixed: dict[int, int]) -> list[int]:
-    """Items with no neighbour there stay in their places; the others are sorted around them."""
+    """Sort items by the mean place of their neighbours; items without any stay in their places."""
     mean = {
         item: sum(fixed[n] for n in neighbours[item]) / len(neighbours[item])
         for item in rank

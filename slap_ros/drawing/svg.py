@@ -255,7 +255,7 @@ def _piece(
     other: Point,
     end: Point,
 ) -> str:
-    """A cubic, or a level line where it is one at the precision written."""
+    """A cubic curve, or a level line where the curve is one at the precision written."""
     if number(start[1]) == number(end[1]):
         return f"H{number(end[0])}"
     return f"C{_point(one)} {_point(other)} {_point(end)}"

@@ -38,7 +38,7 @@ class OrientedBox(NamedTuple):
 
     @property
     def radius(self) -> float:
-        """Half the diagonal, m."""
+        """Half the box's diagonal, m."""
         return math.hypot(*self.half)
 
     def half_extent(self, axis: Vector) -> float:

@@ -39,7 +39,7 @@ _FACES = (
 
 
 def cuboid(half: Vector) -> ConvexPiece:
-    """A box by half its edges, m."""
+    """A box with the given half edges, m."""
     x, y, z = half
     corners = product((-x, x), (-y, y), (-z, z))
     return ConvexPiece(tuple(corners), _FACES)
@@ -135,7 +135,7 @@ class Solid:
 
     @cached_property
     def inertia(self) -> Vector:
-        """Moments about its own axes for a mass of 1 kg, m². Products of inertia are left out."""
+        """Moments about the solid's own axes for a mass of 1 kg, m²; no products of inertia."""
         moments = [_moments(piece) for piece in self.pieces]
         xx, yy, zz = (np.sum([m[2] for m in moments], 0) / sum(m[0] for m in moments)).tolist()
         return (yy + zz, xx + zz, xx + yy)

@@ -51,5 +51,5 @@ class RigidBody:
         return Material(self.mass_kg, self.friction)
 
     def with_material(self, material: Material) -> Self:
-        """The same body of another material."""
+        """The same body with another material."""
         return replace(self, mass_kg=material.mass_kg, friction=material.friction)

@@ -37,7 +37,7 @@ class BodyState(NamedTuple):
 
     @property
     def still(self) -> bool:
-        """Whether it has no velocity at all."""
+        """Whether the body has no velocity at all."""
         return self.velocity == ORIGIN and self.angular_velocity == ORIGIN
 
 

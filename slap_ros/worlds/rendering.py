@@ -106,7 +106,7 @@ class Camera:
         return self._mesh(corners, np.repeat(normals[:, None], 3, axis=1), colour)
 
     def _cylinder(self, cylinder: Cylinder, colour: Colour) -> int:
-        """Smooth all around and flat at its ends, which PyBullet's own cylinders are not."""
+        """A cylinder, smooth all around and flat at its ends, which PyBullet's own ones are not."""
         corners, normals = _faces(prism(*cylinder, SIDES))
         around = np.abs(normals[:, None, 2:]) < 0.5
         outwards = corners * (1.0, 1.0, 0.0) / cylinder.radius_m

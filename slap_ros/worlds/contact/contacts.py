@@ -106,5 +106,5 @@ THE_HAND = Surface(Side.PALM)  # stands for its fingers too
 
 
 def _whole(surface: Surface) -> Surface:
-    """What stands for the hand is its palm. A frame passes nothing on."""
+    """The surface that stands for a body: the palm for the hand. Frames pass nothing on."""
     return THE_HAND if surface.side in HAND else surface

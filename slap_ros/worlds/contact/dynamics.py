@@ -150,7 +150,7 @@ class ContactDynamics:
         return Involved(tuple(sorted(movers)), met)
 
     def _unsupported(self, now: ContactSnapshot, left: Sequence[Bounds | None]) -> list[int]:
-        """Those of the bodies that would not stay where they are by themselves."""
+        """The bodies that would not stay where they are by themselves."""
         moving = _all(now)
         quiet = [None if box is None else moving[i] for i, box in enumerate(left)]
         if quiet == self._quiet:
@@ -182,7 +182,7 @@ class ContactDynamics:
         return stands
 
     def _widened(self, now: ContactSnapshot, involved: Involved, outcome: Outcome) -> Involved:
-        """With what was reached although it was not expected to be."""
+        """The bodies involved, with those that were reached although it was not expected."""
         if involved.hand and len(involved.bodies) == self._count:
             return involved
         moving, after = _all(now), self._results(outcome)
@@ -315,7 +315,7 @@ def _near(some: Iterable[float], others: Iterable[float], distance: float) -> bo
 
 
 def _stopped(motion: Moving) -> Moving:
-    """Where it was, without velocity."""
+    """The motion with the same pose or opening, and without velocity."""
     if motion.still:
         return motion
     return Opening(motion.position) if isinstance(motion, Opening) else BodyState(motion.pose)

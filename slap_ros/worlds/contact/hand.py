@@ -51,7 +51,7 @@ HALF_TURN = (0.0, 0.0, 1.0, 0.0)  # from the left finger to the right one
 
 
 class HandState(NamedTuple):
-    """How the hand is and moves, and what it was told."""
+    """How the hand is and moves, and its last command."""
 
     pose: Pose  # of the grasp point, in the base's frame
     velocity: Vector  # m/s
@@ -90,7 +90,7 @@ def pointing_down(yaw: float) -> Quaternion:
 
 
 def wrapped(angle: float) -> float:
-    """The same angle in [-pi, pi), rad."""
+    """The same angle within [-pi, pi), rad."""
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 

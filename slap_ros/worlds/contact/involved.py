@@ -37,7 +37,7 @@ class Bounds(NamedTuple):
         return Bounds((a - margin, b - margin, c - margin), (d + margin, e + margin, f + margin))
 
     def hull(self, other: Bounds) -> Bounds:
-        """The box around both."""
+        """The bounds around both boxes."""
         (a, b, c), (d, e, f) = self
         (u, v, w), (x, y, z) = other
         return Bounds((min(a, u), min(b, v), min(c, w)), (max(d, x), max(e, y), max(f, z)))
@@ -155,7 +155,7 @@ class Mover(NamedTuple):
 
     @classmethod
     def of(cls, bounds: Bounds, travel: float) -> Mover:
-        """What begins there and goes so far, in m, in any direction."""
+        """The mover that begins in these bounds and goes so far, in m, in any direction."""
         return cls((bounds.grown(travel + TOUCH),), travel)
 
 

@@ -51,7 +51,7 @@ class BoxPart:
 
     @cached_property
     def bounding_boxes(self) -> tuple[OrientedBox, ...]:
-        """Boxes around it; what is outside of one of them does not touch it."""
+        """Boxes around the part; what is outside of one of them does not touch it."""
         return (self.bounding_box,)
 
     @property
@@ -94,7 +94,7 @@ class CylinderPart:
 
     @cached_property
     def bounding_boxes(self) -> tuple[OrientedBox, ...]:
-        """Boxes around it; what is outside of one of them does not touch it.
+        """Boxes around the cylinder; what is outside of one of them does not touch it.
 
         Each is turned about the axis: a single one's corners are 1.4 radii away from it, what is
         inside all of them is 1.02 at most.
@@ -136,24 +136,24 @@ class Compound(RigidBody):
 
     @cached_property
     def bounding_box(self) -> OrientedBox:
-        """The box around it in its own frame, along the axes of that frame."""
+        """The box around the body in its own frame, along the axes of that frame."""
         return bounding_box(self.parts)
 
     def at(self, pose: Pose) -> OrientedBox:
-        """The box around it at a pose."""
+        """The box around the body at a pose."""
         return self.bounding_box.at(pose)
 
     def cores(self, pose: Pose) -> tuple[OrientedBox, ...]:
-        """Boxes inside it at a pose."""
+        """Boxes inside the body at a pose."""
         return _inner_boxes(self.parts, pose)
 
     @cached_property
     def inertia(self) -> Vector:
-        """About the axes of its frame, kg m², of parts that weigh by their volumes."""
+        """Inertia about the axes of the body's frame, kg m²; parts weigh by their volumes."""
         return inertia(self.parts, self.mass_kg, ORIGIN)
 
     def extent(self, axis: Vector) -> float:
-        """How far it reaches from its origin along an axis of length 1, m."""
+        """How far the body reaches from its origin along a unit vector, m."""
         return max(_extent(part.bounding_box, axis) for part in self.parts)
 
 
@@ -229,7 +229,7 @@ class JointedBody:
 
     @cached_property
     def lever_m(self) -> float:
-        """How far its fastest point goes while it opens by 1: 1 m, or m per rad."""
+        """How far the fastest point goes while the body opens by 1: 1 m, or m per rad."""
         if self.joint.kind is JointKind.SLIDE:
             return 1.0
         corners = (corner for part in self.moving for corner in part.bounding_box.corners())

@@ -59,7 +59,7 @@ class Drive(NamedTuple):
 
     @classmethod
     def between(cls, start: Pose, end: Pose) -> Drive:
-        """From one pose to another at constant velocity, the shorter way round."""
+        """The drive from one pose to another at constant velocity, the shorter way round."""
         (ax, ay, az), (bx, by, bz) = start.position, end.position
         t = CONTROL_PERIOD_S
         x, y, z, w = multiply(end.quaternion, conjugate(start.quaternion))
