@@ -113,7 +113,7 @@ class ContactSimulation:
                 pybullet.resetBasePositionAndOrientation(body, *pose, self.client)
 
     def run(self, now: ContactSnapshot, pull: Pose, involved: Involved) -> Outcome:
-        """Simulate one control period.
+        """The outcome of one control period.
 
         Args:
             now: Present snapshot.
