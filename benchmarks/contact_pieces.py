@@ -42,7 +42,7 @@ Figures = dict[str, float]
 
 @contextmanager
 def without(owner: Any, name: str, instead: Any) -> Iterator[None]:
-    """Everything as it is but for one piece, in simulations of their own."""
+    """Run with everything as it is but for one piece, in simulations of its own."""
     was = getattr(owner, name)
     close_idle()
     setattr(owner, name, instead)
@@ -141,7 +141,7 @@ def press() -> Figures:
 
 
 def pieces() -> dict[str, tuple[Callable[[], Figures], tuple[Any, str, Any]]]:
-    """Of each: what measures it, and what is instead of it."""
+    """The function that measures each piece, and what stands in for the piece."""
     contact = simulation.ContactSimulation
     return {
         "prime": (impure, (contact, "_prime", lambda *_: None)),

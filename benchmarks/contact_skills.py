@@ -83,10 +83,10 @@ class Graspable:
     """A thing and how it lies on the table.
 
     Args:
-        body: The thing.
-        height: Of its origin above the table, m.
-        lying: Its orientation when its yaw is 0.
-        grip: Where it is grasped, from its origin, when its yaw is 0, m.
+        body: Body of the thing.
+        height: Height of the thing's origin above the table, m.
+        lying: Orientation of the thing when its yaw is 0, a quaternion.
+        grip: Grasp point from the thing's origin when its yaw is 0, m.
     """
 
     body: Compound
@@ -218,9 +218,9 @@ def inserted_depth(clearance_mm: float, seed: int, steps: int = 90) -> float:
     """How deep a script that sees everything gets a rod into a hole, m.
 
     Args:
-        clearance_mm: What the hole is wider than the rod.
-        seed: Of the rod's place in the hand.
-        steps: After which it gives up.
+        clearance_mm: Difference between the width of the hole and that of the rod, mm.
+        seed: Seed of the rod's place in the hand.
+        steps: Number of steps after which the script gives up.
     """
     rng = np.random.default_rng([seed, 7])
     half = ROD.parts[0].bounding_box.half[0] + 0.5e-3 * clearance_mm

@@ -55,7 +55,7 @@ QUARTER = 0.5 * math.pi  # rad
 
 
 class ArticulatedArm(ContactSimulation):
-    """The same bodies around a whole Panda, whose joints are driven to their targets."""
+    """A world of the bodies around a whole Panda, whose joints are driven to their targets."""
 
     def __init__(self, scene: ContactScene) -> None:
         self._q, self._speeds = list(HOME), [0.0] * JOINTS

@@ -54,9 +54,9 @@ def block(x: float, y: float, z: float = ON_TABLE) -> OrientedBox:
     """A block.
 
     Args:
-        x: Of its centre, m.
-        y: Of its centre, m.
-        z: Of its centre, m.
+        x: X of the block's centre, m.
+        y: Y of the block's centre, m.
+        z: Z of the block's centre, m.
     """
     return OrientedBox(Pose((x, y, z)), HALF)
 
@@ -65,10 +65,10 @@ def top_down(x: float, y: float, z: float, yaw: float = 0.0) -> Pose:
     """A grasp from above.
 
     Args:
-        x: Of the grasp point, m.
-        y: Of the grasp point, m.
-        z: Of the grasp point, m.
-        yaw: Of the hand, rad.
+        x: X of the grasp point, m.
+        y: Y of the grasp point, m.
+        z: Z of the grasp point, m.
+        yaw: Yaw of the hand, rad.
     """
     return Pose((x, y, z), (math.cos(yaw / 2), math.sin(yaw / 2), 0.0, 0.0))
 
@@ -95,7 +95,7 @@ def microseconds(call: Callable[[], object], repetitions: int = 300) -> float:
 
 
 def measure_inverse_kinematics(queries: int) -> dict[str, float]:
-    """Of grasps from above over the table, at any yaw."""
+    """Measure inverse kinematics of grasps from above over the table, at any yaw."""
     rng = np.random.default_rng(1)
     times, found = [], 0
     for _ in range(queries):
@@ -113,7 +113,7 @@ def measure_inverse_kinematics(queries: int) -> dict[str, float]:
 
 
 def measure_collisions() -> dict[str, float]:
-    """Of queries against six boxes, the hand far from them and among them."""
+    """Measure queries against six boxes, the hand far from them and among them."""
     tower = [block(0.5, 0.0, ON_TABLE + 0.05 * i) for i in range(3)]
     free = CollisionChecker([TABLE, *tower, block(0.375, -0.2), block(0.5, 0.2)])
     rng = np.random.default_rng(2)
@@ -130,7 +130,7 @@ def measure_collisions() -> dict[str, float]:
 
 
 def measure_plans(queries: int) -> Figures:
-    """Of reaching over a block, coming down on it, and carrying it past the tower."""
+    """Measure plans: reach over a block, come down on it, and carry it past the tower."""
     rows: dict[str, list[dict[str, float]]] = {"reach": [], "approach": [], "carry": []}
     failed = dict.fromkeys(rows, 0)
     for seed, scene in enumerate(scenes(queries)):

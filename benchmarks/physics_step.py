@@ -139,8 +139,8 @@ def reach(point: Array, yaw: float, joints: Array) -> Array | None:
     """Joint positions with the grasp point somewhere, the hand pointing down.
 
     Args:
-        point: Where, m, shape (3,).
-        yaw: Of the hand, rad.
+        point: Position of the grasp point, m, shape (3,).
+        yaw: Yaw of the hand, rad.
         joints: Joint positions to begin the search at, rad, shape (7,).
 
     Returns:
@@ -198,7 +198,7 @@ class Ours:
 
 
 class Fine:
-    """The same driven links with fine substeps; nothing is skipped, nothing marked at rest."""
+    """The driven links with fine substeps; nothing is skipped, nothing marked at rest."""
 
     def __init__(self) -> None:
         self._start = [motion_of(tower(), name) for name in NAMES]
@@ -245,7 +245,7 @@ class Plain:
         self._client: int | None = None
 
     def reset(self, joints: Array) -> None:
-        """All as it was, the arm there: a new scene, as a reset would not clear contacts."""
+        """The tower as it was, the arm there: a new scene, as a reset would not clear contacts."""
         if self._client is None:
             self._client = pybullet.connect(pybullet.DIRECT)
         client = self._client
@@ -404,9 +404,9 @@ def truth(count: int, seed: int = 11, plot: Path | None = None) -> dict[str, flo
     """How plain stepping and ours agree with the fine reference on scripted pushes.
 
     Args:
-        count: Pushes.
-        seed: Of the pushes.
-        plot: A folder for the plot, if there is to be one.
+        count: Number of pushes.
+        seed: Seed of the pushes.
+        plot: Folder for the plot; None for no plot.
 
     Returns:
         The figures by name, lengths in cm.
@@ -434,9 +434,10 @@ def draw(moved: dict[str, Array], figures: dict[str, float], folder: Path) -> No
     """Plot how far the bottom block was pushed, against the reference.
 
     Args:
-        moved: How far, cm, shape (pushes,), by kind of stepping.
-        figures: What :func:`truth` gives.
-        folder: Where the plot is written.
+        moved: Distances by which the bottom block was moved, cm, shape (pushes,), by kind of
+            stepping.
+        figures: Figures by name, as :func:`truth` returns them.
+        folder: Folder for the plot.
     """
     from matplotlib import pyplot  # only to make the picture
 

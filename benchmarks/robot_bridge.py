@@ -56,14 +56,14 @@ are counted over all tasks. Success has Wilson's 95 % interval."""
 
 @dataclass(frozen=True)
 class BridgeTrial:
-    """A task, as it ended.
+    """How a task ended.
 
     Args:
-        seed: Of the task.
+        seed: Seed of the task.
         success: Whether the goal was reached.
-        steps: Of the environment.
-        replans: Plans that were made after the first.
-        error_code: Why it was not.
+        steps: Number of environment steps.
+        replans: Number of plans that were made after the first.
+        error_code: Error code of a task that was not solved.
     """
 
     seed: int
@@ -75,13 +75,13 @@ class BridgeTrial:
 
 @dataclass(frozen=True)
 class Conditions:
-    """Which tasks, and what the mock robot is like.
+    """The tasks, and the properties of the mock robot.
 
     Args:
         tasks: Number of tasks.
-        first_seed: Of the first task; each has a seed of its own.
-        pace: How often faster than a real robot.
-        latency: Of messages, s.
+        first_seed: Seed of the first task; each task has a seed of its own.
+        pace: Speed of the mock robot relative to a real one.
+        latency: Latency of messages, s.
         pose_noise: Standard deviation of measured positions, m.
         dropout: Share of detections that are lost.
     """
@@ -95,7 +95,7 @@ class Conditions:
 
     @property
     def command(self) -> str:
-        """That measures the same again."""
+        """The command that measures the same again."""
         options = " ".join(
             f"--{name.replace('_', '-')} {value:g}" for name, value in asdict(self).items()
         )
@@ -117,9 +117,9 @@ def solve(seed: int, shortcuts: str, conditions: Conditions) -> BridgeTrial:
     """Solve one task.
 
     Args:
-        seed: Of the task.
-        shortcuts: Library.
-        conditions: What the mock robot is like.
+        seed: Seed of the task.
+        shortcuts: Library of shortcuts.
+        conditions: Properties of the mock robot.
     """
     settings = RunSettings(
         DOMAIN,
@@ -166,7 +166,7 @@ def summary(found: Found) -> dict[str, dict[str, float]]:
 
 
 def table(found: Found) -> MarkdownTable:
-    """A row an approach."""
+    """The table with one row per approach."""
     rows = []
     for approach, trials in found.items():
         steps = [float(trial.steps) for trial in trials if trial.success]
@@ -183,7 +183,7 @@ def table(found: Found) -> MarkdownTable:
 
 
 def draw(figure: Figure, found: Found) -> None:
-    """Steps of each task."""
+    """Draw the steps of each task."""
     axes = figure.subplots()
     for approach, trials in found.items():
         style, solved = APPROACH_STYLES[approach], [trial for trial in trials if trial.success]
@@ -217,7 +217,7 @@ def report(found: Found) -> StudyReport:
 
 
 def origin(conditions: Conditions) -> Provenance:
-    """From what it is made: tasks, mock robot, and the shortcuts that ship."""
+    """The inputs of the report: tasks, mock robot, and the shortcuts that ship."""
     path = shipped_library(DOMAIN)
     assert path is not None
     library = describe_library(f"models/shortcuts/{DOMAIN}", load_library(path, get_domain(DOMAIN)))

@@ -32,7 +32,7 @@ HORIZON, SOON = PAPER.horizon, DEFAULT.horizon  # environment steps of an attemp
 def starts_of(
     shortcut: Shortcut, domain: Domain, explored: list[ExplorationResult], seed: int, count: int
 ) -> list[Start]:
-    """Where it would begin in ``count`` tasks of a seed, as training looks for it."""
+    """Starts of a shortcut in ``count`` tasks of a seed, as training looks for them."""
     patterns = shortcut.signature.patterns
     group = next(group for group in rank(explored) if group.signature.patterns == patterns)
     steps = mean_steps(explored)
@@ -44,7 +44,7 @@ def starts_of(
 
 
 def attempt(shortcut: Shortcut, domain: Domain, start: Start) -> int | None:
-    """Steps until it succeeds; None where it fails, or does not succeed by the horizon."""
+    """Steps until the shortcut succeeds; None where it fails, or reaches the horizon first."""
     encoder = ObservationEncoder(domain, start.space, shortcut.signature, start.change)
     worlds = domain.make_vector_world([start.state])
     encoding = encoder.encode(worlds.states)
@@ -73,7 +73,7 @@ def measure(shortcut: Shortcut, domain: Domain, starts: list[Start]) -> dict[str
 
 
 def explore(name: str) -> list[ExplorationResult]:
-    """What training found, from which it is known where a shortcut begins."""
+    """The results of exploration in training, which say where a shortcut begins."""
     settings = training_settings("ours", get_domain(name)).exploration
     distribution = TaskDistribution(DomainChoice(name, "fair"), 0)
     found = (jobs.explore(distribution, index, settings) for index in range(settings.tasks))

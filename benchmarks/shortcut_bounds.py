@@ -32,9 +32,9 @@ def shortest_rollouts(
     """What shortcuts take wherever planning for a task tries one with success.
 
     Args:
-        domain: Whose task.
-        library: The shortcuts.
-        index: Of the task.
+        domain: Domain of the task.
+        library: Library of the shortcuts.
+        index: Index of the task.
 
     Yields:
         Environment steps of the shortest rollout from a state, and of the shortest success in

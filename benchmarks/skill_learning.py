@@ -43,10 +43,10 @@ def source_of(domain: Domain) -> TaskSource:
 
 
 def rollouts_from(source: TaskSource, first: int) -> list[PlanRollout]:
-    """Plans without any skill.
+    """Rollouts of plans without any skill.
 
     Args:
-        source: Of tasks.
+        source: Source of tasks.
         first: Index of the first task.
     """
     return [PlanRollout.from_json(jobs.carry_out(source, first + i, {})) for i in range(STARTS)]

@@ -101,7 +101,7 @@ All numbers: [soak.json](soak.json). The library's digest is `{digest}`.
 
 @dataclass(frozen=True)
 class Sample:
-    """What a process holds."""
+    """The resources of a process."""
 
     memory_mib: float  # resident
     threads: int
@@ -109,21 +109,21 @@ class Sample:
 
     @classmethod
     def of(cls, process: psutil.Process) -> Sample:
-        """Read it."""
+        """Measure the resources of a process."""
         with process.oneshot():
             return cls(process.memory_info().rss / MIB, process.num_threads(), process.num_fds())
 
 
 @dataclass(frozen=True)
 class Soaked:
-    """What it came to.
+    """The samples and results of a run.
 
     Args:
-        tasks: After how many tasks each sample was taken.
-        samples: By node, in order of ``tasks``.
-        solved: Of all tasks.
-        seconds: That all of it took.
-        failures: What was said of those not solved.
+        tasks: Number of tasks after which each sample was taken.
+        samples: Samples of each node, by its name, in order of ``tasks``.
+        solved: Number of tasks that were solved.
+        seconds: Duration of the run, s.
+        failures: Reasons of the tasks that were not solved.
     """
 
     tasks: Sequence[int]
@@ -133,7 +133,7 @@ class Soaked:
     failures: Sequence[str]
 
     def growth(self, node: str) -> float:
-        """Of resident memory over the second half, KiB a task.
+        """Growth of resident memory over the second half, KiB per task.
 
         The median slope over pairs of samples (Theil and Sen's), as whole libraries' pages come and
         go in steps.
@@ -145,7 +145,7 @@ class Soaked:
         return float(np.median(slopes)) if slopes else 0.0
 
     def as_json(self) -> dict[str, Any]:
-        """Plain data."""
+        """The run as JSON data."""
         return {
             "solved": self.solved,
             "seconds": round(self.seconds, 1),
@@ -235,7 +235,7 @@ def draw(figure: Figure, soaked: Soaked) -> None:
 
 
 def table(soaked: Soaked) -> MarkdownTable:
-    """A row a process."""
+    """The table with one row per process."""
     rows = []
     for node, samples in soaked.samples.items():
         middle = samples[len(samples) // 2]
@@ -260,7 +260,7 @@ def table(soaked: Soaked) -> MarkdownTable:
 
 
 def _library() -> dict[str, Any]:
-    """Whose shortcuts the ensemble plans with: those that ship."""
+    """The library that the ensemble plans with: the one that ships."""
     path = shipped_library(DOMAIN)
     assert path is not None
     return describe_library(DOMAIN, load_library(path, get_domain(DOMAIN)))

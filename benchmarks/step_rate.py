@@ -82,7 +82,7 @@ def obstacle_tower() -> dict[str, Any]:
 
 
 def cleanup_table() -> dict[str, Any]:
-    """World and atoms against a plain world without them."""
+    """Compare world and atoms with a plain world without atoms."""
     from benchmarks.physics_step import Plain, away, steps_per_second
     from slap_ros.domains.cleanup_table.scene import scene_of
     from slap_ros.domains.cleanup_table.shapes import shipped

@@ -38,11 +38,12 @@ def up_to_date(page: str) -> str:
 
 
 def quote(path: Path, names: Sequence[str]) -> str:
-    """Definitions as a file has them.
+    """The definitions of some names, as a file has them.
 
     Args:
-        path: A Python file.
-        names: Of its functions, classes and constants; ``Class.method`` for a method alone.
+        path: Path of a Python file.
+        names: Names of the file's functions, classes and constants; ``Class.method`` for a method
+            alone.
 
     Returns:
         Their sources in this order; constants without blank lines between them.

@@ -36,12 +36,12 @@ class Figure:
     """A published figure or table.
 
     Args:
-        name: Of its files.
-        source: What of a paper it makes again; empty for those that are none of a paper's.
-        command: That made it.
-        found: Its numbers.
-        measured: Seconds of one core that it took, or None, and what of it they are.
-        training: The command that made the work folder that it reads, if it reads one.
+        name: Name of the figure's files.
+        source: Figure of a paper that it reproduces; empty for those of no paper.
+        command: Command that made the figure.
+        found: Numbers of the figure, as JSON data.
+        measured: Seconds of one core that the command took, or None, and what of it they are.
+        training: Command that made the work folder that the figure reads, if it reads one.
     """
 
     name: str
@@ -53,12 +53,12 @@ class Figure:
 
     @property
     def again(self) -> Path:
-        """Its data once it is made again."""
+        """Path of the data that are made again."""
         return OUTPUT / f"{self.name}.json"
 
     @property
     def made(self) -> bool:
-        """Whether it is there already; the study refuses to replace what another command made."""
+        """Whether the data are made already; the study does not replace those of other commands."""
         if not self.again.exists():
             return False
         command = json.loads(self.again.read_text(encoding="utf-8")).get("command")
@@ -66,20 +66,20 @@ class Figure:
 
     @property
     def trainings(self) -> list[tuple[str, ...]]:
-        """Commands that make the work folders it reads, where they are missing."""
+        """Commands that make the work folders that the figure reads, where they are missing."""
         words = shlex.split(self.command)
         folders = [Path(after) for word, after in pairwise(words) if word == "--work"]
         return [self.training for folder in folders if not folder.is_dir()]
 
     @property
     def minutes(self) -> float | None:
-        """Of one core, trainings included; None where nothing of it was measured."""
+        """Minutes of one core, trainings included; None where nothing of it was measured."""
         known = [self.measured[0] / 60.0] if self.measured[0] is not None else []
         known += [TRAINING_MINUTES.get(training[2], 0) for training in self.trainings]
         return sum(known) if known else None
 
     def duration(self) -> str:
-        """In words."""
+        """The minutes in words."""
         seconds, what = self.measured
         words = NOT_MEASURED if seconds is None else f"{seconds / 60:.0f} min{what}"
         extra = sum(TRAINING_MINUTES.get(training[2], 0) for training in self.trainings)
@@ -117,7 +117,7 @@ def _training(domain: str) -> tuple[str, ...]:
 
 
 def make(figure: Figure) -> None:
-    """Run its command, and before it the trainings that it needs.
+    """Run a figure's command, and before it the trainings that it needs.
 
     Raises:
         CalledProcessError: It failed.
@@ -142,7 +142,7 @@ def differences(published: Any, again: Any, where: str = "found") -> Iterator[st
 
 
 def compare(figure: Figure) -> str:
-    """Whether it came out as it is published, in words."""
+    """Whether a figure came out as it is published, in words."""
     again = json.loads(figure.again.read_text(encoding="utf-8"))
     different = list(differences(figure.found, again["found"]))
     if not different:

@@ -64,13 +64,14 @@ class UnwatchedCurriculum:
 
 @dataclass(frozen=True)
 class AcquisitionWatch:
-    """Who is told what while skills are acquired.
+    """Functions that are called while skills are acquired.
 
     Args:
-        on_attempt: Called with every answer of a model, and every verdict.
-        on_proposal: Called once operators and rewards are there.
-        curriculum: Opens what receives the events of training, once that begins.
-        tell: Receives what is said of skills that are left out.
+        on_attempt: Function that receives every answer of a model, and every verdict.
+        on_proposal: Function that receives the proposal, once operators and rewards are complete.
+        curriculum: Function that opens the callback for events of training, called when training
+            begins.
+        tell: Function that receives warnings about skills that are left out.
     """
 
     on_attempt: Callable[[Entry], None] = lambda _: None
@@ -110,9 +111,9 @@ def acquire(
         rewarder: Name of the rewarder: manual, composed or language.
         settings: Name of the hyper-parameters of networks and SAC.
         changes: Settings to change, by dotted name; or texts as on the command line.
-        steps: Environment steps for all skills together; None for the settings'.
+        steps: Environment steps for all skills together; None for those of the settings.
         begin_with: Folders of skill libraries that new skills may begin with.
-        work: Folder for checkpoints; None for one beside the library's.
+        work: Folder for checkpoints; None for one beside the library's folder.
         jobs: Number of processes; None for this one. A script that uses processes needs
             ``if __name__ == "__main__"``.
         watch: Receives what happens.
@@ -166,7 +167,7 @@ def carry_out(
     """Acquire what is requested, and save it; see :func:`acquire`.
 
     Args:
-        request: What to acquire, and how.
+        request: Request: what to acquire, and how.
         jobs: Number of processes; None for this one.
         ray: Address of a Ray cluster to run on instead.
         watch: Receives what happens.
@@ -242,7 +243,7 @@ def _proposed(request: AcquisitionRequest, watch: AcquisitionWatch) -> _Proposed
     A model would give others when it is asked again.
 
     Args:
-        request: What to acquire.
+        request: Request: what to acquire.
         watch: Receives every answer.
 
     Raises:
@@ -282,7 +283,7 @@ def _require_budget(settings: AcquisitionSettings, least: int) -> None:
     """Refuse a budget in which no skill can be judged even once.
 
     Args:
-        settings: With the budget.
+        settings: Settings with the budget of environment steps.
         least: Environment steps until a skill is judged first.
 
     Raises:

@@ -29,13 +29,13 @@ class AcquisitionRequest:
         domain: Domain to acquire skills in.
         library_folder: Folder that the library is saved to.
         work_folder: Folder for checkpoints.
-        proposers: Who proposes operators.
-        goal: Name of a goal, or atoms; None for the domain's first.
+        proposers: Proposer of the operators, with its sources, model and budget.
+        goal: Name of a goal, or atoms; None for the domain's first goal.
         seed: Seed of all random numbers.
         rewarder: Name of the rewarder: manual, composed or language.
         settings: Name of the hyper-parameters.
         changes: Settings to change, as texts.
-        steps: Environment steps for all skills together; None for the settings'.
+        steps: Environment steps for all skills together; None for those of the settings.
         begin_with: Libraries whose skills new ones may begin with.
         encoder: Embedding model that says which skills are alike; None for metrics alone.
         keep: Library whose skills are there already.

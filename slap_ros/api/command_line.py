@@ -19,8 +19,8 @@ def command_line(*words: str, **options: Any) -> str:
 
     Args:
         words: Sub-commands and arguments.
-        options: By name. Values that say nothing (None, False, or a mapping) are left out; True
-            gives an option without a value, and a list repeats its option.
+        options: Options by name. None, False, and mappings are left out; True gives an option
+            without a value, and a list repeats its option.
 
     Returns:
         The command, to be pasted into a shell.

@@ -30,7 +30,7 @@ class TrialRow:
         preset: Preset of the domain.
         approach: Name of the way to plan: pure_planning, slap_1_sample, slap or shooting.
         seed: Seed of the task.
-        index: Which of the seed's tasks it is.
+        index: Index of the task among those of its seed.
         success: Whether the goal was reached.
         plan_length: Environment steps executed.
         shortcut_steps: Environment steps of these that shortcuts took.
@@ -103,9 +103,10 @@ def evaluate(
         domain: Domain of the tasks, as :func:`make` makes it.
         shortcuts: Learned shortcuts to plan with, as for :func:`plan`.
         tasks: Tasks per seed.
-        seeds: How many seeds.
+        seeds: Number of seeds.
         first_seed: First of the seeds; training draws its tasks from seed 1000000 on.
-        goal: Another goal: one of ``domain.goals``, or atoms in PDDL; None for each task's own.
+        goal: Goal in place of each task's own: one of ``domain.goals``, or atoms in PDDL; None for
+            each task's own.
         planner: Name of the planner.
         samples: Attempts of a shortcut in the model.
         compare_shooting: Whether to compare with a search of as many rollouts of random actions.
@@ -167,10 +168,10 @@ def run_approaches(
     """Solve every task with every approach, each approach with processes of its own.
 
     Args:
-        experiment: Which tasks.
+        experiment: Tasks to solve.
         compared: Ways to plan.
         jobs: Number of processes; None for this one.
-        on_trial: Called with each trial as it ends.
+        on_trial: Function that receives each trial as it ends.
 
     Returns:
         The trials of each approach, in the order of seeds and indices.

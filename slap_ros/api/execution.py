@@ -28,7 +28,7 @@ class Run(ShownInNotebooks):
 
     Args:
         domain: Domain of the task.
-        task: What was to be solved.
+        task: Task that was to be solved.
         episode: Everything that happened.
         began_ns: Time at which it began, ns since the epoch; the only thing in a bag that differs
             from one run of the same plan to the next.
@@ -66,7 +66,7 @@ class Run(ShownInNotebooks):
 
     @property
     def error(self) -> str:
-        """Why it was not solved; empty for a success."""
+        """Why the task was not solved; empty for a success."""
         return "" if self.success else self.episode.error.reason
 
     def __str__(self) -> str:
@@ -135,7 +135,7 @@ def execute(
         domain: Domain of the task.
         task: Task to solve; the world begins in its initial state.
         plan: Plan to execute, as :func:`plan` makes it; None to plan with what ships.
-        max_replans: How often a plan that diverges may be replaced.
+        max_replans: Largest number of plans that replace a diverged one.
 
     Returns:
         The run. A task that is not solved is no error: ``run.success`` and ``run.error`` say so.

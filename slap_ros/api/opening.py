@@ -38,12 +38,12 @@ def make(
     """Make a domain.
 
     Args:
-        name: One of :func:`domains`.
+        name: Name of the domain, one of :func:`domains`.
         preset: Name of a preset, maybe with settings, as ``fair:obstacles=4``; None for the
             domain's first.
-        skills: Whose skills: ``shipped`` for those that ship, or else the domain's own; None for
-            no skills; ``demonstrator`` for hand-written operators with scripts; or the folder of a
-            library that :func:`acquire` made.
+        skills: Choice of the skills: ``shipped`` for those that ship, or else the domain's own;
+            None for no skills; ``demonstrator`` for hand-written operators with scripts; or the
+            folder of a library that :func:`acquire` made.
         settings: Settings of the preset to change, as ``obstacles=4``; a range is a pair, as
             ``mass=(0.8, 1.2)``.
 

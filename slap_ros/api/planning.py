@@ -72,7 +72,7 @@ class NamedPlanner:
 
     Args:
         planner: The planner.
-        origin: What its plans are to say.
+        origin: Record, kept in each plan, of what made it.
     """
 
     planner: Planner

@@ -30,13 +30,13 @@ Status = Callable[[str], AbstractContextManager[Any]]  # shows a text while some
 
 @dataclass(frozen=True)
 class Proposers:
-    """Who proposes operators, from what, with which model and budget.
+    """A proposer of operators, with its sources, model and budget.
 
     Args:
         proposer: Name of the proposer: manual (operators written by hand), induced (from
             demonstrations), or language (from a language model).
-        demonstrations: With induced: bags, or one number of demonstrations that the domain's
-            demonstrator shall show; None for ten of them.
+        demonstrations: Demonstrations for the proposer ``induced``: bags, or one number of
+            demonstrations that the domain's demonstrator records; None for ten of them.
         model: Name of the language model; None for that of the environment or the settings.
         base_url: Address of a server with the OpenAI-compatible interface; None likewise.
         language_settings: JSON file with settings of the model.

@@ -47,7 +47,7 @@ def request_for(domain: Domain, task: Task, proposers: Proposers, rewarder: str)
     Args:
         domain: Domain of the task.
         task: Task that the operators are to solve.
-        proposers: Who proposes.
+        proposers: Proposer of the operators, with its sources, model and budget.
         rewarder: Name of the rewarder.
     """
     shown = proposers.demonstrations_in(domain)
@@ -60,9 +60,9 @@ def answer(
     """The proposal that is asked for, and the conversation with a model if there was one.
 
     Args:
-        request: What is asked for.
-        proposers: Who proposes, with which model and budget.
-        log: Receives every answer.
+        request: Request: what is to be proposed.
+        proposers: Proposer of the operators, with its sources, model and budget.
+        log: Log that receives every answer.
     """
     inquiry = proposers.inquiry(request, log)
     return request.propose(inquiry), inquiry

@@ -26,10 +26,10 @@ def choose_library(
     """The library to plan with, if any; says which of its shortcuts are left out.
 
     Args:
-        shortcuts: Those that are wanted.
-        domain: What they must fit.
+        shortcuts: Choice of shortcuts: the word ``shipped``, a folder, a library, or None.
+        domain: Domain that the shortcuts must fit.
         planner: Name of the planner that is to use them.
-        tell: Receives what is said of shortcuts that are left out.
+        tell: Function that receives warnings about shortcuts that are left out.
 
     Raises:
         InvalidLibraryError: The library cannot be used as a whole, or is another domain's.

@@ -69,8 +69,8 @@ def train(
         settings: Name of the hyper-parameters: ours, ours_several, paper, or the domain's own.
         changes: Settings to change, by dotted name, as ``{"exploration.rollouts": 16}``; or texts
             as on the command line.
-        steps: Environment steps per shortcut; None for the settings'.
-        work: Folder for checkpoints; None for one beside the library's.
+        steps: Environment steps per shortcut; None for those of the settings.
+        work: Folder for checkpoints; None for one beside the library's folder.
         jobs: Number of processes; None for this one. A script that uses processes needs
             ``if __name__ == "__main__"``.
         ray: Address of a Ray cluster to run on instead, or ``local``.
@@ -119,7 +119,7 @@ def chosen_settings(
         domain: Domain to train in, which may have settings of its own.
         name: Name of the settings.
         changes: Settings to change.
-        steps: Environment steps per shortcut; None for the settings'.
+        steps: Environment steps per shortcut; None for those of the settings.
 
     Raises:
         InvalidParameterError: There are none of that name, or they cannot be changed so.

@@ -20,7 +20,7 @@ def require_renderable(domain: Domain, state: State, path: Path) -> None:
 
     Args:
         domain: Domain whose states are to be rendered.
-        state: One of the states.
+        state: A state of the domain.
         path: File to write.
 
     Raises:
@@ -53,7 +53,7 @@ def write_video(
         states: States, in order.
         path: File to write; its ending gives the format.
         size: Size of the frames; None for the domain's own.
-        on_frame: Called with the number of frames that are done.
+        on_frame: Function that receives the number of frames that are done.
 
     Raises:
         InvalidParameterError: See :func:`require_renderable`.

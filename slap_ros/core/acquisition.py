@@ -28,7 +28,7 @@ class Acquisition:
         approach: Brings the hand to where a skill begins; a function of its arguments.
         operators: Written by hand, what LEAGUE starts from.
         rewards: Written by hand, by operator name.
-        scripts: What the demonstrator does, by operator name.
+        scripts: Scripts of the demonstrator, by operator name.
         horizon: Environment steps of a skill, approach not counted.
     """
 

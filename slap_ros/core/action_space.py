@@ -36,11 +36,11 @@ class ActionSpace:
     """The axes of an action, and their ranges. An action of zeros moves nothing.
 
     Args:
-        axes: Displacement in a step, in the axis' unit; a gripper's command is what its domain
-            takes.
+        axes: Axes: each displacement in a step, in the axis' unit; the gripper's command in its
+            domain's unit.
         low: The least entry of each axis, not above 0.
         high: The greatest entry of each axis, not below 0.
-        gripper: Which axis is a gripper; None: the robot has none.
+        gripper: Axis of the gripper; None: the robot has none.
 
     Raises:
         InvalidDomainError: The parts do not fit.
@@ -117,8 +117,8 @@ class ActionSpace:
         """The action of these parts; the inverse of :meth:`split`.
 
         Args:
-            displacements: One per displacement axis, in the unit of each.
-            gripper_command: In the unit of the gripper's axis; 0 without a gripper.
+            displacements: Displacements, one per displacement axis, in the unit of each.
+            gripper_command: Command of the gripper, in the unit of its axis; 0 without a gripper.
 
         Returns:
             The action. It is not checked: see :meth:`check`.

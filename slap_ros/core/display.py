@@ -30,7 +30,7 @@ class VisibleBody:
 
 
 class PictureSize(NamedTuple):
-    """Of a picture, in pixels; even, as a video wants it."""
+    """The size of a picture, in pixels; even, as a video needs it."""
 
     width: int
     height: int

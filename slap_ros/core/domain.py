@@ -45,12 +45,12 @@ MOST_DRAWN = 1_000  # tasks, until one has the objects of a named goal
 
 @dataclass(frozen=True)
 class Execution:
-    """How a domain's world runs in time, and how it is seen.
+    """How a domain's world runs in time, and how measured states are corrected.
 
     Args:
-        control_period_s: What one environment step takes, s.
-        settle: Puts measured poses where physics would have them: what rests on something still
-            does.
+        control_period_s: Duration of one environment step, s.
+        settle: Function that puts measured poses where physics would have them. What rests on
+            something in the given state still rests on it afterwards.
     """
 
     control_period_s: float
@@ -220,10 +220,10 @@ class Domain(ShownInNotebooks):
         """The ``index``-th task of a seed; every (seed, index) has a stream of its own.
 
         Args:
-            seed: At least 0.
-            index: At least 0.
-            goal: One of ``goals``: the first task of the stream that has its objects, with this
-                goal. None for the goal that comes with the task.
+            seed: Seed of the task, at least 0.
+            index: Index of the task among those of its seed, at least 0.
+            goal: Name of a goal, one of ``goals``; the task is the first of the stream that has its
+                objects. None for the goal that comes with the task.
 
         Raises:
             InvalidParameterError: A negative seed or index.

@@ -47,12 +47,12 @@ class DomainFactory:
         changes: Mapping[str, str] = MappingProxyType({}),
         **more: Any,
     ) -> Domain:
-        """The domain.
+        """Make the domain.
 
         Args:
-            preset: One of ``presets``; None for the first.
+            preset: Name of the preset, one of ``presets``; None for the first.
             changes: Settings of the preset to change, by name.
-            more: What else ``make`` takes.
+            more: Further arguments of ``make``.
 
         Raises:
             InvalidParameterError: No such preset; or it has no such setting, or none at all.
@@ -79,8 +79,8 @@ def presets(first: str, *others: str) -> Callable[[Callable[..., Domain]], Domai
     """Name the presets that a function can make a domain with; a decorator.
 
     Args:
-        first: Used where no preset is asked for.
-        others: More names.
+        first: Name of the preset that is used where none is given.
+        others: Names of further presets.
 
     Returns:
         Makes the function a :class:`DomainFactory`.

@@ -18,12 +18,12 @@ def task_with_goal(domain: Domain, seed: int, index: int = 0, goal: str | None =
     """A task of a seed, with a goal as people give it.
 
     Args:
-        domain: Whose task.
-        seed: At least 0.
-        index: At least 0.
-        goal: One of the domain's names, as ``test1``, for the first task of the stream that has its
-            objects; or an atom or a conjunction of atoms, as
-            ``(and (On block2 target) (GripperEmpty robot))``. None or empty: the task's own.
+        domain: Domain of the task.
+        seed: Seed of the task, at least 0.
+        index: Index of the task among those of its seed, at least 0.
+        goal: Goal: a name of the domain, as ``test1``, for the first task of the stream that has
+            its objects; or an atom or a conjunction of atoms, as ``(and (On block2 target)
+            (GripperEmpty robot))``. None or empty: the task's own.
 
     Returns:
         The task.

@@ -57,9 +57,9 @@ class GymnasiumWorld:
         """Begin in ``state``.
 
         Args:
-            environment: What is stepped; nobody else may use it.
-            state: Where to begin.
-            actions: What the robot can do.
+            environment: Environment to step; nothing else may use it.
+            state: State to begin in.
+            actions: Actions of the robot.
 
         Raises:
             InvalidDomainError: It does not keep to what this module asks for.

@@ -54,12 +54,12 @@ class KinderType(Protocol):
 
     @property
     def name(self) -> str:
-        """Such as ``dyn_rectangle``."""
+        """The type's name, such as ``dyn_rectangle``."""
         ...
 
     @property
     def parent(self) -> Any:
-        """The type above, if any."""
+        """The type above this one, if any."""
         ...
 
 
@@ -166,7 +166,7 @@ class KinderBridge:
         return self._types[name]
 
     def sample(self, seed: int) -> State:
-        """An initial state from the environment's own sampler, settled as it settles it."""
+        """An initial state from the environment's own sampler, settled as the environment does."""
         return self.state_of(_sampled(self._make(), seed))
 
     def state_of(self, observed: KinderState) -> State:
@@ -201,8 +201,8 @@ class KinderBridge:
         """The environment's action space.
 
         Args:
-            axes: Names and units, which KinDER states only in its descriptions.
-            gripper: Which of them is a gripper; None: the robot has none.
+            axes: Names and units of the axes, which KinDER states only in its descriptions.
+            gripper: Axis of the gripper, one of ``axes``; None: the robot has none.
 
         Returns:
             It, with the environment's own limits.
@@ -232,9 +232,9 @@ class KinderSimulator:
         """Continue from ``state``.
 
         Args:
-            bridge: Translates states.
-            environment: What is stepped; nobody else may use it.
-            state: Where to begin.
+            bridge: Bridge that translates states.
+            environment: Simulator to step; nothing else may use it.
+            state: State to begin in.
 
         Raises:
             InvalidStateError: It has other objects.

@@ -91,14 +91,15 @@ class Learning:
 
     Args:
         interface: Observations and distances; see :class:`LearnerInterface`.
-        actions: What a learned policy may command, where that is less than the action space.
-        make_vector_world: Makes worlds that are stepped together, where that is faster than one
-            after the other.
-        settings: What a training's settings are in this domain, where they differ: by the name of
-            ``slap train --settings`` (``ours``, ``ours_several``, which differs from ``ours``,
-            ``paper``, or a new one), then by dotted name, as ``slap train --set`` has it.
-        ablations: The interface without one of the terms that were made by hand for this domain,
-            by what is left out, and a plain one: what ``slap study ablation`` compares.
+        actions: Actions of a learned policy, where it may command less than the action space.
+        make_vector_world: Function that makes worlds that are stepped together, where that is
+            faster than one after the other.
+        settings: Training settings of this domain where they differ from the usual ones: by the
+            name of ``slap train --settings`` (``ours``, ``ours_several``, which differs from
+            ``ours``, ``paper``, or a new one), then by dotted name, as ``slap train --set`` has it.
+        ablations: Interfaces that each lack one of the terms that were made by hand for this
+            domain, by the name of what is left out, and a plain one. ``slap study ablation``
+            compares them.
     """
 
     interface: LearnerInterface

@@ -39,8 +39,8 @@ class RebuildEachStep:
         Args:
             make: Builds a simulator in a state. It has to be a function of that state: simulators
                 share nothing that changes.
-            state: Where to begin.
-            actions: What the robot can do.
+            state: State to begin in.
+            actions: Actions of the robot.
 
         Raises:
             InvalidStateError: The state is not finite, or ``make`` refuses it.

@@ -27,22 +27,22 @@ class Skill(Protocol):
 
     @property
     def step_limit(self) -> int:
-        """Environment steps after which it counts as failed."""
+        """Environment steps after which the skill counts as failed."""
         ...
 
     @property
     def least_steps(self) -> int:
-        """Environment steps that it takes at least, from any state: a lower bound."""
+        """Environment steps that the skill takes at least, from any state: a lower bound."""
         ...
 
     def lower_bound(self, state: State, objects: tuple[Object, ...]) -> int:
-        """A lower bound of the environment steps that it takes from a state.
+        """A lower bound of the environment steps that the skill takes from a state.
 
         Lazy search finds a cheapest plan only if the bound never exceeds the true steps.
 
         Args:
-            state: Where it would begin.
-            objects: What it is applied to.
+            state: State in which the skill would begin.
+            objects: Objects that the skill is applied to.
 
         Returns:
             Environment steps, at least 0.
@@ -50,11 +50,11 @@ class Skill(Protocol):
         ...
 
     def start(self, state: State, objects: tuple[Object, ...]) -> Policy:
-        """Begin in a state.
+        """Begin the skill in a state.
 
         Args:
-            state: Where it begins.
-            objects: What it is applied to.
+            state: State in which the skill begins.
+            objects: Objects that the skill is applied to.
 
         Returns:
             The policy, to be called once per environment step.
@@ -70,10 +70,10 @@ class DemandingSkill(Skill, Protocol):
     """A skill that does not end in every state in which its target is reached."""
 
     def accepts(self, state: State, objects: tuple[Object, ...]) -> bool:
-        """Whether it may end in a state in which its target is reached.
+        """Whether the skill may end in a state in which its target is reached.
 
         Args:
-            state: As things are.
-            objects: What it is applied to.
+            state: Current state.
+            objects: Objects that the skill is applied to.
         """
         ...

@@ -17,11 +17,11 @@ class Task(ShownInNotebooks):
     """Where to start, what to reach, and in how many environment steps.
 
     Args:
-        initial_state: State in which it begins.
-        goal: Atoms that must hold at its end.
-        step_limit: Environment steps that it may take.
-        seed: Seed that sampled it, or ``UNSAMPLED``; of two equal tasks it may differ.
-        index: Which of the seed's tasks it is.
+        initial_state: State in which the task begins.
+        goal: Atoms that must hold at the end.
+        step_limit: Largest number of environment steps.
+        seed: Seed that sampled the task, or ``UNSAMPLED``; of two equal tasks it may differ.
+        index: Index of the task among those of its seed.
     """
 
     initial_state: State

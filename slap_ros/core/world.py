@@ -46,10 +46,10 @@ class VectorWorld(Protocol):
         ...
 
     def step(self, actions: Array) -> State:
-        """Act in each of them for one control period.
+        """Act in each of the worlds for one control period.
 
         Args:
-            actions: One per world, shape (worlds, axes).
+            actions: Action of each world, shape (worlds, axes).
 
         Returns:
             Their states, a batch of shape (worlds, layout.size).

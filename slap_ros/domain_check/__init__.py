@@ -24,10 +24,10 @@ def check_domain(
     """Check a domain; the findings come one after the other, as soon as each is made.
 
     Args:
-        domain: Made by its own factory.
-        seed: Other seeds, other tasks and actions.
-        task_count: Tasks that are sampled, planned and executed.
-        state_count: Transitions that are repeated from a reset, in random order.
+        domain: Domain to check, as its own factory makes it.
+        seed: Seed of the tasks and actions.
+        task_count: Number of tasks that are sampled, planned and executed.
+        state_count: Number of transitions that are repeated from a reset, in random order.
 
     Yields:
         Findings; a *problem* makes planning, replay or learning wrong, a *warning* may.

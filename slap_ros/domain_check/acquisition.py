@@ -26,8 +26,8 @@ def parts(domain: Domain, acquisition: Acquisition) -> Iterator[Check]:
     """Whether there is something to compose rewards of, and to compare what is learned with.
 
     Args:
-        domain: To be checked.
-        acquisition: The domain's.
+        domain: Domain to check.
+        acquisition: Acquisition of the domain.
     """
     yield _metrics(domain, acquisition)
     names = {operator.name for operator in acquisition.operators}
@@ -73,9 +73,9 @@ def goals(domain: Domain, acquisition: Acquisition, seed: int) -> Check:
     """Whether hand-written operators lead to each goal by name, and none holds at the start.
 
     Args:
-        domain: To be checked.
-        acquisition: The domain's.
-        seed: Of the tasks.
+        domain: Domain to check.
+        acquisition: Acquisition of the domain.
+        seed: Seed of the tasks.
     """
     lengths, wrong = [], []
     for name in domain.goals:

@@ -45,9 +45,9 @@ def thresholds(domain: Domain, seed: int, count: int) -> Check:
     """Whether atoms of initial states are so close to their thresholds that rounding decides.
 
     Args:
-        domain: Whose tasks.
-        seed: Whose tasks.
-        count: How many.
+        domain: Domain to check.
+        seed: Seed of the tasks.
+        count: Number of tasks.
 
     Returns:
         The finding, with the closest atom.

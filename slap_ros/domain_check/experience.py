@@ -53,11 +53,11 @@ def gather(
     """Transitions, half of them from executed plans, half from random actions.
 
     Args:
-        domain: Whose world is stepped.
-        start: Where random actions begin if no plan was executed.
-        episodes: Executed plans.
-        count: Transitions.
-        rng: Chooses among the plans' transitions, and random actions.
+        domain: Domain whose world is stepped.
+        start: State in which random actions begin if no plan was executed.
+        episodes: Episodes of executed plans.
+        count: Number of transitions.
+        rng: Source of random numbers: it chooses among the plans' transitions, and random actions.
 
     Returns:
         As many transitions.

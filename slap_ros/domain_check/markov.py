@@ -34,13 +34,13 @@ def reset(domain: Domain, experience: Experience) -> Check:
 
 
 def repeat(domain: Domain, experience: Experience, rng: np.random.Generator) -> Check:
-    """Whether each transition comes out the same again, from a reset, in random order.
+    """Whether each transition gives the same state again, from a reset, in random order.
 
     Args:
-        domain: Whose worlds are used: one for each set of objects, so that each reset follows
-            upon another state's step.
+        domain: Domain of the worlds. There is one world for each set of objects, so that each reset
+            follows a step from another state.
         experience: Transitions of worlds that ran on.
-        rng: Draws the order.
+        rng: Source of random numbers for the order.
 
     Returns:
         The finding, with the first and the largest difference.

@@ -21,9 +21,9 @@ def different(domain: Domain, seed: int, count: int) -> Check:
     """Whether the same seed gives the same task, other seeds other tasks, and goals lie ahead.
 
     Args:
-        domain: To be checked.
-        seed: Of the tasks.
-        count: How many tasks are sampled.
+        domain: Domain to check.
+        seed: Seed of the tasks.
+        count: Number of tasks that are sampled.
     """
     name = "tasks"
     samples = [domain.task(seed, index) for index in range(count)]
@@ -56,11 +56,11 @@ class SolvedTasks:
     """What came of planning and executing tasks without shortcuts.
 
     Args:
-        seed: Of the tasks.
-        episodes: Those that were executed, successful or not.
-        failures: Reasons of those that were not solved, by task index.
-        count: Tasks.
-        planner: By name.
+        seed: Seed of the tasks.
+        episodes: Episodes that were executed, successful or not.
+        failures: Reason why a task was not solved, by its index.
+        count: Number of tasks.
+        planner: Name of the planner.
     """
 
     seed: int
@@ -74,10 +74,10 @@ class SolvedTasks:
         """Plan and execute the first tasks of a seed.
 
         Args:
-            domain: Whose tasks.
-            seed: Whose tasks.
-            count: How many.
-            planner: By name.
+            domain: Domain of the tasks.
+            seed: Seed of the tasks.
+            count: Number of tasks.
+            planner: Name of the planner.
 
         Returns:
             What came of each.

@@ -14,7 +14,7 @@ TINY = float(np.finfo(np.float64).tiny)
 
 
 def always(state: State, column: Column) -> Bools:
-    """True of every object: what its type alone says."""
+    """True of every object: for predicates that an object's type alone decides."""
     return np.ones((*state.data.shape[:-1], len(column.objects)), dtype=bool)
 
 
@@ -33,8 +33,8 @@ def flag(state: State, column: Column, feature: str) -> Bools:
 
     Args:
         state: One state, or a batch.
-        column: The objects to ask of.
-        feature: Its name.
+        column: Objects whose feature is read.
+        feature: Name of the feature.
 
     Returns:
         Shape (..., objects).

@@ -45,8 +45,8 @@ class Registrations:
     """What other distributions register.
 
     Args:
-        entries: Of all distributions that can be read.
-        unreadable: The others, each with what reading it raised.
+        entries: Entry points of all distributions that can be read.
+        unreadable: Distributions that cannot be read, each with the error.
     """
 
     entries: tuple[EntryPoint, ...]
@@ -90,9 +90,9 @@ def get_domain(name: str, preset: str | None = None) -> Domain:
     """Make a domain.
 
     Args:
-        name: One of :func:`domain_names`.
-        preset: One of :func:`preset_names`, maybe with settings: ``fair:obstacles=6``. None, or
-            empty: the first.
+        name: Name of the domain, one of :func:`domain_names`.
+        preset: Name of the preset, one of :func:`preset_names`, maybe with settings:
+            ``fair:obstacles=6``. None, or empty: the first.
 
     Raises:
         UnknownDomainError: No such domain.
@@ -145,11 +145,11 @@ def _load(name: str, entries: list[EntryPoint]) -> object:
 
 @contextmanager
 def _blaming(name: str, let_pass: tuple[type[Exception], ...] = ()) -> Iterator[None]:
-    """Whatever a domain's own code raises, even to end the process, is that domain's error.
+    """Raise whatever a domain's own code raises, even to end the process, as that domain's error.
 
     Args:
-        name: Of the domain.
-        let_pass: What is nobody's fault but the caller's.
+        name: Name of the domain.
+        let_pass: Types of the errors that are the caller's fault and are raised as they are.
     """
     try:
         yield

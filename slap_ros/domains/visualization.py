@@ -23,8 +23,8 @@ def arm_bodies(joints: Sequence[float], fingers: tuple[float, float]) -> list[Vi
     """The arm: a box around each of its links.
 
     Args:
-        joints: rad, seven.
-        fingers: Distance of the left and the right one from the middle, m.
+        joints: Positions of the seven joints, rad.
+        fingers: Distances of the left and the right finger from the middle, m.
 
     Returns:
         One for each link, named after it.
@@ -50,12 +50,12 @@ def arm_bodies(joints: Sequence[float], fingers: tuple[float, float]) -> list[Vi
 def animation(
     visuals_of: Callable[[State], Visuals], period_s: float, view: Viewpoint | None = None
 ) -> Animate:
-    """What writes states as an animation.
+    """The function that writes states as an animation.
 
     Args:
-        visuals_of: What there is to be seen, by the first of the states.
-        period_s: What a control step takes.
-        view: From where it is seen.
+        visuals_of: Function from the first of the states to what there is to see.
+        period_s: Duration of a control step, s.
+        view: Viewpoint of the animation.
 
     Returns:
         The function that writes it, one frame per control step.

@@ -33,10 +33,10 @@ def draw_abstract_graph(
     differs from the start node. Pointing at a card or an edge shows it in full.
 
     Args:
-        graph: What to draw. Of a very large one only a part is shown, and the picture says so.
-        space: The atoms of the graph's task.
-        plan: A plan from the graph's start node, or None where there is none.
-        title: A line above the picture.
+        graph: Graph to draw. Of a very large one only a part is shown, and the picture says so.
+        space: Atoms of the graph's task.
+        plan: Plan from the graph's start node, or None where there is none.
+        title: Title above the picture.
 
     Returns:
         A self-contained SVG 1.1 document.
@@ -48,10 +48,10 @@ def compose(graph: AbstractGraph, space: AtomSpace, plan: Plan | None, title: st
     """The picture as shapes.
 
     Args:
-        graph: See :func:`draw_abstract_graph`, as for the others.
-        space: The atoms of the graph's task.
-        plan: A plan from the graph's start node, if there is one.
-        title: A line above the picture.
+        graph: Graph to draw; see :func:`draw_abstract_graph`.
+        space: Atoms of the graph's task.
+        plan: Plan from the graph's start node; None where there is none.
+        title: Title above the picture.
     """
     selection, words = select(graph, plan), AtomNaming(space)
     many = len(selection.nodes) > MANY_NODES
@@ -78,7 +78,7 @@ def compose(graph: AbstractGraph, space: AtomSpace, plan: Plan | None, title: st
 
 
 def _cards(selection: Selection, words: AtomNaming, start: int, many: bool) -> list[Card]:
-    """Of many, only the plan's have room for everything."""
+    """The cards of nodes; of many nodes, only the plan's have room for all lines."""
     bodies = list_bodies(selection, words, start)
     common = Counter(line.content for body in bodies for line in body)
     cards = []

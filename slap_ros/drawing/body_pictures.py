@@ -59,12 +59,12 @@ def write_body_animation(
     """Write an animation of the bodies of a domain, one frame per state.
 
     Args:
-        path: The file; its ending says the format, see ``slap_ros.worlds.animation``.
-        display: Shows bodies, the arm among them.
-        states: One per frame; not empty.
-        period_s: How long each is shown.
-        size: Of the frames.
-        progress: Told the number of frames drawn so far, after each.
+        path: Path of the file; its ending says the format, see ``slap_ros.worlds.animation``.
+        display: Display that shows bodies, the arm among them.
+        states: States, one per frame; not empty.
+        period_s: Duration of each frame, s.
+        size: Size of the frames, pixels.
+        progress: Function that receives the number of frames drawn so far, after each.
 
     Raises:
         OSError: It cannot be written.
@@ -87,7 +87,7 @@ def visible(display: Display, state: State) -> list[VisibleBody]:
 
 
 def viewpoint(scenes: Sequence[Sequence[VisibleBody]]) -> Projection:
-    """From the front right; a world that is itself flat is looked at squarely."""
+    """The view from the front right; a world that is itself flat is seen squarely."""
     places = np.array([body.position for bodies in scenes for body in bodies])
     if len(places) and np.ptp(places[:, 1]) < STILL:
         return SIDE
@@ -97,12 +97,12 @@ def viewpoint(scenes: Sequence[Sequence[VisibleBody]]) -> Projection:
 def canvas_of(
     scenes: Sequence[Sequence[VisibleBody]], view: Projection, size: PictureSize
 ) -> Canvas:
-    """The room for all that moves and what is not much larger, in the shape of the picture.
+    """The part of the view with all that moves and what is not much larger, in the picture's shape.
 
     Args:
-        scenes: The bodies of each picture.
-        view: From where they are seen.
-        size: Of the pictures.
+        scenes: Bodies of each picture.
+        view: Projection that the bodies are seen in.
+        size: Size of the pictures, pixels.
     """
     points = [
         np.array([[view.project(corner) for corner in corners(body)] for body in bodies])
@@ -138,10 +138,10 @@ def draw_bodies(
     """Draw bodies, the nearer ones before the farther ones.
 
     Args:
-        bodies: Each can be drawn.
-        view: From where they are seen.
-        canvas: The part of the view that is drawn, in the shape of the picture.
-        size: Of the picture.
+        bodies: Bodies that can be drawn.
+        view: Projection that the bodies are seen in.
+        canvas: Part of the view that is drawn, in the shape of the picture.
+        size: Size of the picture, pixels.
 
     Returns:
         Shape (height, width, 3).
@@ -200,14 +200,14 @@ class _Sheet:
 
     @classmethod
     def empty(cls, width: int, height: int) -> _Sheet:
-        """Nothing but background."""
+        """A sheet with nothing but background."""
         shape = (height, width)
         colours = np.full((*shape, 3), PAPER, dtype=np.float32)
         return cls(colours, np.full(shape, -np.inf), np.zeros(shape, dtype=int))
 
     @property
     def width(self) -> int:
-        """In pixels."""
+        """The width in pixels."""
         return int(self.depths.shape[1])
 
     def next_face(self, count: int) -> int:

@@ -34,10 +34,10 @@ def state_facts(
     """The sentences under the title: goal, size of the graph, plan.
 
     Args:
-        graph: What is drawn.
+        graph: Graph that is drawn.
         words: Names of the task's atoms.
-        plan: Whose steps are predicted; None where there is none.
-        selection: What of the graph is shown.
+        plan: Plan with predicted steps; None where there is none.
+        selection: Nodes and edges of the graph that are shown.
     """
     nodes, edges = counted(len(graph.nodes), "abstract state"), counted(len(graph.edges), "option")
     facts = [
@@ -64,9 +64,9 @@ def write_header(title: str, facts: Sequence[str], width: float) -> Iterator[Svg
     """The title and the facts below it, broken into lines.
 
     Args:
-        title: In bold.
-        facts: A paragraph each.
-        width: Of the lines, px.
+        title: Title, shown in bold.
+        facts: Sentences below the title, one paragraph each.
+        width: Width of the lines, px.
     """
     y = PAGE_MARGIN_PX
     for line in text.wrap(title, TITLE_PX, width, bold=True):
@@ -79,12 +79,12 @@ def write_header(title: str, facts: Sequence[str], width: float) -> Iterator[Svg
 
 
 def draw_legend(selection: Selection, y: float, width: float) -> tuple[list[SvgShape], float]:
-    """What the marks mean that occur, in rows, and the height at which the last row ends, px.
+    """The legend of the marks that occur, in rows, and the height at which it ends, px.
 
     Args:
-        selection: What is drawn.
-        y: Where the first row begins, px from the top.
-        width: Of the rows, px.
+        selection: Nodes and edges that are drawn.
+        y: Height at which the first row begins, px from the top.
+        width: Width of the rows, px.
     """
     shapes: list[SvgShape] = []
     x, row_px, sample_px = PAGE_MARGIN_PX, 24.0, 30.0

@@ -113,12 +113,12 @@ def list_bodies(selection: Selection, words: AtomNaming, start: int) -> list[lis
 
 
 def cut(lines: list[CardLine], limit: int, common: Counter[str]) -> list[CardLine]:
-    """The lines, or as many as there is room for of those that are on the fewest cards.
+    """The lines of a card; if there are too many, those that are on the fewest cards.
 
     Args:
-        lines: Of one card.
+        lines: Lines of one card.
         limit: Greatest number of lines.
-        common: On how many cards each line is: the rarest say most about a card.
+        common: Number of cards that have each line. The rarest lines say most about a card.
     """
     if len(lines) <= limit:
         return lines
@@ -131,8 +131,8 @@ def make_card(node: ShownNode, body: Sequence[CardLine], style: CardStyle) -> Ca
     """A node's card.
 
     Args:
-        node: Its role gives heading and frame.
-        body: The lines below the heading.
+        node: Node of the graph; its role gives heading and frame.
+        body: Lines below the heading.
         style: Size of the text.
     """
     heading, colour = _heading(node)

@@ -46,21 +46,21 @@ class Area:
 
     @property
     def right(self) -> float:
-        """The right edge."""
+        """The right edge, px."""
         return self.x + self.width
 
     @property
     def bottom(self) -> float:
-        """The lower edge."""
+        """The lower edge, px."""
         return self.y + self.height
 
     @property
     def middle(self) -> float:
-        """Half way down."""
+        """The height of the middle, px."""
         return self.y + self.height / 2
 
     def moved(self, x: float, y: float) -> Area:
-        """The same, so much further right and down."""
+        """The same area, so much further right and down."""
         return Area(self.x + x, self.y + y, self.width, self.height)
 
 
@@ -100,7 +100,7 @@ class Route:
     label: Area | None = None
 
     def moved(self, x: float, y: float) -> Route:
-        """The same, so much further right and down."""
+        """The same route, so much further right and down."""
         curves = (
             tuple(RoutePoint(p.x + x, p.y + y, p.heading) for p in curve) for curve in self.curves
         )
@@ -117,7 +117,7 @@ class GraphLayout:
     height: float
 
     def moved(self, x: float, y: float) -> GraphLayout:
-        """The same, so much further right and down."""
+        """The same layout, so much further right and down."""
         return GraphLayout(
             tuple(box.moved(x, y) for box in self.boxes),
             tuple(route.moved(x, y) for route in self.routes),
@@ -294,7 +294,7 @@ class _End:
 def _ports(
     slots: list[_Slot], areas: Sequence[Area], links: Sequence[EdgeLink], chains: list[list[int]]
 ) -> list[tuple[float, float]]:
-    """Heights at which each link leaves its source and enters its target."""
+    """Heights at which each link leaves its source box and enters its target box."""
     sides: dict[tuple[int, bool], list[_End]] = {}  # by box and whether on its right
     for i, (link, chain) in enumerate(zip(links, chains, strict=True)):
         for end in (
@@ -312,7 +312,7 @@ def _ports(
 
 
 def _port_heights(area: Area, ends: Sequence[_End]) -> list[float]:
-    """Around the middle, where the spine is if it is among them."""
+    """Heights of the ports: around the middle, where the spine is if it is among them."""
     centre = next((k for k, end in enumerate(ends) if end.on_spine), (len(ends) - 1) / 2)
     furthest = max(centre, len(ends) - 1 - centre)
     pitch = min(PORT_PITCH_PX, area.height / 2 / (furthest + 0.5))

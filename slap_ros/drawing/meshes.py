@@ -47,9 +47,9 @@ def body_paths(body: VisibleBody, view: Projection, canvas: Canvas) -> tuple[str
     """The visible faces of a body as paths: all of them, those in the light, those in the shade.
 
     Args:
-        body: A box, or of triangles.
-        view: From where it is seen.
-        canvas: The part of the view that is drawn, with the scale.
+        body: Body that is a box or has triangles.
+        view: Projection that the body is seen in.
+        canvas: Part of the view that is drawn, with the scale.
     """
     if not 0 < len(body.triangles) <= 3 * MOST_TRIANGLES:
         return box_paths(body, view, canvas)

@@ -28,13 +28,13 @@ Flags = NDArray[np.bool_]
 def painting_order(
     bodies: Sequence[VisibleBody], view: Projection, ranks: Sequence[Any]
 ) -> list[int]:
-    """Bodies from back to front.
+    """The numbers of bodies, from back to front.
 
     Args:
-        bodies: Boxes, or bodies of triangles, which count as the boxes around them.
-        view: From where they are seen.
-        ranks: Of each body, and maybe of more that hides or is hidden by nothing. Where nothing
-            else decides, the lower rank comes first.
+        bodies: Bodies: boxes, or of triangles, which count as the boxes around them.
+        view: Projection that the bodies are seen in.
+        ranks: Rank of each body, and maybe of further items that hide nothing and are not hidden.
+            Where nothing else decides, the lower rank comes first.
 
     Returns:
         Numbers of what has ranks, each once.

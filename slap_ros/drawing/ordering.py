@@ -19,9 +19,9 @@ def order(ranks: Ranks, before: Neighbours, after: Neighbours) -> Ranks:
     """Reorder the items of each rank by barycentre sweeps, then by exchanging neighbours.
 
     Args:
-        ranks: The items of each rank in an initial order, which breaks ties.
-        before: Each item's neighbours in the rank to its left.
-        after: Each item's neighbours in the rank to its right.
+        ranks: Items of each rank in an initial order, which breaks ties.
+        before: Neighbours of each item in the rank to its left.
+        after: Neighbours of each item in the rank to its right.
 
     Returns:
         The items of each rank in the order found, from the top.
@@ -64,7 +64,7 @@ def _sweep(ranks: Ranks, before: Neighbours, after: Neighbours, rightwards: bool
 
 
 def _by_barycentre(rank: list[int], neighbours: Neighbours, fixed: dict[int, int]) -> list[int]:
-    """Items with no neighbour there stay in their places; the others are sorted around them."""
+    """Sort items by the mean place of their neighbours; items without any stay in their places."""
     mean = {
         item: sum(fixed[n] for n in neighbours[item]) / len(neighbours[item])
         for item in rank

@@ -37,7 +37,7 @@ class Projection:
 
     @property
     def toward(self) -> Vector:
-        """Toward the viewer."""
+        """The direction toward the viewer, of length 1."""
         (a, b, c), (d, e, f) = self.right, self.up
         return (b * f - c * e, c * d - a * f, a * e - b * d)
 
@@ -46,12 +46,12 @@ class Projection:
         return _dot(self.right, point), _dot(self.up, point)
 
     def depth(self, point: Vector) -> float:
-        """How near to the viewer it is, m."""
+        """How near to the viewer a point is, m."""
         return _dot(self.toward, point)
 
 
 def _oblique(turn: float, height: float) -> Projection:
-    """From the right of the robot and above; rad from its right side, and from the ground."""
+    """The view from the robot's right and above; angles from its right side and the ground, rad."""
     up = (-sin(turn) * sin(height), cos(turn) * sin(height), cos(height))
     return Projection("From the front right", (cos(turn), sin(turn), 0.0), up)
 
@@ -72,7 +72,7 @@ class Canvas:
 
     @classmethod
     def around(cls, points: Iterable[Point], margin: float) -> Canvas:
-        """Room for points, and a share of the greater extent around them."""
+        """A canvas around points, with a margin that is a share of the greater extent."""
         xs, ys = zip(*points, strict=True)
         width, height = max(xs) - min(xs), max(ys) - min(ys)
         rim = margin * max(width, height) or 1.0
@@ -80,7 +80,7 @@ class Canvas:
 
     @property
     def scale(self) -> float:
-        """Units a metre."""
+        """Drawing units per metre."""
         return UNITS / self.width
 
     @property
@@ -89,7 +89,7 @@ class Canvas:
         return round(self.height * self.scale)
 
     def path(self, points: Iterable[Point], closed: bool = True) -> str:
-        """Straight lines through points."""
+        """The path of straight lines through points."""
         at = [
             (round((x - self.left) * self.scale), round((self.top - y) * self.scale))
             for x, y in points
@@ -101,9 +101,9 @@ def box_paths(body: VisibleBody, view: Projection, canvas: Canvas) -> tuple[str,
     """The visible faces of a box as paths: all of them, those in the light, those in the shade.
 
     Args:
-        body: Drawn as a box.
-        view: From where it is seen.
-        canvas: The part of the view that is drawn, with the scale.
+        body: Body that is drawn as a box.
+        view: Projection that the body is seen in.
+        canvas: Part of the view that is drawn, with the scale.
     """
     drawn = [
         (light, canvas.path(map(view.project, corners))) for light, corners in _seen(body, view)
@@ -123,7 +123,7 @@ def corners(body: VisibleBody) -> list[Vector]:
 
 
 def extents(body: VisibleBody) -> list[tuple[float, float]]:
-    """From where to where it reaches along its own axes, m."""
+    """How far a body reaches along its own axes, from and to, m."""
     if body.triangles:
         return [(min(values), max(values)) for values in zip(*body.triangles, strict=True)]
     return [(-size / 2, size / 2) for size in body.size]
@@ -152,7 +152,7 @@ def _face(half: Sequence[float], axis: int, sign: float) -> list[Vector]:
 
 
 def drawable(bodies: Iterable[VisibleBody]) -> Iterator[VisibleBody]:
-    """Those that can be drawn: anyone may have recorded or displayed anything."""
+    """The bodies that can be drawn: any values may have been recorded or displayed."""
     for body in bodies:
         shape = (number for corner in body.triangles for number in corner)
         numbers = (*body.position, *body.quaternion, *body.size, *body.colour, *shape)

@@ -37,12 +37,12 @@ class ShownEdge:
 
     @property
     def is_shortcut(self) -> bool:
-        """Whether it was learned."""
+        """Whether the edge's option was learned."""
         return self.option.kind is OptionKind.SHORTCUT
 
     @property
     def mark(self) -> str:
-        """How it is to be drawn: as one of ``palette.PENS``."""
+        """How the edge is to be drawn: as one of ``palette.PENS``."""
         if not self.is_forward:
             return "back"
         if self.step is None:

@@ -222,9 +222,9 @@ def element(name: str, attributes: Mapping[str, str], inner: str = "") -> str:
     """An SVG element.
 
     Args:
-        name: Of the element.
-        attributes: Values are escaped here.
-        inner: Markup of what is inside.
+        name: Name of the element.
+        attributes: Attributes by name; their values are escaped here.
+        inner: Markup of the content.
     """
     written = "".join(f" {key}={quoteattr(clean_value(v))}" for key, v in attributes.items())
     return f"<{name}{written}>{inner}</{name}>" if inner else f"<{name}{written}/>"
@@ -255,7 +255,7 @@ def _piece(
     other: Point,
     end: Point,
 ) -> str:
-    """A cubic, or a level line where it is one at the precision written."""
+    """A cubic curve, or a level line where the curve is one at the precision written."""
     if number(start[1]) == number(end[1]):
         return f"H{number(end[0])}"
     return f"C{_point(one)} {_point(other)} {_point(end)}"

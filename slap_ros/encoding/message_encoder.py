@@ -59,7 +59,7 @@ class MessageEncoder:
         return self.make("std_msgs/msg/Header", stamp=stamp, frame_id=FRAME)
 
     def domain_info(self, domain: Domain, stamp: Any) -> Any:
-        """Which world runs, whose skills it has, and the versions of all that runs it."""
+        """The message of the domain: world, skills, and the versions of all that runs it."""
         moved = domain.action_space.displacement_axes
         return self.make(
             DOMAIN_INFO,
@@ -103,10 +103,10 @@ class MessageEncoder:
         """The message of a state.
 
         Args:
-            value: The state.
-            episode: Its episode's number.
-            step: Environment steps taken before it.
-            stamp: When it came to be.
+            value: State to encode.
+            episode: Number of the state's episode.
+            step: Number of environment steps taken before the state.
+            stamp: Time of the state.
 
         Returns:
             The message, objects in the state's own order.
@@ -139,7 +139,7 @@ class MessageEncoder:
         ]
 
     def percept(self, value: Percept, of: Any, space: AtomSpace, known: State) -> Any:
-        """What is perceived of a state.
+        """The message of what is perceived of a state.
 
         Args:
             value: The percept.
@@ -171,17 +171,17 @@ class MessageEncoder:
         )
 
     def goal(self, ground_atoms: Iterable[GroundAtom]) -> list[Any]:
-        """A goal, in a stable order."""
+        """The message of a goal, in a stable order."""
         return self.atoms(sorted(ground_atoms, key=str))
 
     def task(self, value: Task, domain: Domain, episode: int, stamp: Any) -> Any:
         """The task that opens an episode.
 
         Args:
-            value: The task.
-            domain: What it is a task of.
+            value: Task to encode.
+            domain: Domain of the task.
             episode: Number of the episode.
-            stamp: When the episode was opened.
+            stamp: Time at which the episode was opened.
 
         Returns:
             The message; its initial state is step 0 of the episode.
@@ -201,14 +201,14 @@ class MessageEncoder:
     def command(
         self, action: Action, actions: ActionSpace, episode: int, step: int, stamp: Any
     ) -> Any:
-        """What the robot is to do next.
+        """The message of the robot's next action.
 
         Args:
-            action: One entry per axis.
-            actions: The domain's: which axis is the gripper.
+            action: Action, one entry per axis.
+            actions: Action space of the domain, which says which axis is the gripper.
             episode: Number of the episode.
-            step: The step of the state that it answers.
-            stamp: When it was decided.
+            step: Step of the state that the command answers.
+            stamp: Time of the decision.
 
         Returns:
             The message.
@@ -224,13 +224,13 @@ class MessageEncoder:
         )
 
     def fault(self, error: SlapError, episode: int, opened_ns: int, step: int) -> Any:
-        """Why an episode cannot go on.
+        """The message of why an episode cannot go on.
 
         Args:
-            error: What has failed.
+            error: Error that stopped the episode.
             episode: Number of the episode.
-            opened_ns: Stamp of its task, ns since the epoch.
-            step: The last that was taken.
+            opened_ns: Stamp of the episode's task, ns since the epoch.
+            step: Number of the last step taken.
 
         Returns:
             The message.
@@ -245,7 +245,7 @@ class MessageEncoder:
         )
 
     def plan_edge(self, edge: PlanEdge, space: AtomSpace) -> Any:
-        """One edge of a plan, with the atoms that are expected at its end."""
+        """The message of one edge of a plan, with the atoms that are expected at its end."""
         target = edge.target
         return self.make(
             "slap_msgs/msg/PlanEdge",
@@ -272,13 +272,13 @@ class MessageEncoder:
         """The message of a plan.
 
         Args:
-            value: The plan.
-            goal_mask: What it is to reach, as a mask over ``space``.
+            value: Plan to encode.
+            goal_mask: Goal of the plan, as a mask over ``space``.
             space: Atom space of the episode.
             episode: Number of the episode.
-            number: Which plan of the run, from 0 on.
-            stamp: When it was made.
-            provenance: What made it: the fields ``planner``, ``library`` and ``samples``.
+            number: Number of the plan in the run, from 0 on.
+            stamp: Time at which the plan was made.
+            provenance: Fields ``planner``, ``library`` and ``samples`` of what made the plan.
 
         Returns:
             The message.
@@ -295,7 +295,7 @@ class MessageEncoder:
         )
 
     def skill_info(self, operator: LiftedOperator, skill: Skill) -> Any:
-        """A given option."""
+        """The message of a given option."""
         return self.make(
             "slap_msgs/msg/SkillInfo",
             kind=OptionKind.OPERATOR.value,
@@ -305,7 +305,7 @@ class MessageEncoder:
         )
 
     def shortcut_info(self, shortcut: Shortcut, sampling: Sampling) -> Any:
-        """A learned option, with the types of its roles."""
+        """The message of a learned option, with the types of its roles."""
         return self.make(
             "slap_msgs/msg/SkillInfo",
             kind=OptionKind.SHORTCUT.value,
@@ -316,14 +316,14 @@ class MessageEncoder:
         )
 
     def plan_event(self, kind: int, episode: int, step: int, stamp: Any, **details: object) -> Any:
-        """What happens to a plan.
+        """The message of an event of a plan.
 
         Args:
-            kind: One of :class:`~slap_ros.messages.events.PlanEventKind`.
+            kind: Kind of the event, one of :class:`~slap_ros.messages.events.PlanEventKind`.
             episode: Number of the episode.
-            step: The step of the newest state.
-            stamp: When it happened.
-            details: Other fields of the message.
+            step: Step of the newest state.
+            stamp: Time of the event.
+            details: Further fields of the message.
         """
         header = self.header(stamp)
         return self.make(
@@ -333,15 +333,15 @@ class MessageEncoder:
     def skill_event(
         self, kind: int, option: Option, outcome: OptionResult, episode: int, step: int, stamp: Any
     ) -> Any:
-        """What happens to an option under execution.
+        """The message of an event of an option under execution.
 
         Args:
-            kind: One of :class:`~slap_ros.messages.events.SkillEventKind`.
-            option: What it happens to.
-            outcome: How the option ended; an error code of NONE where it did not.
+            kind: Kind of the event, one of :class:`~slap_ros.messages.events.SkillEventKind`.
+            option: Option that the event is about.
+            outcome: Result of the option; its error code is NONE unless the option has failed.
             episode: Number of the episode.
-            step: The step of the newest state.
-            stamp: When it happened.
+            step: Step of the newest state.
+            stamp: Time of the event.
         """
         return self.make(
             SKILL_EVENT,

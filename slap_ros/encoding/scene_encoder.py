@@ -40,9 +40,9 @@ class SceneEncoder:
         """All that is shown of a state.
 
         Args:
-            display: How the domain looks.
-            state: What is shown.
-            stamp: When it came to be.
+            display: Display of the domain.
+            state: State that is shown.
+            stamp: Time of the state.
         """
         bodies = display.bodies(state)
         markers = self.markers(bodies, stamp)
@@ -54,9 +54,9 @@ class SceneEncoder:
         """Bodies as markers: boxes, or triangles where a body has a mesh.
 
         Args:
-            bodies: What is shown, in the world frame.
-            stamp: When they are there.
-            namespace: Of the markers.
+            bodies: Bodies that are shown, in the world frame.
+            stamp: Time at which the bodies are there.
+            namespace: Namespace of the markers.
 
         Returns:
             A marker per body, numbered from 0 on.

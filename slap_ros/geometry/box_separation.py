@@ -27,9 +27,10 @@ def separated(turn: Array, offset: Array, half_a: Array, half_b: Array, distance
     Args:
         turn: Orientation of B seen from A, shape (m, 3, 3).
         offset: Centre of A seen from B, m, shape (m, 3).
-        half_a: Half extents of A, m, shape (m, 3).
-        half_b: Half extents of B, m, shape (m, 3).
-        distance: m, shape (m,); below 0, how deep the boxes may overlap.
+        half_a: Half the edges of A, m, shape (m, 3).
+        half_b: Half the edges of B, m, shape (m, 3).
+        distance: Least distance between the boxes, m, shape (m,); below 0, how deep they may
+            overlap.
 
     Returns:
         Shape (m,).

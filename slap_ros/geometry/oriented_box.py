@@ -38,22 +38,22 @@ class OrientedBox(NamedTuple):
 
     @property
     def radius(self) -> float:
-        """Half the diagonal, m."""
+        """Half the box's diagonal, m."""
         return math.hypot(*self.half)
 
     def half_extent(self, axis: Vector) -> float:
-        """How far it reaches from its centre along an axis of length 1, seen from outside, m."""
+        """How far the box reaches from its centre along a unit vector, seen from outside, m."""
         along = rotate(conjugate(self.pose.quaternion), axis)
         return sum(abs(a) * half for a, half in zip(along, self.half, strict=True))
 
     @property
     def top(self) -> float:
-        """Height of its highest point, m."""
+        """Height of the box's highest point, m."""
         return self.pose.position[2] + self.half_extent(UP)
 
     @property
     def bottom(self) -> float:
-        """Height of its lowest point, m."""
+        """Height of the box's lowest point, m."""
         return self.pose.position[2] - self.half_extent(UP)
 
     def corners(self) -> list[Vector]:

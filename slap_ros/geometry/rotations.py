@@ -15,7 +15,7 @@ def rotate_each(turns: Array, vectors: Array) -> Array:
 
     Args:
         turns: Quaternions, shape (..., 4).
-        vectors: Shape (..., 3).
+        vectors: Vectors, shape (..., 3).
 
     Returns:
         Shape (..., 3).

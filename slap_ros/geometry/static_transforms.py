@@ -8,7 +8,7 @@ from slap_ros.geometry.pose import IDENTITY, Pose
 
 
 class StaticTransforms:
-    """What ``/tf_static`` said."""
+    """The static transforms of ``/tf_static``."""
 
     def __init__(self, base: str) -> None:
         """``base``: the frame of the robot's base."""
@@ -20,8 +20,8 @@ class StaticTransforms:
 
         Args:
             parent: Name of the frame in which the pose is given.
-            child: Name of the frame that is there.
-            pose: Of the child in its parent, position in m.
+            child: Name of the frame that has that pose.
+            pose: Pose of the child in its parent, position in m.
         """
         self._parents[child] = (parent, pose)
 

@@ -51,7 +51,7 @@ def load_mesh(
     Args:
         file: OBJ, GLB, STL, PLY or what else trimesh reads.
         size_m: The longest edge that the box around the solid is to have.
-        settings: How closely to follow the mesh.
+        settings: Settings that say how closely the pieces follow the mesh.
 
     Returns:
         The solid; its origin is its centre of mass.
@@ -78,10 +78,10 @@ def cached_file(
     """Where the pieces of a mesh are cached.
 
     Args:
-        content: Of the mesh's file.
-        suffix: Of the file's name, lower case, with its dot.
-        size_m: The longest edge of the box around it, m.
-        settings: How closely the pieces follow it.
+        content: Content of the mesh's file.
+        suffix: Ending of the file's name, lower case, with its dot.
+        size_m: Longest edge of the box around the mesh, m.
+        settings: Settings that say how closely the pieces follow the mesh.
 
     Returns:
         A path that differs wherever any of these does.

@@ -32,9 +32,10 @@ def load_objaverse(
     Where there is no network, put it into the cache folder as ``objaverse/IDENTIFIER.glb``.
 
     Args:
-        identifier: Its uid.
-        size_m: See :func:`slap_ros.meshes.decomposition.load_mesh`, also for what else may fail.
-        settings: How closely to follow it.
+        identifier: Identifier (uid) of the object: 32 hexadecimal digits.
+        size_m: Longest edge of the box around the object, m; see
+            :func:`slap_ros.meshes.decomposition.load_mesh`, also for what else may fail.
+        settings: Settings that say how closely the pieces follow the object.
 
     Returns:
         The solid; its origin is its centre of mass.

@@ -39,7 +39,7 @@ _FACES = (
 
 
 def cuboid(half: Vector) -> ConvexPiece:
-    """A box by half its edges, m."""
+    """A box with the given half edges, m."""
     x, y, z = half
     corners = product((-x, x), (-y, y), (-z, z))
     return ConvexPiece(tuple(corners), _FACES)
@@ -49,9 +49,9 @@ def prism(radius_m: float, length_m: float, sides: int) -> ConvexPiece:
     """A prism about z in place of a cylinder, with the origin in its middle.
 
     Args:
-        radius_m: Of the circle that its corners are on.
-        length_m: From end to end.
-        sides: How many, three or more.
+        radius_m: Radius of the circle that the corners are on, m.
+        length_m: Length from end to end, m.
+        sides: Number of sides, three or more.
 
     Returns:
         The prism; its corners at the lower end come before those at the upper end.
@@ -121,21 +121,21 @@ class Solid:
 
     @cached_property
     def bounds(self) -> OrientedBox:
-        """The smallest box around it along its own axes."""
+        """The smallest box around the solid along its own axes."""
         return _around(self.points)
 
     @cached_property
     def radius(self) -> float:
-        """How far it reaches from its centre of mass, m."""
+        """How far the solid reaches from its centre of mass, m."""
         return float(np.linalg.norm(self.points, axis=1).max())
 
     def extent(self, axis: Vector) -> float:
-        """How far it reaches from its centre of mass along an axis, to either side, m."""
+        """How far the solid reaches from its centre of mass along an axis, to either side, m."""
         return float(np.abs(self.points @ np.array(axis)).max())
 
     @cached_property
     def inertia(self) -> Vector:
-        """Moments about its own axes for a mass of 1 kg, m². Products of inertia are left out."""
+        """Moments about the solid's own axes for a mass of 1 kg, m²; no products of inertia."""
         moments = [_moments(piece) for piece in self.pieces]
         xx, yy, zz = (np.sum([m[2] for m in moments], 0) / sum(m[0] for m in moments)).tolist()
         return (yy + zz, xx + zz, xx + yy)

@@ -19,8 +19,8 @@ def make_message(type_name: str, **fields: Any) -> Any:
     """A message; numbers in sequences become arrays, as rosbags has them.
 
     Args:
-        type_name: Its type, such as ``slap_msgs/msg/Task``.
-        fields: Values by name; those that are not given are zero or empty, as in ROS.
+        type_name: Name of the message's type, such as ``slap_msgs/msg/Task``.
+        fields: Values of fields by name; fields that are not given are zero or empty, as in ROS.
 
     Raises:
         TypeError: The type has no such field.

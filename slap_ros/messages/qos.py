@@ -54,7 +54,7 @@ def offered_qos(topic: str) -> OfferedQos:
     """What publishers of a topic offer.
 
     Args:
-        topic: Its full name: ``/slap/state``, or ``/robot1/slap/state`` in a namespace.
+        topic: Full name of the topic: ``/slap/state``, or ``/robot1/slap/state`` in a namespace.
 
     Returns:
         ROS 2's default for topics that are not the ensemble's.

@@ -46,10 +46,10 @@ class PlanCache:
         """What :func:`slap_ros.motion.planning.plan_path` gives, from the cache where it is there.
 
         Args:
-            start: rad, shape (7,).
-            goal: rad, shape (7,).
-            free: Which configurations are free of collisions.
-            seed: Fixes the result.
+            start: Configuration to start from, rad, shape (7,).
+            goal: Configuration to reach, rad, shape (7,).
+            free: Checker of which configurations are free of collisions.
+            seed: Seed of the random numbers; it fixes the result.
 
         Returns:
             rad, shape (k, 7), read-only.

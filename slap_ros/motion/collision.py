@@ -43,11 +43,11 @@ class CollisionChecker:
         held_margin: float = HELD_MARGIN,
         base: bool = True,
     ) -> None:
-        """Lay out the shapes.
+        """Lay out the shapes of the arm, the held box and the obstacles.
 
         Args:
-            obstacles: In the base's frame.
-            held: What the hand holds; its pose is in the frame of the grasp point.
+            obstacles: Boxes to keep clear of, in the base's frame.
+            held: Box that the hand holds; its pose is in the frame of the grasp point.
             finger: Distance of each finger from the middle, m.
             margin: Distance that the links keep from the obstacles, m.
             held_margin: Distance that the held box keeps, m; below 0, how deep it may overlap.
@@ -134,7 +134,7 @@ def _moving_shapes(
 
 @lru_cache(maxsize=64)
 def _arm_shapes(finger: float) -> tuple[tuple[int, Array], ...]:
-    """Of each of the arm's shapes: the index of its link, 0 for link 1, and its frame in it."""
+    """The link's index (0 for link 1) and the frame in that link of each of the arm's shapes."""
     zero = link_poses((0.0,) * JOINTS, finger)
     found = []
     for shape in ARM_SHAPES:

@@ -55,7 +55,7 @@ def inverse_kinematics(target: Pose, near: Joints, *, free: Free | None = None) 
     Args:
         target: Pose of the grasp point in the base's frame.
         near: Configuration to be near to, rad, shape (7,).
-        free: Which configurations are free of collisions; all, if None.
+        free: Checker of which configurations are free of collisions; None: all are.
 
     Returns:
         rad, shape (7,); None if the pose is out of reach or no configuration there is free.
@@ -71,7 +71,7 @@ def nearest_configurations(
     Args:
         targets: Poses of the grasp point in the base's frame.
         near: Configuration to be near to, rad, shape (7,).
-        free: Which configurations are free of collisions; all, if None.
+        free: Checker of which configurations are free of collisions; None: all are.
 
     Returns:
         For each pose rad, shape (7,); None if it is out of reach or no configuration there is free.
@@ -93,7 +93,7 @@ def ik_candidates(target: Pose, near: Joints) -> Joints:
 
     Args:
         target: Pose of the grasp point in the base's frame.
-        near: rad, shape (7,).
+        near: Configuration to be near to, rad, shape (7,).
 
     Returns:
         rad, shape (k, 7); k is 0 if the pose is out of reach.
@@ -102,7 +102,7 @@ def ik_candidates(target: Pose, near: Joints) -> Joints:
 
 
 def _sweep(near: Joints) -> Array:
-    """Values of joint 7 over its range, and the one that it has: shape (SWEEP + 1,)."""
+    """Values of joint 7 over its range, and its present one: shape (SWEEP + 1,)."""
     return np.append(np.linspace(LOW[6], HIGH[6], SWEEP), near[6])
 
 
@@ -116,7 +116,7 @@ def _around(best: Joints | None) -> Array:
 
 
 def _solutions(targets: Sequence[Pose], joint7: Sequence[Array], near: Joints) -> list[Joints]:
-    """At each pose with its values of joint 7: configurations, shape (k, 7), nearest first."""
+    """The configurations at each pose with its values of joint 7, shape (k, 7), nearest first."""
     counts = [len(values) for values in joint7]
     frames = np.repeat([matrix(target) for target in targets], counts, axis=0)
     branches = ik_branches(frames, np.concatenate(joint7), near[0])
@@ -156,8 +156,8 @@ def ik_solutions(target: Pose, joint7: Array, joint1: float = 0.0) -> Joints:
 
     Args:
         target: Pose of the grasp point in the base's frame.
-        joint7: rad, shape (m,).
-        joint1: rad; taken where the upper arm is upright and joint 1 is free.
+        joint7: Values of joint 7, rad, shape (m,).
+        joint1: Value of joint 1 where the upper arm is upright and joint 1 is free, rad.
 
     Returns:
         rad, shape (k, 7), within the limits.
@@ -172,8 +172,8 @@ def ik_branches(targets: Array, joint7: Array, joint1: float = 0.0) -> Joints:
     Args:
         targets: Poses of the grasp point in the base's frame, as homogeneous transforms, lengths
             in m, shape (m, 4, 4), or (1, 4, 4) for the same pose throughout.
-        joint7: rad, shape (m,).
-        joint1: rad; taken where the upper arm is upright and joint 1 is free.
+        joint7: Values of joint 7, rad, shape (m,).
+        joint1: Value of joint 1 where the upper arm is upright and joint 1 is free, rad.
 
     Returns:
         rad, shape (m, BRANCHES, 7), NaN where a branch does not reach; joint limits are not heeded.

@@ -41,8 +41,8 @@ def control_steps(start: Joints, goal: Joints) -> Array:
     """Control steps from one configuration straight to another, not rounded: the slowest joint's.
 
     Args:
-        start: Shape (..., 7).
-        goal: Shape (..., 7).
+        start: Configurations to start from, rad, shape (..., 7).
+        goal: Configurations to reach, rad, shape (..., 7).
     """
     return cast(Array, (np.abs(goal - start) / STEP).max(-1))
 
@@ -56,8 +56,8 @@ def interpolate(start: Joints, goal: Joints, resolution: float = RESOLUTION) -> 
     """Configurations on the straight line, the goal among them and the start not.
 
     Args:
-        start: Shape (7,).
-        goal: Shape (7,).
+        start: Configuration to start from, rad, shape (7,).
+        goal: Configuration to reach, rad, shape (7,).
         resolution: Largest distance between neighbours, control steps.
 
     Returns:

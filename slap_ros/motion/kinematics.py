@@ -38,7 +38,7 @@ def arm_frames(q: Joints) -> Array:
     """Where link 1 to link 7 are, in the base's frame.
 
     Args:
-        q: Shape (n, 7).
+        q: Joint positions, rad, shape (n, 7).
 
     Returns:
         Homogeneous transforms, shape (n, 7, 4, 4), lengths in m.

@@ -52,9 +52,9 @@ def linear_motion(
     so that the arm stays in its branch; where it is too long for that, it is halved.
 
     Args:
-        q: Where to start, rad, shape (7,).
+        q: Configuration to start from, rad, shape (7,).
         target: Pose of the grasp point in the base's frame.
-        free: Which configurations are free of collisions; all, if None.
+        free: Checker of which configurations are free of collisions; None: all are.
         increment: Distance between rows, m; less where joints move fast.
         resolution: Control steps between checked configurations.
 
@@ -109,11 +109,11 @@ def _rows(
     """The rows of a part of the way behind ``q``: one if that does, else those of both halves.
 
     Args:
-        q: Where the part begins, rad, shape (7,).
+        q: Configuration at which the part begins, rad, shape (7,).
         start: Pose where the whole way begins.
-        target: Pose where it ends.
+        target: Pose where the whole way ends.
         part: Fractions of the way, from and to.
-        halvings: How often the part may be halved.
+        halvings: Largest number of times that the part may be halved.
     """
     begin, end = part
     following = _follow(q, _on_the_way(start, target, end))

@@ -48,9 +48,9 @@ def plan_path(
     Paths over a via point and random paths are then shortened.
 
     Args:
-        start: rad, shape (7,).
-        goal: rad, shape (7,).
-        free: Which configurations are free of collisions.
+        start: Configuration to start from, rad, shape (7,).
+        goal: Configuration to reach, rad, shape (7,).
+        free: Checker of which configurations are free of collisions.
         seed: Fixes the result.
         attempts: Random paths to find if a via point will not do; fewer if one is nearly straight.
         max_samples: Samples of the joint space after which an attempt fails.
@@ -108,8 +108,8 @@ def _shortest(make_path: Callable[[], Path | None], attempts: int, enough: float
     """The shortest of some paths; no more are made after a failure, or once one is good enough.
 
     Args:
-        make_path: Another path, or None if there was none.
-        attempts: Paths at most.
+        make_path: Function that makes another path; None if it fails.
+        attempts: Largest number of paths.
         enough: Control steps of a path that is good enough.
     """
     best: Path | None = None

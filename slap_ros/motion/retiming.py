@@ -46,10 +46,11 @@ def retime(
     the corner, which costs up to one step.
 
     Args:
-        path: rad, shape (k, 7).
+        path: Configurations of the path, rad, shape (k, 7).
         max_step: Largest change of each joint in a control step, rad, shape (7,).
         steps_multiple: The number of control steps is rounded up to a multiple of this.
-        free: Which configurations are free; if given, cut corners are checked.
+        free: Checker of which configurations are free of collisions; if given, cut corners are
+            checked.
         resolution: Control steps between checked configurations.
 
     Returns:
@@ -76,10 +77,10 @@ def retime_fixed_steps(path: Path, steps: int = PAPER_STEPS, *, per_radian: bool
     The timing of the preset ``paper``: the joint limits a step are ignored.
 
     Args:
-        path: rad, shape (k, 7).
-        steps: Control steps a piece.
-        per_radian: As often for a piece as the joint that turns most begins a radian. Otherwise
-            once, however long it is.
+        path: Configurations of the path, rad, shape (k, 7).
+        steps: Control steps per straight piece.
+        per_radian: Whether a piece takes ``steps`` once per begun radian of the joint that turns
+            most, instead of once however long it is.
 
     Returns:
         rad, shape (n, 7), n a multiple of ``steps``; the start is left out.

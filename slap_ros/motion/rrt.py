@@ -91,8 +91,8 @@ def rrt_connect(
     Args:
         start: Free, rad, shape (7,).
         goal: Free, rad, shape (7,).
-        free: Which configurations are free of collisions.
-        rng: Where the samples come from.
+        free: Checker of which configurations are free of collisions.
+        rng: Source of random numbers for the samples.
         max_samples: Samples after which to give up.
         resolution: Control steps between checked configurations.
 
@@ -118,7 +118,7 @@ def rrt_connect(
 
 
 def _limited(tree: _Tree, sample: Joints) -> Joints:
-    """The sample, or where the way to it from the nearest node is as long as it may be."""
+    """The sample, or a configuration on the way to it that is as far as the tree may grow."""
     nearest = tree[tree.nearest(sample)]
     fraction = min(1.0, MAX_GROWTH / float(control_steps(nearest, sample)))
     return nearest + fraction * (sample - nearest)

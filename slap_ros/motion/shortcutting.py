@@ -21,10 +21,10 @@ def shorten(
     """The path with detours cut off where the straight way is free and takes fewer control steps.
 
     Args:
-        path: rad, shape (k, 7).
-        free: Which configurations are free of collisions.
-        rng: Where the points come from.
-        tries: Pairs of points to try.
+        path: Configurations of the path, rad, shape (k, 7).
+        free: Checker of which configurations are free of collisions.
+        rng: Source of random numbers for the points.
+        tries: Number of pairs of points to try.
         resolution: Control steps between checked configurations.
 
     Returns:
@@ -51,8 +51,8 @@ def straighten(path: Path, free: Free, *, resolution: float) -> Path:
     """The path without the rows that can be skipped, one after the other (pruning).
 
     Args:
-        path: rad, shape (k, 7).
-        free: Which configurations are free of collisions.
+        path: Configurations of the path, rad, shape (k, 7).
+        free: Checker of which configurations are free of collisions.
         resolution: Control steps between checked configurations.
 
     Returns:
@@ -79,9 +79,9 @@ def points_at(path: Path, times: Array, at: Array) -> Joints:
     """The configurations on a path at some times.
 
     Args:
-        path: rad, shape (k, 7).
-        times: When its rows are reached, shape (k,), ascending.
-        at: Shape (n,).
+        path: Configurations of the path, rad, shape (k, 7).
+        times: Times at which the path's rows are reached, shape (k,), ascending.
+        at: Times to interpolate at, shape (n,), in the unit of ``times``.
 
     Returns:
         rad, shape (n, 7).

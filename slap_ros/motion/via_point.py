@@ -40,8 +40,8 @@ def via_point_path(
     Args:
         start: Free, rad, shape (7,).
         goal: Free, rad, shape (7,).
-        free: Which configurations are free of collisions.
-        rng: Where the via points come from.
+        free: Checker of which configurations are free of collisions.
+        rng: Source of random numbers for the via points.
         resolution: Control steps between checked configurations.
 
     Returns:

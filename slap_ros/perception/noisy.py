@@ -46,11 +46,11 @@ class NoisyPerceiver:
         """The perceiver of an episode.
 
         Args:
-            domain: Whose ``settle`` corrects measured poses.
-            space: The ground atoms of the task.
-            initial: Where the episode begins, as its task says.
-            quality: How well is perceived.
-            rng: Where noise comes from; used by this perceiver alone.
+            domain: Domain with the ``settle`` that corrects measured poses.
+            space: Ground atoms of the task.
+            initial: Initial state of the task.
+            quality: Quality of the perception.
+            rng: Source of random numbers for the noise; only this perceiver uses it.
 
         Returns:
             One that has perceived nothing yet.

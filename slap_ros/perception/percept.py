@@ -27,8 +27,8 @@ def known_part(state: State, missing: Collection[str]) -> State:
     If all objects of a type are, the state stays whole: predicates need one of each.
 
     Args:
-        state: Of every object of the task.
-        missing: Names of objects.
+        state: State with every object of the task.
+        missing: Names of the missing objects.
     """
     known = tuple(obj for obj in state.objects if obj.name not in missing)
     if {obj.type for obj in known} != {obj.type for obj in state.objects}:

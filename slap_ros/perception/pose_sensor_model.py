@@ -26,9 +26,9 @@ class PoseSensorModel:
     """Measures the poses of what can be moved; robot and fixed bodies are known exactly.
 
     Args:
-        quality: How well it measures.
-        rng: Noise comes from it.
-        latest: The latest pose of each object; before the first sighting, the task's.
+        quality: Quality of the measurements.
+        rng: Source of random numbers for the noise.
+        latest: Latest pose of each object; before the first sighting, the pose in the task.
     """
 
     quality: Quality
@@ -41,9 +41,9 @@ class PoseSensorModel:
         """The sensor of an episode.
 
         Args:
-            quality: How well it measures.
-            rng: Noise comes from it.
-            initial: The task's initial state, which says where things are before they are seen.
+            quality: Quality of the measurements.
+            rng: Source of random numbers for the noise.
+            initial: Initial state of the task, with the poses of things before they are seen.
 
         Returns:
             A sensor that has measured nothing yet.

@@ -28,7 +28,7 @@ class RecordedIteration:
     """Plans that were carried out with the skills at hand.
 
     Args:
-        number: From 0.
+        number: Number of the iteration, from 0.
         progress: Mean share of a plan that was done, 0 to 1.
         rollouts: Plans that were carried out.
         failures: Operators that failed, each with how often and the commonest reason.
@@ -45,7 +45,7 @@ class SkillCurve:
     """The success of a skill over the steps that it learned for.
 
     Args:
-        skill: The operator's name.
+        skill: Name of the operator.
         steps: Environment steps, from 0.
         success: Share of fresh starts, 0 to 1, after so many steps.
     """
@@ -72,12 +72,12 @@ class RecordedAcquisition:
     """Skills that were acquired, as far as the bag tells.
 
     Args:
-        outcome: How it ended, in a word or two.
-        reason: Why it failed; empty if it did not.
-        digest: Of the library; empty if there is none.
-        operators: With their rewards, as people read them.
-        iterations: In order.
-        curves: One per skill that was trained.
+        outcome: Outcome of the acquisition in a word or two.
+        reason: Reason of a failure; empty if it did not fail.
+        digest: Digest of the library; empty if there is none.
+        operators: Operators with their rewards, as people read them.
+        iterations: Iterations in order.
+        curves: Learning curves, one per skill that was trained.
     """
 
     outcome: str

@@ -164,7 +164,7 @@ def _order(
     samples: Sequence[VisibleBody],
     has_arm: bool,
 ) -> tuple[int, ...]:
-    """From back to front; else what stands still first, the largest of it before all."""
+    """The bodies from back to front; else those that stand still first, the largest before all."""
 
     def rank(number: int) -> tuple[bool, float]:
         if number == len(samples):

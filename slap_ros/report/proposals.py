@@ -26,11 +26,11 @@ class RecordedExchange:
     """An answer of a model, or a verdict of the planner.
 
     Args:
-        subject: What was asked for.
-        answer: The text; empty of a verdict.
-        complaints: What is wrong with it, warnings among them.
-        tokens: Of question and answer.
-        seconds: Waited for it, s.
+        subject: Subject of the question.
+        answer: Text of the answer; empty for a verdict.
+        complaints: Errors and warnings about the answer.
+        tokens: Number of tokens of question and answer together.
+        seconds: Time waited for the answer, s.
     """
 
     subject: str
@@ -45,10 +45,10 @@ class RecordedProposal:
     """One proposal, as far as the bag tells.
 
     Args:
-        outcome: How it ended, in a word.
-        reason: Why it failed; empty if it did not.
+        outcome: Outcome of the proposal in a word.
+        reason: Reason of a failure; empty if it did not fail.
         plan: Ground operators of the plan that was found.
-        exchanges: In order.
+        exchanges: Exchanges in order.
     """
 
     outcome: str

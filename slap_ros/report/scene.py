@@ -57,10 +57,10 @@ def scene(
     Bodies are those of the recorded markers; without markers, those that the domain displays.
 
     Args:
-        trace: The run.
-        episode: Its states.
+        trace: Run to show.
+        episode: Recorded episode with the run's states.
         recording: Markers, and the layout of the robot's features.
-        domain: None where it is not known here.
+        domain: Domain of the bag; None where it is not known here.
 
     Raises:
         InvalidStateError: It has a state that its domain cannot have.
@@ -93,7 +93,7 @@ class _BodyFinder:
         self._domain = domain
 
     def of(self, state: StateMessage) -> tuple[VisibleBody, ...]:
-        """Those of its markers, or of the next state's that has some."""
+        """The bodies of the state's markers, or of the next state's that has some."""
         shown: Iterable[VisibleBody] = ()
         if self._steps:
             since = bisect_left(self._steps, state.step)
@@ -148,7 +148,7 @@ def _arm(
 def _robot_features(
     state: StateMessage, recording: Recording, robots: Collection[str]
 ) -> dict[str, float]:
-    """Those of the first robot, by name."""
+    """The features of the first robot, by name."""
     info = recording.domain_info
     layouts = {t.name: t.feature_names for t in info.types} if info is not None else {}
     for obj in state.objects:

@@ -24,7 +24,7 @@ class OptionSpan:
 
     @property
     def end(self) -> int:
-        """The step at which it ended."""
+        """The step at which the option ended."""
         return self.start + self.option.steps
 
     @property
@@ -34,7 +34,7 @@ class OptionSpan:
 
     @property
     def is_shortcut(self) -> bool:
-        """Whether it was learned."""
+        """Whether the option was learned."""
         return self.option.kind == SHORTCUT
 
 

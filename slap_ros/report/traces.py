@@ -56,10 +56,10 @@ def robot_series(
     """Every feature of the robot that moves, in the order of its type.
 
     Args:
-        trace: The run.
-        episode: Its states.
+        trace: Run to show.
+        episode: Recorded episode with the run's states.
         recording: Names and units of the robot's features.
-        domain: Which types are robots; None where it is not known here.
+        domain: Domain, which says which types are robots; None where it is not known here.
     """
     info = recording.domain_info
     steps = sorted(s for s in episode.states if trace.first_step <= s <= trace.last_step)

@@ -27,7 +27,7 @@ class Extreme:
 
     @property
     def share(self) -> float:
-        """How much of what is allowed it takes: more than 1 is too much."""
+        """The share of the allowed range that the motion takes: more than 1 is too much."""
         middle, half = (self.low + self.high) / 2.0, (self.high - self.low) / 2.0
         return abs(self.value - middle) / half
 

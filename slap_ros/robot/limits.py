@@ -68,12 +68,12 @@ class Limits:
     """Limits of an arm; joint by joint.
 
     Args:
-        low: rad.
-        high: rad.
-        velocity: rad/s.
-        acceleration: rad/s^2.
-        step: rad, either way in one command.
-        workspace: Where the fingertips may be.
+        low: Lower limits of the joint positions, rad.
+        high: Upper limits of the joint positions, rad.
+        velocity: Largest joint velocities, rad/s.
+        acceleration: Largest joint accelerations, rad/s^2.
+        step: Largest change of each joint in one command, either way, rad.
+        workspace: Space in which the fingertips may be.
     """
 
     low: Joints
@@ -89,9 +89,9 @@ class Limits:
         """The motion to a target.
 
         Args:
-            start: Where the arm is, rad, shape (7,).
-            target: Where it is to go, rad, shape (7,).
-            least_s: How long it takes at least.
+            start: Present joint positions, rad, shape (7,).
+            target: Joint positions to go to, rad, shape (7,).
+            least_s: Least duration of the motion, s.
 
         Returns:
             The motion, as long as velocity and acceleration limits ask for.
@@ -135,7 +135,7 @@ class Limits:
         return max(*by_velocity, *by_acceleration)
 
     def scaled(self, fraction: float, workspace: Workspace) -> Limits:
-        """The same at a fraction of the speed, in another workspace.
+        """The limits at a fraction of the speed, in another workspace.
 
         Raises:
             InvalidParameterError: The fraction is not within (0, 1].

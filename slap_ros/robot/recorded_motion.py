@@ -119,7 +119,7 @@ def _waypoints(states: Sequence[State]) -> Iterator[RecordedWaypoint]:
 
 
 def _pressing(states: Sequence[State]) -> Iterator[RecordedWaypoint]:
-    """The same of a hand that acts by forces: fingers close for some steps before they hold."""
+    """Waypoints of a hand that acts by forces: fingers close for some steps before they hold."""
     told = [float(state.get(_robot(state), GRIPPER.name)) for state in states]
     for step, state in enumerate(states[1:], start=1):
         gripper, gap = GripperAction.KEEP, 0.0
@@ -132,7 +132,7 @@ def _pressing(states: Sequence[State]) -> Iterator[RecordedWaypoint]:
 
 
 def _gap(state: State) -> float:
-    """Between the fingers, m."""
+    """Distance between the fingers, m."""
     return sum(float(state.get(_robot(state), f"{side}_finger")) for side in ("left", "right"))
 
 

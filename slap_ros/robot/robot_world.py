@@ -66,10 +66,10 @@ class RobotWorld:
     """A robot and the objects around it, as far as they are measured.
 
     Args:
-        domain: One with a Panda.
-        scene_config: Which objects there are.
-        limits: What the arm may do.
-        tracking: How well detections can be trusted.
+        domain: Domain with a Panda.
+        scene_config: Objects of the scene, and how they are detected.
+        limits: Limits of the arm.
+        tracking: Settings of how far detections can be trusted.
 
     Raises:
         InvalidParameterError: The domain has another robot, or lets its joints jump.
@@ -107,8 +107,8 @@ class RobotWorld:
 
         Args:
             frame: Name of the child frame.
-            stamp_s: When it was measured, s.
-            base: Pose of the parent frame in the base's.
+            stamp_s: Time of the measurement, s.
+            base: Pose of the parent frame in the base's frame.
             seen: Pose of the child frame in its parent.
 
         Raises:
@@ -158,7 +158,7 @@ class RobotWorld:
         """The state since the arm came to rest, once measured.
 
         Args:
-            since_s: When the arm came to rest, s: older measurements do not count.
+            since_s: Time at which the arm came to rest, s. Older measurements do not count.
             moving: Whether to take a state in which objects still move, with velocities from
                 finite differences.
 
@@ -242,7 +242,7 @@ class RobotWorld:
         """Take what the gripper closed around as held, if the fingers stand far enough apart.
 
         Args:
-            gap: Between the fingers, m.
+            gap: Distance between the fingers, m.
 
         Returns:
             Whether something is in the hand.

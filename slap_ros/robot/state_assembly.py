@@ -45,8 +45,8 @@ class StateAssembler:
 
         Args:
             reading: Joints of the arm, at rest.
-            known: Where detected objects are, in the base's frame; without what is held.
-            grasp: What is held.
+            known: Poses of detected objects, in the base's frame, without what is held.
+            grasp: Held object and its pose in the hand; None if the hand is empty.
 
         Returns:
             The state: resting objects stand upon one another, what is held is where the hand is,
@@ -102,9 +102,9 @@ def feature_values(state: State, obj: Object, features: Sequence[Feature]) -> li
     """Some features of an object.
 
     Args:
-        state: Has the object.
-        obj: The object.
-        features: Which.
+        state: State with the object.
+        obj: Object of the state.
+        features: Features to read.
 
     Returns:
         Their values, in the order asked for.

@@ -24,12 +24,12 @@ class TaskOutcome(Protocol):
 
     @property
     def success(self) -> bool:
-        """Whether it was solved."""
+        """Whether the task was solved."""
         ...
 
     @property
     def reason(self) -> str:
-        """Why it was not solved; empty where it was."""
+        """Why the task was not solved; empty where it was."""
         ...
 
 
@@ -45,7 +45,7 @@ class PlanningSetup:
     approach: Approach
 
     def make_domain(self) -> Domain:
-        """Open the domain that is meant.
+        """Open the chosen domain.
 
         Raises:
             UnknownDomainError: It is not registered.
@@ -79,12 +79,12 @@ class Comparison:
     """What is compared, and on which tasks.
 
     Args:
-        domain: Whose tasks.
+        domain: Domain of the tasks.
         approaches: Ways to plan, pure planning first.
         tasks: Number of tasks per seed.
         seeds: Number of seeds.
-        first_seed: The first of them.
-        runner: Does what takes long.
+        first_seed: First of the seeds.
+        runner: Runner of the jobs.
         planner: Name of the planner: lazy, exhaustive, ff or astar.
     """
 
@@ -97,7 +97,7 @@ class Comparison:
     planner: str = "lazy"
 
     def under(self, preset: str) -> Comparison:
-        """The same under another preset.
+        """The same comparison under another preset.
 
         Raises:
             InvalidParameterError: The domain has no such preset or setting.
@@ -131,10 +131,11 @@ class Comparison:
         """Do something with tasks, by every approach, each in processes of its own.
 
         Args:
-            what: Is done; nothing else that the study does is called so.
-            function: Does a job; called with a :class:`PlanningSetup`, then the job's arguments.
-            decode: Makes a result of its JSON.
-            jobs: Arguments of each job, by what it is called.
+            what: Name of what is done; nothing else in the study has the same name.
+            function: Function that does a job: it gets a :class:`PlanningSetup`, then the job's
+                arguments.
+            decode: Function that makes a result of its JSON.
+            jobs: Arguments of each job, by the job's name.
 
         Returns:
             Results in the order of ``jobs``, by the approach's name.
@@ -170,9 +171,9 @@ def solve_task(setup: PlanningSetup, seed: int, index: int) -> Trial:
     """Plan for a task and execute the plan.
 
     Args:
-        setup: Makes domain and planner, in the process where this runs.
-        seed: Of the task.
-        index: Number of the task among its seed's.
+        setup: Choice of domain, planner and approach; they are made in the process that runs this.
+        seed: Seed of the task.
+        index: Index of the task among those of its seed.
 
     Returns:
         What came of it.

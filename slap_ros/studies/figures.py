@@ -100,9 +100,9 @@ def plot_spreads(
     """Draw means joined by a line, each with a bar of one standard deviation.
 
     Args:
-        axes: To draw into.
-        places: Horizontal coordinates.
-        spreads: One per place; None where there is nothing to draw.
+        axes: Axes to draw into.
+        places: Horizontal coordinates of the spreads.
+        spreads: Spread at each place; None where there is nothing to draw.
         approach: Name of the approach, which gives colour and marker.
     """
     known = [(x, spread) for x, spread in zip(places, spreads, strict=True) if spread is not None]
@@ -122,9 +122,9 @@ def plot_values(
     """Draw values joined by a line.
 
     Args:
-        axes: To draw into.
-        places: Horizontal coordinates.
-        values: One per place.
+        axes: Axes to draw into.
+        places: Horizontal coordinates of the values.
+        values: Value at each place.
         approach: Name of the approach, which gives colour and marker.
     """
     axes.plot(places, values, **_pen(approach))
@@ -155,9 +155,9 @@ def dodged(places: Sequence[float], number: int, count: int, apart: float = 0.1)
 
     Args:
         places: Horizontal coordinates that the series share.
-        number: Which of the series, from 0.
-        count: How many series there are.
-        apart: Between neighbouring series, in the unit of ``places``.
+        number: Number of the series, from 0.
+        count: Number of series.
+        apart: Distance between neighbouring series, in the unit of ``places``.
 
     Returns:
         The places of that series.

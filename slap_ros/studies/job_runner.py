@@ -26,9 +26,9 @@ class JobRunner:
     """Does the jobs of a study; what a log has already is not done again.
 
     Args:
-        log: Keeps results.
-        processes: Jobs at a time.
-        progress: Is called as jobs end.
+        log: Log that keeps the results.
+        processes: Largest number of jobs at a time.
+        progress: Progress display, called as jobs begin and end.
     """
 
     log: StudyLog
@@ -49,12 +49,13 @@ class JobRunner:
         in its caches would make another faster than it is.
 
         Args:
-            what: They are, for the progress bar.
-            function: Does a job and returns what JSON can hold, or a dataclass of that; importable
-                by its name, for other processes.
-            decode: Makes a result of its JSON.
+            what: Name of the jobs for the progress bar.
+            function: Function that does a job and returns what JSON can hold, or a dataclass of
+                that; importable by its name, for other processes.
+            decode: Function that makes a result of its JSON.
             batches: Arguments of jobs, by the job's name, which no other job of the study has.
-            failure: What there is to say of a job that failed; None of one that did not.
+            failure: Function that gives the complaint about a job that failed; None for one that
+                did not.
 
         Returns:
             The results by the job's name, in the order of ``batches``.
@@ -87,7 +88,7 @@ class JobRunner:
         return {name: found[name] for name in jobs}
 
     def _decoded(self, name: str, decode: Callable[[Any], Result]) -> Result:
-        """Always from JSON, so that results are alike whether or not the study was interrupted."""
+        """The result, always from JSON, so that results are alike if the study was interrupted."""
         try:
             return decode(self.log.results[name])
         except DECODING_ERRORS as error:
@@ -102,13 +103,13 @@ class JobRunner:
 
 
 def _timed(function: Callable[..., Any], job: Job) -> tuple[Any, float]:
-    """The result of a job, and the seconds of the processor that it took."""
+    """The result of a job, and the CPU time that it took, s."""
     before = _cpu_seconds()
     result = function(*job)
     return result, _cpu_seconds() - before
 
 
 def _cpu_seconds() -> float:
-    """Of this process, and of those that it started and that have ended."""
+    """CPU time of this process, and of those that it started and that have ended, s."""
     usages = getrusage(RUSAGE_SELF), getrusage(RUSAGE_CHILDREN)
     return sum(usage.ru_utime + usage.ru_stime for usage in usages)

@@ -37,8 +37,8 @@ class PublishedFigure:
     """Data of a study as it is published.
 
     Args:
-        name: Of its files.
-        data: Its JSON.
+        name: Name of its files, without their endings.
+        data: Content of its JSON file.
     """
 
     name: str
@@ -46,12 +46,12 @@ class PublishedFigure:
 
     @property
     def link(self) -> str:
-        """To its page, from a page of the documentation."""
+        """Link to the figure's page, from a page of the documentation."""
         return f"[{self.data['domain']}](results/{self.name}.md)"
 
     @property
     def command(self) -> str:
-        """That makes it again."""
+        """Command that makes the figure again."""
         return f"`{self.data['command']}`"
 
     @property
@@ -62,7 +62,7 @@ class PublishedFigure:
 
     @property
     def trials(self) -> str:
-        """Seeds × tasks, and of what else there are several."""
+        """Number of seeds × tasks, and of what else there are several."""
         data = self.data
         if "trainings" in data:
             number = data["trainings"]
@@ -83,7 +83,7 @@ class PublishedFigure:
 
     @property
     def core_seconds(self) -> tuple[float | None, str]:
-        """Of one core, and what of it was measured; None where nothing was."""
+        """Time of one core, s, and what of it was measured; None where nothing was."""
         if "cpu_seconds" in self.data:
             return float(self.data["cpu_seconds"]), ""
         if self.name in MINUTES:
@@ -93,13 +93,13 @@ class PublishedFigure:
 
     @property
     def core_hours(self) -> str:
-        """The same as a table has it."""
+        """Time of one core, as a table has it."""
         seconds, what = self.core_seconds
         return NOT_MEASURED if seconds is None else f"{seconds / 3600:.2f}{what}"
 
 
 def _seconds(found: Any) -> Iterator[float]:
-    """Of planning in every trial, of learning in every training, of every plan of a model."""
+    """Seconds of planning in all trials, of learning in all trainings, of all plans of a model."""
     if isinstance(found, Mapping):
         for key, value in found.items():
             if key in ("planning_seconds", "cpu_seconds") and isinstance(value, float):

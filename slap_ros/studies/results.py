@@ -31,7 +31,7 @@ class MarkdownTable:
     rows: Sequence[Sequence[str]]
 
     def as_markdown(self) -> str:
-        """As Markdown, without a line break at the end."""
+        """The table as Markdown, without a line break at the end."""
         rule = ["---"] * len(self.columns)
         return "\n".join(_row(cells) for cells in (self.columns, rule, *self.rows))
 
@@ -41,15 +41,16 @@ class StudyReport:
     """What a study came to.
 
     Args:
-        study: Its name, as in ``slap study``.
-        source: The figure or table of the paper that it makes again; empty where it is no paper's.
-        title: Of the page.
-        measured: What the numbers are, and whatever must be known to read them; Markdown.
-        table: The numbers.
-        found: The numbers in full, as JSON has them.
-        draw: Draws the picture.
-        size: Of the picture.
-        circumstances: What no command decides, as the day on which a model answered; by name.
+        study: Name of the study, as in ``slap study``.
+        source: Figure or table of the paper that the study reproduces; empty where there is none.
+        title: Title of the page.
+        measured: Text on what the numbers are, and on all that readers must know; Markdown.
+        table: Table of the numbers.
+        found: All numbers in full, as JSON data.
+        draw: Function that draws the picture.
+        size: Size of the picture.
+        circumstances: Facts that no command decides, such as the day on which a model answered; by
+            name.
     """
 
     study: str
@@ -65,12 +66,12 @@ class StudyReport:
 
 @dataclass(frozen=True)
 class Provenance:
-    """From what a report was made.
+    """The inputs that a report was made from.
 
     Args:
         domain: Name of the domain.
-        command: That makes it again.
-        settings: What else it depends on, as JSON has it.
+        command: Command that makes the report again.
+        settings: Everything else that the report depends on, as JSON data.
     """
 
     domain: str
@@ -91,9 +92,9 @@ def require_replaceable(folder: Path, study: str, origin: Provenance) -> None:
     """Check that a report may be written: there is none yet, or that of the same command.
 
     Args:
-        folder: Where to.
-        study: As in ``slap study``.
-        origin: From what the report will be made.
+        folder: Folder for the report.
+        study: Name of the study, as in ``slap study``.
+        origin: Inputs that the report will be made from.
 
     Raises:
         InvalidParameterError: There is data of another command, or something else.
@@ -118,10 +119,10 @@ def write(folder: Path, report: StudyReport, origin: Provenance, cpu_seconds: fl
     """Write a report's files, in place of those of an earlier one.
 
     Args:
-        folder: Where to; it is made if need be.
-        report: What to write.
-        origin: From what it was made.
-        cpu_seconds: Of the processor, that making it took.
+        folder: Folder for the files; it is made if need be.
+        report: Report to write.
+        origin: Inputs that the report was made from.
+        cpu_seconds: CPU time that the study took, s.
 
     Returns:
         The files: JSON, SVG and Markdown.

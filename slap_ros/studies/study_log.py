@@ -25,8 +25,8 @@ class StudyLog:
         """Open the log of a study.
 
         Args:
-            path: Of the file.
-            origin: From what the study is made; a log of another one is refused.
+            path: Path of the file.
+            origin: Inputs of the study; a log with other inputs is refused.
 
         Raises:
             BusyError: Another process has it open.
@@ -52,9 +52,9 @@ class StudyLog:
         """Write what a job came to.
 
         Args:
-            job: Its name.
-            result: What JSON can hold.
-            cpu_seconds: Of the processor, that it took.
+            job: Name of the job.
+            result: Result, in a form that JSON can hold.
+            cpu_seconds: CPU time that the job took, s.
 
         Raises:
             BusyError: Another process began the same study and had a result before.
@@ -88,7 +88,7 @@ class StudyLog:
         return file
 
     def _read(self, file: TextIO) -> None:
-        """Read the results, and cut off what is no whole line."""
+        """Read the results, and cut off a last line that is not whole."""
         try:
             content = read_bytes(self.path)
             whole = content[: content.rfind(b"\n") + 1]

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a study calls while it is under way."""
+"""The calls of a study that show its progress."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import Protocol
 
 
 class StudyProgress(Protocol):
-    """Is called as the jobs of a study begin and end, to show its progress."""
+    """A display of progress, called as the jobs of a study begin and end."""
 
     def begin(self, what: str, total: int) -> None:
         """So many jobs of a kind follow."""
         ...
 
     def advance(self) -> None:
-        """One of them has ended."""
+        """One of the jobs has ended."""
         ...
 
     def report_failure(self, complaint: str) -> None:

@@ -21,9 +21,9 @@ def write_pictures(path: Path, pictures: Iterable[Picture], period_s: float) -> 
     """Write an animation; the file appears when it is complete, and not at all otherwise.
 
     Args:
-        path: The file, with an ending of :data:`WRITERS`.
-        pictures: All of one size, which is even for an MP4; at least one.
-        period_s: How long each is shown.
+        path: Path of the file, with an ending of :data:`WRITERS`.
+        pictures: Pictures of one size, which is even for an MP4; at least one.
+        period_s: Duration of each picture, s.
 
     Raises:
         OSError: It cannot be written.

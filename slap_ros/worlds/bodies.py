@@ -27,13 +27,15 @@ class RigidBody:
     """What bodies of all shapes have in common.
 
     Args:
-        name: That of the object in the state which it embodies.
-        mass_kg: 0 for a body that is fixed. A free body may have another one in the state.
-        friction: See :class:`Material`; a free body may have another one in the state.
-        colour: For pictures.
-        pose: Where a fixed body stands, unless the state has pose features for it. A free body
-            is always where the state says.
-        solid: False for what only marks a place: nothing touches it.
+        name: Name of the body, which is that of its object in the state.
+        mass_kg: Mass, kg; 0 for a body that is fixed. A free body may have another mass in the
+            state.
+        friction: Coefficient of friction, see :class:`Material`; a free body may have another one
+            in the state.
+        colour: Colour in pictures.
+        pose: Pose of a fixed body, unless the state has pose features for it. The pose of a free
+            body is always in the state.
+        solid: Whether others collide with the body; False for one that only marks a place.
     """
 
     name: str
@@ -45,9 +47,9 @@ class RigidBody:
 
     @property
     def material(self) -> Material:
-        """What it is made of, unless the state says otherwise."""
+        """The body's material, unless the state has another."""
         return Material(self.mass_kg, self.friction)
 
     def with_material(self, material: Material) -> Self:
-        """The same body of another material."""
+        """The same body with another material."""
         return replace(self, mass_kg=material.mass_kg, friction=material.friction)

@@ -39,11 +39,11 @@ def body_features(
     """A free body's features, for ``State.build``, all in the base's frame.
 
     Args:
-        position: m.
-        quaternion: x y z w, of length 1.
-        velocity: m/s.
-        angular_velocity: rad/s.
-        held: Whether it is in the hand.
+        position: Position, m.
+        quaternion: Orientation as a unit quaternion, x y z w.
+        velocity: Velocity, m/s.
+        angular_velocity: Angular velocity, rad/s.
+        held: Whether the body is in the hand.
 
     Returns:
         A value for each of :data:`BODY_FEATURES`, by name.

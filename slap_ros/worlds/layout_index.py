@@ -37,7 +37,7 @@ class BodyState(NamedTuple):
 
     @property
     def still(self) -> bool:
-        """Whether it has no velocity at all."""
+        """Whether the body has no velocity at all."""
         return self.velocity == ORIGIN and self.angular_velocity == ORIGIN
 
 
@@ -120,11 +120,11 @@ def optional_columns(
 def poses(
     bodies: Iterable[Standing], columns: Iterable[Columns | None], state: State
 ) -> tuple[Pose, ...]:
-    """Where bodies stand that do not move: in the state if it says so, else where they are built.
+    """The poses of bodies that do not move: from the state if it has them, else from the scene.
 
     Args:
         bodies: Bodies in the scene's order.
-        columns: Of each body the columns of its pose, if the state has one.
+        columns: Columns of each body's pose in the state, None for a body without them.
         state: State to read.
 
     Returns:

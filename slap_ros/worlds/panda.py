@@ -110,7 +110,8 @@ def link_poses(
     Args:
         q: Joint positions, rad, shape (7,).
         finger: Distance of each finger from the middle, m; or only of the left one.
-        right_finger: Of the right one, if it is another.
+        right_finger: Distance of the right finger from the middle, m, if it differs from the left
+            one's.
 
     Returns:
         A pose for each of :data:`LINKS`, in the frame of the base.
@@ -142,8 +143,8 @@ def vertical_jacobian(
 
     Args:
         q: Joint positions, rad, shape (7,).
-        link: Which of :data:`LINKS` the point moves with.
-        point: In the base's frame, m.
+        link: Index of the link, in :data:`LINKS`, that the point moves with.
+        point: Point in the base's frame, m.
 
     Returns:
         m/rad, one for each joint; 0 for joints beyond the link.

@@ -37,8 +37,8 @@ class Camera:
         """Look at an arm and what is around it.
 
         Args:
-            visuals: What is around it.
-            view: From where; by default from the front right, from above the arm.
+            visuals: Shapes around the arm, and where they are.
+            view: Viewpoint; by default from the front right, from above the arm.
         """
         view = view or Viewpoint()
         self._visuals = visuals
@@ -106,7 +106,7 @@ class Camera:
         return self._mesh(corners, np.repeat(normals[:, None], 3, axis=1), colour)
 
     def _cylinder(self, cylinder: Cylinder, colour: Colour) -> int:
-        """Smooth all around and flat at its ends, which PyBullet's own cylinders are not."""
+        """A cylinder, smooth all around and flat at its ends, which PyBullet's own ones are not."""
         corners, normals = _faces(prism(*cylinder, SIDES))
         around = np.abs(normals[:, None, 2:]) < 0.5
         outwards = corners * (1.0, 1.0, 0.0) / cylinder.radius_m
@@ -147,9 +147,9 @@ def write_animation(
 
     Args:
         path: The file; its ending says the format, see ``slap_ros.worlds.animation``.
-        camera: Draws the frames.
-        states: One per control step; not empty.
-        period_s: What a control step takes.
+        camera: Camera that draws the frames.
+        states: States, one per control step; not empty.
+        period_s: Duration of a control step, s.
         progress: Told the number of frames drawn so far, after each.
     """
 

@@ -14,7 +14,7 @@ AXES: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 def levelled(pose: Pose) -> Pose | None:
-    """With the axis that points up or down best exactly so; None where none does."""
+    """The pose with its most vertical axis exactly vertical; None where no axis is nearly so."""
     ups = [rotate(pose.quaternion, axis) for axis in AXES]
     x, y, z = max(ups, key=lambda up: abs(up[2]))
     angle = math.atan2(math.hypot(x, y), abs(z))

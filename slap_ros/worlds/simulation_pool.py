@@ -47,7 +47,7 @@ class SimulationPool(Generic[Key, Pooled]):
         return self._make(key)
 
     def release(self, key: Key, simulation: Pooled) -> None:
-        """Keep it for the next world; close the one that waited longest if there are many."""
+        """Keep a simulation for the next world; of many, close the one that waited longest."""
         with self._lock:
             self._idle.append((key, simulation))
             if len(self._idle) > MAX_IDLE:

@@ -11,7 +11,7 @@ from slap_ros.geometry.pose import Vector
 
 @dataclass(frozen=True)
 class Viewpoint:
-    """By default from the front right, from above the arm."""
+    """Where a camera is, and how it looks; by default from the front right, above the arm."""
 
     eye: Vector = (1.45, -1.1, 0.85)  # m
     target: Vector = (0.3, 0.0, 0.22)  # m

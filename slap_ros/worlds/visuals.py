@@ -44,5 +44,5 @@ class Visuals(Protocol):
         ...
 
     def configuration(self, state: State) -> Configuration:
-        """Where they are in a state."""
+        """The poses of the shapes in a state."""
         ...

@@ -43,15 +43,15 @@ TITLES = ("planning with given skills", "and with a learned shortcut")
 
 @dataclass(frozen=True)
 class Subject:
-    """What is shown.
+    """A task and how it is shown.
 
     Args:
-        domain: By name.
-        preset: Of the domain.
-        seed: Of the task.
-        visuals_of: What there is to be seen, by a first state.
-        viewpoint: Where it is seen from; its size does not matter.
-        prepared: A state as it is drawn.
+        domain: Name of the domain.
+        preset: Name of the domain's preset.
+        seed: Seed of the task.
+        visuals_of: Function from a first state to what there is to see.
+        viewpoint: Viewpoint of the camera; its size does not matter.
+        prepared: Function from a state to the state that is drawn.
     """
 
     domain: str
@@ -150,9 +150,9 @@ def record(subject: Subject, title: str, approach: Approach) -> Recording:
     """Plan and execute.
 
     Args:
-        subject: The task.
-        title: What is written above the arm.
-        approach: How to plan.
+        subject: Subject that has the task.
+        title: Title above the arm.
+        approach: Way to plan.
 
     Raises:
         RuntimeError: The plan was not executed as planned, so that nobody knows which option
@@ -237,8 +237,8 @@ def write_gif(path: Path, frames: Sequence[Image.Image], period_s: float) -> Non
 
     Args:
         path: The file.
-        frames: All of one size.
-        period_s: How long each is shown.
+        frames: Frames, all of one size.
+        period_s: Duration of each frame, s.
     """
     palette = common_palette(frames)
     first, *others = (frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)

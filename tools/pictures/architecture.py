@@ -80,8 +80,8 @@ def compose(floors: Floors, imports: Imports) -> SvgPicture:
     """The picture as shapes.
 
     Args:
-        floors: Packages, from the top.
-        imports: What to draw an arrow to from each package.
+        floors: Names of the packages on each floor, from the top.
+        imports: Packages that each package imports; each gets an arrow.
     """
     rows = rows_of(floors, imports)
     names = list(rows)

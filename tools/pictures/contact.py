@@ -36,15 +36,15 @@ from tools.pictures.animations import (
 
 @dataclass(frozen=True)
 class Subject:
-    """What is shown.
+    """A use of an operator and how it is shown.
 
     Args:
-        title: What is written above it.
-        domain: By name.
-        operator: Of the domain; its first use in the task is shown.
-        eye: Where it is seen from, m, from the last of the operator's objects.
-        target: What is in the middle of the picture, m, from there too.
-        seed: Of the task.
+        title: Title above the picture.
+        domain: Name of the domain.
+        operator: Name of an operator of the domain; its first use in the task is shown.
+        eye: Position of the camera, m, from the last of the operator's objects.
+        target: Position in the middle of the picture, m, from the same object.
+        seed: Seed of the task.
     """
 
     title: str

@@ -38,8 +38,8 @@ def make(path: Path, chromium: str) -> None:
     """Run the task twice, write the report, and take a picture of its upper part.
 
     Args:
-        path: Where to.
-        chromium: The program, or a headless shell of it.
+        path: Path of the picture.
+        chromium: Program of the browser, Chromium or its headless shell.
     """
     with TemporaryDirectory() as name:
         folder = Path(name)

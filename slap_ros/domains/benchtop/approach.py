@@ -78,7 +78,7 @@ def withdraw(state: State, up: Move) -> tuple[Move, ...]:
     opening them frees the hand from most of what it is caught in.
 
     Args:
-        state: Where it begins.
+        state: State in which the hand begins to go up.
         up: The move up to where nothing is in the way.
     """
     if held_thing(state) is not None:
@@ -96,7 +96,7 @@ def relax_and_withdraw(state: State, up: Move) -> tuple[Move, ...]:
     what stands between its fingers. So it is first pulled to where it is.
 
     Args:
-        state: Where it begins.
+        state: State in which the hand begins to go up.
         up: The move up to where nothing is in the way.
     """
     return Move(_as_it_is, until=_is_relaxed, patience=RELAX_STEPS), *withdraw(state, up)
@@ -112,11 +112,13 @@ def make_approach(
     """The approach of a domain.
 
     Args:
-        acts_at: Where a skill acts.
-        outwards: From there to where it begins.
-        height: Of the grasp point while it travels, m.
-        turned: By how much what is held is turned from how it is to be, least and most, rad.
-        leave: How a hand goes up that has nothing to bring.
+        acts_at: Function from state and objects to the hand's goal where a skill acts.
+        outwards: Function from state and objects to the unit vector from where the skill acts to
+            where it begins.
+        height: Function from a state to the height of the grasp point while it travels, m.
+        turned: Least and most angle by which a hand that holds something is turned, when the skill
+            begins, from its yaw where the skill acts, rad.
+        leave: Function that gives the moves of an empty hand up from where it is.
     """
 
     def approach(state: State, objects: tuple[Object, ...]) -> Policy:
@@ -141,11 +143,12 @@ def begin_at(
     """Where a skill begins: before where it acts, somewhat aside, and turned if need be.
 
     Args:
-        state: In which the approach begins; how far aside, and to which side, is a function of it.
-        objects: The operator's.
-        goal: Where the skill acts.
-        outwards: Of length 1, from there to where it begins.
-        turned: By how much, least and most, to either side, rad.
+        state: State in which the approach begins. It decides how far aside the skill begins, and to
+            which side.
+        objects: Objects of the operator, in its order.
+        goal: Goal of the hand where the skill acts.
+        outwards: Unit vector from where the skill acts to where it begins.
+        turned: Least and most angle by which the hand is turned, to either side, rad.
 
     Returns:
         A goal for the hand.

@@ -46,9 +46,9 @@ class CabinetShape:
     """How large a cabinet is.
 
     Args:
-        half_width: Of the drawer, inside.
-        headroom: From the drawer's floor to the roof.
-        compartment: From the front to the end of the part of the drawer that things stand in.
+        half_width: Half the width of the drawer inside, m.
+        headroom: Height from the drawer's floor to the roof, m.
+        compartment: Length of the part of the drawer that things stand in, from the front, m.
     """
 
     half_width: float
@@ -59,8 +59,8 @@ class CabinetShape:
         """A cabinet of that shape.
 
         Args:
-            name: Of its object.
-            colour: Of its drawer.
+            name: Name of the cabinet's object.
+            colour: Colour of the drawer.
         """
         joint = Joint(JointKind.SLIDE, (0.0, 1.0, 0.0), TRAVEL, damping=5.0, dry_friction=STAYS)
         return JointedBody(

@@ -49,9 +49,9 @@ def in_drawer(state: State, cabinet: Object, point: Vector) -> Vector:
     """Where a point of the drawer is, m.
 
     Args:
-        state: As things are.
-        cabinet: Whose drawer.
-        point: Where it is in the cabinet's frame while the drawer is closed, m.
+        state: Current state.
+        cabinet: Cabinet that has the drawer.
+        point: Position of the point in the cabinet's frame while the drawer is closed, m.
     """
     x, y, z = point
     return pose_of(state, cabinet).apply((x, y + value(state, cabinet, "opening"), z))
@@ -68,12 +68,12 @@ def middle_of(state: State, cabinet: Object) -> Vector:
 
 
 def in_drawers(state: State, cabinets: Column, point: Vector) -> Array:
-    """The same point of several drawers.
+    """Where the same point of several drawers is.
 
     Args:
         state: A state or a batch of states.
-        cabinets: Whose drawers.
-        point: Where it is in a cabinet's frame while the drawer is closed, m.
+        cabinets: Cabinets that have the drawers.
+        point: Position of the point in a cabinet's frame while the drawer is closed, m.
 
     Returns:
         m, shape (..., cabinets, 3).
@@ -88,7 +88,7 @@ def in_drawers(state: State, cabinets: Column, point: Vector) -> Array:
 
 
 def dis_to_handle(state: State, cabinet: Object) -> float:
-    """From the point between the fingertips to the middle of the handle."""
+    """The distance from the point between the fingertips to the middle of the handle."""
     return math.dist(hand_position(state), handle_of(state, cabinet))
 
 
@@ -97,12 +97,12 @@ def _dis_to_handle(state: State, cabinets: Column) -> Array:
 
 
 def drawer_dis(state: State, thing: Object, cabinet: Object) -> float:
-    """Seen from above, from the thing to the middle of the drawer, however far that is open.
+    """The distance from a thing to the middle of a drawer, however far open, seen from above.
 
     Args:
-        state: A single one.
-        thing: What is put into a drawer.
-        cabinet: The drawer's.
+        state: A single state.
+        thing: Thing that is put into the drawer.
+        cabinet: Cabinet that has the drawer.
 
     Returns:
         m, at least 0.

@@ -27,8 +27,9 @@ def place_features(pose: Pose, support_height: float = 0.0) -> Mapping[str, floa
     """A place's features, for ``State.build``.
 
     Args:
-        pose: In the base's frame.
-        support_height: From its origin up to where things stand on it, m; below 0 for a basket.
+        pose: Pose of the place in the base's frame.
+        support_height: Height of the surface that things stand on above the place's origin, m;
+            below 0 for a basket.
 
     Returns:
         A value for each feature of :data:`PLACE`, by name.
@@ -40,9 +41,10 @@ def thing_features(pose: Pose, rest_height: float, support_height: float) -> Map
     """The features of a thing at rest, for ``State.build``.
 
     Args:
-        pose: In the base's frame.
-        rest_height: From where it stands up to its origin, m.
-        support_height: From its origin up to where things stand on it, m.
+        pose: Pose of the thing in the base's frame.
+        rest_height: Height of the thing's origin above what it stands on, m.
+        support_height: Height of the surface that other things stand on above the thing's origin,
+            m.
 
     Returns:
         A value for each feature of :data:`THING`, by name.
@@ -57,9 +59,10 @@ def jointed_features(
     """The features of a drawer or a lid that does not move, for ``State.build``.
 
     Args:
-        pose: Of its frame, in the base's.
-        opening: m or rad.
-        support_height: As for :func:`place_features`.
+        pose: Pose of the drawer's or lid's frame, in the base's frame.
+        opening: How far the drawer (m) or the lid (rad) is open.
+        support_height: Height of the surface that things stand on above the frame's origin, m; see
+            :func:`place_features`.
 
     Returns:
         A value for each feature of :data:`DRAWER` or :data:`LID`, by name.

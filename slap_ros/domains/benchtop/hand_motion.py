@@ -31,21 +31,21 @@ class HandGoal:
     yaw: float = 0.0
 
     def raised(self, height: float) -> HandGoal:
-        """The same so much higher, m."""
+        """The same goal, so much higher, m."""
         x, y, z = self.position
         return replace(self, position=(x, y, z + height))
 
     def at_height(self, z: float) -> HandGoal:
-        """The same at a height, m."""
+        """The same goal at another height, m."""
         x, y, _ = self.position
         return replace(self, position=(x, y, z))
 
     def distance(self, state: State) -> float:
-        """From the hand, m."""
+        """The distance from the hand to the goal, m."""
         return math.dist(self.position, hand_position(state))
 
     def reached(self, state: State) -> bool:
-        """Whether the hand is there."""
+        """Whether the hand is at the goal."""
         turn = abs(self.yaw - hand_yaw(state))
         return self.distance(state) <= NEAR and turn <= TURNED
 
@@ -59,10 +59,10 @@ def action_towards(
     """The action that takes the hand's target straight towards a goal.
 
     Args:
-        state: As things are.
-        goal: Where to.
-        gripper: OPEN, KEEP or CLOSE.
-        fastest: Along each axis in one control step, m.
+        state: Current state.
+        goal: Goal of the hand.
+        gripper: Gripper command: OPEN, KEEP or CLOSE.
+        fastest: Largest shift along each axis in one control step, m.
 
     Returns:
         Within the limits of the action space.
@@ -78,7 +78,7 @@ def nearest_turn(yaw: float, symmetry: float = 2.0 * math.pi) -> float:
     """The yaw nearest to 0 at which something looks the same, rad.
 
     Args:
-        yaw: Any that it has.
-        symmetry: By what it can be turned and looks the same: pi/2 for a cube.
+        yaw: Any yaw at which it looks like that, rad.
+        symmetry: Angle by which it can be turned and looks the same, rad: pi/2 for a cube.
     """
     return wrapped(yaw * (2.0 * math.pi / symmetry)) * symmetry / (2.0 * math.pi)

@@ -50,11 +50,11 @@ OF_ALL = {feature.name for kind in (THING, DRAWER, LID) for feature in kind.feat
 def learner_interface(
     held: Predicate, scene_of: Callable[[State], ContactScene]
 ) -> LearnerInterface:
-    """What is observed in a domain.
+    """What learners observe in a domain.
 
     Args:
-        held: Its predicate Holding.
-        scene_of: The bodies of a state.
+        held: Predicate Holding of the domain.
+        scene_of: Function from a state to its bodies.
     """
     return LearnerInterface(
         hand=lambda state: hand_positions(state)[..., 0, :],

@@ -51,7 +51,7 @@ def _is_grasped(state: State, things: Column) -> Array:
 
 
 def dis_to_obj(state: State, place: Object) -> float:
-    """From the point between the fingertips to the object's origin."""
+    """The distance from the point between the fingertips to an object's origin."""
     return math.dist(hand_position(state), position_of(state, place))
 
 
@@ -60,7 +60,7 @@ def _dis_to_obj(state: State, places: Column) -> Array:
 
 
 def xy_dis(state: State, place: Object) -> float:
-    """The same seen from above."""
+    """The distance from the point between the fingertips to an object's origin, seen from above."""
     return math.dist(hand_position(state)[:2], position_of(state, place)[:2])
 
 
@@ -69,7 +69,7 @@ def _xy_dis(state: State, places: Column) -> Array:
 
 
 def z_dis(state: State, place: Object) -> float:
-    """The same along the vertical."""
+    """The vertical distance from the point between the fingertips to an object's origin."""
     return abs(hand_position(state)[2] - position_of(state, place)[2])
 
 
@@ -82,12 +82,12 @@ def _z_dis(state: State, places: Column) -> Array:
 
 
 def parallel_dis(state: State, thing: Object, place: Object) -> float:
-    """Between the origins, seen from above.
+    """The distance between two origins, seen from above.
 
     Args:
-        state: A single one.
-        thing: What is put somewhere.
-        place: Where.
+        state: A single state.
+        thing: Thing that is put on or into the place.
+        place: Place that the thing is put on or into.
 
     Returns:
         m, at least 0.
@@ -100,12 +100,12 @@ def _parallel_dis(state: State, things: Column, places: Column) -> Array:
 
 
 def perpendicular_dis(state: State, thing: Object, place: Object) -> float:
-    """From where things stand on the place up to the thing's underside.
+    """The height of a thing's underside over where things stand on a place.
 
     Args:
-        state: A single one.
-        thing: What is put somewhere.
-        place: What it is to stand on.
+        state: A single state.
+        thing: Thing that is put on the place.
+        place: Place that the thing is to stand on.
 
     Returns:
         m, 0 where it stands there, below 0 where it would be inside.
@@ -121,12 +121,12 @@ def _perpendicular_dis(state: State, things: Column, places: Column) -> Array:
 
 
 def norm_angle(state: State, thing: Object, place: Object) -> float:
-    """Between their axes; either end of an axis may come first.
+    """The angle between the axes of two objects; either end of an axis may come first.
 
     Args:
-        state: A single one.
-        thing: One with an axis.
-        place: Another.
+        state: A single state.
+        thing: Object with an axis.
+        place: Another object with an axis.
 
     Returns:
         rad, from 0 to a right angle.
@@ -142,12 +142,12 @@ def _norm_angle(state: State, things: Column, places: Column) -> Array:
 
 
 def radial_dis(state: State, peg: Object, hole: Object) -> float:
-    """From the peg's origin to the hole's axis.
+    """The distance from a peg's origin to a hole's axis.
 
     Args:
-        state: A single one.
-        peg: What is pushed in.
-        hole: Into what.
+        state: A single state.
+        peg: Peg that is pushed in.
+        hole: Hole that the peg is pushed into.
 
     Returns:
         m, at least 0.
@@ -162,12 +162,12 @@ def _radial_dis(state: State, pegs: Column, holes: Column) -> Array:
 
 
 def axial_dis(state: State, peg: Object, hole: Object) -> float:
-    """From the hole's origin to the peg's, along the hole's axis.
+    """The signed distance from a hole's origin to a peg's, along the hole's axis.
 
     Args:
-        state: A single one.
-        peg: What is pushed in.
-        hole: Into what.
+        state: A single state.
+        peg: Peg that is pushed in.
+        hole: Hole that the peg is pushed into.
 
     Returns:
         m, 0 where the middle of the one is in the middle of the other, of either sign elsewhere.
@@ -334,9 +334,9 @@ def opening_metric(kind: Type, full: float, name: str = "joint_dis") -> Metric:
     """The metric of how far a drawer or a lid is open; its normalised form grows as it opens.
 
     Args:
-        kind: Of drawers or of lids.
+        kind: Type of the drawers or the lids.
         full: The opening from which on the normalised form is 1, m or rad.
-        name: Another, where a domain has drawers and lids.
+        name: Name of the metric; to be given where a domain has both drawers and lids.
 
     Returns:
         The metric, in the unit of the opening.
@@ -347,11 +347,11 @@ def opening_metric(kind: Type, full: float, name: str = "joint_dis") -> Metric:
 
 
 def closure_metric(kind: Type, name: str = "closure") -> Metric:
-    """The same opening, with a normalised form that grows as it closes.
+    """The metric of how far a drawer or a lid is open; its normalised form grows as it closes.
 
     Args:
-        kind: Of drawers or of lids.
-        name: Where a domain has drawers and lids.
+        kind: Type of the drawers or the lids.
+        name: Name of the metric; to be given where a domain has both drawers and lids.
     """
     unit = kind.features[kind.column["opening"]].unit
     form = NEAR_METRES if unit == "m" else NEAR_RADIANS

@@ -32,11 +32,11 @@ def operator(
     """An operator that is exact: what it changes is all that its skill changes.
 
     Args:
-        name: As in the paper, where it is printed.
-        parameters: Its skill begins at what the last one names.
-        needs: PRE.
-        adds: EFF+.
-        deletes: EFF-.
+        name: Name of the operator, as in the paper where the paper has it.
+        parameters: Parameters of the operator. Its skill begins at the object of the last one.
+        needs: Preconditions (PRE).
+        adds: Add effects (EFF+).
+        deletes: Delete effects (EFF-).
 
     Returns:
         The operator.
@@ -52,8 +52,8 @@ def reward(
     """The dense reward of an operator.
 
     Args:
-        of: The operator.
-        terms: Of each the metric, its weight, and the parameters that it is about.
+        of: Operator that the reward is for.
+        terms: Metric, weight and parameters of each term.
 
     Returns:
         The template.

@@ -43,7 +43,7 @@ def standing(*arguments: int) -> tuple[Condition, Condition]:
     """The conditions on a thing that is released and at rest.
 
     Args:
-        arguments: Which of the predicate's objects is the thing.
+        arguments: Position, among the predicate's objects, of the thing.
     """
     return is_false(IS_GRASPED, *arguments), is_true(AT_REST, *arguments)
 
@@ -52,10 +52,10 @@ def on(thing: Type, place: Type, name: str = "On", radius: float = STACKED) -> P
     """The predicate that a thing stands on the middle of a place, released and at rest.
 
     Args:
-        thing: What stands.
-        place: On what.
-        name: The predicate's.
-        radius: Between both middles, at most, m.
+        thing: Type of the things that stand.
+        place: Type of what they stand on.
+        name: Name of the predicate.
+        radius: Largest distance between the middles of thing and place, m.
     """
     conditions = [
         at_most(PARALLEL_DIS, radius),
@@ -69,9 +69,9 @@ def is_open(drawer: Type, opening: Metric, name: str = "IsCabinetOpen") -> Predi
     """The predicate that a drawer is open far enough for things to go in and out.
 
     Args:
-        drawer: Its type.
-        opening: How far it is open.
-        name: The predicate's.
+        drawer: Type of the drawers.
+        opening: Metric of how far a drawer is open.
+        name: Name of the predicate.
     """
     return Predicate.of(name, (drawer,), [at_least(opening, DRAWER_OPEN)])
 
@@ -82,10 +82,10 @@ def is_closed(
     """The predicate that a drawer or a lid is closed.
 
     Args:
-        jointed: Its type.
-        closure: How far it is open.
-        name: The predicate's.
-        most: Up to which opening it is closed, m or rad.
+        jointed: Type of the drawers or the lids.
+        closure: Metric of how far a drawer or a lid is open.
+        name: Name of the predicate.
+        most: Largest opening at which it counts as closed, m or rad.
     """
     return Predicate.of(name, (jointed,), [at_most(closure, most)])
 
@@ -119,9 +119,9 @@ def is_clear(occupied: Predicate, name: str = "IsClear") -> Predicate:
     """The predicate that nothing is on a place, or in it.
 
     Args:
-        occupied: What makes it not so, of a thing and a place: In, or :func:`over`. Of a thing
-            and itself it must be false.
-        name: The predicate's.
+        occupied: Predicate of a thing and a place that makes the place not clear: In, or
+            :func:`over`. It must be false of a thing and itself.
+        name: Name of the predicate.
     """
     thing, place = occupied.types
 

@@ -41,19 +41,19 @@ class BenchtopTasks(Protocol):
 
 @dataclass(frozen=True)
 class BenchtopModel:
-    """What a domain at a bench says of itself.
+    """The parts of a domain at a bench that it does not share with the others.
 
     Args:
-        types: Beside the robot's, parents first.
-        predicates: All of them.
-        holding: The one of them that says what is held.
-        goals: By name; the first is trained for.
+        types: Types besides the robot's, parents first.
+        predicates: All predicates of the domain.
+        holding: Predicate of what is held, one of ``predicates``.
+        goals: Goals by name; the domain trains for the first one.
         acquisition: Operators, rewards and scripts written by hand, and the approach.
-        scene_of: The bodies of a state. Those that move and that the state does not have are left
-            out: who perceives may not know where they are.
-        metrics: Beside those that every domain has and those that predicates rest on.
+        scene_of: Function from a state to its bodies. Bodies that move and are not in the state are
+            left out, since perception may not know where they are.
+        metrics: Metrics besides those that every domain has and those that predicates use.
         static: Predicates that nothing changes.
-        view: Where animations are seen from.
+        view: Viewpoint of animations.
     """
 
     types: tuple[Type, ...]
@@ -73,10 +73,10 @@ def benchtop_domain(
     """The domain; it has no operators and no skills, as these are acquired.
 
     Args:
-        name: The domain's.
-        preset: By which its settings go.
-        model: What it says of itself.
-        settings: What tasks are sampled from.
+        name: Name of the domain.
+        preset: Name of the preset that the settings come from.
+        model: Parts of the domain that it does not share with the others.
+        settings: Settings that tasks are sampled from.
 
     Returns:
         The domain.

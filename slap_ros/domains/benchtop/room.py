@@ -26,8 +26,8 @@ class Station:
     """The space that a body fills, and the space around the hand that acts there.
 
     Args:
-        body: Where it stands, or may stand later.
-        hand: Of hands that grasp it or put something down there.
+        body: Boxes that the body fills where it stands, or may stand later.
+        hand: Boxes around the hands that grasp the body or put something down there.
     """
 
     body: tuple[OrientedBox, ...]
@@ -46,9 +46,9 @@ def palm_space(pose: Pose, bottom: float = PALM_BOTTOM, room: float = ROOM) -> O
     """The space around the palm of a hand that is open.
 
     Args:
-        pose: Of the grasp point, upright: z upwards, fingers along y.
+        pose: Pose of the grasp point, upright: z upwards, fingers along y.
         bottom: Height over the grasp point at which the space begins.
-        room: On all sides.
+        room: Free space around the palm along x and y, m.
     """
     x, y, z = PALM.half_extents_m
     top = PALM_BOTTOM + 2.0 * z
@@ -60,8 +60,8 @@ def finger_space(pose: Pose, room: float = ROOM) -> OrientedBox:
     """The space around open fingers, and between them.
 
     Args:
-        pose: Of the grasp point, upright: z upwards, fingers along y.
-        room: On all sides.
+        pose: Pose of the grasp point, upright: z upwards, fingers along y.
+        room: Free space around the fingers along x and y, m.
     """
     half = (STEM.half_extents_m[0] + room, STEM_REACH + room, 0.5 * (STEM_TOP + BELOW))
     return OrientedBox(pose.compose(Pose((0.0, 0.0, 0.5 * (STEM_TOP - BELOW)))), half)
@@ -76,8 +76,8 @@ def within_reach(goal: HandGoal, room: float = ROOM) -> bool:
     """Whether the arm gets its hand there, around there, and over it.
 
     Args:
-        goal: The hand where it acts.
-        room: How far around there, along x and y.
+        goal: Goal of the hand where it acts.
+        room: Distance from the goal, along x and y, up to which the arm must reach as well, m.
     """
     x, y, z = goal.position
     turn = pointing_down(goal.yaw)

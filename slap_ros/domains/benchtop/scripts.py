@@ -50,11 +50,12 @@ class Move:
     """Go on towards a goal until something holds.
 
     Args:
-        to: Where to; if it is a function, asked in each step.
-        gripper: OPEN, KEEP or CLOSE.
-        until: When it is done; when the hand is there, if left out.
-        fastest: Along each axis in one control step, m.
-        patience: Environment steps after which it is given up.
+        to: Goal of the hand, or a function that gives it in each step.
+        gripper: Gripper command: OPEN, KEEP or CLOSE.
+        until: Condition that ends the move; if it is left out, the move ends when the hand is
+            there.
+        fastest: Largest shift along each axis in one control step, m.
+        patience: Number of environment steps after which the move is given up.
     """
 
     to: HandGoal | GoalOf
@@ -64,11 +65,11 @@ class Move:
     patience: int = PATIENCE
 
     def goal(self, state: State) -> HandGoal:
-        """Where to, as things are now."""
+        """The goal of the hand in a state."""
         return self.to(state) if callable(self.to) else self.to
 
     def done(self, state: State) -> bool:
-        """Whether it is done."""
+        """Whether the move is done."""
         return self.until(state) if self.until else self.goal(state).reached(state)
 
     def action(self, state: State) -> Action:
@@ -109,10 +110,10 @@ def over(
     """The moves up to a height at which the hand touches nothing, then over a goal.
 
     Args:
-        state: Where it begins.
-        goal: Over which the hand is to be, turned as it is there.
-        gripper: OPEN, KEEP or CLOSE.
-        height: Of the grasp point, m; :func:`travel_height` if left out.
+        state: State in which the moves begin.
+        goal: Goal that the hand is to be over, with the same yaw.
+        gripper: Gripper command: OPEN, KEEP or CLOSE.
+        height: Height of the grasp point, m; :func:`travel_height` if left out.
     """
     z = travel_height(state) if height is None else height
     z = max(z, goal.position[2], hand_position(state)[2])
@@ -125,9 +126,9 @@ def hold_still(gripper: float, until: Condition, patience: int = GRIP_STEPS) -> 
     """The move that stays where the hand is until something holds.
 
     Args:
-        gripper: OPEN, KEEP or CLOSE.
-        until: When it is done.
-        patience: Environment steps after which it is given up.
+        gripper: Gripper command: OPEN, KEEP or CLOSE.
+        until: Condition that ends the move.
+        patience: Number of environment steps after which the move is given up.
     """
     return Move(_here, gripper, until, patience=patience)
 
@@ -151,9 +152,10 @@ def carry(
     """Where the hand must be for what it holds to be somewhere.
 
     Args:
-        thing: In the hand.
-        to: Where its origin is to be, m; if it is a function, asked in each step.
-        yaw: Of the hand, rad; as it is told already, if left out.
+        thing: Thing in the hand.
+        to: Position that the thing's origin is to have, m, or a function that gives it in each
+            step.
+        yaw: Yaw of the hand, rad; the present yaw of its target if left out.
     """
 
     def goal(state: State) -> HandGoal:

@@ -41,9 +41,9 @@ def value(state: State, obj: Object, feature: str) -> float:
     """One feature of an object.
 
     Args:
-        state: A single one.
-        obj: Of its objects.
-        feature: By name.
+        state: A single state.
+        obj: Object of the state.
+        feature: Name of the feature.
     """
     return float(state.get(obj, feature))
 
@@ -61,12 +61,12 @@ def pose_of(state: State, obj: Object) -> Pose:
 
 
 def axis_of(state: State, obj: Object) -> Vector:
-    """The direction of its own x axis, of length 1."""
+    """The direction of an object's own x axis, of length 1."""
     return rotate(pose_of(state, obj).quaternion, (1.0, 0.0, 0.0))
 
 
 def yaw_of(state: State, obj: Object) -> float:
-    """How its own x axis is turned about the vertical, rad."""
+    """How an object's own x axis is turned about the vertical, rad."""
     x, y, _ = axis_of(state, obj)
     return math.atan2(y, x)
 
@@ -102,12 +102,12 @@ def finger_opening(state: State) -> float:
 
 
 def things_of(layout: Layout) -> tuple[Object, ...]:
-    """The free bodies."""
+    """The free bodies of a layout."""
     return layout.of_type(THING)
 
 
 def held_thing(state: State) -> Object | None:
-    """What both fingers press on; None where they hold nothing."""
+    """The thing that both fingers press on; None where they hold nothing."""
     for thing in things_of(state.layout):
         if state.get(thing, "held") > 0.5:
             return thing
@@ -118,9 +118,9 @@ def standing_on(state: State, thing: Object, place: Object) -> Vector:
     """Where a thing's origin is when it stands on the middle of a place.
 
     Args:
-        state: A single one.
-        thing: What stands there; it need not do so yet.
-        place: On what.
+        state: A single state.
+        thing: Thing that stands on the place, or will stand there.
+        place: Place that the thing stands on.
 
     Returns:
         Position, m.
@@ -144,7 +144,7 @@ def positions(state: State, column: Column) -> Array:
 
 
 def axes(state: State, column: Column) -> Array:
-    """The directions of their own x axes, shape (..., objects, 3)."""
+    """The directions of objects' own x axes, shape (..., objects, 3)."""
     return x_axes(state.gather(column, QUATERNION))
 
 
@@ -154,7 +154,7 @@ def in_base(state: State, column: Column, points: Array) -> Array:
     Args:
         state: A state or a batch of states.
         column: The objects.
-        points: In the objects' own frames, m, shape (..., objects, 3).
+        points: Points in the objects' own frames, m, shape (..., objects, 3).
 
     Returns:
         Of the same shape.

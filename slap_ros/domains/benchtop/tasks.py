@@ -29,11 +29,11 @@ def spread_out(
     """Places that are not too near to one another.
 
     Args:
-        rng: Draws them.
-        count: How many.
-        x: Within which range.
-        y: Within which range.
-        apart: Between any two, at least.
+        rng: Source of random numbers.
+        count: Number of places.
+        x: Range of the places' x, m.
+        y: Range of the places' y, m.
+        apart: Least distance between any two places, m.
 
     Returns:
         One for each.
@@ -59,9 +59,9 @@ def some_of(rng: np.random.Generator, total: int, count: int, first: int = ANY) 
     """Numbers from 0 up to a total, drawn at random.
 
     Args:
-        rng: Draws them.
-        total: Of numbers that there are.
-        count: How many are wanted.
+        rng: Source of random numbers.
+        total: Numbers to choose from: 0 up to, but not including, this one.
+        count: Number of numbers wanted.
         first: The one that is surely among them, and comes first; :data:`ANY` for none.
 
     Returns:

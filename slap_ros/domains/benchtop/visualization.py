@@ -29,8 +29,8 @@ def display(scene_of: SceneOf, view: Viewpoint = VIEW) -> Display:
     """How a domain of the contact world looks.
 
     Args:
-        scene_of: What there is in a state.
-        view: Where animations are seen from.
+        scene_of: Function from a state to its bodies.
+        view: Viewpoint of animations.
 
     Returns:
         Every part of every body but the floor, the arm, the bodies' frames, and animations.

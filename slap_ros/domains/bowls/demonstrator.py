@@ -70,7 +70,7 @@ def rim_of(state: State, bowl: Object) -> HandGoal:
 
 
 def rim_at(pose: Pose) -> HandGoal:
-    """The same of a bowl at a pose."""
+    """The hand around the rim of a bowl that stands at a pose."""
     x, y, _ = rotate(pose.quaternion, (1.0, 0.0, 0.0))
     return HandGoal(pose.apply(GRIP), nearest_turn(math.atan2(y, x), math.pi))
 

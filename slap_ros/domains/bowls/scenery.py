@@ -89,10 +89,10 @@ class Furniture:
     """What a bowl can stand on, with the middle of where it stands for its frame.
 
     Args:
-        body: Fixed.
-        height: Of its frame over the table.
-        half_length: Along x, of where a bowl's middle counts as over it.
-        half_width: Along y.
+        body: Body of the furniture; it is fixed.
+        height: Height of the furniture's frame over the table, m.
+        half_length: Half the length, along x, of the area that bowls can stand on, m.
+        half_width: Half the width, along y, of the area that bowls can stand on, m.
     """
 
     body: Compound
@@ -101,7 +101,7 @@ class Furniture:
     half_width: float
 
     def features(self, pose: Pose) -> Mapping[str, float]:
-        """Its features, for ``State.build``; the pose is that of its frame."""
+        """The furniture's features, for ``State.build``; the pose is that of its frame."""
         halves = dict(zip(HALVES, (self.half_length, self.half_width), strict=True))
         return {**place_features(pose), **halves}
 
@@ -121,7 +121,7 @@ def _ramekin() -> Furniture:
 
 
 def _tray() -> Furniture:
-    """Its walls are lower than fingers that grasp a bowl in it."""
+    """A tray with walls that are lower than fingers that grasp a bowl in it."""
     half, wall, floor, high = 0.08, 0.003, 0.006, 0.012
     parts = (
         BoxPart((half, half, 0.5 * floor), Pose((0.0, 0.0, -0.5 * floor))),

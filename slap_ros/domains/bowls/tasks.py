@@ -171,9 +171,9 @@ def with_bowls(rng: np.random.Generator, poses: Poses, numbers: Sequence[int]) -
     """The task to put the first bowl on the plate.
 
     Args:
-        rng: Draws where exactly bowls stand, and how they are turned.
-        poses: Of the plate and of furniture.
-        numbers: Of the spots at which there are bowls.
+        rng: Source of random numbers for where exactly bowls stand, and how they are turned.
+        poses: Poses of the plate and of furniture, by name.
+        numbers: Numbers of the spots at which there are bowls.
 
     Returns:
         None where the hand has no room at one of the bowls.
@@ -264,7 +264,7 @@ def _jittered(rng: np.random.Generator, x: float, y: float) -> tuple[float, floa
 
 
 def _beside(rng: np.random.Generator, pose: Pose, far: Range) -> tuple[float, float]:
-    """In any direction from a pose, so far away."""
+    """A place in any direction from a pose, so far away."""
     x, y, _ = pose.position
     angle, distance = float(rng.uniform(-math.pi, math.pi)), float(rng.uniform(*far))
     return x + distance * math.cos(angle), y + distance * math.sin(angle)
@@ -274,12 +274,12 @@ def _beside(rng: np.random.Generator, pose: Pose, far: Range) -> tuple[float, fl
 
 
 def fixed_station(name: str, pose: Pose, gap: float = 0.0) -> Station:
-    """Of the plate or a piece of furniture, which no hand has to grasp.
+    """The station of the plate or a piece of furniture, which no hand has to grasp.
 
     Args:
-        name: Which.
-        pose: Of its frame.
-        gap: To be left around it, m.
+        name: Name of the plate or of the piece of furniture.
+        pose: Pose of its frame.
+        gap: Space to be left around it, m.
 
     Returns:
         What takes room, without room for a hand.
@@ -290,7 +290,7 @@ def fixed_station(name: str, pose: Pose, gap: float = 0.0) -> Station:
 
 
 def bowl_station(pose: Pose, plate: Pose) -> Station:
-    """Of a bowl, and of the hand that grasps it and puts it on the plate."""
+    """The station of a bowl, with the hand that grasps it and puts it on the plate."""
     there = _on_plate(pose, plate)
     hands = [upright(rim_at(at)) for at in (pose, there)]
     spaces = (space for hand in hands for space in (palm_space(hand), finger_space(hand)))

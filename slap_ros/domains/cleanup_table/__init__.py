@@ -45,8 +45,8 @@ def make(
     Args:
         preset: ``fair`` or ``paper``.
         changes: Settings of the preset to change.
-        shapes: Other toys by kind, and the ``wiper``; those that are shipped, if None. Any mesh
-            will do (``slap_ros.meshes``) that the fingers fit around from above.
+        shapes: Toys by kind, and the ``wiper``, in place of those that are shipped; None for these.
+            Any mesh will do (``slap_ros.meshes``) that the fingers fit around from above.
 
     Returns:
         The domain.

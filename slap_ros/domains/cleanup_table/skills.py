@@ -81,12 +81,12 @@ class MotionPaths(NamedTuple):
 def _across(
     state: State, goals: Sequence[Pose], accepts: Callable[[Pose, Joints], bool]
 ) -> MotionPaths:
-    """To the nearest of some poses of the grasp point that will do, on a planned path.
+    """The motion, on a planned path, to the nearest pose of the grasp point that is accepted.
 
     Args:
-        state: Where it begins.
-        goals: Poses of the grasp point.
-        accepts: Whether one will do in a configuration.
+        state: State in which the motion begins.
+        goals: Poses of the grasp point to choose among.
+        accepts: Function that says whether a pose is accepted in a configuration of the joints.
 
     Raises:
         SkillNotApplicableError: None of them can be reached.
@@ -115,9 +115,9 @@ def grasps(state: State, block: Object, table: Object) -> list[Pose]:
     """Poses of the grasp point from above, where the fingers fit around a block.
 
     Args:
-        state: Where everything is.
-        block: What is to be grasped.
-        table: What it stands on.
+        state: Current state.
+        block: Block that is to be grasped.
+        table: Table that the block stands on.
 
     Returns:
         Poses in the base's frame, the deepest grasps first.
@@ -307,12 +307,12 @@ class MotionSkill:
     """Move; then grip or let go, if need be. How long that takes is known once it is planned.
 
     Args:
-        name: The operator's.
-        timing: How fast.
-        motion: Where to: of a state, a block and a surface.
-        until: Where on the way that is enough; None: at its end.
-        grip: Gripper commands there.
-        step_limit: Environment steps.
+        name: Name of the operator.
+        timing: Timing of the paths.
+        motion: Function from a state, a block and a surface to the paths of the arm.
+        until: Condition that ends the motion on the way; None: it ends at its goal.
+        grip: Gripper commands after the motion.
+        step_limit: Environment steps after which the skill fails.
     """
 
     name: str

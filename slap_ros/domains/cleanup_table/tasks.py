@@ -44,9 +44,9 @@ def make_task(
     """The task to put everything that stands on the table into the bin.
 
     Args:
-        places: Where each block stands, by its name.
-        shapes: What each kind of block looks like.
-        material: Of all blocks.
+        places: Place of each block, by the block's name.
+        shapes: Shape of each kind of block, by the kind's name.
+        material: Material of all blocks.
 
     Returns:
         A task whose goal is that all of them are in the bin.

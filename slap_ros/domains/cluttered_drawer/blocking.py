@@ -59,8 +59,8 @@ class FingerClearance:
     """What has to be free at a side of the target block, so that a finger fits there.
 
     Args:
-        reach: How far from its face, m. A finger that is open ends 4.2 cm from it.
-        half_width: To each side of the middle, m. A finger is 2.1 cm wide.
+        reach: Free distance from the block's face, m. A finger that is open ends 4.2 cm from it.
+        half_width: Free distance to each side of the face's middle, m. A finger is 2.1 cm wide.
     """
 
     reach: float = 0.048

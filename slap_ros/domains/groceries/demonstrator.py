@@ -79,11 +79,11 @@ def travel_height(state: State) -> float:
 
 
 def straight_up(z: float, gripper: float = KEEP) -> Move:
-    """Up to a height from wherever the hand is then.
+    """The move straight up to a height, from wherever the hand is then.
 
     Args:
-        z: Of the grasp point, m.
-        gripper: OPEN, KEEP or CLOSE.
+        z: Height of the grasp point, m.
+        gripper: Gripper command: OPEN, KEEP or CLOSE.
     """
 
     def goal(state: State) -> HandGoal:

@@ -23,10 +23,10 @@ class Grocery:
     """A thing as it stands, and where it is grasped: over its middle, the fingers along its y.
 
     Args:
-        body: Its origin is its centre of mass.
-        rest_height: Of its origin above what it stands on.
-        half_width: Half of what is between the fingers.
-        grasp_height: Of the grasp point above its origin.
+        body: Body of the thing. The origin is its centre of mass.
+        rest_height: Height of the thing's origin above what it stands on, m.
+        half_width: Half the width of the part between the fingers, m.
+        grasp_height: Height of the grasp point above the thing's origin, m.
     """
 
     body: Compound
@@ -47,12 +47,12 @@ def _grocery(
     """A thing of parts that stand on z = 0, along the vertical through the origin.
 
     Args:
-        name: Of its object.
-        parts: They weigh by their volumes.
-        colour: Of those that have none of their own.
-        mass_kg: Of all together.
-        half_width: See :class:`Grocery`.
-        grasp_at: Height of the grasp point above what it stands on.
+        name: Name of the thing's object.
+        parts: Parts of the thing. Each has its share of the mass by its volume.
+        colour: Colour of the parts that have none of their own.
+        mass_kg: Mass of the whole thing, kg.
+        half_width: Half the width of the part between the fingers, m.
+        grasp_at: Height of the grasp point above what the thing stands on, m.
     """
     volume = sum(part.volume_m3 for part in parts)
     height = sum(part.volume_m3 * part.pose.position[2] for part in parts) / volume

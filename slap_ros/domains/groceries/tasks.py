@@ -131,9 +131,9 @@ def make_task(basket: Pose, names: Sequence[str], poses: Sequence[Pose]) -> Task
     """The task to put the first thing into the basket.
 
     Args:
-        basket: Where it stands.
-        names: Of things, in the order of the state.
-        poses: Where they stand.
+        basket: Pose of the basket.
+        names: Names of the things, in the order of the state.
+        poses: Poses of the things.
     """
     features: dict[Object, Mapping[str, float]] = {
         ROBOT("robot"): robot_features(HOME),
@@ -146,12 +146,12 @@ def make_task(basket: Pose, names: Sequence[str], poses: Sequence[Pose]) -> Task
 
 
 def station(thing: Grocery, pose: Pose) -> Station:
-    """Of a thing that stands at a pose; nothing else is below the palm there."""
+    """The station of a thing that stands at a pose; nothing else is below the palm there."""
     return Station((thing.body.at(pose),), (palm_space(pose, bottom=0.0),))
 
 
 def basket_station(pose: Pose) -> Station:
-    """Of the basket, into which the hand reaches turned in any way."""
+    """The station of the basket, into which the hand reaches turned in any way."""
     half = math.hypot(*PALM.half_extents_m[:2]) + ROOM
     return Station((BASKET_BODY.at(pose),), (OrientedBox(pose, (half, half, HIGHEST)),))
 
@@ -160,9 +160,9 @@ def grasp_goal(thing: Grocery, pose: Pose, yaw: float) -> HandGoal:
     """The hand around a thing.
 
     Args:
-        thing: To be grasped.
-        pose: At which it stands.
-        yaw: Of the hand, rad.
+        thing: Thing that is to be grasped.
+        pose: Pose at which the thing stands.
+        yaw: Yaw of the hand, rad.
     """
     x, y, z = pose.position
     return HandGoal((x, y, z + thing.grasp_height), yaw)

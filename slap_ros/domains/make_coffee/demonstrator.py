@@ -78,9 +78,9 @@ def at_lid(state: State, holder: Object, away: float = 0.0) -> HandGoal:
     """Where fingers touch the back of an open lid, or a place behind it.
 
     Args:
-        state: As things are.
-        holder: Whose lid.
-        away: So far behind, along the holder's x.
+        state: Current state.
+        holder: Holder that has the lid.
+        away: Distance of the place behind the lid, along the holder's x, m.
 
     Returns:
         A goal for the hand.
@@ -95,9 +95,9 @@ def inserting(pod: Object, holder: Object, height: float = 0.0) -> GoalOf:
     """Where the hand must be for the pod in it to be in the holder.
 
     Args:
-        pod: In the hand.
-        holder: Into which it goes.
-        height: So much above its bottom.
+        pod: Pod in the hand.
+        holder: Holder that the pod goes into.
+        height: Height of the pod over its place in the holder, m.
     """
 
     def goal(state: State) -> HandGoal:
@@ -112,9 +112,9 @@ def pushing(holder: Object, ahead: float, up: float) -> GoalOf:
     """A place for the hand, seen from the hinge.
 
     Args:
-        holder: Whose lid is pushed.
-        ahead: Along the holder's x.
-        up: Over the hinge.
+        holder: Holder whose lid is pushed.
+        ahead: Distance of the place from the hinge along the holder's x, m.
+        up: Height of the place over the hinge, m.
     """
     x, y, z = HINGE
 

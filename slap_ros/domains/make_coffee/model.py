@@ -62,7 +62,7 @@ LID_OPEN, LID_CLOSED = math.radians(60.0), math.radians(5.0)
 
 
 def dis_to_lid(state: State, holder: Object) -> float:
-    """From the point between the fingertips to the middle of the lid's free edge."""
+    """The distance from the point between the fingertips to the middle of the lid's free edge."""
     lid = lid_pose(pose_of(state, holder), value(state, holder, "opening"))
     return math.dist(hand_position(state), lid.apply((-LID_LENGTH, 0.0, 0.0)))
 
@@ -87,7 +87,7 @@ DIS_TO_LID = Metric(
 
 
 def tilt(state: State, pod: Object) -> float:
-    """Between the pod's axis and upright."""
+    """The angle between a pod's axis and the vertical."""
     return float(_tilt(state, Column((pod,)))[0])
 
 

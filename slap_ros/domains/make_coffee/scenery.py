@@ -107,8 +107,8 @@ def lid_pose(frame: Pose, opening: float) -> Pose:
     """The lid's frame: its origin in the hinge, x away from its edge, z up while it is closed.
 
     Args:
-        frame: The holder's, in the base's.
-        opening: rad.
+        frame: Pose of the holder in the base's frame.
+        opening: How far the lid is open, rad.
     """
     turn = from_rotation_vector((0.0, opening, 0.0))
     return frame.compose(Pose(HINGE, turn))

@@ -30,18 +30,19 @@ HAND = hand_at((0.45, 0.0, 0.25), 0.25 * math.pi)
 
 @dataclass(frozen=True)
 class CoffeeTasks(TaskSettings):
-    """The cabinet is on the left, the holder on the right.
+    """The cabinet is on the left, the holder on the right. Each setting is a range to sample from.
 
     Args:
-        front_x: The middle of the cabinet's front.
-        front_y: The same.
-        front_turn: From facing the arm.
-        pod_aside: Of the pod, from the middle of the drawer, along the front.
-        pod_deep: The same, out of the drawer.
-        holder_x: Where the holder stands.
-        holder_y: The same.
-        holder_turn: From where the lid opens away from the arm.
-        lid: How far the lid is open.
+        front_x: X of the middle of the cabinet's front, m.
+        front_y: Y of the middle of the cabinet's front, m.
+        front_turn: Turn of the cabinet's front from facing the arm, rad.
+        pod_aside: Distance of the pod from the middle of the drawer along the front, m.
+        pod_deep: Distance of the pod from the middle of the drawer in the direction in which it
+            opens, m.
+        holder_x: X of the holder, m.
+        holder_y: Y of the holder, m.
+        holder_turn: Turn of the holder from the yaw at which its lid opens away from the arm, rad.
+        lid: How far the lid is open, rad.
     """
 
     limits: ClassVar = {

@@ -80,8 +80,8 @@ def step(
     Args:
         layout: The worlds' objects.
         data: States, shape (worlds, layout.size). Not changed.
-        actions: Shape (worlds, 3), within the action space.
-        tolerance: Of a grasp.
+        actions: Action of each world, shape (worlds, 3), within the action space.
+        tolerance: How far from a block the gripper still grasps it, m.
 
     Returns:
         The next states, shape (worlds, layout.size).

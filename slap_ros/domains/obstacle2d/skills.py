@@ -30,8 +30,8 @@ class WaypointPolicy:
         """Begin at the first waypoint.
 
         Args:
-            robot: Whose gripper it is.
-            waypoints: Gripper positions, m.
+            robot: Robot that has the gripper.
+            waypoints: Positions that the gripper visits, m.
             gripper: The gripper command after the last waypoint.
         """
         self._robot = robot

@@ -59,9 +59,10 @@ class Tolerances(TaskSettings):
     """How exact the world and its predicates are, m.
 
     Args:
-        grasp_reach: Sideways, from the gripper to the middle of a block that it still grasps.
-        grasp_gap: From the gripper down to that block.
-        inside_tolerance: By which a block in the target area may reach over its edge.
+        grasp_reach: Largest sideways distance from the gripper to the middle of a block that it
+            grasps, m.
+        grasp_gap: Largest distance from the gripper down to a block that it grasps, m.
+        inside_tolerance: Length by which a block in the target area may reach over its edge, m.
     """
 
     limits: ClassVar = TOLERANCE_LIMITS
@@ -154,9 +155,9 @@ def make_task(robot: tuple[float, float], target_x: float, blocks_x: list[float]
     """A task from positions.
 
     Args:
-        robot: x and y, m.
-        target_x: Of the middle of the target area, m.
-        blocks_x: Of the blocks on the table, m; the first is to go into the target area.
+        robot: Position x and y of the robot, m.
+        target_x: X of the middle of the target area, m.
+        blocks_x: X of each block on the table, m; the first block is to go into the target area.
 
     Returns:
         The task.

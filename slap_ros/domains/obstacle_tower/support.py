@@ -90,10 +90,10 @@ def _covers(blocks: slice, offset: Complex, q: Array, edges: Array) -> Array:
     """How far blocks cover things, seen along the axes of the thing: shape (..., blocks, things).
 
     Args:
-        blocks: Which of the things are blocks.
-        offset: From things to blocks, m, shape (..., blocks, things).
+        blocks: Slice of the things that selects the blocks.
+        offset: Offsets from things to blocks, m, shape (..., blocks, things).
         q: Parts of the things' quaternions, shape (..., things, 4).
-        edges: Of the things, m, shape (..., things, 9), as ``TO_EDGES`` gives them.
+        edges: Edges of the things, m, shape (..., things, 9), as ``TO_EDGES`` gives them.
     """
     back = inverse_yaws(q, edges)[..., None, :]
     width = half_widths(complex_of(edges[..., :6])[..., None, :], back)

@@ -80,10 +80,10 @@ def inserting(state: State, peg: Object, hole: Object, ahead: float) -> HandGoal
     """Where the hand has the tip of what it holds on a hole's axis, and the peg along it.
 
     Args:
-        state: As things are.
-        peg: In the hand.
-        hole: Whose axis.
-        ahead: Of the seat, where the tip is to be.
+        state: Current state.
+        peg: Peg in the hand.
+        hole: Hole whose axis the tip is to be on.
+        ahead: Distance of the tip from the seat, along the hole's x, m.
     """
     turn = turn_between(state, peg, hole)
     hand, tip = hand_position(state), tip_of(state, peg)
@@ -110,12 +110,12 @@ def tip_of(state: State, peg: Object) -> Vector:
 
 
 def tip_seen_from(state: State, peg: Object, hole: Object) -> Vector:
-    """The tip of a peg in a hole's frame.
+    """The position of a peg's tip in a hole's frame.
 
     Args:
-        state: A single one.
-        peg: Whose tip.
-        hole: Whose frame.
+        state: A single state.
+        peg: Peg that has the tip.
+        hole: Hole that has the frame.
     """
     return pose_of(state, hole).inverse().apply(tip_of(state, peg))
 
@@ -124,9 +124,9 @@ def turn_between(state: State, peg: Object, hole: Object) -> float:
     """How a peg is turned about the vertical, seen from a hole, rad.
 
     Args:
-        state: A single one.
-        peg: What is turned.
-        hole: From whose frame.
+        state: A single state.
+        peg: Peg whose turn is measured.
+        hole: Hole whose frame the turn is measured in.
     """
     back = pose_of(state, hole).inverse().quaternion
     x, y, _ = rotate(back, leading(state, peg))

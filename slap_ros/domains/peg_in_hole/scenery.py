@@ -41,8 +41,8 @@ def plate(name: str, clearance: float) -> Compound:
     """A plate with a square hole.
 
     Args:
-        name: The hole's.
-        clearance: What the hole is wider than a peg.
+        name: Name of the hole's object.
+        clearance: Difference between the width of the hole and the diameter of a peg, m.
     """
     half, deep, middle = PEG_RADIUS + 0.5 * clearance, 0.5 * DEPTH, FACE + 0.5 * DEPTH
     wall, foot = 0.5 * WALL, 0.5 * (FOOT - half)
@@ -57,10 +57,10 @@ def plate(name: str, clearance: float) -> Compound:
 
 
 def wall_top(clearance: float) -> float:
-    """From a hole's axis up to the top of its plate.
+    """The height from a hole's axis up to the top of its plate, m.
 
     Args:
-        clearance: What the hole is wider than a peg.
+        clearance: Difference between the width of the hole and the diameter of a peg, m.
     """
     return PEG_RADIUS + 0.5 * clearance + WALL
 
@@ -69,8 +69,8 @@ def seat(mouth: Vector, yaw: float) -> Pose:
     """A hole's pose.
 
     Args:
-        mouth: Where its axis leaves the plate's face.
-        yaw: The turn of the plate about the vertical, rad; at 0 the hole leads along x.
+        mouth: Position at which the hole's axis leaves the plate's face, m.
+        yaw: Turn of the plate about the vertical, rad; at 0 the hole leads along x.
     """
     back, aside, _ = rotate(from_yaw(yaw), (-FACE, 0.0, 0.0))
     x, y, z = mouth
@@ -82,7 +82,7 @@ def scene(clearance: float) -> ContactScene:
     """Table, pegs and plates with holes.
 
     Args:
-        clearance: What the holes are wider than a peg.
+        clearance: Difference between the width of the holes and the diameter of a peg, m.
     """
     pegs = [peg(name, colour) for name, colour in PEGS.items()]
     return ContactScene((TABLE, *pegs, *(plate(name, clearance) for name in HOLES)))

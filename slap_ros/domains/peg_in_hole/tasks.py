@@ -40,14 +40,14 @@ class PegTasks(TaskSettings):
     """Where pegs and plates are is sampled for each task, one of each on either side of the arm.
 
     Args:
-        clearance: What holes are wider than pegs, mm.
-        peg_x: Of a peg's middle.
-        peg_y: The same, to its side.
-        peg_yaw: Of a peg, rad.
-        plate_x: Of the hole in a plate's face.
-        plate_y: The same, to its side.
-        plate_yaw: Of a plate, rad.
-        height: Of the holes.
+        clearance: Difference between the width of a hole and the diameter of a peg, mm.
+        peg_x: Range of the x of a peg's middle, m.
+        peg_y: Range of a peg's distance from y = 0, to its side of the arm, m.
+        peg_yaw: Range of a peg's yaw, rad.
+        plate_x: Range of the x of the hole in a plate's face, m.
+        plate_y: Range of that hole's distance from y = 0, to its side of the arm, m.
+        plate_yaw: Range of a plate's yaw, rad.
+        height: Range of the height of the holes, m.
     """
 
     limits: ClassVar = {

@@ -47,9 +47,9 @@ def cube_features(x: float, y: float, yaw: float, under: float = 0.0) -> Mapping
     """A cube's features where it stands.
 
     Args:
-        x: m.
-        y: m.
-        yaw: rad.
+        x: X of the cube, m.
+        y: Y of the cube, m.
+        yaw: Yaw of the cube, rad.
         under: Height of what it stands on, m.
 
     Returns:

@@ -30,12 +30,12 @@ class StackTasks(TaskSettings):
     """Where cubes and targets stand is sampled for each task.
 
     Args:
-        cubes: On the table.
-        blocked: 1: target0 is blocked by one more cube, for which there is a target1.
-        x: Of what stands on the table.
-        y: The same.
-        yaw: Of cubes.
-        apart: Between the middles of what stands on the table, at least.
+        cubes: Number of cubes on the table, besides one that may block a target.
+        blocked: 1 if target0 is blocked by one more cube, for which there is a target1; else 0.
+        x: Range of the x of what stands on the table, m.
+        y: Range of the y of what stands on the table, m.
+        yaw: Range of the yaw of cubes, rad.
+        apart: Least distance between the middles of what stands on the table, m.
     """
 
     limits: ClassVar = BENCH_LIMITS | {"cubes": (2, 4), "blocked": (0, 1), "apart": (0.0, 0.5)}

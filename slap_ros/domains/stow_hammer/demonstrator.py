@@ -48,9 +48,9 @@ def stowing(hammer: Object, cabinet: Object, height: float = 0.0) -> GoalOf:
     """Where the hand must be for the hammer in it to be in the middle of a drawer.
 
     Args:
-        hammer: In the hand.
-        cabinet: Whose drawer.
-        height: So much above its floor.
+        hammer: Hammer in the hand.
+        cabinet: Cabinet that has the drawer.
+        height: Height of the hammer over its place on the drawer's floor, m.
     """
 
     def goal(state: State) -> HandGoal:

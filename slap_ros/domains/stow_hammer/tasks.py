@@ -39,12 +39,12 @@ class StowTasks(TaskSettings):
     """A cabinet to either side, and between them two hammers, one behind the other.
 
     Args:
-        hammer_x: Where hammers lie.
-        hammer_y: The same.
-        hammer_turn: From lying along the fronts.
-        front_x: The middle of a cabinet's front.
-        front_y: The same, to either side.
-        front_turn: From facing the arm.
+        hammer_x: Range of the x of hammers, m.
+        hammer_y: Range of the y of hammers, m.
+        hammer_turn: Range of the hammers' turn from lying along the fronts, rad.
+        front_x: Range of the x of the middle of a cabinet's front, m.
+        front_y: Range of that middle's distance from y = 0, to either side, m.
+        front_turn: Range of a front's turn from facing the arm, rad.
     """
 
     limits: ClassVar = {

@@ -37,16 +37,16 @@ def grasps_to_stand(
     height: float,
     yaws: Iterable[float],
 ) -> list[Pose]:
-    """Where the held body stands upright at a place.
+    """The poses of the grasp point at which the held body stands upright at a place.
 
     However the hand is tilted now, it points down there: so the body was grasped.
 
     Args:
-        state: With a held body.
-        body: That body; only how high it is matters.
-        place: Of its middle: x, y in m.
-        height: Of what it is to stand on, m.
-        yaws: Of its faces, rad.
+        state: State with a held body.
+        body: Box around the held body; only its height matters.
+        place: Position x, y of the body's middle, m.
+        height: Height of what the body is to stand on, m.
+        yaws: Yaws that the body's faces may have, rad.
 
     Returns:
         A pose of the grasp point for each yaw, base's frame.

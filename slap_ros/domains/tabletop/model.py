@@ -27,20 +27,21 @@ from slap_ros.worlds.viewpoint import Viewpoint
 
 @dataclass(frozen=True)
 class TabletopModel:
-    """What a domain at a table says of itself.
+    """The parts of a domain at a table that it does not share with the others.
 
     Args:
-        types: Types of its objects, parents first, the robot's among them.
-        predicates: All its predicates.
-        operators: All its operators.
-        skills: Makes a skill for each operator, by the operator's name.
-        scene_of: The bodies of a state.
+        types: Types of the domain's objects, parents first, the robot's among them.
+        predicates: All predicates of the domain.
+        operators: All operators of the domain.
+        skills: Function that makes a skill for each operator, by the operator's name.
+        scene_of: Function from a state to its bodies.
         goal: Goal of tasks that have none of their own.
-        step_limit: Control steps of a task.
-        learning: How shortcuts are learned; their actions follow from the settings.
+        step_limit: Largest number of control steps of a task.
+        learning: Settings of how shortcuts are learned; their actions follow from the domain's
+            settings.
         robot_types: Types whose features a robot measures by itself.
         robot_predicates: Predicates that a robot measures by itself.
-        view: Where animations are seen from.
+        view: Viewpoint of animations.
     """
 
     types: tuple[Type, ...]
@@ -68,9 +69,9 @@ def tabletop_domain(
     Args:
         name: Name of the domain.
         preset: Name of the preset that the settings come from.
-        model: What the domain says of itself.
-        settings: How the arm may move.
-        sample: Samples a task.
+        model: Parts of the domain that it does not share with the others.
+        settings: Settings of how the arm may move.
+        sample: Function that samples a task.
 
     Returns:
         The domain.

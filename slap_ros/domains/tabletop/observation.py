@@ -68,8 +68,8 @@ def joint_contributions(hand: Array, displacements: Array) -> Array:
     observes joints and positions only would have to learn the arm's kinematics first.
 
     Args:
-        hand: What :func:`hand_frame_and_velocities` gives.
-        displacements: m, shape (n, displacements, 3).
+        hand: Frames and velocities of the hand, from :func:`hand_frame_and_velocities`.
+        displacements: Displacements, m, shape (n, displacements, 3).
 
     Returns:
         Shape (n, displacements, joints).
@@ -114,7 +114,7 @@ def scaled_displacements(state: State, hand: Array, column: Column) -> Array:
 
     Args:
         state: A batch of n states.
-        hand: What :func:`hand_frame` gives, or more columns.
+        hand: Frames of the hand, from :func:`hand_frame`, maybe with more columns.
         column: The objects.
 
     Returns:
@@ -168,9 +168,9 @@ def distances_above(state: State, hand: Array, column: Column, height: float) ->
 
     Args:
         state: A batch of n states.
-        hand: What :func:`hand_frame` gives, or more columns.
-        column: The objects.
-        height: Of the points above the middles, m.
+        hand: Frames of the hand, from :func:`hand_frame`, maybe with more columns.
+        column: Objects whose distances are wanted.
+        height: Height of the points above the middles, m.
 
     Returns:
         m, shape (n, objects).
@@ -185,9 +185,9 @@ def displacements_above(state: State, hand: Array, column: Column, height: float
 
     Args:
         state: A batch of n states.
-        hand: What :func:`hand_frame` gives, or more columns.
-        column: The objects.
-        height: Of the points above the middles, m.
+        hand: Frames of the hand, from :func:`hand_frame`, maybe with more columns.
+        column: Objects whose displacements are wanted.
+        height: Height of the points above the middles, m.
 
     Returns:
         Along the base's axes, m, shape (n, objects, 3).
@@ -201,7 +201,7 @@ def displacements(state: State, hand: Array, column: Column) -> Array:
 
     Args:
         state: A batch of n states.
-        hand: What :func:`hand_frame` gives, or more columns.
+        hand: Frames of the hand, from :func:`hand_frame`, maybe with more columns.
         column: The objects.
 
     Returns:
@@ -212,12 +212,12 @@ def displacements(state: State, hand: Array, column: Column) -> Array:
 
 
 def separations(state: State, thing: Object, column: Column) -> Array:
-    """Distances between middles; for the robot, from its hand.
+    """Distances from the middle of a thing, or from the robot's hand, to the middles of objects.
 
     Args:
         state: A batch of n states.
-        thing: From where.
-        column: The objects to which.
+        thing: Object that distances are measured from; a robot's are measured from its hand.
+        column: Objects that distances are measured to.
 
     Returns:
         m, shape (n, objects).

@@ -24,11 +24,11 @@ def free_placements(
     """The free places of a grid, the nearest first.
 
     Args:
-        near: What they are to be near to.
-        middle: Of the rectangle, a place of the grid.
-        half: Half the edges of the rectangle that the places are in.
-        taken: Middles of what stands there, and the distance from each at least.
-        spacing: Of the grid, m.
+        near: Place that the free places are to be near to: x, y in m.
+        middle: Middle of the rectangle, which is a place of the grid: x, y in m.
+        half: Half the edges of the rectangle that the places are in, m.
+        taken: Middles of what stands there, each with the least distance of a place from it, m.
+        spacing: Distance between neighbouring places of the grid, m.
 
     Returns:
         At most MAX_PLACEMENTS, nearest first.

@@ -35,11 +35,11 @@ class PlanningScene:
     def checker(
         self, state: State, touched: tuple[Object, ...] = (), held_margin: float = PLACING
     ) -> CollisionChecker:
-        """What is free of collisions in a state.
+        """The collision checker of a state.
 
         Args:
-            state: Where everything is.
-            touched: What the arm, or what it holds, may touch.
+            state: Current state.
+            touched: Objects that the arm, or what it holds, may touch.
             held_margin: Distance that a held body keeps from the rest, m.
 
         Returns:

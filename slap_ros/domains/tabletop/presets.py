@@ -29,9 +29,9 @@ class ArmSettings(TaskSettings):
     """Tasks on a table, and how the arm may move in them.
 
     Args:
-        timing: Of given skills. ``limit``: as fast as the joints may move. ``tens``: the paper's,
-            in multiples of ten control steps, at any speed.
-        shortcut_speed: How fast shortcuts may move the joints, as a share of their speed limit.
+        timing: Timing of given skills. ``limit``: as fast as the joints may move. ``tens``: the
+            paper's, in multiples of ten control steps, at any speed.
+        shortcut_speed: Highest speed of the joints in shortcuts, as a share of their speed limit.
     """
 
     limits: ClassVar = ARM_LIMITS

@@ -28,16 +28,16 @@ class ScalarBox:
         """Take a pose in the base's frame, and compute the heights.
 
         Args:
-            x: Of its middle, m.
-            y: Of its middle, m.
-            z: Of its middle, m.
-            qw: Parts of its quaternion, in the order of ``footprints.PARTS``.
-            qz: See ``qw``.
-            qx: See ``qw``.
-            qy: See ``qw``.
-            a: Half its edge along its own x, m.
-            b: Half its edge along its own y, m.
-            c: Half its edge along its own z, m.
+            x: X of the box's middle, m.
+            y: Y of the box's middle, m.
+            z: Z of the box's middle, m.
+            qw: Part w of the box's quaternion.
+            qz: Part z of the box's quaternion.
+            qx: Part x of the box's quaternion.
+            qy: Part y of the box's quaternion.
+            a: Half the box's edge along its own x, m.
+            b: Half the box's edge along its own y, m.
+            c: Half the box's edge along its own z, m.
         """
         self.x, self.y = x, y
         self._q, self._half = (qw, qz, qx, qy), (a, b, c)
@@ -48,7 +48,7 @@ class ScalarBox:
         self._frame: tuple[Vector2, Vector2] | None = None
 
     def covers(self, other: ScalarBox) -> bool:
-        """Whether it is over the other somewhere, both seen from above along the other's axes."""
+        """Whether this box is over the other, both seen from above along the other's axes."""
         x, y = self.x - other.x, self.y - other.y
         # However they are turned, a box reaches as far as its shortest half edge, and never as far
         # as all three together.
@@ -69,7 +69,7 @@ class ScalarBox:
         return ahead + more_ahead >= 0.0 and aside + more_aside >= 0.0
 
     def _find_frame(self) -> tuple[Vector2, Vector2]:
-        """Cosine and sine of its yaw (see ``footprints.inverse_yaws``), and its reach along it."""
+        """Cosine and sine of the box's yaw (see ``footprints.inverse_yaws``), and its reach."""
         w, z, x, y = self._q
         a, b = (w, z) if self._up > 0.0 else (x, y)
         scale = 1.0 / (a * a + b * b)
@@ -78,7 +78,7 @@ class ScalarBox:
         return self._frame
 
     def _reach(self, cos: float, sin: float) -> Vector2:
-        """How far it reaches from its middle, ahead and aside."""
+        """How far the box reaches from its middle, ahead and aside."""
         w, z, x, y = self._q
         a, b, c = self._half
         ax, ay = (w * w + x * x - y * y - z * z) * a, 2.0 * (x * y + w * z) * a

@@ -77,12 +77,12 @@ class TransitSkill:
     leave a block so close to a place that another, held over it, would touch the top of the first.
 
     Args:
-        name: The operator's.
-        timing: How fast.
-        transits: Where to; see :data:`Transits`.
+        name: Name of the operator.
+        timing: Timing of the paths.
+        transits: Function that gives the transits to try; see :data:`Transits`.
         gripper: The gripper command at the goal.
-        lift: How far to go up after it, m.
-        step_limit: Environment steps.
+        lift: Height to which the hand is lifted after the gripper command, m.
+        step_limit: Environment steps after which the skill fails.
     """
 
     name: str

@@ -32,7 +32,7 @@ def bodies(layout: Layout) -> Column:
 
 
 def held_body(state: State) -> Object | None:
-    """What is in the hand."""
+    """The body in the hand; None if there is none."""
     for body in bodies(state.layout).objects:
         if state.get(body, "held") > 0.5:
             return body

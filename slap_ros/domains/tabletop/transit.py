@@ -66,11 +66,11 @@ class Transit:
     """How the grasp point gets to one of several goals: retreat, crossing, approach.
 
     Args:
-        scene: What to keep clear of.
-        state: Where it begins.
+        scene: Collision geometry of the domain.
+        state: State in which the transit begins.
         goals: Poses of the grasp point, any of which will do.
-        touched: What the arm or its body may touch during the approach.
-        clearance: Between a goal and where the crossing to it ends, m.
+        touched: Objects that the arm or its body may touch during the approach.
+        clearance: Distance between a goal and where the crossing to it ends, m.
     """
 
     scene: PlanningScene
@@ -80,7 +80,7 @@ class Transit:
     clearance: float = CLEARANCE
 
     def from_higher(self) -> Transit:
-        """The same, with an approach that begins twice as high."""
+        """The same transit with an approach that begins twice as high."""
         return replace(self, clearance=HIGHER)
 
     def paths(self) -> list[Path]:

@@ -59,9 +59,9 @@ class LibraryProgress:
     """What came of a goal's tasks with one library.
 
     Args:
-        digest: Of the library.
-        seed: That it was trained with.
-        rollouts: One for each task.
+        digest: Digest of the library.
+        seed: Seed that the library was trained with.
+        rollouts: Rollouts of the plans, one per task.
     """
 
     digest: str
@@ -105,10 +105,10 @@ class GoalProgress:
     """All libraries of one origin at one goal.
 
     Args:
-        domain: Its name.
-        goal: By name; empty for the goal that comes with each task.
-        origin: Of the libraries: their proposer and their rewarder.
-        libraries: One at least.
+        domain: Name of the domain.
+        goal: Name of the goal; empty for the goal that comes with each task.
+        origin: Proposer and rewarder of the libraries.
+        libraries: Progress with each library, one at least.
     """
 
     domain: str
@@ -118,7 +118,7 @@ class GoalProgress:
 
     @property
     def rollouts(self) -> list[PlanRollout]:
-        """Of all libraries."""
+        """The rollouts of all libraries."""
         return [rollout for library in self.libraries for rollout in library.rollouts]
 
     @property
@@ -128,7 +128,7 @@ class GoalProgress:
 
     @property
     def solved(self) -> Interval:
-        """Wilson's, of the share of tasks whose stages were all done."""
+        """Wilson's interval of the share of tasks whose stages were all done."""
         done = sum(rollout.progress == 1.0 for rollout in self.rollouts)
         return wilson_interval(done, len(self.rollouts))
 
@@ -138,7 +138,7 @@ class GoalProgress:
         return PAPER.get((self.domain, self.goal))
 
     def as_json(self) -> dict[str, Any]:
-        """The summary, and each library's."""
+        """The summary, and that of each library."""
         return {
             "goal": self.goal,
             **self.origin._asdict(),
@@ -172,10 +172,11 @@ def study(
     """Carry out plans with the skills of libraries.
 
     Args:
-        choices: The domain, with each library for skills.
-        counts: Tasks of each goal, by name; an empty name for the goal that comes with each task.
-        seed: Of the tasks.
-        runner: Carries out plans.
+        choices: Domain with the skills of each library.
+        counts: Number of tasks of each goal, by name; an empty name for the goal that comes with
+            each task.
+        seed: Seed of the tasks.
+        runner: Runner of the jobs.
 
     Returns:
         The report.
@@ -233,10 +234,10 @@ def carry_out_task(choice: DomainChoice, goal: str, seed: int, index: int) -> di
     """Carry out one task's plan.
 
     Args:
-        choice: The domain, with a library for skills.
-        goal: By name; empty for the task's own.
-        seed: Of the task.
-        index: Of the task.
+        choice: Domain with the skills of a library.
+        goal: Name of the goal; empty for the task's own.
+        seed: Seed of the task.
+        index: Index of the task.
 
     Returns:
         A :class:`~slap_ros.acquisition.curriculum.rollouts.PlanRollout` as JSON, without states.

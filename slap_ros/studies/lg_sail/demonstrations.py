@@ -39,12 +39,13 @@ class DemonstratedTask:
     """What came of one task.
 
     Args:
-        index: Of the task among its seed's.
+        index: Index of the task among those of its seed.
         success: Whether the goal was reached.
         steps: Environment steps executed.
-        replans: Plans after the first.
-        begun: Options begun, by operator.
-        failed: Of them, those that did not end in the abstract state that was expected.
+        replans: Number of plans after the first.
+        begun: Number of options begun, by operator.
+        failed: Number of begun options that did not end in the expected abstract state, by
+            operator.
         reason: Why the goal was not reached; empty where it was.
     """
 
@@ -76,17 +77,17 @@ class GoalDemonstrations:
 
     @property
     def interval(self) -> Interval:
-        """Wilson's, of the rate."""
+        """Wilson's interval of the rate."""
         return wilson_interval(self.solved, len(self.tasks))
 
     @property
     def steps(self) -> Spread | None:
-        """Over solved tasks; None without any."""
+        """Environment steps of solved tasks; None without any."""
         return spread_of([float(task.steps) for task in self.tasks if task.success])
 
     @property
     def replans(self) -> Spread:
-        """Over all tasks."""
+        """Replans of all tasks."""
         return Spread.of([float(task.replans) for task in self.tasks])
 
     @property
@@ -141,10 +142,11 @@ def study(
     """Let the demonstrator solve tasks.
 
     Args:
-        choice: The domain, with its demonstrator for skills.
-        counts: Tasks of each goal, by name; an empty name for the goal that comes with each task.
-        seed: Of the tasks.
-        runner: Solves tasks.
+        choice: Domain with its demonstrator for skills.
+        counts: Number of tasks of each goal, by name; an empty name for the goal that comes with
+            each task.
+        seed: Seed of the tasks.
+        runner: Runner of the jobs.
 
     Returns:
         The report.
@@ -195,10 +197,10 @@ def demonstrate_task(choice: DomainChoice, goal: str, seed: int, index: int) -> 
     """Solve one task.
 
     Args:
-        choice: The domain, with its demonstrator for skills.
-        goal: By name; empty for the task's own.
-        seed: Of the task.
-        index: Of the task.
+        choice: Domain with its demonstrator for skills.
+        goal: Name of the goal; empty for the task's own.
+        seed: Seed of the task.
+        index: Index of the task.
 
     Returns:
         What came of it.

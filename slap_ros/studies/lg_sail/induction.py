@@ -49,9 +49,10 @@ class GoalPlans:
     """What operators are worth for a goal.
 
     Args:
-        goal: By name; empty for the goal that comes with each task.
-        lengths: Operators of a shortest plan, by task; None where there is no plan.
-        shortest: The same with hand-written operators.
+        goal: Name of the goal; empty for the goal that comes with each task.
+        lengths: Number of operators of a shortest plan, by task; None where there is no plan.
+        shortest: Number of operators of a shortest plan with hand-written operators, by task; None
+            where there is no plan.
     """
 
     goal: str
@@ -66,7 +67,7 @@ class GoalPlans:
 
     @property
     def as_short(self) -> int:
-        """Tasks whose plan has as few operators."""
+        """Number of tasks whose plan has as few operators as with hand-written ones."""
         return sum(ours == best for ours, best in self.pairs)
 
 
@@ -75,10 +76,10 @@ class Induction:
     """Operators from so many demonstrations, and what they are worth.
 
     Args:
-        demonstrations: How many.
-        operators: As text, with preconditions and effects.
+        demonstrations: Number of demonstrations.
+        operators: Operators as text, with preconditions and effects.
         too_many: Preconditions that hand-written operators with the same effects lack, by operator.
-        goals: What they are worth, by goal.
+        goals: Plans with the operators, by goal.
     """
 
     demonstrations: int
@@ -102,7 +103,7 @@ class Induction:
         return all(goal.as_short == len(goal.pairs) for goal in self.goals)
 
     def as_json(self) -> dict[str, Any]:
-        """Operators, plans and what is too many."""
+        """Operators, plans and superfluous preconditions."""
         return {
             "demonstrations": self.demonstrations,
             "complete": self.complete,
@@ -123,7 +124,7 @@ class Induction:
 
 
 def _cell(goal: GoalPlans) -> str:
-    """Of how many tasks the plan is as short; how long the others' are."""
+    """Share of the tasks whose plan is as short as possible, and how long the others' plans are."""
     found = [(ours, best) for ours, best in goal.pairs if ours is not None]
     parts = [f"{goal.as_short} of {len(goal.pairs)}"]
     if missing := len(goal.pairs) - len(found):
@@ -142,11 +143,11 @@ def study(
     """Induce operators from so many demonstrations, and plan with them.
 
     Args:
-        choice: The domain, with its demonstrator for skills.
-        counts: Of demonstrations; the first of as many as the greatest count says.
-        tasks: To plan for, of each goal.
-        seed: Of these tasks.
-        runner: Does it for a count at a time.
+        choice: Domain with its demonstrator for skills.
+        counts: Numbers of demonstrations; each uses the first of them.
+        tasks: Number of tasks to plan for, per goal.
+        seed: Seed of the tasks to plan for.
+        runner: Runner of the jobs, one per count.
 
     Returns:
         The report.
@@ -169,10 +170,10 @@ def induce(choice: DomainChoice, count: int, tasks: int, seed: int) -> Induction
     """Operators from some demonstrations, and what they are worth.
 
     Args:
-        choice: The domain, with its demonstrator for skills.
-        count: Of demonstrations.
-        tasks: To plan for, of each goal.
-        seed: Of these tasks.
+        choice: Domain with its demonstrator for skills.
+        count: Number of demonstrations.
+        tasks: Number of tasks to plan for, per goal.
+        seed: Seed of the tasks to plan for.
 
     Returns:
         What came of it.

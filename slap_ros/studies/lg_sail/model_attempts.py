@@ -66,11 +66,11 @@ class ModelsOnly:
 
 @dataclass(frozen=True)
 class LanguageModel:
-    """Whom a study asks.
+    """A language model that a study asks.
 
     Args:
-        client: Whoever answers.
-        settings: Which model, and how it samples.
+        client: Client that answers.
+        settings: Name of the model, and how it samples.
     """
 
     client: Client
@@ -80,8 +80,8 @@ class LanguageModel:
         """A conversation of its own for an attempt.
 
         Args:
-            number: Of the attempt, which becomes the seed of the model's sampling.
-            limits: What it may cost.
+            number: Number of the attempt, which becomes the seed of the model's sampling.
+            limits: Budget of the attempt.
         """
         sampling = {**self.settings.sampling, SEED: number}
         settings = replace(self.settings, sampling=sampling)
@@ -90,7 +90,7 @@ class LanguageModel:
 
 @dataclass(frozen=True)
 class Attempt:
-    """What came of it.
+    """How an attempt ended, and what it cost.
 
     Args:
         errors: Classes of what is wrong, by what was asked for; none where it passed.
@@ -152,8 +152,8 @@ def attempt_operators(
     """Ask once for a decomposition and each of its operators, until an answer does not pass.
 
     Args:
-        inquiry: The conversation.
-        problem: What they are for.
+        inquiry: Conversation with the model.
+        problem: Problem that the operators are for.
 
     Returns:
         What came of it, and the operators; none unless the attempt passed.
@@ -180,9 +180,9 @@ def attempt_plan(
     """Ask once for a plan.
 
     Args:
-        inquiry: The conversation.
-        operators: From which there is a plan.
-        problem: Where to start, and what to reach.
+        inquiry: Conversation with the model.
+        operators: Operators that have a plan.
+        problem: Problem to plan for: initial state and goal.
 
     Returns:
         What came of it.
@@ -201,9 +201,9 @@ def attempt_rewards(
     """Ask once for the reward of each operator.
 
     Args:
-        inquiry: The conversation.
-        operators: Whose rewards.
-        problem: Whose metrics there are to choose among.
+        inquiry: Conversation with the model.
+        operators: Operators that need rewards.
+        problem: Problem with the metrics to choose among.
         with_definitions: Whether the metrics' source is quoted.
 
     Returns:

@@ -66,12 +66,12 @@ class PlanTrial:
     """A task, and the attempts that it took.
 
     Args:
-        model: Who was asked.
-        variant: Who plans.
-        attempts: At operators, in order.
-        plans: At plans with those that passed; none of A*'s.
+        model: Name of the model that was asked.
+        variant: Name of the variant, which says what plans.
+        attempts: Attempts at operators, in order.
+        plans: Attempts at plans with operators that passed; none where A* plans.
         found: Whether there is a plan in the end.
-        cpu_seconds: That this process worked for it, a model in it included.
+        cpu_seconds: CPU time of this process for the trial, with that of a model in it, s.
     """
 
     model: str
@@ -87,7 +87,7 @@ class PlanTrial:
         return self.attempts + self.plans
 
     def as_json(self) -> dict[str, Any]:
-        """As the report has it: how each attempt ended, and what all of them cost."""
+        """The trial in the report: how each attempt ended, and what all of them cost."""
         return {
             "found": self.found,
             "attempts": [attempt.verdict for attempt in self.attempts],
@@ -114,13 +114,13 @@ class PlanTrials:
 
     @property
     def operators(self) -> tuple[int, int]:
-        """Attempts that passed, and all."""
+        """Number of attempts that passed, and of all attempts."""
         attempts = [attempt for trial in self.trials for attempt in trial.attempts]
         return sum(attempt.passed for attempt in attempts), len(attempts)
 
     @property
     def planning(self) -> tuple[int, int]:
-        """Plans that reach the goal, and those attempted with sound operators."""
+        """Number of plans that reach the goal, and of plans attempted with sound operators."""
         if self.trials[0].variant == SEARCH:
             sound = self.operators[0]
             return sound, sound
@@ -129,12 +129,12 @@ class PlanTrials:
 
     @property
     def overall(self) -> tuple[int, int]:
-        """Tasks with a plan, and all."""
+        """Number of tasks with a plan, and of all tasks."""
         return sum(trial.found for trial in self.trials), len(self.trials)
 
     @property
     def attempts(self) -> float | None:
-        """For each plan that was found; None where none was."""
+        """Number of attempts for each plan that was found; None where none was."""
         found = self.overall[0]
         return self.operators[1] / found if found else None
 
@@ -146,7 +146,7 @@ class PlanTrials:
 
     @property
     def cost(self) -> tuple[float, float, float]:
-        """Of an attempt, in the mean: tokens, seconds of waiting, seconds of the processor."""
+        """Mean cost of an attempt: tokens, seconds of waiting, CPU seconds."""
         every = [one for trial in self.trials for one in trial.every]
         sums = (
             sum(one.tokens for one in every),
@@ -189,11 +189,11 @@ def study(
     """Ask each model for a plan of each task, in each variant.
 
     Args:
-        models: By name.
-        problems: A task per plan.
-        variants: Of :data:`VARIANTS`.
-        most_attempts: For one plan.
-        runner: Keeps what was asked already, and is in this process: models cannot be sent.
+        models: Language models by name.
+        problems: Problems, one per plan.
+        variants: Names of variants, of :data:`VARIANTS`.
+        most_attempts: Largest number of attempts at one plan.
+        runner: Runner of the jobs. It must be in this process: models cannot be sent to others.
 
     Returns:
         The report.

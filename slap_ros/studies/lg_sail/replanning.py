@@ -47,9 +47,9 @@ class LibraryOutcomes:
     """What came of a goal's tasks with one library.
 
     Args:
-        digest: Of the library.
-        seed: That it was trained with.
-        trials: One for each task.
+        digest: Digest of the library.
+        seed: Seed that the library was trained with.
+        trials: Trials, one per task.
     """
 
     digest: str
@@ -86,8 +86,8 @@ class ReplanningRow:
     """Libraries at one goal: the one that ships, or those that other seeds trained.
 
     Args:
-        goal: By name; empty for the goal that comes with each task.
-        libraries: One at least.
+        goal: Name of the goal; empty for the goal that comes with each task.
+        libraries: Outcomes with each library, one at least.
     """
 
     goal: str
@@ -95,12 +95,12 @@ class ReplanningRow:
 
     @property
     def trials(self) -> list[Trial]:
-        """Of all libraries."""
+        """The trials of all libraries."""
         return [trial for library in self.libraries for trial in library.trials]
 
     @property
     def seeds(self) -> str:
-        """That the libraries were trained with."""
+        """The seeds that the libraries were trained with, in words."""
         plural = "s" if len(self.libraries) > 1 else ""
         return f"seed{plural} {', '.join(str(library.seed) for library in self.libraries)}"
 
@@ -116,17 +116,17 @@ class ReplanningRow:
 
     @property
     def interval(self) -> Interval:
-        """Wilson's, of the rate."""
+        """Wilson's interval of the rate."""
         return wilson_interval(self.solved, len(self.trials))
 
     @property
     def replans(self) -> Spread:
-        """Over all tasks."""
+        """Replans of all tasks."""
         return Spread.of([float(trial.replans) for trial in self.trials])
 
     @property
     def steps(self) -> Spread | None:
-        """Over solved tasks; None without any."""
+        """Environment steps of solved tasks; None without any."""
         return spread_of([float(trial.plan_length) for trial in self.trials if trial.success])
 
     @property
@@ -136,7 +136,7 @@ class ReplanningRow:
         return Counter(ErrorCode(trial.error_code).name for trial in failed)
 
     def as_json(self) -> dict[str, Any]:
-        """The summary, and each library's."""
+        """The summary, and that of each library."""
         return {
             "goal": self.goal,
             "tasks": len(self.trials),
@@ -170,9 +170,9 @@ def study(
     """Solve tasks with the skills of libraries, planning again where plans fail.
 
     Args:
-        experiments: The tasks of each library, that which ships first.
-        goals: By name; an empty name for the goal that comes with each task.
-        runner: Solves tasks.
+        experiments: Experiment with each library; the first library is the one that ships.
+        goals: Names of goals; an empty name for the goal that comes with each task.
+        runner: Runner of the jobs.
 
     Returns:
         The report.

@@ -46,8 +46,8 @@ class RewardTrials:
     """All trials in which the same was shown.
 
     Args:
-        metrics: What was shown of them, of :data:`METRICS`.
-        attempts: One per trial.
+        metrics: What was shown of the metrics, one of :data:`METRICS`.
+        attempts: Attempts, one per trial.
     """
 
     metrics: str
@@ -97,12 +97,12 @@ def study(
     """Ask for the rewards of all operators, again and again.
 
     Args:
-        model: Whom to ask.
-        problem: Whose metrics there are to choose among.
-        operators: Whose rewards.
-        shown: Of :data:`METRICS`.
-        trials: Of each.
-        runner: Keeps what was asked already, and is in this process: models cannot be sent.
+        model: Language model to ask.
+        problem: Problem with the metrics to choose among.
+        operators: Operators that need rewards.
+        shown: What is shown of the metrics: some of :data:`METRICS`.
+        trials: Number of trials for each of ``shown``.
+        runner: Runner of the jobs. It must be in this process: models cannot be sent to others.
 
     Returns:
         The report.
@@ -147,14 +147,14 @@ def _try(
     metrics: str,
     number: int,
 ) -> Attempt:
-    """A trial of its own.
+    """Ask for all rewards once.
 
     Args:
-        model: Whom to ask.
-        problem: Whose metrics there are to choose among.
-        operators: Whose rewards.
-        metrics: What is shown of them.
-        number: Of the trial.
+        model: Language model to ask.
+        problem: Problem with the metrics to choose among.
+        operators: Operators that need rewards.
+        metrics: What is shown of the metrics, one of :data:`METRICS`.
+        number: Number of the trial.
     """
     inquiry = model.inquiry(number, BudgetLimits())
     return attempt_rewards(inquiry, operators, problem, metrics == FULL)
@@ -182,9 +182,9 @@ def draw(figure: Figure, measured: Sequence[RewardTrials], names: Sequence[str])
     """Bars of the share of right rewards, for each operator and for all.
 
     Args:
-        figure: To draw into.
-        measured: A series each.
-        names: Of the operators.
+        figure: Figure to draw into.
+        measured: Trials, one series per entry.
+        names: Names of the operators.
     """
     axes = figure.subplots()
     for number, one in enumerate(measured):

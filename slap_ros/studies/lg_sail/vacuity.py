@@ -71,7 +71,7 @@ class PolicySuccess:
 
     @property
     def interval(self) -> Interval:
-        """Wilson's, of the rate."""
+        """Wilson's interval of the rate."""
         return wilson_interval(self.successes, self.starts)
 
     def as_json(self) -> dict[str, Any]:
@@ -84,11 +84,11 @@ class OperatorVacuity:
     """All policies from all starts of an operator.
 
     Args:
-        operator: Its name.
-        starts: How many.
-        lost: Approaches that did not lead to one.
-        policies: Those that see nothing.
-        learned: The skill of a library, if it is to be judged and there is one.
+        operator: Name of the operator.
+        starts: Number of starts.
+        lost: Number of approaches that did not lead to a start.
+        policies: Success of the policies that see nothing.
+        learned: Success of the skill of a library, if it is to be judged and there is one.
     """
 
     operator: str
@@ -130,11 +130,11 @@ def study(
     """Let policies without eyes act where skills begin.
 
     Args:
-        choice: The domain, with its demonstrator for skills.
-        wanted: Starts of each operator.
-        seed: Of the tasks that are demonstrated.
-        runner: Does what takes long.
-        learned: The domain with a library of skills, which are judged from the same starts.
+        choice: Domain with its demonstrator for skills.
+        wanted: Number of starts of each operator.
+        seed: Seed of the tasks that are demonstrated.
+        runner: Runner of the jobs.
+        learned: Domain with a library of skills, which are judged from the same starts.
 
     Returns:
         The report.
@@ -172,8 +172,8 @@ def _judged(learned: DomainChoice | None, domain: Domain) -> tuple[str, ...]:
     """The operators whose learned skills are judged: those that are demonstrated.
 
     Args:
-        learned: The domain with a library of skills; None without one.
-        domain: With its demonstrator for skills.
+        learned: Domain with a library of skills; None without one.
+        domain: Domain with its demonstrator for skills.
 
     Raises:
         InvalidParameterError: There are none.
@@ -197,13 +197,13 @@ def _report(
     never: Sequence[str],
     learned: DomainChoice | None,
 ) -> StudyReport:
-    """What was found.
+    """The report of what was found.
 
     Args:
-        choice: The domain.
-        horizon: Environment steps of a skill.
-        found: By operator.
-        never: Operators without a start.
+        choice: Chosen domain.
+        horizon: Largest number of environment steps of a skill.
+        found: Success of the policies, one entry per operator.
+        never: Names of operators without a start.
         learned: The domain with the library whose skills were judged, if there is one.
 
     Raises:
@@ -260,11 +260,11 @@ def _gather(
     """Starts by operator, in the order of tasks; and how many approaches led to none.
 
     Args:
-        domain: Opened.
-        choice: The domain, for other processes.
-        wanted: Starts of each operator.
-        seed: Of the tasks.
-        runner: Does what takes long.
+        domain: Opened domain, with its demonstrator for skills.
+        choice: Choice of the same domain, for other processes.
+        wanted: Number of starts of each operator.
+        seed: Seed of the tasks.
+        runner: Runner of the jobs.
     """
     goals = list(domain.goals) or [""]
     starts: dict[str, list[Any]] = {}
@@ -292,10 +292,10 @@ def gather_starts(choice: DomainChoice, goal: str, seed: int, index: int) -> lis
     """The starts that one demonstration gives.
 
     Args:
-        choice: The domain, with its demonstrator for skills.
-        goal: By name; empty for the task's own.
-        seed: Of the task.
-        index: Of the task.
+        choice: Domain with its demonstrator for skills.
+        goal: Name of the goal; empty for the task's own.
+        seed: Seed of the task.
+        index: Index of the task.
 
     Returns:
         For each option that was begun: task, operator, objects, and the state after the approach as
@@ -376,10 +376,10 @@ def try_policies(
     """Let every policy act from a start.
 
     Args:
-        choice: The domain, with its demonstrator for skills.
-        number: Of the start among its operator's; with it the random policy's numbers.
-        start: As :func:`gather_starts` gives it.
-        learned: The domain with a library that has a skill for the start's operator; its policy is
+        choice: Domain with its demonstrator for skills.
+        number: Number of the start among its operator's; it also seeds the random policy.
+        start: Start, as :func:`gather_starts` gives it.
+        learned: Domain with a library that has a skill for the start's operator. Its policy is
             tried too, without the approach, which was made already.
 
     Returns:

@@ -87,12 +87,12 @@ class AblationSetup:
 
     Args:
         domain: Name of the domain.
-        preset: Of the domain.
-        steps: Environment steps of each training, all stages together; None: as the domain's
-            settings have it.
-        tasks: How many are planned for with what was learned.
-        first_seed: Seed of these tasks.
-        sampling: How shortcuts are tried out in the model.
+        preset: Name of the domain's preset.
+        steps: Environment steps of each training, all stages together; None: those of the domain's
+            settings.
+        tasks: Number of tasks that are planned for with what was learned.
+        first_seed: Seed of the tasks that are planned for.
+        sampling: Settings of how shortcuts are tried out in the model.
     """
 
     domain: str
@@ -103,7 +103,7 @@ class AblationSetup:
     sampling: Sampling
 
     def tasks_of(self, seed: int, term: str = NOTHING) -> TaskDistribution:
-        """Those of a training without a term."""
+        """The tasks of a training without a term."""
         return TaskDistribution(AblatedChoice(self.domain, self.preset, term=term), seed)
 
     def settings(self, term: str) -> TrainingSettings:
@@ -133,7 +133,7 @@ class AblationSetup:
 
 @dataclass(frozen=True)
 class TermResult:
-    """What was learned without a term, as JSON has it, a training each."""
+    """What was learned without a term, as JSON data, one entry per training."""
 
     term: str
     trainings: tuple[Mapping[str, Any], ...]
@@ -146,7 +146,7 @@ class TermResult:
 
     @property
     def steps(self) -> Spread | None:
-        """Of successful episodes, over the trainings that had any."""
+        """Environment steps of successful episodes, over the trainings that had any."""
         known = [float(one["steps"]) for one in self.trainings if one["success"] > 0.0]
         return Spread.of(known) if known else None
 
@@ -179,11 +179,11 @@ def study(
     """Learn with and without each term, and plan with what was learned.
 
     Args:
-        setup: What is learned, and how it is tried.
-        terms: What is left out, of :meth:`AblationSetup.terms`.
-        trainings: How many of each, with seeds from 0 on.
-        runner: Does what takes long.
-        folder: Of checkpoints.
+        setup: Settings of learning and of planning.
+        terms: Terms to leave out, of :meth:`AblationSetup.terms`.
+        trainings: Number of trainings per term, with seeds from 0 on.
+        runner: Runner of the jobs.
+        folder: Folder for checkpoints.
 
     Returns:
         The report.
@@ -232,8 +232,8 @@ def find_problem(setup: AblationSetup, seed: int) -> dict[str, Any]:
     """The most promising shortcut of a training that can begin somewhere, and its starts.
 
     Args:
-        setup: Domain and settings.
-        seed: Of the training.
+        setup: Settings of learning and of planning.
+        seed: Seed of the training.
 
     Returns:
         Name, signature and starts, as JSON.
@@ -281,11 +281,11 @@ def learn_without(
     """Learn a shortcut without a term, and plan with it.
 
     Args:
-        setup: What is learned, and how it is tried.
-        term: What is left out.
-        seed: Of the training.
-        problem: What :func:`find_problem` found for that seed.
-        folder: Of checkpoints.
+        setup: Settings of learning and of planning.
+        term: Term that is left out.
+        seed: Seed of the training.
+        problem: Problem that :func:`find_problem` found for that seed.
+        folder: Folder for checkpoints.
 
     Returns:
         Success and steps in training, and how each task was solved by each approach.

@@ -114,7 +114,7 @@ def study(folders: Sequence[TrainingFolder], comparison: Comparison) -> StudyRep
     """The curves in the work folders of trainings, and plans in the course of them.
 
     Args:
-        folders: Of one domain.
+        folders: Work folders of trainings in one domain.
         comparison: Pure planning, and for plans SLAP with a library that one of the trainings made.
 
     Returns:
@@ -162,7 +162,7 @@ def plan_while_learned(
     """Plan with the shortcuts of a library as they were while they were learned.
 
     Args:
-        folders: Of trainings, one of which has made the library.
+        folders: Work folders of trainings, one of which has made the library.
         comparison: Pure planning, and SLAP with the library; the tasks.
 
     Returns:
@@ -222,9 +222,9 @@ def draw(
     """Draw success above, length below, one line per shortcut; below them plans.
 
     Args:
-        figure: To draw into.
-        learned: A line each.
-        planned: In order of their steps; may be none.
+        figure: Figure to draw into.
+        learned: Curves, one per line.
+        planned: Plans in the order of their steps; may be none.
     """
     above, below, *rest = figure.subplots(4 if planned else 2, 1, sharex=True)
     for number, one in enumerate(learned):

@@ -32,7 +32,7 @@ tasks that both solved. A task for which no plan is found counts as failed."""
 
 @dataclass(frozen=True)
 class StudyCondition:
-    """One value of one setting; neither, where the preset is unchanged."""
+    """One value of one setting; neither of them where the preset is unchanged."""
 
     setting: str | None
     value: str | None
@@ -107,7 +107,7 @@ def draw(
     """Draw one column per setting: success above, length below.
 
     Args:
-        figure: To draw into.
+        figure: Figure to draw into.
         conditions: The unchanged preset, which is at the left of every column, then the others.
         variations: The settings, in the order of columns.
     """

@@ -129,10 +129,10 @@ def solve_for(setup: PlanningSetup, seed: int, index: int, goal: NamedGoal) -> T
     """Solve one task for another goal.
 
     Args:
-        setup: Makes domain and planner, in the process where this runs.
-        seed: Of the task.
-        index: Number of the task among its seed's.
-        goal: Instead of the task's own.
+        setup: Choice of domain, planner and approach; they are made in the process that runs this.
+        seed: Seed of the task.
+        index: Index of the task among those of its seed.
+        goal: Goal in place of the task's own.
 
     Returns:
         What came of it.

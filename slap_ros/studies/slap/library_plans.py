@@ -25,9 +25,9 @@ class LibraryPlans:
     """Executed plans with some shortcuts.
 
     Args:
-        shortcuts: Their names.
-        trials: By seed and index.
-        baseline: The same tasks, by pure planning.
+        shortcuts: Names of the shortcuts.
+        trials: Trials with the shortcuts, by seed and index.
+        baseline: Trials of the same tasks with pure planning.
     """
 
     shortcuts: tuple[str, ...]
@@ -47,7 +47,7 @@ class LibraryPlans:
 
     @property
     def relative(self) -> float | None:
-        """Relative to pure planning, on tasks that both solved; None where there are none."""
+        """Length relative to pure planning, on tasks that both solved; None without any."""
         own, other = lengths_of_both(self.trials, self.baseline)
         return sum(own) / sum(other) if other else None
 
@@ -68,7 +68,7 @@ class LibraryPlans:
         return {**self.summary(), "trials": [trial.as_json() for trial in self.trials]}
 
     def as_cells(self) -> list[str]:
-        """For a row of a table."""
+        """The cells of a table's row."""
         relative = "-" if self.relative is None else f"{self.relative:.2f}"
         return [str(len(self.shortcuts)), format_spread(self.length, 1), relative]
 
@@ -79,9 +79,9 @@ def plan_with(
     """Solve tasks with other shortcuts than those of a comparison.
 
     Args:
-        comparison: Pure planning, and SLAP; the tasks.
-        shortcuts: In place of the library's; none for pure planning.
-        what: They are; no others in the study are called so.
+        comparison: Comparison of pure planning with SLAP, and its tasks.
+        shortcuts: Shortcuts in place of the library's; none for pure planning.
+        what: Name of the shortcuts; nothing else in the study has the same name.
 
     Returns:
         What came of each task, by seed and index.

@@ -177,7 +177,7 @@ def study(comparison: Comparison, max_replans: int) -> StudyReport:
 def _measure(
     comparison: Comparison, kind: str, value: str, quality: Quality, max_replans: int
 ) -> Iterator[NoiseLevel]:
-    """A level, an approach each."""
+    """A noise level, with what came of each approach."""
     jobs = {
         name: (quality, max_replans, *task)
         for name, task in named_tasks(comparison.experiment).items()
@@ -194,11 +194,11 @@ def solve_perceived(
     """Solve one task as it is perceived.
 
     Args:
-        setup: Makes domain and planner, in the process where this runs.
-        quality: How well is perceived.
-        max_replans: Plans after the first.
-        seed: Of the task, and with ``index`` of the noise.
-        index: Number of the task among its seed's.
+        setup: Choice of domain, planner and approach; they are made in the process that runs this.
+        quality: Quality of the perception.
+        max_replans: Largest number of plans after the first.
+        seed: Seed of the task; seed and ``index`` together are the seed of the noise.
+        index: Index of the task among those of its seed.
 
     Returns:
         What came of it, in the world and in the planner's belief.
@@ -267,7 +267,7 @@ def draw(figure: Figure, levels: Sequence[NoiseLevel]) -> None:
 
 
 def _plot(column: Sequence[Axes], levels: Sequence[NoiseLevel], values: Sequence[str]) -> None:
-    """Approaches beside each other; exact perception at 0, the others from 1 on."""
+    """Draw approaches beside each other; exact perception at 0, the others from 1 on."""
     names = list(dict.fromkeys(one.approach for one in levels))
     places = range(len(values)) if values == [EXACT] else range(1, len(values) + 1)
     for number, name in enumerate(names):

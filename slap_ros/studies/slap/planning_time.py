@@ -140,9 +140,9 @@ def plan_once(setup: PlanningSetup, seed: int, index: int) -> PlanningTrial:
     """Plan for one task.
 
     Args:
-        setup: Makes domain and planner, in the process where this runs.
-        seed: Of the task.
-        index: Number of the task among its seed's.
+        setup: Choice of domain, planner and approach; they are made in the process that runs this.
+        seed: Seed of the task.
+        index: Index of the task among those of its seed.
 
     Returns:
         What planning took, whether or not it found a plan.
@@ -198,9 +198,9 @@ def draw(figure: Figure, variation: Variation, costs: Sequence[PlanningCost]) ->
     """Draw seconds, edges rolled out and edges of the graph beside each other.
 
     Args:
-        figure: To draw into.
-        variation: The setting on the horizontal axes.
-        costs: One per value of the setting and approach.
+        figure: Figure to draw into.
+        variation: Setting on the horizontal axes, and its values.
+        costs: Planning cost of each value of the setting and each approach.
     """
     panels = figure.subplots(1, 3)
     places = range(len(variation.values))

@@ -56,9 +56,9 @@ class PrunedCandidates:
     """What is left of one task's candidates.
 
     Args:
-        seed: Of the training.
-        index: Which of its tasks.
-        explored: What exploring it came to.
+        seed: Seed of the training.
+        index: Index of the task in the training.
+        explored: Result of exploring the task.
     """
 
     seed: int
@@ -66,11 +66,11 @@ class PrunedCandidates:
     explored: ExplorationResult
 
     def remaining(self, hits: int) -> int:
-        """Pairs reached in at least so many rollouts."""
+        """Number of pairs reached in at least so many rollouts."""
         return sum(candidate.hits >= hits for candidate in self.explored.candidates)
 
     def percent(self, hits: int) -> float:
-        """The same as part of all candidates, in %; 0 where there are no candidates."""
+        """Share of the pairs that remain, in %; 0 where there are no candidates."""
         return 100.0 * self.remaining(hits) / max(1, self.explored.pairs)
 
     def as_json(self) -> dict[str, Any]:
@@ -97,7 +97,7 @@ def explore(
     Args:
         trainings: The tasks that each draws; all of one domain.
         tasks: Number of tasks per training.
-        settings: How to explore.
+        settings: Settings of exploration.
         runner: Explores.
 
     Returns:
@@ -164,8 +164,8 @@ def study(
     """The report on what is left, by the number of rollouts that must succeed.
 
     Args:
-        pruned: One per task.
-        settings: How all of them were explored.
+        pruned: Candidates of each task.
+        settings: Settings with which all tasks were explored.
         comparison: Pure planning, and for plan length SLAP with a library.
 
     Returns:
@@ -228,8 +228,8 @@ def most_hits(shortcut: Shortcut, explored: Sequence[ExplorationResult]) -> int:
     """Rollouts that reached a candidate which the shortcut was, or could be, learned for.
 
     Args:
-        shortcut: Of a library.
-        explored: The tasks in which candidates were looked for.
+        shortcut: Shortcut of a library.
+        explored: Results of the tasks in which candidates were looked for.
 
     Returns:
         The most in any task; 0 where there was no such candidate.
@@ -277,10 +277,10 @@ def _at(
     """What is left at one threshold.
 
     Args:
-        hits: The threshold.
-        pruned: One per task.
-        settings: How all of them were explored.
-        plans: With the shortcuts that are left, if any were made.
+        hits: Threshold: number of rollouts that must succeed.
+        pruned: Candidates of each task.
+        settings: Settings with which all tasks were explored.
+        plans: Plans with the shortcuts that are left, if any were made.
     """
     return {
         "k": hits,
@@ -292,7 +292,7 @@ def _at(
 
 
 def _different(plans: Iterable[LibraryPlans]) -> list[dict[str, Any]]:
-    """Those with different shortcuts, for the report's JSON."""
+    """The plans with different shortcuts, for the report's JSON."""
     by_shortcuts = {one.shortcuts: one.as_json() for one in plans}
     return list(by_shortcuts.values())
 
@@ -302,7 +302,7 @@ def _by_threshold(
     settings: ExplorationSettings,
     plans: Mapping[int, LibraryPlans],
 ) -> MarkdownTable:
-    """A row per threshold."""
+    """A table with a row per threshold."""
     rows = []
     for hits, own in plans.items():
         percent = format_spread(Spread.of([one.percent(hits) for one in pruned]), 1)
@@ -315,7 +315,7 @@ def _by_threshold(
 def _table(
     pruned: Sequence[PrunedCandidates], settings: ExplorationSettings, different: int
 ) -> MarkdownTable:
-    """One row per task, then all of them."""
+    """A table with one row per task, then one for all of them."""
     hits = settings.hits
     candidates = sum(one.explored.pairs for one in pruned)
     remaining = sum(one.remaining(hits) for one in pruned)
@@ -347,10 +347,10 @@ def draw(
     """Draw what remains against K/N, a thin line per task and the mean; below it plan length.
 
     Args:
-        figure: To draw into.
-        pruned: One per task.
-        settings: How all of them were explored.
-        plans: By threshold; may be none.
+        figure: Figure to draw into.
+        pruned: Candidates of each task.
+        settings: Settings with which all tasks were explored.
+        plans: Plans by threshold; may be none.
     """
     above, *below = figure.subplots(2 if plans else 1, 1, squeeze=False, sharex=True)[:, 0]
     thresholds = _thresholds(settings)
@@ -381,7 +381,7 @@ def draw(
 def _plot(
     axes: Axes, places: Sequence[float], spreads: Sequence[Spread | None], name: str | None
 ) -> None:
-    """Means with their deviations, joined by a line; from 0 on."""
+    """Draw means with their deviations, joined by a line; from 0 on."""
     known = [(place, one) for place, one in zip(places, spreads, strict=True) if one is not None]
     axes.errorbar(
         [place for place, _ in known],

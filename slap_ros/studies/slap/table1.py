@@ -63,9 +63,9 @@ class LibraryTrials:
     """All tasks of a preset, with one library or without.
 
     Args:
-        library: Its name; empty for pure planning.
+        library: Name of the library; empty for pure planning.
         approach: Name of the way to plan.
-        trials: By seed and index.
+        trials: Trials by seed and index.
     """
 
     library: str
@@ -78,11 +78,11 @@ class Row:
     """A way to plan, over all tasks of a preset and all libraries.
 
     Args:
-        preset: Of the domain.
+        preset: Name of the domain's preset.
         approach: Name of the way to plan.
         tasks: Number of different tasks.
-        results: One per library.
-        baseline: Pure planning's trials of the same tasks.
+        results: Trials with each library.
+        baseline: Trials of the same tasks with pure planning.
     """
 
     preset: str
@@ -93,7 +93,7 @@ class Row:
 
     @property
     def trials(self) -> list[Trial]:
-        """Of all libraries."""
+        """The trials of all libraries."""
         return [trial for result in self.results for trial in result.trials]
 
     @property
@@ -109,12 +109,12 @@ class Row:
 
     @property
     def length(self) -> Spread | None:
-        """Over solved tasks; None where none was solved."""
+        """Plan length over solved tasks; None where none was solved."""
         return spread_of([float(t.plan_length) for t in self.trials if t.success])
 
     @property
     def length_over_libraries(self) -> Spread | None:
-        """Over the mean lengths of the libraries; None with fewer than two."""
+        """Spread of the libraries' mean lengths; None with fewer than two libraries."""
         means = [
             fmean(lengths)
             for result in self.results
@@ -181,8 +181,8 @@ def study(
 
     Args:
         experiments: The tasks of each preset.
-        libraries: Each evaluated under every preset.
-        sampling: How shortcuts are tried out.
+        libraries: Libraries; each is evaluated under every preset.
+        sampling: Settings of how shortcuts are tried out.
         runner: Solves tasks.
 
     Returns:
@@ -210,13 +210,13 @@ def _rows(
     sampling: Sampling,
     runner: JobRunner,
 ) -> list[Row]:
-    """Those of one preset, pure planning first.
+    """The rows of one preset, pure planning first.
 
     Args:
-        experiment: Its tasks.
-        libraries: What was trained.
-        sampling: How shortcuts are tried out.
-        runner: Solves tasks.
+        experiment: Tasks of the preset.
+        libraries: Trained libraries.
+        sampling: Settings of how shortcuts are tried out.
+        runner: Runner of the jobs.
     """
     domain = experiment.domain
     planned = [("", "", PURE_PLANNING)]
@@ -244,10 +244,10 @@ def _batch(experiment: Experiment, library: str, digest: str, approach: Approach
     """The tasks of an experiment, for an approach.
 
     Args:
-        experiment: Its tasks.
+        experiment: Tasks to solve.
         library: Name of the library; empty for pure planning.
-        digest: Of the library.
-        approach: How to plan.
+        digest: Digest of the library.
+        approach: Way to plan.
     """
     setup = PlanningSetup(DomainChoice.of(experiment.domain), experiment.planner, approach)
     whose = " ".join(filter(None, (library, digest, approach.name)))
@@ -258,7 +258,7 @@ def _batch(experiment: Experiment, library: str, digest: str, approach: Approach
 
 
 def _ways(library: ShortcutLibrary, domain: Domain, sampling: Sampling) -> tuple[Approach, ...]:
-    """To plan with a library, the one that learned nothing first."""
+    """The ways to plan with a library, the one that learned nothing first."""
     return (shooting(library, domain, sampling), *approaches(library, sampling)[1:])
 
 

@@ -34,9 +34,9 @@ class LearningCurve:
     """How one shortcut was learned.
 
     Args:
-        shortcut: Its name.
-        points: In order of their steps.
-        stages: Where each stage but the first begins, in environment steps.
+        shortcut: Name of the shortcut.
+        points: Points of the curve, in the order of their steps.
+        stages: Environment steps at which each stage but the first begins.
     """
 
     shortcut: str
@@ -96,7 +96,7 @@ class TrainingFolder:
             raise _damaged(path, error) from error
 
     def curves(self) -> tuple[LearningCurve, ...]:
-        """Those of all shortcuts that were, or are being, learned; by name.
+        """The curves of all shortcuts that were, or are being, learned; by name.
 
         Raises:
             InvalidParameterError: There are none, or a file is damaged.
@@ -113,7 +113,7 @@ class TrainingFolder:
         """How a shortcut was in the course of the attempt that came to it.
 
         Args:
-            shortcut: As a library has it.
+            shortcut: Shortcut of a library.
 
         Returns:
             Environment steps and the shortcut as it was then, and itself in the end; None where

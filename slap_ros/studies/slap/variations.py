@@ -29,7 +29,7 @@ class Variation:
 
     @property
     def label(self) -> str:
-        """For an axis, with the unit."""
+        """The label for an axis, with the unit."""
         return LABELS.get(self.setting, self.setting.replace("_", " "))
 
 
@@ -68,13 +68,13 @@ def offered_number(domain: Domain) -> Variation:
 
 
 def _scaled(domain: Domain, setting: str) -> Variation:
-    """A setting at parts and multiples of what it is by default."""
+    """A setting at parts and multiples of its default."""
     middle = fmean(literal_eval(str(domain.configuration[setting])))
     return Variation(setting, tuple(str(factor * middle) for factor in FACTORS))
 
 
 def _settings(domain: Domain, wanted: Iterable[str]) -> list[str]:
-    """Those that the domain's preset has, one at least."""
+    """The settings that the domain's preset has, one at least."""
     found = [setting for setting in wanted if setting in domain.configuration]
     if not found:
         raise InvalidParameterError(

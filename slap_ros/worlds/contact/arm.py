@@ -89,7 +89,7 @@ class _LastLink(NamedTuple):
         return math.atan2(-self.y[0] * x - self.y[1] * y, self.x[0] * x + self.x[1] * y)
 
     def joints(self, q7: float) -> Joints | None:
-        """The configuration for the wrist that a joint 7 makes, with the joint 7 that it wants."""
+        """The configuration for the wrist that a joint 7 makes; its own joint 7 may differ."""
         c7, s7 = math.cos(q7), math.sin(q7)
         (px, py, pz), (ax, ay, az), (bx, by, bz) = self.origin, self.x, self.y
         wx = px - _WRIST * (c7 * ax - s7 * bx)
@@ -115,8 +115,8 @@ def share_in_time(joints: Sequence[float], goal: Sequence[float]) -> float:
     """How much of the way to a configuration the arm can well go in a control period, up to 1.
 
     Args:
-        joints: Where it is, rad.
-        goal: Where it is to be, rad.
+        joints: Present joint positions, rad.
+        goal: Joint positions to go to, rad.
     """
     share = 1.0
     for q, wanted, step in zip(joints, goal, MAX_JOINT_STEP, strict=True):

@@ -60,8 +60,8 @@ def grasped(points: Iterable[ContactPoint], hand: Pose) -> int | None:
     """The free body that both fingers press on from opposite sides; the one gripped hardest.
 
     Args:
-        points: What touches what.
-        hand: The fingers move along its y.
+        points: Contact points.
+        hand: Pose of the hand; the fingers move along its y.
     """
     x, y, z = rotate(hand.quaternion, (0.0, 1.0, 0.0))
     pressing: dict[int, dict[Side, float]] = {}
@@ -86,8 +86,8 @@ def groups(points: Iterable[ContactPoint], surfaces: Sequence[Surface]) -> list[
     """The bodies that touch one another, directly or by others; fixed ones pass nothing on.
 
     Args:
-        points: What touches what.
-        surfaces: The bodies asked about, the hand as its palm; each is in one group.
+        points: Contact points.
+        surfaces: Bodies to be grouped, the hand as its palm; each is in one group.
     """
     group = {surface: {surface} for surface in surfaces}
     for one, other, _, _, distance, _ in points:
@@ -106,5 +106,5 @@ THE_HAND = Surface(Side.PALM)  # stands for its fingers too
 
 
 def _whole(surface: Surface) -> Surface:
-    """What stands for the hand is its palm. A frame passes nothing on."""
+    """The surface that stands for a body: the palm for the hand. Frames pass nothing on."""
     return THE_HAND if surface.side in HAND else surface

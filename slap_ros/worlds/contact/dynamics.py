@@ -92,8 +92,8 @@ class ContactDynamics:
         """How everything is after a control period, and what touches what.
 
         Args:
-            now: How everything is, with what the hand was told now.
-            pull: Where the hand is pulled in this period.
+            now: Present snapshot, with the hand's new command.
+            pull: Pose that the hand is pulled to in this period.
         """
         far = self._is_far(now, pull)
         involved = NOTHING if far else self._involved(now, self._sweep(now.hand, pull))
@@ -150,7 +150,7 @@ class ContactDynamics:
         return Involved(tuple(sorted(movers)), met)
 
     def _unsupported(self, now: ContactSnapshot, left: Sequence[Bounds | None]) -> list[int]:
-        """Those of the bodies that would not stay where they are by themselves."""
+        """The bodies that would not stay where they are by themselves."""
         moving = _all(now)
         quiet = [None if box is None else moving[i] for i, box in enumerate(left)]
         if quiet == self._quiet:
@@ -182,7 +182,7 @@ class ContactDynamics:
         return stands
 
     def _widened(self, now: ContactSnapshot, involved: Involved, outcome: Outcome) -> Involved:
-        """With what was reached although it was not expected to be."""
+        """The bodies involved, with those that were reached although it was not expected."""
         if involved.hand and len(involved.bodies) == self._count:
             return involved
         moving, after = _all(now), self._results(outcome)
@@ -276,7 +276,7 @@ class ContactDynamics:
 
 
 def _alone(now: ContactSnapshot, members: tuple[int, ...]) -> ContactSnapshot:
-    """The same with all else as it always is, so that what is known of these holds for ever."""
+    """The snapshot of some bodies alone; all others, and the hand, always have the same state."""
     count = len(now.bodies)
     return now._replace(
         hand=SOMEWHERE,
@@ -288,7 +288,7 @@ def _alone(now: ContactSnapshot, members: tuple[int, ...]) -> ContactSnapshot:
 
 
 def _all(now: ContactSnapshot) -> tuple[Moving, ...]:
-    """What moves, by number."""
+    """The motion of every free body, then the opening of every jointed one, by number."""
     return (*now.bodies, *now.openings)
 
 
@@ -315,7 +315,7 @@ def _near(some: Iterable[float], others: Iterable[float], distance: float) -> bo
 
 
 def _stopped(motion: Moving) -> Moving:
-    """Where it was, without velocity."""
+    """The motion with the same pose or opening, and without velocity."""
     if motion.still:
         return motion
     return Opening(motion.position) if isinstance(motion, Opening) else BodyState(motion.pose)

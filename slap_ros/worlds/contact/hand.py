@@ -50,7 +50,7 @@ HALF_TURN = (0.0, 0.0, 1.0, 0.0)  # from the left finger to the right one
 
 
 class HandState(NamedTuple):
-    """How the hand is and moves, and what it was told."""
+    """How the hand is and moves, and its last command."""
 
     pose: Pose  # of the grasp point, in the base's frame
     velocity: Vector  # m/s
@@ -63,12 +63,12 @@ class HandState(NamedTuple):
 
     @property
     def target_pose(self) -> Pose:
-        """Where it is pulled."""
+        """The pose that the hand is pulled to."""
         return Pose(self.target, pointing_down(self.target_yaw))
 
     @property
     def yaw(self) -> float:
-        """Of the hand, rad, within half a turn of its target's."""
+        """The yaw of the hand, rad, within half a turn of its target's."""
         x, y, _, _ = self.pose.quaternion
         return self.target_yaw + wrapped(2.0 * math.atan2(y, x) - self.target_yaw)
 
@@ -89,7 +89,7 @@ def pointing_down(yaw: float) -> Quaternion:
 
 
 def wrapped(angle: float) -> float:
-    """The same angle in [-pi, pi), rad."""
+    """The same angle within [-pi, pi), rad."""
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
@@ -99,10 +99,10 @@ def hand_at(
     """A hand that points down, at its target and at rest.
 
     Args:
-        position: Of the grasp point, m.
-        yaw: About the vertical, rad; at 0 the fingers move along the base's y.
+        position: Position of the grasp point, m.
+        yaw: Yaw about the vertical, rad; at 0 the fingers move along the base's y.
         finger: Distance of each finger from the middle, m.
-        closing: What the gripper was told last.
+        closing: Whether the gripper was last told to close.
     """
     return HandState(
         Pose(position, pointing_down(yaw)),
@@ -122,9 +122,9 @@ def own_way(hand: HandState, pull: Pose, forces: HandForces) -> HandState:
     What PyBullet makes of the same, to a few micrometres.
 
     Args:
-        hand: At the beginning.
-        pull: Where it is pulled in this period.
-        forces: How strong it is.
+        hand: Hand at the beginning of the period.
+        pull: Pose that the hand is pulled to in this period.
+        forces: Strength of the hand.
     """
     kick = forces.pull_n / MASS * SUBSTEP_S  # m/s, the most that a substep changes
     ways = [
@@ -168,16 +168,16 @@ def rotation_between(start: Pose, goal: Pose) -> Vector:
 def _pulled(
     left: float, speed: float, kick: float, fastest: float = math.inf
 ) -> tuple[float, float]:
-    """The way that is left along one axis, and the speed, after a control period.
+    """The remaining way along one axis, and the speed, after a control period.
 
     In each substep the speed becomes that which goes :data:`SHARE` of the way that is left, or as
     near to it as the force allows.
 
     Args:
-        left: The way at the beginning, m or rad.
-        speed: At the beginning, per s.
-        kick: By how much the force changes the speed in a substep, at most.
-        fastest: The largest speed that is wanted.
+        left: Remaining way at the beginning, m or rad.
+        speed: Speed at the beginning, m/s or rad/s.
+        kick: Largest change of speed that the force makes in a substep, m/s or rad/s.
+        fastest: Largest wanted speed, m/s or rad/s.
     """
     for done in range(SUBSTEPS):
         wanted = left * _RATE

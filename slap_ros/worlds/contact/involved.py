@@ -32,12 +32,12 @@ class Bounds(NamedTuple):
     high: Vector
 
     def grown(self, margin: float) -> Bounds:
-        """With a layer of ``margin`` m around it."""
+        """The bounds with a layer of ``margin`` m around them."""
         (a, b, c), (d, e, f) = self
         return Bounds((a - margin, b - margin, c - margin), (d + margin, e + margin, f + margin))
 
     def hull(self, other: Bounds) -> Bounds:
-        """The box around both."""
+        """The bounds around both boxes."""
         (a, b, c), (d, e, f) = self
         (u, v, w), (x, y, z) = other
         return Bounds((min(a, u), min(b, v), min(c, w)), (max(d, x), max(e, y), max(f, z)))
@@ -92,9 +92,9 @@ def moving_bounds(body: JointedBody, pose: Pose, opening: float) -> Bounds:
     """The bounds of the moving part of a jointed body.
 
     Args:
-        body: Whose.
-        pose: Where it stands.
-        opening: Of its joint, m or rad.
+        body: Jointed body that has the moving part.
+        pose: Pose of the body.
+        opening: Opening of the body's joint, m or rad.
     """
     return bounds_of(body.moving_box.at(body.moving_pose(pose, opening)))
 
@@ -130,9 +130,9 @@ def space_of_way(start: Pose, end: Pose, margin: float) -> Bounds | None:
     """A space that a hand does not leave on its way, however it is turned about the vertical.
 
     Args:
-        start: Where the hand begins.
-        end: Where it is pulled.
-        margin: By how much it may miss the straight way, m.
+        start: Pose of the hand at the beginning.
+        end: Pose that the hand is pulled to.
+        margin: Largest distance from the straight way, m.
 
     Returns:
         None where the hand does not point straight down.
@@ -155,7 +155,7 @@ class Mover(NamedTuple):
 
     @classmethod
     def of(cls, bounds: Bounds, travel: float) -> Mover:
-        """What begins there and goes so far, in m, in any direction."""
+        """The mover that begins in these bounds and goes so far, in m, in any direction."""
         return cls((bounds.grown(travel + TOUCH),), travel)
 
 
@@ -163,8 +163,8 @@ def touched(movers: Sequence[Mover], resting: Sequence[Bounds | None]) -> dict[i
     """The resting bodies that movers can touch, or bodies that these push.
 
     Args:
-        movers: What moves.
-        resting: The bodies that rest, None for those that do not.
+        movers: Spaces in which each mover can touch something, and how far it can push that.
+        resting: Bounds of the bodies that rest, None for those that do not.
 
     Returns:
         Each that can be touched, by its index; it goes as far as what touches it can push it.

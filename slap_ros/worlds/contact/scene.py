@@ -35,9 +35,9 @@ class BoxPart:
     """A cuboid of a body.
 
     Args:
-        half_extents_m: Half its edges along x, y, z of its own frame.
-        pose: In the frame of what it is a part of.
-        colour: Instead of the body's.
+        half_extents_m: Half the edges along x, y, z of the box's own frame, m.
+        pose: Pose in the frame of what the box is a part of.
+        colour: Colour of the part, in place of the body's.
     """
 
     half_extents_m: Vector
@@ -46,27 +46,27 @@ class BoxPart:
 
     @cached_property
     def bounding_box(self) -> OrientedBox:
-        """The smallest box around it."""
+        """The smallest box around the part."""
         return OrientedBox(self.pose, self.half_extents_m)
 
     @cached_property
     def bounding_boxes(self) -> tuple[OrientedBox, ...]:
-        """Boxes around it; what is outside of one of them does not touch it."""
+        """Boxes around the part; what is outside of one of them does not touch it."""
         return (self.bounding_box,)
 
     @property
     def inner_box(self) -> OrientedBox:
-        """A box inside it."""
+        """A box inside the part."""
         return self.bounding_box
 
     @property
     def volume_m3(self) -> float:
-        """What it fills."""
+        """Volume of the part, m³."""
         return 8.0 * math.prod(self.half_extents_m)
 
     @property
     def inertia_per_kg(self) -> Vector:
-        """About the axes through its middle, m²."""
+        """Inertia about the axes through the part's middle for a mass of 1 kg, m²."""
         x, y, z = (half * half / 3.0 for half in self.half_extents_m)
         return (y + z, x + z, x + y)
 
@@ -76,10 +76,10 @@ class CylinderPart:
     """A cylinder of a body; its axis is its own z.
 
     Args:
-        radius_m: Of the round section.
-        length_m: From end to end.
-        pose: In the frame of what it is a part of.
-        colour: Instead of the body's.
+        radius_m: Radius of the round section, m.
+        length_m: Length from end to end, m.
+        pose: Pose in the frame of what the cylinder is a part of.
+        colour: Colour of the part, in place of the body's.
     """
 
     radius_m: float
@@ -89,12 +89,12 @@ class CylinderPart:
 
     @cached_property
     def bounding_box(self) -> OrientedBox:
-        """The smallest box around it."""
+        """The smallest box around the cylinder."""
         return OrientedBox(self.pose, (self.radius_m, self.radius_m, 0.5 * self.length_m))
 
     @cached_property
     def bounding_boxes(self) -> tuple[OrientedBox, ...]:
-        """Boxes around it; what is outside of one of them does not touch it.
+        """Boxes around the cylinder; what is outside of one of them does not touch it.
 
         Each is turned about the axis: a single one's corners are 1.4 radii away from it, what is
         inside all of them is 1.02 at most.
@@ -104,18 +104,18 @@ class CylinderPart:
 
     @property
     def inner_box(self) -> OrientedBox:
-        """A box inside it."""
+        """A box inside the cylinder."""
         half = INSCRIBED * self.radius_m
         return OrientedBox(self.pose, (half, half, 0.5 * self.length_m))
 
     @property
     def volume_m3(self) -> float:
-        """What it fills."""
+        """Volume of the cylinder, m³."""
         return math.pi * self.radius_m**2 * self.length_m
 
     @property
     def inertia_per_kg(self) -> Vector:
-        """About the axes through its middle, m²."""
+        """Inertia about the axes through the cylinder's middle for a mass of 1 kg, m²."""
         across = self.radius_m**2 / 4.0 + self.length_m**2 / 12.0
         return (across, across, self.radius_m**2 / 2.0)
 
@@ -128,7 +128,7 @@ class Compound(RigidBody):
     """A body of one part or of several, that may overlap; its origin is its centre of mass.
 
     Args:
-        parts: What it is made of.
+        parts: Parts of the body.
     """
 
     parts: tuple[Part, ...]
@@ -136,24 +136,24 @@ class Compound(RigidBody):
 
     @cached_property
     def bounding_box(self) -> OrientedBox:
-        """The box around it in its own frame, along the axes of that frame."""
+        """The box around the body in its own frame, along the axes of that frame."""
         return bounding_box(self.parts)
 
     def at(self, pose: Pose) -> OrientedBox:
-        """The box around it at a pose."""
+        """The box around the body at a pose."""
         return self.bounding_box.at(pose)
 
     def cores(self, pose: Pose) -> tuple[OrientedBox, ...]:
-        """Boxes inside it at a pose."""
+        """Boxes inside the body at a pose."""
         return _inner_boxes(self.parts, pose)
 
     @cached_property
     def inertia(self) -> Vector:
-        """About the axes of its frame, kg m², of parts that weigh by their volumes."""
+        """Inertia about the axes of the body's frame, kg m²; parts weigh by their volumes."""
         return inertia(self.parts, self.mass_kg, ORIGIN)
 
     def extent(self, axis: Vector) -> float:
-        """How far it reaches from its origin along an axis of length 1, m."""
+        """How far the body reaches from its origin along a unit vector, m."""
         return max(_extent(part.bounding_box, axis) for part in self.parts)
 
 
@@ -171,12 +171,12 @@ class Joint:
     Its opening is 0 where it is closed: in m if it slides, in rad if it turns.
 
     Args:
-        kind: Whether it slides along the axis or turns about it.
-        axis: Of length 1, in the joint's own frame.
-        high: The largest opening, m or rad; the least is 0.
-        mount: The joint's frame in the body's.
-        damping: N s/m or N m s/rad.
-        dry_friction: The force or moment that it takes to move it at all, N or N m.
+        kind: Kind of the joint: whether it slides along the axis or turns about it.
+        axis: Axis as a unit vector in the joint's own frame.
+        high: Largest opening, m or rad; the least is 0.
+        mount: Pose of the joint's frame in the body's.
+        damping: Damping, N s/m or N m s/rad.
+        dry_friction: Force or moment that it takes to move the joint at all, N or N m.
     """
 
     kind: JointKind
@@ -201,15 +201,15 @@ class JointedBody:
     The two do not touch one another: leave the room that a real one has.
 
     Args:
-        name: That of the object in the state which it embodies.
-        frame: The parts that stand still, in the body's frame.
-        moving: The parts that move, in the joint's frame at opening 0.
-        joint: How they move.
-        mass_kg: Of the moving part.
-        friction: See :class:`Compound`.
-        colour: Of the frame.
-        moving_colour: Of the moving part.
-        pose: Where it stands, unless the state has pose features for it.
+        name: Name of the body, which is that of its object in the state.
+        frame: Parts that stand still, in the body's frame.
+        moving: Parts that move, in the joint's frame at opening 0.
+        joint: Joint that moves the moving parts.
+        mass_kg: Mass of the moving part, kg.
+        friction: Coefficient of friction; see :class:`Compound`.
+        colour: Colour of the frame.
+        moving_colour: Colour of the moving part.
+        pose: Pose of the body, unless the state has pose features for it.
     """
 
     name: str
@@ -229,7 +229,7 @@ class JointedBody:
 
     @cached_property
     def lever_m(self) -> float:
-        """How far its fastest point goes while it opens by 1: 1 m, or m per rad."""
+        """How far the fastest point goes while the body opens by 1: 1 m, or m per rad."""
         if self.joint.kind is JointKind.SLIDE:
             return 1.0
         corners = (corner for part in self.moving for corner in part.bounding_box.corners())
@@ -266,8 +266,8 @@ class ContactScene:
     """All bodies around a Panda whose base is at the origin.
 
     Args:
-        bodies: The order of those that move is part of the physics.
-        forces: How strong the hand is.
+        bodies: Bodies of the scene. The order of those that move is part of the physics.
+        forces: Strength of the hand.
         floor_m: Height of the floor, which catches what falls off the table.
 
     Raises:
@@ -324,12 +324,12 @@ def box(
     """A body that is one cuboid; see :class:`Compound` and :class:`BoxPart`.
 
     Args:
-        name: The body's.
-        half_extents_m: Half its edges along its own axes.
+        name: Name of the body.
+        half_extents_m: Half the edges along the box's own axes, m.
         mass_kg: 0 for a body that never moves.
         friction: Coefficient of its surface.
         colour: Red, green, blue, alpha, each from 0 to 1.
-        pose: Where a body without mass stands.
+        pose: Pose of a body without mass.
         solid: Whether others collide with it.
     """
     return Compound(
@@ -357,13 +357,13 @@ def cylinder(
     """A body that is one cylinder about its own z; see :class:`Compound`.
 
     Args:
-        name: The body's.
-        radius_m: Of the cylinder.
-        length_m: Along its own z.
-        mass_kg: 0 for a body that never moves.
-        friction: Coefficient of its surface.
+        name: Name of the body.
+        radius_m: Radius of the cylinder, m.
+        length_m: Length along the cylinder's own z, m.
+        mass_kg: Mass, kg; 0 for a body that never moves.
+        friction: Coefficient of friction of the surface.
         colour: Red, green, blue, alpha, each from 0 to 1.
-        pose: Where a body without mass stands.
+        pose: Pose of a body without mass.
         solid: Whether others collide with it.
     """
     return Compound(
@@ -391,9 +391,9 @@ def inertia(parts: Sequence[Part], mass_kg: float, about: Vector) -> Vector:
     """The diagonal of the inertia of parts that weigh by their volumes, kg m².
 
     Args:
-        parts: In one frame.
-        mass_kg: Of all together.
-        about: The point of that frame through which the axes go, along those of the frame.
+        parts: Parts, all in one frame.
+        mass_kg: Mass of all parts together, kg.
+        about: Point of that frame through which the axes go, along those of the frame, m.
     """
     volume = sum(part.volume_m3 for part in parts)
     total = [0.0, 0.0, 0.0]

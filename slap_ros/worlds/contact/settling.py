@@ -27,7 +27,7 @@ FLAT = 0.5  # sine up to which an axis counts as horizontal
 
 
 class Piece(NamedTuple):
-    """A part where it is."""
+    """A part of a body at its pose in the scene."""
 
     part: Part
     pose: Pose
@@ -39,7 +39,7 @@ class Piece(NamedTuple):
         return cls(part, pose.compose(part.pose), part.bounding_box.radius)
 
     def extent(self, axis: Vector) -> float:
-        """How far it reaches from its middle along an axis of length 1, m."""
+        """How far the piece reaches from its middle along a unit vector, m."""
         if isinstance(self.part, CylinderPart):
             along = abs(_dot(axis, rotate(self.pose.quaternion, UP)))
             across = math.sqrt(max(0.0, 1.0 - along * along))
@@ -77,8 +77,8 @@ def settled(scene: ContactScene, state: State) -> State:
     """The state with everything that lies still where physics would have it.
 
     Args:
-        scene: What there is.
-        state: As measured; the hand, what it holds, drawers and lids are where they are.
+        scene: Bodies of the scene.
+        state: Measured state; the hand, what it holds, drawers and lids are where they are.
 
     Returns:
         The state in which nothing is in anything else, as far as there is room, and in which bodies
@@ -119,7 +119,7 @@ def _pieces(body: Compound, pose: Pose) -> list[Piece]:
 def _put(
     body: Compound, measured: Pose, obstacles: Sequence[SettlingObstacle], still: bool
 ) -> Pose:
-    """A body out of everything; one that lies still is flat, too, and down on what is below it."""
+    """The pose of a body outside of all others; one that lies still is flat and put down, too."""
     pose = measured
     if still:
         pose = _flat(body, measured) or measured
@@ -139,7 +139,7 @@ def _near(piece: Piece, point: Vector, distance: float) -> bool:
 
 
 def _flat(body: Compound, pose: Pose) -> Pose | None:
-    """With the face on which it lies exactly level; None where it is not clear which that is.
+    """The pose with the lower face exactly level; None where it is not clear which face that is.
 
     What is round all along lies or stands as its axis does, however it has rolled.
     """
@@ -159,7 +159,7 @@ def _flat(body: Compound, pose: Pose) -> Pose | None:
 
 
 def _moved_out(body: Compound, pose: Pose, near: Sequence[SettlingObstacle]) -> Pose:
-    """Moved the shorter way out of whatever it is in deepest, again and again."""
+    """The pose moved the shorter way out of the deepest overlap, again and again."""
     for _ in range(ROUNDS):
         shift = max(_shifts(body, pose, near), key=lambda shift: math.hypot(*shift), default=None)
         if shift is None:

@@ -113,12 +113,12 @@ class ContactSimulation:
                 pybullet.resetBasePositionAndOrientation(body, *pose, self.client)
 
     def run(self, now: ContactSnapshot, pull: Pose, involved: Involved) -> Outcome:
-        """One control period.
+        """The outcome of one control period.
 
         Args:
-            now: How everything is.
-            pull: Where the hand is pulled.
-            involved: What is computed; all else is as if it were not there.
+            now: Present snapshot.
+            pull: Pose that the hand is pulled to.
+            involved: Bodies that are simulated; all others are left out.
         """
         self._prime_and_wake(now, set(involved.bodies))
         free = [i for i in involved.bodies if i < len(self._free)]

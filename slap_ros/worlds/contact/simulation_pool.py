@@ -14,5 +14,5 @@ close_idle = _pool.close_idle
 
 
 def release(simulation: ContactSimulation) -> None:
-    """Keep it for the next world."""
+    """Keep a simulation for the next world."""
     _pool.release(simulation.scene, simulation)

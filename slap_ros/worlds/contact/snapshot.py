@@ -37,7 +37,7 @@ class Opening(NamedTuple):
 
     @property
     def still(self) -> bool:
-        """Whether it has no velocity at all."""
+        """Whether the opening has no velocity at all."""
         return self.velocity == 0.0
 
 

@@ -86,12 +86,12 @@ def _link(
     """Add a link.
 
     Args:
-        robot: What it is added to.
-        name: Of the link.
-        parts: What it is made of, in its frame.
-        mass_kg: 0 for what does not move.
-        inertia_diagonal: About the centre of mass, kg m².
-        centre: Where the centre of mass is.
+        robot: Element that the link is added to.
+        name: Name of the link.
+        parts: Parts of the link, in its frame.
+        mass_kg: Mass of the link, kg; 0 for a link that does not move.
+        inertia_diagonal: Diagonal of the inertia about the centre of mass, kg m².
+        centre: Position of the centre of mass in the link's frame, m.
     """
     link = SubElement(robot, "link", name=name)
     weight = SubElement(link, "inertial")
@@ -121,11 +121,11 @@ def _joint(
     """Add a joint that goes from 0 on.
 
     Args:
-        robot: What it is added to.
-        called: Its name and kind, and the names of parent and child.
-        axis: In its own frame.
-        high: Its largest position, m or rad.
-        mount: Its frame in the parent's.
+        robot: Element that the joint is added to.
+        called: Name and kind of the joint, and the names of its parent and child.
+        axis: Axis in the joint's own frame.
+        high: Largest position of the joint, m or rad.
+        mount: Pose of the joint's frame in the parent's.
     """
     name, kind, parent, child = called
     joint = SubElement(robot, "joint", name=name, type=kind.value)

@@ -35,10 +35,10 @@ def require_possible(
     """Refuse scenes that cannot be.
 
     Args:
-        scene: What there is.
-        snapshot: How it is; finite.
-        placement: Where the bodies stand that do not move.
-        gripper: What the state says that the gripper was told.
+        scene: Bodies of the scene.
+        snapshot: Physics of the state; all numbers are finite.
+        placement: Poses of the bodies that do not move.
+        gripper: Last gripper command, as the state has it.
 
     Raises:
         InvalidStateError: Names the value that is wrong, and what would be right.

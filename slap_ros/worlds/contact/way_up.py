@@ -26,10 +26,10 @@ def way_up_is_free(
     """Whether a hand can go straight up without touching anything, its fingers as they are.
 
     Args:
-        scene: What there is.
-        snapshot: How it is.
-        placement: Where the bodies stand that do not move.
-        margin: Least distance from what it passes, m.
+        scene: Bodies of the scene.
+        snapshot: Physics of the state.
+        placement: Poses of the bodies that do not move.
+        margin: Least distance from what the hand passes, m.
 
     Returns:
         True also where it holds something, which goes up with it.
@@ -73,8 +73,8 @@ class _Shaft(NamedTuple):
         """Whether a ball around a part reaches into the shaft.
 
         Args:
-            part: Of a body.
-            pose: The body's.
+            part: Part of a body.
+            pose: Pose of the body.
         """
         ball = part.bounding_box
         x, y, z = pose.apply(ball.pose.position)

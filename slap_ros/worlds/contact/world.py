@@ -47,8 +47,9 @@ class ContactWorld(SimulatedWorld[ContactScene]):
         """Begin in ``state``.
 
         Args:
-            scene: What there is.
-            state: How it is: one robot, and an object for each free or jointed body of the scene.
+            scene: Bodies of the scene.
+            state: State to begin in: one robot, and an object for each free or jointed body of the
+                scene.
 
         Raises:
             InvalidStateError: A scene that cannot be.

@@ -49,8 +49,8 @@ class Arm:
         Args:
             joints: Joint positions, rad, shape (7,).
             finger: Distance of each finger from the middle, m.
-            held: What is in the hand, if anything.
-            grasp: Its pose in the hand's frame.
+            held: Body in the hand; None if there is none.
+            grasp: Pose of the held body in the hand's frame.
 
         Returns:
             Everything in the base's frame.
@@ -82,8 +82,8 @@ class Arm:
 
         Args:
             link: Index in ``LINK_SHAPES``; one more is the held body.
-            point: In the base's frame, m.
-            distance: At which it no longer is near, m.
+            point: Point in the base's frame, m.
+            distance: Distance from which on the point is no longer near, m.
 
         Returns:
             Whether it is closer than that.

@@ -26,9 +26,9 @@ def grip(scene: Scene, snapshot: Snapshot, command: float) -> Snapshot:
     """What the gripper command changes before the arm moves.
 
     Args:
-        scene: What there is.
-        snapshot: How it is before the command.
-        command: Above 0.5 closes, below -0.5 opens, anything between does nothing.
+        scene: Bodies of the scene.
+        snapshot: Physics of the state before the command.
+        command: Gripper command: above 0.5 closes, below -0.5 opens, anything between does nothing.
 
     Returns:
         How it is afterwards; the same object where nothing changes.

@@ -23,27 +23,27 @@ class Box(RigidBody):
     """A body in the shape of a cuboid.
 
     Args:
-        half_extents_m: Half its edges along x, y, z of its own frame.
+        half_extents_m: Half the edges along x, y, z of the box's own frame, m.
     """
 
     half_extents_m: Vector
     friction: float = field(default=REFERENCE_FRICTION, kw_only=True)
 
     def at(self, pose: Pose) -> OrientedBox:
-        """The space it fills at a pose."""
+        """The space that the box fills at a pose."""
         return OrientedBox(pose, self.half_extents_m)
 
     def cores(self, pose: Pose) -> tuple[OrientedBox, ...]:
-        """Boxes inside it at a pose."""
+        """Boxes inside the box at a pose."""
         return (self.at(pose),)
 
     @property
     def shape(self) -> Shape:
-        """Alike for boxes of one size."""
+        """Half the edges, m, as the key of the shape: boxes of one size have the same key."""
         return self.half_extents_m
 
     def extent(self, axis: Vector) -> float:
-        """How far it reaches from its origin along an axis of length 1, m."""
+        """How far the box reaches from its origin along a unit vector, m."""
         return sum(abs(a) * half for a, half in zip(axis, self.half_extents_m, strict=True))
 
 
@@ -52,22 +52,22 @@ class Mesh(RigidBody):
     """A body of convex pieces, whose origin is its centre of mass; the mass is spread evenly.
 
     Args:
-        shape: Its pieces; alike for meshes of one shape.
+        shape: Solid of the body: its pieces. Meshes of one shape share it.
     """
 
     shape: Solid
     friction: float = field(default=REFERENCE_FRICTION, kw_only=True)
 
     def at(self, pose: Pose) -> OrientedBox:
-        """A box around it at a pose: the space that the arm takes it to fill."""
+        """A box around the mesh at a pose: the space that the arm takes it to fill."""
         return self.shape.bounds.at(pose)
 
     def cores(self, pose: Pose) -> tuple[OrientedBox, ...]:
-        """Boxes inside it at a pose."""
+        """Boxes inside the mesh at a pose."""
         return tuple(core.at(pose) for core in self.shape.cores)
 
     def extent(self, axis: Vector) -> float:
-        """How far it reaches from its origin along an axis of length 1, m."""
+        """How far the mesh reaches from its origin along a unit vector, m."""
         return self.shape.extent(axis)
 
 

@@ -41,7 +41,7 @@ def resting_poses(
 
 
 def _put_down(pose: Pose, body: Body, below: Sequence[OrientedBox]) -> Pose | None:
-    """On the highest top near its bottom, if there is one."""
+    """The pose on the highest top near the body's bottom, if there is one."""
     box = body.at(pose)  # whose middle need not be the body's origin
     bottom = box.bottom
     tops = [other.top for other in below if _under(box, other)]

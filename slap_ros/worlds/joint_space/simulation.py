@@ -59,7 +59,7 @@ class Drive(NamedTuple):
 
     @classmethod
     def between(cls, start: Pose, end: Pose) -> Drive:
-        """From one pose to another at constant velocity, the shorter way round."""
+        """The drive from one pose to another at constant velocity, the shorter way round."""
         (ax, ay, az), (bx, by, bz) = start.position, end.position
         t = CONTROL_PERIOD_S
         x, y, z, w = multiply(end.quaternion, conjugate(start.quaternion))
@@ -157,12 +157,13 @@ class Simulation:
         held: int | None = None,
         drives: Sequence[Drive] = (),
     ) -> list[BodyState]:
-        """One control period.
+        """Simulate one control period.
 
         Args:
-            bodies: The scene's free bodies.
-            held: Which of them moves with the hand, if any; its motion is not computed.
-            drives: One for each of ``LINK_SHAPES``, then the held body's; none without an arm.
+            bodies: Poses and velocities of the scene's free bodies.
+            held: Index of the free body that moves with the hand, if any; its motion is not
+                computed.
+            drives: Motion of each of ``LINK_SHAPES``, then of the held body; none without an arm.
 
         Returns:
             The free bodies afterwards; the held one as it was.

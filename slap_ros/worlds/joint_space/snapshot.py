@@ -34,7 +34,7 @@ class Snapshot:
     bodies: tuple[BodyState, ...]  # the scene's free bodies
 
     def moved(self, index: int, motion: BodyState) -> Snapshot:
-        """The same with one body elsewhere."""
+        """The same snapshot with one body elsewhere."""
         bodies = (*self.bodies[:index], motion, *self.bodies[index + 1 :])
         return replace(self, bodies=bodies)
 

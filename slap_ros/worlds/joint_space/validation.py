@@ -34,11 +34,11 @@ def require_valid(
     """Refuse a state that no scene can be in.
 
     Args:
-        scene: What there is.
-        snapshot: How it is; finite.
-        materials: What the free bodies are made of.
-        arm: The same arm.
-        obstacles: The fixed bodies that are solid.
+        scene: Bodies of the scene.
+        snapshot: Physics of the state; all numbers are finite.
+        materials: Materials of the free bodies.
+        arm: Arm in the snapshot's configuration.
+        obstacles: Fixed bodies that are solid.
 
     Raises:
         InvalidStateError: A mass or friction that nothing has, a quaternion that is not

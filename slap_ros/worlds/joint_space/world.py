@@ -64,10 +64,11 @@ class PandaWorld(SimulatedWorld[Scene]):
         """Begin in ``state``.
 
         Args:
-            scene: What there is.
-            state: How it is: one robot, and an object for each free body of the scene.
-            stepping: How finely to compute; another one is another world.
-            actions: What may be commanded: the joints' speed limit, unless a domain has another.
+            scene: Bodies of the scene.
+            state: State to begin in: one robot, and an object for each free body of the scene.
+            stepping: Resolution of the simulation. Another one makes another world.
+            actions: Actions that may be commanded: the joints' speed limit, unless a domain has
+                another.
 
         Raises:
             InvalidStateError: A scene that cannot be.
