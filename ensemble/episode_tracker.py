@@ -15,8 +15,9 @@ from slap_msgs.msg import DomainInfo, SkillLibrary
 from slap_msgs.msg import Task as TaskMessage
 
 from ensemble.answering import domain_error, error_to_answer
+from ensemble.endpoints import subscribe
 from ensemble.futures import run_in_executor
-from ensemble.interfaces import DOMAIN, SKILLS, TASK, Topic
+from ensemble.interfaces import DOMAIN, SKILLS, TASK
 from ensemble.observation import Episode
 from ensemble.refusals import Refusals
 from ensemble.steady_time import create_timer
@@ -29,17 +30,6 @@ RIVAL_PERIOD = 1.0  # s, between two looks at whether another simulator is still
 
 Endpoint = tuple[int, ...]
 T = TypeVar("T")  # what is prepared for an episode
-
-
-def subscribe(node: Node, topic: Topic, callback: Callable[..., None]) -> None:
-    """Subscribe with the topic's own QoS.
-
-    Args:
-        node: Who subscribes.
-        topic: What to.
-        callback: Called with each message.
-    """
-    node.create_subscription(topic.type, topic.name, callback, topic.qos)
 
 
 class EpisodeTracker(Generic[T]):

@@ -22,6 +22,7 @@ from slap_msgs.srv import ResetTask
 from ensemble import encode
 from ensemble.answering import domain_error, error_to_answer
 from ensemble.diagnostics import DiagnosticsPublisher
+from ensemble.endpoints import advertise
 from ensemble.interfaces import (
     COMMAND,
     DOMAIN,
@@ -89,7 +90,7 @@ class LockstepWorld(Node, ABC, Generic[P]):
         self._counts: Counter[str] = Counter(dict.fromkeys(kinds, 0))
         self._domains = self.create_publisher(DOMAIN.type, DOMAIN.name, DOMAIN.qos)
         self._tasks = self.create_publisher(TASK.type, TASK.name, TASK.qos)
-        self._states = self.create_publisher(STATE.type, STATE.name, STATE.qos)
+        self._states = advertise(self, STATE)
         self._faults = self.create_publisher(FAULT.type, FAULT.name, FAULT.qos)
         # Volatile: commands from before this node started answer another world's states.
         self.create_subscription(COMMAND.type, COMMAND.name, self._on_command, VOLATILE)

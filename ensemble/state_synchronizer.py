@@ -13,7 +13,8 @@ from rclpy.node import Node
 from slap_msgs.msg import AbstractState, EpisodeFault, ObjectCentricState
 
 from ensemble.early_messages import EarlyMessages
-from ensemble.episode_tracker import EpisodeTracker, subscribe
+from ensemble.endpoints import subscribe
+from ensemble.episode_tracker import EpisodeTracker
 from ensemble.futures import wait_until
 from ensemble.interfaces import ATOMS, FAULT, STATE
 from ensemble.observation import Episode, Observation

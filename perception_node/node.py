@@ -48,8 +48,9 @@ from ensemble.answering import domain_error
 from ensemble.common_parameters import CommonParameters
 from ensemble.diagnostics import DiagnosticsPublisher
 from ensemble.early_messages import EarlyMessages
+from ensemble.endpoints import subscribe
 from ensemble.entry_point import run_node
-from ensemble.episode_tracker import EpisodeTracker, subscribe
+from ensemble.episode_tracker import EpisodeTracker
 from ensemble.interfaces import ATOMS, FAULT, STATE
 from ensemble.observation import Episode
 from ensemble.parameters import read_parameters

@@ -3,7 +3,7 @@
 """Solves tasks: plans over the abstract graph, has the skill server execute, watches, replans.
 
 ROS Parameters:
-    planner (string, "lazy"): lazy, exhaustive or ff; see ``slap_ros.planning.planner``.
+    planner (string, "lazy"): lazy, exhaustive, ff or astar; see ``slap_ros.planning.planner``.
     shortcuts (string, ""): folder of a shortcut library, or none; empty: the shipped one.
     samples (int, 16): attempts of a shortcut in the model; the shortest is used.
     observation_timeout (double, 10.0): seconds to wait for a perceived state.
@@ -73,7 +73,7 @@ from slap_ros.relational import State
 class PlannerParameters(ShortcutParameters):
     """See the module's docstring."""
 
-    planner: str = parameter("lazy", "lazy, exhaustive or ff")
+    planner: str = parameter("lazy", f"name of the planner: {', '.join(PLANNERS)}")
     observation_timeout: float = parameter(10.0, "s to wait for a perceived state")
     server_timeout: float = parameter(5.0, "s without a skill server until a run fails")
 

@@ -33,6 +33,7 @@ from slap_msgs.msg import DomainInfo, Task
 from std_srvs.srv import Trigger
 
 from ensemble.diagnostics import DiagnosticsPublisher
+from ensemble.endpoints import subscribe
 from ensemble.entry_point import run_node
 from ensemble.futures import wait_until
 from ensemble.interfaces import (
@@ -114,7 +115,7 @@ class RecorderNode(Node):
         if topic is JOINT_STATES:
             subscribe_as_offered(self, topic, callback, raw=True)
         else:
-            self.create_subscription(topic.type, topic.name, callback, topic.qos, raw=True)
+            subscribe(self, topic, callback, raw=True)
 
     def _on_message(self, topic: Topic, name: str, raw: bytes) -> None:
         if self._closed:

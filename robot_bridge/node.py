@@ -68,6 +68,7 @@ from builtin_interfaces.msg import Time
 from slap_msgs.srv import ResetTask
 
 from ensemble import encode
+from ensemble.endpoints import advertise
 from ensemble.entry_point import run_node
 from ensemble.interfaces import MARKERS
 from ensemble.lockstep_world import LockstepWorld
@@ -111,7 +112,7 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
         )  # when the phase, or the measurement of a state, began
         self._goal: Collection[GroundAtom] = ()
         self._measurement: StepMeasurement  # of the step under way
-        self._markers = self.create_publisher(MARKERS.type, MARKERS.name, MARKERS.qos)
+        self._markers = advertise(self, MARKERS)
         create_timer(self, POLL_PERIOD, self._poll)
         self._publish_domain()
 

@@ -85,7 +85,7 @@ class Comparison:
         seeds: Number of seeds.
         first_seed: The first of them.
         runner: Does what takes long.
-        planner: Name of the planner: lazy, exhaustive or ff.
+        planner: Name of the planner: lazy, exhaustive, ff or astar.
     """
 
     domain: Domain

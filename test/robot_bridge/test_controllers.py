@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What controllers answer, as drivers do: what counts as done, and what is said of the rest."""
 
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import pytest
 from control_msgs.action import FollowJointTrajectory, GripperCommand
@@ -89,10 +89,8 @@ def driven():
 
 def outcome(spinner, work):
     task = spinner.executor.create_task(work)
-    try:
+    with suppress(ControllerAbortedError):  # the executor raises it as well
         spinner.spin_until(task.done, LIMIT)
-    except ControllerAbortedError:  # the executor raises it as well
-        pass
     return task.result() if task.exception() is None else task.exception()
 
 
@@ -136,7 +134,8 @@ def test_a_canceled_grip_is_none_whatever_the_fingers_hold(network):
 
 
 @pytest.mark.parametrize(
-    ("code", "words"), [(-4, "PATH_TOLERANCE_VIOLATED, blocked"), (-77, "unknown code -77, blocked")]
+    ("code", "words"),
+    [(-4, "PATH_TOLERANCE_VIOLATED, blocked"), (-77, "unknown code -77, blocked")],
 )
 def test_a_trajectory_that_is_given_up_has_its_reason_by_name(network, code, words):
     with driven() as (robot, driver, spinner):
