@@ -70,6 +70,7 @@ from ensemble.futures import submit, wait_for_first, wait_until
 from ensemble.interfaces import ACQUIRE_SKILLS, PROPOSE_OPERATORS
 from ensemble.observation import Episode
 from ensemble.parameters import read_parameters
+from ensemble.patience import load_advice
 from ensemble.refusals import Refusals
 from slap_ros.errors import BusyError, EpisodeChangedError, NoTaskError, TaskCanceledError
 from slap_ros.messages.decode import decode_goal
@@ -189,7 +190,8 @@ class AcquisitionNode(Node):
         episode = self._episodes.current
         if episode is None or not known():
             raise self._episodes.refusal or NoTaskError(
-                f"no task within {self._timeout_s} s: is sim_node (or robot_bridge) running?"
+                f"no task within {self._timeout_s} s: is sim_node (or robot_bridge) running? "
+                f"If so, {load_advice()}"
             )
         if number and number != episode.number:
             raise EpisodeChangedError(

@@ -18,6 +18,7 @@ from ensemble.episode_tracker import EpisodeTracker
 from ensemble.futures import wait_until
 from ensemble.interfaces import ATOMS, FAULT, STATE
 from ensemble.observation import Episode, Observation
+from ensemble.patience import load_advice
 from ensemble.refusals import Refusals
 from slap_ros.errors import SlapError
 from slap_ros.messages.decode import decode_atoms, decode_fault, decode_seen, decode_state, stamp_ns
@@ -128,7 +129,8 @@ class StateSynchronizer:
         if self.latest is None or not seen():
             raise missing(
                 f"no perceived state{f' of episode {episode}' if episode else ''} within "
-                f"{timeout_s} s: are sim_node (or robot_bridge) and perception_node running?"
+                f"{timeout_s} s: are sim_node (or robot_bridge) and perception_node running? "
+                f"If so, {load_advice()}"
             )
         return self.latest
 

@@ -120,11 +120,7 @@ def _nodes(context: LaunchContext) -> list[Node]:
 
 def _node(name: str, given: Mapping[str, str], **options: object) -> Node:
     """A node of the ensemble: what is given goes before files, and a user's file before ours."""
-    taken: dict[str, object] = {
-        key: ParameterValue(given[key], value_type=PARAMETERS[key][0])
-        for key in TAKEN[name]
-        if key in given
-    }
+    taken = {key: _value(key, given[key]) for key in TAKEN[name] if key in given}
     if name == "recorder_node":
         taken["bag"] = ParameterValue(given["record"], value_type=str)
     return Node(
@@ -136,6 +132,19 @@ def _node(name: str, given: Mapping[str, str], **options: object) -> Node:
         output="screen",
         **options,
     )
+
+
+def _value(name: str, text: str) -> ParameterValue:
+    """An argument as a parameter.
+
+    Raises:
+        InvalidParameterError: It is no number where one is wanted.
+    """
+    kind, _ = PARAMETERS[name]
+    try:
+        return ParameterValue(kind(text), value_type=kind)
+    except ValueError:
+        raise InvalidParameterError(f"{name} is a number, not {text!r}") from None
 
 
 def _parameter_files(given: Mapping[str, str]) -> list[str]:

@@ -116,9 +116,9 @@ def overridden(
 
 
 def _declared(node: Node, name: str, default: Any) -> Any:
-    descriptor = message_class("rcl_interfaces/msg/ParameterDescriptor")(
-        description=f"QoS override of {name.split('.')[1]}", read_only=True
-    )
+    descriptor: Any = message_class("rcl_interfaces/msg/ParameterDescriptor")()
+    descriptor.description = f"QoS override of {name.split('.')[1]}"
+    descriptor.read_only = True
     try:
         return node.declare_parameter(name, default, descriptor).value
     except ParameterAlreadyDeclaredException:  # a second publisher on the topic
@@ -137,7 +137,9 @@ def _as_policy(kind: QoSPolicyKind, value: Any) -> Any:
             return _NAMED[kind][value.upper()]
         except KeyError:
             policy = kind.name.lower()
-            raise RuntimeError(f"Unexpected QoS override for policy `{policy}`: `{value}`") from None
+            raise RuntimeError(
+                f"Unexpected QoS override for policy `{policy}`: `{value}`"
+            ) from None
     durations = (
         QoSPolicyKind.LIFESPAN,
         QoSPolicyKind.DEADLINE,
