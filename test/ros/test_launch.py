@@ -42,7 +42,11 @@ def test_a_parameter_file_goes_before_defaults_and_arguments_before_the_file(cli
 
 @pytest.mark.parametrize(
     ("argument", "words"),
-    [("params_file:=nowhere.yaml", "nowhere.yaml"), ("world:=moon", "moon"), ("seed:=x", "seed is a number")],
+    [
+        ("params_file:=nowhere.yaml", "nowhere.yaml"),
+        ("world:=moon", "moon"),
+        ("seed:=x", "seed is a number"),
+    ],
 )
 def test_a_wrong_argument_starts_nothing(cli, argument, words):
     done = subprocess.run([*LAUNCH, argument], capture_output=True, text=True, timeout=LIMIT)
