@@ -22,6 +22,8 @@ ROS Parameters:
     domain (string, ""), preset (string, ""): imported at the start; empty: whichever the simulator
         announces.
     skills (string, ""): as perception_node's.
+    libraries (string, "runs/skills"): folders below which a library that slap/skills names may lie,
+        separated by ':'; others are refused.
     patience (double, 1.0): factor of all deadlines, for slow domains and machines.
 
 Publishers:
@@ -94,9 +96,7 @@ class AcquisitionNode(Node):
         self._counts = Counter(asked=0, proposed=0, trainings=0, acquired=0)
         self._workers = ThreadPoolExecutor(THREADS, thread_name_prefix="proposing")
         refusals = Refusals(self)
-        self._episodes = EpisodeTracker(
-            self, lambda _: None, lambda *_: None, refusals, common.skills
-        )
+        self._episodes = EpisodeTracker(self, lambda _: None, lambda *_: None, refusals, common)
         self._publisher = AcquisitionPublisher(self)
         self._actions = [
             ActionServer(

@@ -44,13 +44,20 @@ def advertise(node: Node, topic: Topic) -> Publisher:
     return _overridden(node.create_publisher, topic)
 
 
-def subscribe(node: Node, topic: Topic, callback: Callable[..., None], **options: Any) -> None:
+def subscribe(
+    node: Node,
+    topic: Topic,
+    callback: Callable[..., None],
+    depth: int | None = None,
+    **options: Any,
+) -> None:
     """Subscribe to a topic with its own QoS, or as parameters override it.
 
     Args:
         node: Node that subscribes.
         topic: Topic to subscribe to.
         callback: Called with each message.
+        depth: Number of messages that may wait for this node; None: as many as publishers keep.
         options: Options of the subscription, such as ``raw``.
 
     Raises:
@@ -58,8 +65,10 @@ def subscribe(node: Node, topic: Topic, callback: Callable[..., None], **options
     """
     if topic in OVERRIDABLE:
         _overridden(node.create_subscription, topic, callback, **options)
-    else:
-        node.create_subscription(topic.type, topic.name, callback, topic.qos, **options)
+        return
+    qos = copy(topic.qos)
+    qos.depth = depth or qos.depth
+    node.create_subscription(topic.type, topic.name, callback, qos, **options)
 
 
 def _overridden(create: Callable[..., Any], topic: Topic, *callback: object, **options: Any) -> Any:

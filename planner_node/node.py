@@ -12,6 +12,8 @@ ROS Parameters:
         the simulator announces, in a thread.
     skills (string, ""): whose skills the domain has: none, demonstrator, or a library's folder;
         empty: whichever the simulator announces. A domain that is announced with others is refused.
+    libraries (string, "runs/skills"): folders below which a library that slap/skills names may lie,
+        separated by ':'; others are refused.
     patience (double, 1.0): factor of all deadlines, for slow domains and machines.
 
 Publishers:
@@ -105,7 +107,7 @@ class PlannerNode(Node):
         self._counts = Counter(tried=0, solved=0)
         self._workers = ThreadPoolExecutor(1, thread_name_prefix="planning")
         self._synchronizer = StateSynchronizer(
-            self, lambda _: None, self._shortcuts.prepare_episode, common.skills
+            self, lambda _: None, self._shortcuts.prepare_episode, common
         )
         self._publisher = PlanPublisher(self)
         self._skills = ActionClient(self, EXECUTE_SKILL.type, EXECUTE_SKILL.name)

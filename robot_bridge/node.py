@@ -13,7 +13,7 @@ until ``slap/reset_task``: no state is published then, and ``slap/fault`` ends t
 ROS Parameters:
     domain (string, "obstacle_tower"): which domain; one with a Panda.
     preset (string, ""): one that obeys the joints' speed limit; empty: the domain's first.
-    skills (string, ""): as sim_node's.
+    skills (string, ""), libraries (string, "runs/skills"): as sim_node's.
     seed (int, 0), index (int, 0), goal (string, ""): the task whose objects there are, unless a
         scene says so; the goal as sim_node's.
     scene (string, ""): a scene file; empty: the sampled task's objects, in frames detected_NAME.
