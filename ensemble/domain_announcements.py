@@ -3,7 +3,7 @@
 """Domains that were announced, until a task asks for one of them.
 
 Strangers may announce anything, thousands of times a second. So announcements wait in a bounded
-room, nothing is imported for them, and one that belongs to a task is known by its stamp: a world
+room, one at a time is imported, and one that belongs to a task is known by its stamp: a world
 stamps both alike.
 """
 
@@ -55,6 +55,11 @@ class DomainAnnouncements:
         while len(self._stamps) > self._limit:
             oldest = next(choice for choice in self._stamps if choice != used)
             del self._stamps[oldest]
+
+    @property
+    def newest(self) -> DomainChoice | None:
+        """The domain that was announced last."""
+        return next(reversed(self._stamps), None)
 
     def is_announced_with(self, choice: DomainChoice, stamp_ns: int) -> bool:
         """Whether a domain was announced with a stamp."""

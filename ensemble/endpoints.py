@@ -21,6 +21,7 @@ from ensemble.interfaces import MARKERS, STATE, Topic
 from slap_ros.errors import InvalidParameterError
 
 OVERRIDABLE = (STATE, MARKERS)  # what grows with the world, and may have to cross a slow network
+BACKLOG = 1000  # messages that may wait for a node
 POLICIES = (
     QoSPolicyKind.HISTORY,
     QoSPolicyKind.DEPTH,
@@ -44,20 +45,16 @@ def advertise(node: Node, topic: Topic) -> Publisher:
     return _overridden(node.create_publisher, topic)
 
 
-def subscribe(
-    node: Node,
-    topic: Topic,
-    callback: Callable[..., None],
-    depth: int | None = None,
-    **options: Any,
-) -> None:
+def subscribe(node: Node, topic: Topic, callback: Callable[..., None], **options: Any) -> None:
     """Subscribe to a topic with its own QoS, or as parameters override it.
+
+    More messages may wait here than a publisher keeps for late joiners, since all publishers share
+    that room: with a depth of 1, the message of a stranger would take the place of the world's.
 
     Args:
         node: Node that subscribes.
         topic: Topic to subscribe to.
         callback: Called with each message.
-        depth: Number of messages that may wait for this node; None: as many as publishers keep.
         options: Options of the subscription, such as ``raw``.
 
     Raises:
@@ -67,7 +64,7 @@ def subscribe(
         _overridden(node.create_subscription, topic, callback, **options)
         return
     qos = copy(topic.qos)
-    qos.depth = depth or qos.depth
+    qos.depth = max(qos.depth, BACKLOG)
     node.create_subscription(topic.type, topic.name, callback, qos, **options)
 
 

@@ -44,7 +44,6 @@ from slap_ros.messages.protocols import StateMessage
 
 RIVAL_PERIOD = 1.0  # s, between two looks at whether another simulator is still there
 LOOK_PERIOD = 0.5  # s, between two looks at who publishes tasks, which cost time
-BACKLOG = 1000  # messages of a topic that wait for this node: strangers' are among them
 WAITING = 16  # tasks that wait to be opened: the newest
 OPENED = 8  # domains that stay open
 UNUSABLE = 256  # domains that are not tried again
@@ -66,7 +65,7 @@ class EpisodeTracker(Generic[T]):
     A task opens an episode. The import of its domain, and whatever else takes time, is done in a
     thread, for one task at a time. What cannot be used is refused: it is counted and logged, and
     the episode that is under way goes on. Strangers may publish on all three topics, so what waits
-    is bounded, and nothing is imported that no task asks for.
+    is bounded. A domain is imported ahead only until there was a first task.
     """
 
     def __init__(
@@ -108,9 +107,9 @@ class EpisodeTracker(Generic[T]):
         self._rival: tuple[TaskMessage, frozenset[Endpoint]] | None = None  # another simulator's
         self._seen: dict[Endpoint, str] = {}  # which published tasks when last looked
         self._looked_s = -inf
-        subscribe(node, SKILLS, self._on_skills, depth=BACKLOG)
-        subscribe(node, DOMAIN, self._on_domain, depth=BACKLOG)
-        subscribe(node, TASK, self._on_task, depth=BACKLOG)
+        subscribe(node, SKILLS, self._on_skills)
+        subscribe(node, DOMAIN, self._on_domain)
+        subscribe(node, TASK, self._on_task)
         create_timer(node, RIVAL_PERIOD, self._check_rival)
 
     def destroy(self) -> None:
@@ -145,6 +144,7 @@ class EpisodeTracker(Generic[T]):
             return
         if not self._announced.add(choice, stamp):
             return
+        self._unusable.discard(choice)  # it may be usable now
         self._announced.trim(self._choice)
         self._correct()
         self._open_waiting()
@@ -217,14 +217,19 @@ class EpisodeTracker(Generic[T]):
     # -- opening: one task at a time, the newest first ---------------------------------------------
 
     def _open_waiting(self) -> None:
-        if not self._opening and self._next() is not None:
+        if not self._opening and (self._next() or self._ahead()):
             self._opening = True
             self._node.executor.create_task(self._open_all())
 
     async def _open_all(self) -> None:
         try:
-            while (found := self._next()) is not None:
-                await self._open(*found)
+            while True:
+                if (found := self._next()) is not None:
+                    await self._open(*found)
+                elif (announced := self._ahead()) is not None:
+                    await self._prepare_for(announced)
+                else:
+                    break
         finally:
             self._opening = False
 
@@ -237,12 +242,25 @@ class EpisodeTracker(Generic[T]):
                     return message, choice
         return None
 
-    async def _open(self, message: TaskMessage, choice: DomainChoice) -> None:
+    def _ahead(self) -> DomainChoice | None:
+        """The domain to import before there is a task: the newest, until there was a first task."""
+        newest = self._announced.newest
+        if self.current is not None or newest in self._domains or newest in self._unusable:
+            return None
+        return newest
+
+    async def _prepare_for(self, choice: DomainChoice) -> Domain | None:
+        """Import a domain; None where it is refused."""
         try:
-            domain = await self._domain(choice)
+            return await self._domain(choice)
         except Exception as raised:  # of a domain's code
             self._set_aside(choice)
             self._refuse("refused_domains", error_to_answer(self._node, raised))
+            return None
+
+    async def _open(self, message: TaskMessage, choice: DomainChoice) -> None:
+        domain = await self._prepare_for(choice)
+        if domain is None:
             return
         try:
             episode, prepared = await run_in_executor(
@@ -266,12 +284,16 @@ class EpisodeTracker(Generic[T]):
         self._unusable.add(choice)
 
     def _drop(self, message: TaskMessage, older: bool = False) -> None:
-        """Let a task wait no longer, nor those that came before it."""
-        place = next(i for i, waiting in enumerate(self._waiting) if waiting is message)
-        kept = [
-            task for i, task in enumerate(self._waiting) if i > place or (i < place and not older)
-        ]
-        self._waiting = deque(kept, maxlen=WAITING)
+        """Let a task wait no longer.
+
+        Args:
+            message: The task. Newer ones may have taken its room meanwhile.
+            older: Whether those that came before it are dropped as well.
+        """
+        waiting = list(self._waiting)
+        place = next((i for i, task in enumerate(waiting) if task is message), -1)
+        before = [] if older else waiting[: max(place, 0)]
+        self._waiting = deque([*before, *waiting[place + 1 :]], maxlen=WAITING)
 
     async def _domain(self, announced: DomainChoice) -> Domain:
         """The domain that was announced, opened once.

@@ -24,7 +24,7 @@ from ensemble import encode
 from ensemble.announced_libraries import AnnouncedLibraries
 from ensemble.answering import domain_error, error_to_answer
 from ensemble.diagnostics import DiagnosticsPublisher
-from ensemble.endpoints import advertise
+from ensemble.endpoints import advertise, subscribe
 from ensemble.interfaces import (
     COMMAND,
     DOMAIN,
@@ -98,7 +98,7 @@ class LockstepWorld(Node, ABC, Generic[P]):
         self._faults = self.create_publisher(FAULT.type, FAULT.name, FAULT.qos)
         # Volatile: commands from before this node started answer another world's states.
         self.create_subscription(COMMAND.type, COMMAND.name, self._on_command, VOLATILE)
-        self.create_subscription(SKILLS.type, SKILLS.name, self._on_skills, SKILLS.qos)
+        subscribe(self, SKILLS, self._on_skills)
         self.create_service(RESET_TASK.type, RESET_TASK.name, self._on_reset)
         DiagnosticsPublisher(self, self._diagnostics)
 

@@ -15,7 +15,7 @@ from slap_msgs.msg import AbstractState, EpisodeFault, ObjectCentricState
 from ensemble.common_parameters import DEFAULTS, CommonParameters
 from ensemble.early_messages import EarlyMessages
 from ensemble.endpoints import subscribe
-from ensemble.episode_tracker import BACKLOG, EpisodeTracker
+from ensemble.episode_tracker import EpisodeTracker
 from ensemble.futures import wait_until
 from ensemble.interfaces import ATOMS, FAULT, STATE
 from ensemble.observation import Episode, Observation
@@ -85,7 +85,7 @@ class StateSynchronizer:
         )
         subscribe(node, STATE, self._on_state)
         subscribe(node, ATOMS, self._on_atoms)
-        subscribe(node, FAULT, self._on_fault, depth=BACKLOG)
+        subscribe(node, FAULT, self._on_fault)
 
     @property
     def episode(self) -> Episode | None:
