@@ -114,10 +114,6 @@ KINDS = {  # what is published, given what was heard and how many there were bef
         lambda heard, n: changed(heard[TASK.name], domain=f"moon{n}", episode=2**20 + n),
     ),
     "task that cannot be": (TASK, spoilt),
-    "task without states": (
-        TASK,
-        lambda heard, n: stamped(changed(heard[TASK.name], episode=2**20 + n), n),
-    ),
     "stale commands": (COMMAND, lambda heard, n: RobotCommand(episode=1, step=0, deltas=[0.0] * 2)),
     "fault of another episode": (
         FAULT,
