@@ -6,13 +6,14 @@ from __future__ import annotations
 
 from typing import Generic, TypeVar
 
-from slap_msgs.msg import AbstractState, ObjectCentricState
+from slap_msgs.msg import AbstractState, ObjectCentricState, ObjectState
 
 from slap_ros.messages.decode import stamp_ns
 
 Key = tuple[int, int, int]  # episode, step, stamp: the atoms' header is a copy of the state's
 M = TypeVar("M", bound=ObjectCentricState | AbstractState)
 NUMBERS = 1_000_000  # features that all messages of a room have together
+LETTERS = 8  # that take as much room as a feature
 
 
 def key_of(message: ObjectCentricState | AbstractState) -> Key:
@@ -21,10 +22,18 @@ def key_of(message: ObjectCentricState | AbstractState) -> Key:
 
 
 def size_of(message: ObjectCentricState | AbstractState) -> int:
-    """How much there is in a message: its objects and atoms, and their features."""
+    """How much there is in a message: its features, and its words at 8 letters a feature."""
     if isinstance(message, ObjectCentricState):
-        return sum(1 + len(item.features) for item in message.objects)
-    return len(message.atoms) + sum(1 + len(item.features) for item in message.seen)
+        return sum(map(_size_of_object, message.objects))
+    letters = sum(map(len, message.missing))
+    for atom in message.atoms:
+        letters += len(atom.predicate) + sum(map(len, atom.objects))
+    atoms = len(message.atoms) + len(message.missing) + letters // LETTERS
+    return atoms + sum(map(_size_of_object, message.seen))
+
+
+def _size_of_object(item: ObjectState) -> int:
+    return 1 + len(item.features) + (len(item.name) + len(item.type)) // LETTERS
 
 
 class WaitingRoom(Generic[M]):

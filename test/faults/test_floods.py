@@ -133,6 +133,10 @@ def test_a_room_is_bounded_in_numbers_and_keeps_the_next_step():
     for number in range(10):
         room.add(state(1, 8 + number, size=NUMBERS // 3))
     assert len(room) <= 3
+    wordy = state(1, 8)
+    wordy.objects[0].name = "b" * 8 * NUMBERS
+    room.add(wordy)  # is too large to be kept at all
+    assert room.pop(key_of(wordy)) is None
     room.drop_through(10**6)
     assert len(room) == 0
 
