@@ -61,9 +61,13 @@ class DomainAnnouncements:
         """The domain that was announced last."""
         return next(reversed(self._stamps), None)
 
-    def is_announced_with(self, choice: DomainChoice, stamp_ns: int) -> bool:
-        """Whether a domain was announced with a stamp."""
-        return stamp_ns in self._stamps.get(choice, ())
+    def with_stamp(self, name: str, stamp_ns: int) -> list[DomainChoice]:
+        """Domains of a name that were announced with a stamp, the newest first."""
+        return [
+            choice
+            for choice in reversed(self._stamps)
+            if choice.name == name and stamp_ns in self._stamps[choice]
+        ]
 
     def candidates(self, name: str, stamp_ns: int) -> list[DomainChoice]:
         """Which domains a task may be of, the likeliest first.
@@ -73,5 +77,4 @@ class DomainAnnouncements:
             stamp_ns: Stamp of the task, ns. A domain that was announced with it is the one.
         """
         named = [choice for choice in reversed(self._stamps) if choice.name == name]
-        exact = [choice for choice in named if self.is_announced_with(choice, stamp_ns)]
-        return exact or named[:TRIED]
+        return self.with_stamp(name, stamp_ns) or named[:TRIED]

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict, deque
+from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -44,7 +44,7 @@ from slap_ros.messages.protocols import StateMessage
 
 RIVAL_PERIOD = 1.0  # s, between two looks at whether another simulator is still there
 LOOK_PERIOD = 0.5  # s, between two looks at who publishes tasks, which cost time
-WAITING = 16  # tasks that wait to be opened: the newest
+WAITING = 16  # tasks that wait to be opened
 OPENED = 8  # domains that stay open
 UNUSABLE = 256  # domains that are not tried again
 
@@ -101,7 +101,7 @@ class EpisodeTracker(Generic[T]):
         self._domains: OrderedDict[DomainChoice, OpenedDomain] = OrderedDict()  # as announced
         self._choice: DomainChoice | None = None  # of the current episode, as announced
         self._task: TaskMessage | None = None  # the newest that is not a rival's
-        self._waiting: deque[TaskMessage] = deque(maxlen=WAITING)
+        self._waiting: list[TaskMessage] = []  # in the order in which they came
         self._opening = False
         self._simulator: frozenset[Endpoint] = frozenset()  # which publish tasks
         self._rival: tuple[TaskMessage, frozenset[Endpoint]] | None = None  # another simulator's
@@ -167,12 +167,13 @@ class EpisodeTracker(Generic[T]):
         opened = self.opened
         if opened is None or self._choice is None:
             return
-        stamp = stamp_ns(opened.header)
-        announced = self._announced.candidates(opened.domain, stamp)
-        if self._choice in announced or opened in self._waiting:
-            return
-        if any(self._announced.is_announced_with(choice, stamp) for choice in announced):
+        own = self._own_domains(opened)
+        if own and self._choice not in own and opened not in self._waiting:
             self._waiting.append(opened)
+
+    def _own_domains(self, message: TaskMessage) -> list[DomainChoice]:
+        """The domain that was announced for a task, with its stamp; more if strangers did so."""
+        return self._announced.with_stamp(message.domain, stamp_ns(message.header))
 
     def _on_skills(self, message: SkillLibrary) -> None:
         try:
@@ -197,13 +198,16 @@ class EpisodeTracker(Generic[T]):
             return
         self._task, self._rival = message, None
         self._waiting.append(message)
+        if len(self._waiting) > WAITING:
+            strange = (task for task in self._waiting if not self._own_domains(task))
+            self._drop(next(strange, self._waiting[0]))
         self._open_waiting()
 
     def _why_not(self, message: TaskMessage) -> SlapError | None:
         """What is wrong with a task, as far as it can be seen at once: else it would wait."""
         if message.domain not in self._names:
             return UnknownDomainError(f"a task of {message.domain!r}, a domain that is not known")
-        if self.current is None or message.domain != self.current.domain.name:
+        if self.current is None or self._choice not in self._own_domains(message):
             return None
         try:
             decode_state(message.initial_state, self.current.domain.types_by_name)
@@ -234,8 +238,12 @@ class EpisodeTracker(Generic[T]):
             self._opening = False
 
     def _next(self) -> tuple[TaskMessage, DomainChoice] | None:
-        """The newest task that waits and whose domain may be usable, and that domain."""
-        for message in reversed(self._waiting):
+        """The newest task that waits and whose domain may be usable, and that domain.
+
+        Tasks for which a domain was announced go first: strangers' may wait in any number.
+        """
+        newest = reversed(self._waiting)
+        for message in sorted(newest, key=lambda task: not self._own_domains(task)):
             stamp = stamp_ns(message.header)
             for choice in self._announced.candidates(message.domain, stamp):
                 if choice not in self._unusable:
@@ -290,10 +298,9 @@ class EpisodeTracker(Generic[T]):
             message: The task. Newer ones may have taken its room meanwhile.
             older: Whether those that came before it are dropped as well.
         """
-        waiting = list(self._waiting)
-        place = next((i for i, task in enumerate(waiting) if task is message), -1)
-        before = [] if older else waiting[: max(place, 0)]
-        self._waiting = deque([*before, *waiting[place + 1 :]], maxlen=WAITING)
+        place = next((i for i, task in enumerate(self._waiting) if task is message), -1)
+        before = [] if older else self._waiting[: max(place, 0)]
+        self._waiting = [*before, *self._waiting[place + 1 :]]
 
     async def _domain(self, announced: DomainChoice) -> Domain:
         """The domain that was announced, opened once.

@@ -65,7 +65,7 @@ def library(heard, number):
 
 
 def large(heard, number):
-    state = changed(heard[STATE.name], episode=2**20 + number)
+    state = changed(heard[STATE.name], episode=2**20 + number, step=1)
     state.objects = list(state.objects) * 400
     return state
 
