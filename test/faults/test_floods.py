@@ -67,6 +67,7 @@ def strangers(bench, kind):
     bench.client.destroy_timer(timer)
 
 
+@pytest.mark.timeout(180)  # six runs, each with bursts of messages between its steps
 def test_a_run_and_the_next_one_succeed_among_messages_of_strangers(network, tmp_path):
     with laboratory_in_process(tmp_path / "bag") as bench:
         episode = bench.episode_from(seed=3)
