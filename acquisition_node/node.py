@@ -22,6 +22,8 @@ ROS Parameters:
     domain (string, ""), preset (string, ""): imported at the start; empty: whichever the simulator
         announces.
     skills (string, ""): as perception_node's.
+    libraries (string, "runs/skills"): folders below which a library that slap/skills names may lie,
+        separated by ':'; others are refused.
     patience (double, 1.0): factor of all deadlines, for slow domains and machines.
 
 Publishers:
@@ -70,6 +72,7 @@ from ensemble.futures import submit, wait_for_first, wait_until
 from ensemble.interfaces import ACQUIRE_SKILLS, PROPOSE_OPERATORS
 from ensemble.observation import Episode
 from ensemble.parameters import read_parameters
+from ensemble.patience import load_advice
 from ensemble.refusals import Refusals
 from slap_ros.errors import BusyError, EpisodeChangedError, NoTaskError, TaskCanceledError
 from slap_ros.messages.decode import decode_goal
@@ -93,9 +96,7 @@ class AcquisitionNode(Node):
         self._counts = Counter(asked=0, proposed=0, trainings=0, acquired=0)
         self._workers = ThreadPoolExecutor(THREADS, thread_name_prefix="proposing")
         refusals = Refusals(self)
-        self._episodes = EpisodeTracker(
-            self, lambda _: None, lambda *_: None, refusals, common.skills
-        )
+        self._episodes = EpisodeTracker(self, lambda _: None, lambda *_: None, refusals, common)
         self._publisher = AcquisitionPublisher(self)
         self._actions = [
             ActionServer(
@@ -189,7 +190,8 @@ class AcquisitionNode(Node):
         episode = self._episodes.current
         if episode is None or not known():
             raise self._episodes.refusal or NoTaskError(
-                f"no task within {self._timeout_s} s: is sim_node (or robot_bridge) running?"
+                f"no task within {self._timeout_s} s: is sim_node (or robot_bridge) running? "
+                f"If so, {load_advice()}"
             )
         if number and number != episode.number:
             raise EpisodeChangedError(

@@ -13,6 +13,7 @@ from rclpy.task import Future
 from slap_msgs.action import SolveTask
 
 from ensemble import encode
+from ensemble.endpoints import subscribe
 from ensemble.interfaces import (
     ATOMS,
     CLOSE_BAG,
@@ -82,7 +83,7 @@ class RunClient(Node):
         if topic is JOINT_STATES:
             subscribe_as_offered(self, topic, callback)
         else:
-            self.create_subscription(topic.type, topic.name, callback, topic.qos)
+            subscribe(self, topic, callback)
 
     def other_nodes(self) -> list[str]:
         """Names of the other nodes in this namespace."""

@@ -11,6 +11,8 @@ from ensemble.patience import IMPATIENT, PATIENT
 from slap_ros.core import Domain
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 
+LIBRARIES = "runs/skills"  # where acquisition_node writes
+
 
 @dataclass(frozen=True)
 class CommonParameters:
@@ -19,6 +21,9 @@ class CommonParameters:
     domain: str = parameter("", "imported at the start; empty: whichever the simulator announces")
     preset: str = parameter("", "the domain's; empty: its first")
     skills: str = parameter("", "whose skills the domain has; empty: whichever are announced")
+    libraries: str = parameter(
+        LIBRARIES, "folders below which a library that is announced may lie, separated by ':'"
+    )
     patience: float = parameter(
         1.0, "factor of all deadlines, for slow domains and machines", IMPATIENT, PATIENT
     )
@@ -33,3 +38,6 @@ class CommonParameters:
         """
         choice = DomainChoice(self.domain, self.preset, self.skills)
         return open_domain(choice) if self.domain else None
+
+
+DEFAULTS = CommonParameters()

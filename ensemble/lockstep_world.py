@@ -12,6 +12,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections import Counter
 from dataclasses import replace
+from time import monotonic
 from typing import Any, Generic, TypeVar
 
 from builtin_interfaces.msg import Time
@@ -20,8 +21,10 @@ from slap_msgs.msg import RobotCommand, SkillLibrary
 from slap_msgs.srv import ResetTask
 
 from ensemble import encode
+from ensemble.announced_libraries import AnnouncedLibraries
 from ensemble.answering import domain_error, error_to_answer
 from ensemble.diagnostics import DiagnosticsPublisher
+from ensemble.endpoints import advertise, subscribe
 from ensemble.interfaces import (
     COMMAND,
     DOMAIN,
@@ -46,7 +49,7 @@ from slap_ros.messages.decode import decode_command, stamp_ns
 from slap_ros.relational import State
 from slap_ros.skills.domain_choice import open_domain
 
-QUIET = 10.0  # s between two log lines about states that cannot be shown
+QUIET = 10.0  # s between two log lines of a kind: whoever sends nonsense may send a lot of it
 REFUSALS = {  # what is counted, by the error that refuses a command
     StaleCommandError: "stale_commands",
     InvalidCommandError: "invalid_commands",
@@ -80,7 +83,9 @@ class LockstepWorld(Node, ABC, Generic[P]):
         super().__init__(name, **kwargs)
         self._settings = read_parameters(self, parameters)
         self._domain = open_domain(self._settings.choice)
-        self._acquired: SkillLibrary | None = None  # to be taken on with the next episode
+        self._libraries = AnnouncedLibraries(self._settings.libraries)
+        self._offered = False  # whether one is to be taken on with the next episode
+        self._warned_s: dict[str, float] = {}  # by kind
         self._episode = 0
         self._step = 0
         self._opened_ns = 0  # the stamp of the episode's task
@@ -89,11 +94,11 @@ class LockstepWorld(Node, ABC, Generic[P]):
         self._counts: Counter[str] = Counter(dict.fromkeys(kinds, 0))
         self._domains = self.create_publisher(DOMAIN.type, DOMAIN.name, DOMAIN.qos)
         self._tasks = self.create_publisher(TASK.type, TASK.name, TASK.qos)
-        self._states = self.create_publisher(STATE.type, STATE.name, STATE.qos)
+        self._states = advertise(self, STATE)
         self._faults = self.create_publisher(FAULT.type, FAULT.name, FAULT.qos)
         # Volatile: commands from before this node started answer another world's states.
         self.create_subscription(COMMAND.type, COMMAND.name, self._on_command, VOLATILE)
-        self.create_subscription(SKILLS.type, SKILLS.name, self._on_skills, SKILLS.qos)
+        subscribe(self, SKILLS, self._on_skills)
         self.create_service(RESET_TASK.type, RESET_TASK.name, self._on_reset)
         DiagnosticsPublisher(self, self._diagnostics)
 
@@ -151,7 +156,7 @@ class LockstepWorld(Node, ABC, Generic[P]):
     def _refuse(self, error: SlapError) -> None:
         kind = REFUSALS[type(error)]
         self._counts[kind] += 1
-        self.get_logger().warning(f"{error} ({self._counts[kind]} {kind.replace('_', ' ')})")
+        self._warn(kind, f"{error} ({self._counts[kind]} {kind.replace('_', ' ')})")
 
     def _fail(self, error: SlapError) -> None:
         """End the episode: no step is taken, and no state published, until the next reset."""
@@ -180,9 +185,14 @@ class LockstepWorld(Node, ABC, Generic[P]):
 
     # -- episodes -------------------------------------------------------------------------------
 
-    def _publish_domain(self) -> None:
-        """Say what runs, also before there is a first state."""
-        self._domains.publish(encode.domain_info(self._domain, self._now()))
+    def _publish_domain(self, stamp: Time | None = None) -> None:
+        """Say what runs, also before there is a first state.
+
+        Args:
+            stamp: Stamp of the task that is published with it, by which nodes know that it is the
+                task's; None: now.
+        """
+        self._domains.publish(encode.domain_info(self._domain, stamp or self._now()))
 
     def _open_episode(self, task: Task) -> None:
         """Publish a task and its initial state, as step 0 of a new episode.
@@ -194,7 +204,7 @@ class LockstepWorld(Node, ABC, Generic[P]):
         self._step = 0
         self._fault = ErrorCode.NONE
         now = self._now()
-        self._publish_domain()  # for whoever was told something else meanwhile
+        self._publish_domain(now)  # for whoever was told something else meanwhile
         message = encode.task(task, self._domain, self._episode, now)
         self._opened_ns = stamp_ns(message.header)
         self._tasks.publish(message)
@@ -218,19 +228,34 @@ class LockstepWorld(Node, ABC, Generic[P]):
         return response
 
     def _on_skills(self, message: SkillLibrary) -> None:
-        if message.domain == self._domain.name:
-            self._acquired = message
+        if message.domain != self._domain.name:
+            return
+        try:
+            self._offered |= self._libraries.add(message)
+        except SlapError as error:
+            self._warn("library", f"a library of skills is left out: {error}")
 
     def _take_on_skills(self) -> None:
-        """Open the domain with the skills that were acquired meanwhile, if any were.
+        """Open the domain with the skills that were acquired meanwhile, if any can be used.
 
-        Raises:
-            SlapError: The library cannot be used here; the next episode has the skills as they are.
+        Of several, those announced last; if none can, the next episode has the skills as they are.
         """
-        library, self._acquired = self._acquired, None
-        if library is not None:
-            choice = replace(self._settings.choice, skills=library.folder, digest=library.digest)
-            self._domain = open_domain(choice)
+        folders = self._libraries.folders(self._domain.name) if self._offered else []
+        self._offered = False
+        for folder in folders:
+            try:
+                self._domain = open_domain(replace(self._settings.choice, skills=str(folder)))
+            except SlapError as error:
+                self._warn("library", f"a library of skills is left out: {error}")
+            else:
+                return
+
+    def _warn(self, kind: str, words: str) -> None:
+        """Log a warning, unless one of its kind was logged a moment ago."""
+        now_s = monotonic()
+        if now_s - self._warned_s.get(kind, -QUIET) >= QUIET:
+            self._warned_s[kind] = now_s
+            self.get_logger().warning(words)
 
     def _now(self) -> Time:
         return self.get_clock().now().to_msg()

@@ -78,6 +78,7 @@ def node_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int |
         "skills": settings.skills,
         "patience": settings.patience,
     }
+    common |= _libraries(settings)
     nodes: dict[str, Mapping[str, str | int | float]] = {
         **_world_parameters(settings),
         "perception_node": {**settings.perception, **common},
@@ -91,6 +92,12 @@ def node_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int |
     return nodes
 
 
+def _libraries(settings: RunSettings) -> dict[str, str]:
+    """Where the libraries may lie that are announced: where the acquisition node writes."""
+    output = (settings.acquisition or {}).get("output", "")
+    return {"libraries": str(Path(str(output)).absolute())} if output else {}
+
+
 def _world_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int | float]]:
     """Whatever is in the world's place."""
     task: dict[str, str | int | float] = {
@@ -100,6 +107,7 @@ def _world_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int
         "seed": settings.seed,
         "index": settings.index,
         "goal": settings.goal,
+        **_libraries(settings),
     }
     if settings.world == SIM:
         return {"sim_node": task | {"pace": settings.pace}}

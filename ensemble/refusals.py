@@ -9,7 +9,7 @@ from time import monotonic
 
 from rclpy.node import Node
 
-KINDS = ("refused_domains", "refused_tasks", "refused_states")
+KINDS = ("refused_domains", "refused_tasks", "refused_states", "refused_skills")
 QUIET = 10.0  # s between two log lines of a kind: whoever sends nonsense may send a lot of it
 
 

@@ -16,6 +16,7 @@ from ensemble.client import OnMessage, RunClient
 from ensemble.interfaces import Topic
 from ensemble.launcher import InProcessLauncher, NodeLauncher, ProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
+from ensemble.patience import load_advice
 from ensemble.skill_request import LACKING, SkillRequest, SkillRequester
 from ensemble.spinner import Spinner, temporary_node
 from slap_ros.errors import (
@@ -105,8 +106,8 @@ def _drive(
 
     if not spinner.spin_until(ready, ready_s):
         raise NotReadyError(
-            f"the ensemble did not come up within {ready_s:.0f} s; try `slap doctor`, or "
-            "--patience if the domain or the machine is slow"
+            f"the ensemble did not come up within {ready_s:.0f} s; try `slap doctor`; or "
+            f"{load_advice()}"
         )
     failure: SlapError | None = None
     try:
@@ -209,7 +210,9 @@ def _close_bag(
     closed = client.close_bag()
     try:
         if not spinner.spin_until(closed.done, limit_s):
-            return RunTimeoutError(f"the recorder did not finish its bag within {limit_s} s")
+            return RunTimeoutError(
+                f"the recorder did not finish its bag within {limit_s} s; {load_advice()}"
+            )
     except NodeDiedError as error:
         return error
     return None

@@ -17,6 +17,7 @@ from slap_msgs.msg import DomainInfo, Task
 from ensemble import encode
 from ensemble.client import RunClient
 from ensemble.interfaces import ACQUIRE_SKILLS, RESET_TASK, Call
+from ensemble.patience import load_advice
 from ensemble.spinner import Spinner
 from slap_ros.errors import ErrorCode, NotReadyError, RunTimeoutError, error_from
 from slap_ros.messages.interfaces import DOMAIN_INFO, TASK
@@ -138,7 +139,9 @@ class SkillRequester:
             if self._spinner.spin_until(lambda: self._announces(digest), TAKE_ON_S / 10):
                 return int(answer.episode)
             if monotonic() > end:  # else the library was still on its way to the world
-                raise NotReadyError(f"the world does not take on the library {digest}")
+                raise NotReadyError(
+                    f"the world does not take on the library {digest}; {load_advice()}"
+                )
 
     def _announces(self, digest: str) -> bool:
         info: DomainInfo = self._client.newest[DOMAIN_INFO]

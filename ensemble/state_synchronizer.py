@@ -12,12 +12,16 @@ from typing import NamedTuple
 from rclpy.node import Node
 from slap_msgs.msg import AbstractState, EpisodeFault, ObjectCentricState
 
+from ensemble.common_parameters import DEFAULTS, CommonParameters
 from ensemble.early_messages import EarlyMessages
-from ensemble.episode_tracker import EpisodeTracker, subscribe
+from ensemble.endpoints import subscribe
+from ensemble.episode_tracker import EpisodeTracker
 from ensemble.futures import wait_until
 from ensemble.interfaces import ATOMS, FAULT, STATE
 from ensemble.observation import Episode, Observation
+from ensemble.patience import load_advice
 from ensemble.refusals import Refusals
+from ensemble.waiting_room import WaitingRoom, key_of
 from slap_ros.errors import SlapError
 from slap_ros.messages.decode import (
     decode_atoms,
@@ -29,9 +33,7 @@ from slap_ros.messages.decode import (
 )
 from slap_ros.perception.percept import known_part
 
-WAITING = 100  # messages kept until their counterpart, or their episode, is known
-
-Key = tuple[int, int, int]  # episode, step, stamp: the atoms' header is a copy of the state's
+WAITING = 1000  # messages of each kind that wait for their counterpart, or for their episode
 
 
 class Pair(NamedTuple):
@@ -41,10 +43,25 @@ class Pair(NamedTuple):
     atoms: AbstractState
 
 
+class Rooms:
+    """Where states and atoms wait for one another."""
+
+    def __init__(self) -> None:
+        self.states: WaitingRoom[ObjectCentricState] = WaitingRoom(WAITING)
+        self.atoms: WaitingRoom[AbstractState] = WaitingRoom(WAITING)
+
+    def drop_through(self, step: int) -> None:
+        """Let nothing wait any longer that is of this step or of one before."""
+        self.states.drop_through(step)
+        self.atoms.drop_through(step)
+
+
 class StateSynchronizer:
     """Pairs states with the atoms of the same step, and reports each pair newer than the last.
 
-    Within an episode, the order is that of the steps. A new episode begins from nothing.
+    Within an episode, the order is that of the steps. A new episode begins from nothing. The
+    current episode, each whose task is here and all others have rooms of their own for what waits:
+    whoever sends messages of other episodes cannot take the room of this one.
     """
 
     def __init__(
@@ -52,7 +69,7 @@ class StateSynchronizer:
         node: Node,
         on_observation: Callable[[Observation], None],
         prepare: Callable[[Episode], None] = lambda _: None,
-        skills: str = "",
+        common: CommonParameters = DEFAULTS,
     ) -> None:
         """Subscribe to task, state and atoms.
 
@@ -60,17 +77,19 @@ class StateSynchronizer:
             node: Who subscribes.
             on_observation: Called with each observation that is newer than the last.
             prepare: Called in a thread for each new episode, before its first observation.
-            skills: What the node was given, see :class:`EpisodeTracker`.
+            common: Parameters of the node, see :class:`EpisodeTracker`.
         """
         self.latest: Observation | None = None
         self._node = node
         self._on_observation = on_observation
         self._refusals = Refusals(node)
-        self._states: OrderedDict[Key, ObjectCentricState] = OrderedDict()  # without atoms
-        self._atoms: OrderedDict[Key, AbstractState] = OrderedDict()  # without a state
-        self._early: EarlyMessages[Pair] = EarlyMessages(WAITING, lambda pair: pair.state)
-        self._fault: EpisodeFault | None = None  # the newest
-        self._episodes = EpisodeTracker(node, prepare, self._open, self._refusals, skills)
+        self._current, self._expected, self._others = Rooms(), Rooms(), Rooms()
+        self._early_faults: OrderedDict[tuple[int, int], EpisodeFault] = OrderedDict()
+        self._fault: EpisodeFault | None = None  # of the current episode
+        self._episodes = EpisodeTracker(node, prepare, self._open, self._refusals, common)
+        self._early: EarlyMessages[Pair] = EarlyMessages(
+            WAITING, lambda pair: pair.state, self._episodes.expects
+        )
         subscribe(node, STATE, self._on_state)
         subscribe(node, ATOMS, self._on_atoms)
         subscribe(node, FAULT, self._on_fault)
@@ -134,30 +153,67 @@ class StateSynchronizer:
         if self.latest is None or not seen():
             raise missing(
                 f"no perceived state{f' of episode {episode}' if episode else ''} within "
-                f"{timeout_s} s: are sim_node (or robot_bridge) and perception_node running?"
+                f"{timeout_s} s: are sim_node (or robot_bridge) and perception_node running? "
+                f"If so, {load_advice()}"
             )
         return self.latest
 
     def _open(self, episode: Episode, _: None) -> None:
+        self._current = Rooms()
+        self._fault = self._early_faults.get((episode.number, episode.opened_ns))
+        assert self._episodes.opened is not None
         if early := self._early.take(episode):
             self._observe(episode, max(early, key=lambda pair: pair.state.step))
+        else:  # the task has the first state, should that have been lost
+            self._on_state(self._episodes.opened.initial_state)
 
     def _on_state(self, message: ObjectCentricState) -> None:
-        atoms = self._atoms.pop(_key(message), None)
-        if atoms is None:
-            _keep(self._states, message)
-        else:
+        key = key_of(message)
+        atoms = next((found for room in self._rooms if (found := room.atoms.pop(key))), None)
+        if atoms is not None:
             self._take(Pair(message, atoms))
+        elif self._is_of_use(message) and self._fits(message):
+            self._room_of(message).states.add(message)
 
     def _on_atoms(self, message: AbstractState) -> None:
-        state = self._states.pop(_key(message), None)
-        if state is None:
-            _keep(self._atoms, message)
-        else:
+        key = key_of(message)
+        state = next((found for room in self._rooms if (found := room.states.pop(key))), None)
+        if state is not None:
             self._take(Pair(state, message))
+        elif self._is_of_use(message):
+            self._room_of(message).atoms.add(message)
+
+    @property
+    def _rooms(self) -> tuple[Rooms, Rooms, Rooms]:
+        return self._current, self._expected, self._others
+
+    def _room_of(self, message: ObjectCentricState | AbstractState) -> Rooms:
+        """Where a message waits: strangers' do so elsewhere, unless they are of this episode."""
+        if self.episode is not None and message.episode == self.episode.number:
+            return self._current
+        return self._expected if self._episodes.expects(message) else self._others
+
+    def _is_of_use(self, message: ObjectCentricState | AbstractState) -> bool:
+        """Whether a message may say something new: not if it is of a step that is known."""
+        latest = self.latest
+        if latest is None or latest.episode is not self.episode:
+            return True
+        return message.episode != latest.episode.number or message.step > latest.step
+
+    def _fits(self, message: ObjectCentricState) -> bool:
+        """Whether a state can be one of the current episode, or is one of another."""
+        episode = self.episode
+        if episode is None or message.episode != episode.number or message.step == 0:
+            return True
+        return episode.has(message)
 
     def _on_fault(self, message: EpisodeFault) -> None:
-        self._fault = message
+        if self.episode is not None and self.episode.is_ended_by(message):
+            self._fault = message
+            return
+        self._early_faults[message.episode, stamp_ns(message.header)] = message
+        if len(self._early_faults) > WAITING:
+            self._early_faults.popitem(last=False)
 
     def _take(self, pair: Pair) -> None:
         episode, known = self._episodes.current, self.latest
@@ -172,6 +228,7 @@ class StateSynchronizer:
         except SlapError as error:
             self._refusals.add("refused_states", f"step {pair.state.step} refused: {error}")
         else:
+            self._current.drop_through(self.latest.step)
             self._on_observation(self.latest)
 
 
@@ -187,16 +244,3 @@ def _decoded(episode: Episode, pair: Pair) -> Observation:
         missing,
         bool(atoms.exact),
     )
-
-
-def _key(message: ObjectCentricState | AbstractState) -> Key:
-    return message.episode, message.step, stamp_ns(message.header)
-
-
-def _keep(
-    waiting: OrderedDict[Key, ObjectCentricState | AbstractState],
-    message: ObjectCentricState | AbstractState,
-) -> None:
-    waiting[_key(message)] = message
-    if len(waiting) > WAITING:
-        waiting.popitem(last=False)

@@ -8,6 +8,7 @@ from builtin_interfaces.msg import Time
 from rclpy.node import Node
 
 from ensemble import encode
+from ensemble.endpoints import advertise
 from ensemble.interfaces import JOINT_STATES, MARKERS, TF
 from slap_ros.core import Domain
 from slap_ros.relational import State
@@ -19,7 +20,7 @@ class Visualizer:
     def __init__(self, node: Node, domain: Domain) -> None:
         """Publish as ``node``."""
         self._domain = domain
-        self._markers = node.create_publisher(MARKERS.type, MARKERS.name, MARKERS.qos)
+        self._markers = advertise(node, MARKERS)
         self._frames = node.create_publisher(TF.type, TF.name, TF.qos)
         self._joints = node.create_publisher(JOINT_STATES.type, JOINT_STATES.name, JOINT_STATES.qos)
 

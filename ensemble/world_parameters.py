@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ensemble.common_parameters import LIBRARIES
 from ensemble.parameters import MAX_SEED, parameter
 from slap_ros.core import Domain, Task, task_with_goal
 from slap_ros.skills.domain_choice import DomainChoice
@@ -20,6 +21,9 @@ class WorldParameters:
     seed: int = parameter(0, "samples the first task", high=MAX_SEED)
     skills: str = parameter("", "none, demonstrator, or a library's folder; empty: what ships")
     index: int = parameter(0, "which of the seed's tasks")
+    libraries: str = parameter(
+        LIBRARIES, "folders below which a library that is announced may lie, separated by ':'"
+    )
     goal: str = parameter("", "of the first task: by name, or as atoms; empty: its own")
 
     @property

@@ -4,63 +4,96 @@
 
 On a robot: ``domain:=obstacle_tower world:=robot scene:=FILE``, or ``world:=mock`` without one.
 
+``params_file:=FILE`` sets any other parameter of any node, in a copy of ``config/ensemble.yaml``.
+
 It waits for a task to be asked for:
 ``ros2 action send_goal /slap/solve_task slap_msgs/action/SolveTask '{max_replans: 5}'``
 """
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
-from launch import Action, LaunchDescription
-from launch.actions import DeclareLaunchArgument, LogInfo, SetEnvironmentVariable
-from launch.conditions import IfCondition, UnlessCondition
-from launch.substitutions import EqualsSubstitution, LaunchConfiguration, PythonExpression
+from launch import Action, LaunchContext, LaunchDescription
+from launch.actions import (
+    DeclareLaunchArgument,
+    LogInfo,
+    OpaqueFunction,
+    SetEnvironmentVariable,
+)
+from launch.conditions import IfCondition
+from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
 from slap_ros.doctor.settings import RANGE, RANGE_HINT
+from slap_ros.errors import InvalidParameterError
 
 ARGUMENTS = {
-    "domain": ("obstacle2d", "which domain"),
-    "preset": (
-        "",
-        "fair: random tasks; paper: the paper's start states; empty: the domain's first",
-    ),
-    "skills": ("", "none, demonstrator, or a folder of acquired skills; empty: what ships"),
-    "seed": ("0", "samples the task"),
-    "index": ("0", "which of the seed's tasks"),
-    "goal": ("", "of the task, by name or as atoms; empty: its own"),
-    "planner": ("lazy", "lazy, exhaustive or ff"),
-    "shortcuts": ("", "folder of a shortcut library, or none; empty: the shipped one"),
-    "samples": ("16", "attempts of a shortcut in the model; the shortest is used"),
     "world": ("sim", "sim; robot: the bridge; mock: the bridge with a mock robot behind it"),
-    "scene": ("", "a robot's scene file; empty: the sampled task's objects"),
-    "arm": ("panda", "a robot's: panda or fr3"),
-    "latency": ("0.02", "s, the mock robot's"),
-    "pose_noise": ("0.002", "m, the mock robot's"),
-    "dropout": ("0.0", "share of detections that the mock robot loses"),
-    "pace": ("0.0", "environment steps per second, for watching; 0: at full speed"),
-    "patience": ("1.0", "factor of all deadlines, for slow domains and machines"),
+    "params_file": ("", "parameter file for all nodes, such as a changed copy of ensemble.yaml"),
     "acquisition": (
         "false",
         "run acquisition_node too: it proposes operators and acquires skills",
     ),
-    "language_settings": ("", "of acquisition_node: JSON file with model and server"),
     "record": ("", "folder of the bag to record; empty: none"),
     "rviz": ("false", "open RViz as well"),
-    "namespace": ("", "of every node: /robot1 gives /robot1/slap/state"),
+    "namespace": ("", "namespace of every node: /robot1 gives /robot1/slap/state"),
+}
+CHOICES = {"world": ["sim", "robot", "mock"]}
+# Arguments that are parameters of nodes. They have no defaults here: a node's parameter that is not
+# given is what the parameter files say.
+PARAMETERS = {
+    "domain": (str, "name of the domain"),
+    "preset": (str, "fair: random tasks; paper: the paper's start states"),
+    "skills": (str, "none, demonstrator, or a folder of acquired skills"),
+    "seed": (int, "seed that samples the task"),
+    "index": (int, "which of the seed's tasks"),
+    "goal": (str, "goal of the task, by name or as atoms"),
+    "planner": (str, "name of the planner: lazy, exhaustive, ff or astar"),
+    "shortcuts": (str, "folder of a shortcut library, or none"),
+    "samples": (int, "attempts of a shortcut in the model; the shortest is used"),
+    "scene": (str, "scene file of a robot"),
+    "arm": (str, "arm of a robot: panda or fr3"),
+    "latency": (float, "latency of the mock robot, s"),
+    "pose_noise": (float, "noise of the mock robot's detections, m"),
+    "dropout": (float, "share of detections that the mock robot loses"),
+    "pace": (float, "environment steps per second, for watching; 0: at full speed"),
+    "patience": (float, "factor of all deadlines, for slow domains and machines"),
+    "language_settings": (str, "JSON file with model and server, for acquisition_node"),
+}
+TASK = ("domain", "preset", "skills", "goal", "seed", "index")
+COMMON = ("domain", "preset", "skills", "patience")
+SHORTCUTS = ("shortcuts", "samples")
+TAKEN = {  # arguments that each node takes as its parameters
+    "sim_node": (*TASK, "pace"),
+    "robot_bridge": (*TASK, "arm", "scene"),
+    "mock_robot": (*TASK, "arm", "latency", "pose_noise", "dropout"),
+    "perception_node": COMMON,
+    "skill_server": (*COMMON, *SHORTCUTS),
+    "planner_node": (*COMMON, *SHORTCUTS, "planner"),
+    "acquisition_node": (*COMMON, "language_settings"),
+    "recorder_node": (),
 }
 
 
 def generate_launch_description() -> LaunchDescription:
     """Describe the ensemble."""
     arguments = [
-        DeclareLaunchArgument(name, default_value=default, description=description)
+        DeclareLaunchArgument(
+            name, default_value=default, description=description, choices=CHOICES.get(name)
+        )
         for name, (default, description) in ARGUMENTS.items()
     ]
+    arguments += [
+        DeclareLaunchArgument(
+            name, default_value="", description=f"{description}; empty: as the parameter file says"
+        )
+        for name, (_, description) in PARAMETERS.items()
+    ]
     return LaunchDescription(
-        [*arguments, *_discovery_range(), *_worlds(), *_solvers(), _recorder(), _rviz()]
+        [*arguments, *_discovery_range(), OpaqueFunction(function=_nodes), _rviz()]
     )
 
 
@@ -71,59 +104,63 @@ def _discovery_range() -> list[Action]:
     return [SetEnvironmentVariable(RANGE, "LOCALHOST"), LogInfo(msg=RANGE_HINT)]
 
 
-def _worlds() -> list[Node]:
-    """The simulator, or the bridge with or without a mock robot behind it."""
-    task = {name: _value(name, str) for name in ("domain", "preset", "skills", "goal")}
-    task |= {"seed": _value("seed", int), "index": _value("index", int)}
-    arm = {"arm": _value("arm", str)}
-    noise = {name: _value(name, float) for name in ("latency", "pose_noise", "dropout")}
+def _nodes(context: LaunchContext) -> list[Node]:
+    """The nodes that the arguments ask for."""
+    given = {name: value for name, value in context.launch_configurations.items() if value}
+    names = ["sim_node"] if given["world"] == "sim" else ["robot_bridge"]
+    names += ["mock_robot"] if given["world"] == "mock" else []
+    names += ["perception_node", "skill_server", "planner_node"]
+    names += ["recorder_node"] if "record" in given else []
+    acquires = IfCondition(LaunchConfiguration("acquisition"))
     return [
-        _node(
-            "sim_node",
-            task | {"pace": _value("pace", float)},
-            condition=IfCondition(_is("world", "sim")),
-        ),
-        _node(
-            "robot_bridge",
-            task | arm | {"scene": _value("scene", str)},
-            condition=UnlessCondition(_is("world", "sim")),
-        ),
-        _node(
-            "mock_robot",
-            task | arm | noise,
-            condition=IfCondition(_is("world", "mock")),
-        ),
+        *(_node(name, given) for name in names),
+        _node("acquisition_node", given, condition=acquires),
     ]
 
 
-def _solvers() -> list[Node]:
-    """Perception, skill server and planner."""
-    shortcuts = {"shortcuts": _value("shortcuts", str), "samples": _value("samples", int)}
-    # A robot takes its time to move and to be measured.
-    state_timeout = ParameterValue(
-        PythonExpression(["2.0 if '", LaunchConfiguration("world"), "' == 'sim' else 8.0"]),
-        value_type=float,
+def _node(name: str, given: Mapping[str, str], **options: object) -> Node:
+    """A node of the ensemble: what is given goes before files, and a user's file before ours."""
+    taken = {key: _value(key, given[key]) for key in TAKEN[name] if key in given}
+    if name == "recorder_node":
+        taken["bag"] = ParameterValue(given["record"], value_type=str)
+    return Node(
+        package="slap_ros",
+        executable=name,
+        name=name,
+        namespace=LaunchConfiguration("namespace"),
+        parameters=[*_parameter_files(given), *([taken] if taken else [])],
+        output="screen",
+        **options,
     )
-    common = {name: _value(name, str) for name in ("domain", "preset", "skills")}
-    common |= {"patience": _value("patience", float)}
-    return [
-        _node("perception_node", common),
-        _node("skill_server", common | shortcuts | {"state_timeout": state_timeout}),
-        _node("planner_node", common | shortcuts | {"planner": _value("planner", str)}),
-        _node(
-            "acquisition_node",
-            common | {"language_settings": _value("language_settings", str)},
-            condition=IfCondition(LaunchConfiguration("acquisition")),
-        ),
-    ]
 
 
-def _recorder() -> Node:
-    return _node(
-        "recorder_node",
-        {"bag": _value("record", str)},
-        condition=UnlessCondition(_is("record", "")),
-    )
+def _value(name: str, text: str) -> ParameterValue:
+    """An argument as a parameter.
+
+    Raises:
+        InvalidParameterError: It is no number where one is wanted.
+    """
+    kind, _ = PARAMETERS[name]
+    try:
+        return ParameterValue(kind(text), value_type=kind)
+    except ValueError:
+        raise InvalidParameterError(f"{name} is a number, not {text!r}") from None
+
+
+def _parameter_files(given: Mapping[str, str]) -> list[str]:
+    """Parameter files, each of which goes before those in front of it.
+
+    Raises:
+        InvalidParameterError: The user's is not there.
+    """
+    files = [_config() / "ensemble.yaml"]
+    if given["world"] != "sim":
+        files.append(_config() / "robot.yaml")
+    if "params_file" in given:
+        files.append(Path(given["params_file"]).expanduser())
+        if not files[-1].is_file():
+            raise InvalidParameterError(f"params_file: there is no file {files[-1]}")
+    return [str(file) for file in files]
 
 
 def _rviz() -> Node:
@@ -138,27 +175,6 @@ def _rviz() -> Node:
         ],
         condition=IfCondition(LaunchConfiguration("rviz")),
     )
-
-
-def _node(name: str, parameters: dict[str, ParameterValue], **options: object) -> Node:
-    """A node of the ensemble: defaults from the configuration file, then ``parameters``."""
-    return Node(
-        package="slap_ros",
-        executable=name,
-        name=name,
-        namespace=LaunchConfiguration("namespace"),
-        parameters=[str(_config() / "ensemble.yaml"), parameters],
-        output="screen",
-        **options,
-    )
-
-
-def _is(name: str, value: str) -> EqualsSubstitution:
-    return EqualsSubstitution(LaunchConfiguration(name), value)
-
-
-def _value(name: str, kind: type) -> ParameterValue:
-    return ParameterValue(LaunchConfiguration(name), value_type=kind)
 
 
 def _config() -> Path:

@@ -21,6 +21,8 @@ ROS Parameters:
         the simulator announces, in a thread.
     skills (string, ""): whose skills the domain has: none, demonstrator, or a library's folder;
         empty: whichever the simulator announces. A domain that is announced with others is refused.
+    libraries (string, "runs/skills"): folders below which a library that slap/skills names may lie,
+        separated by ':'; others are refused.
     patience (double, 1.0): factor of all deadlines, for slow domains and machines.
 
 Publishers:
@@ -48,9 +50,11 @@ from ensemble.answering import domain_error
 from ensemble.common_parameters import CommonParameters
 from ensemble.diagnostics import DiagnosticsPublisher
 from ensemble.early_messages import EarlyMessages
+from ensemble.endpoints import subscribe
 from ensemble.entry_point import run_node
-from ensemble.episode_tracker import EpisodeTracker, subscribe
+from ensemble.episode_tracker import EpisodeTracker
 from ensemble.interfaces import ATOMS, FAULT, STATE
+from ensemble.next_states import NextStates
 from ensemble.observation import Episode
 from ensemble.parameters import read_parameters
 from ensemble.perception_parameters import PerceptionParameters
@@ -60,7 +64,6 @@ from slap_ros.messages import qos
 from slap_ros.messages.decode import decode_state
 from slap_ros.perception import ExactPerceiver, NoisyPerceiver, Perceiver
 
-BEFORE_FIRST = -1  # step before an episode's first
 AFTER_LAST = 2**32  # above all that a message can have
 
 
@@ -75,15 +78,15 @@ class PerceptionNode(Node):
         self._quality, self._seed = parameters.quality, parameters.noise_seed
         self._perceiver: Perceiver
         self._perceived = 0
-        self._step = BEFORE_FIRST  # of the newest state perceived in this episode
-        self._early: EarlyMessages[ObjectCentricState] = EarlyMessages(
-            qos.EPISODE.depth, lambda message: message
-        )
+        self._states = NextStates(0)  # of the current episode
         self._atoms = self.create_publisher(ATOMS.type, ATOMS.name, ATOMS.qos)
         self._faults = self.create_publisher(FAULT.type, FAULT.name, FAULT.qos)
         self._refusals = Refusals(self)
         self._episodes = EpisodeTracker(
-            self, self._perceiver_of, self._open, self._refusals, common.skills
+            self, self._perceiver_of, self._open, self._refusals, common
+        )
+        self._early: EarlyMessages[ObjectCentricState] = EarlyMessages(
+            qos.EPISODE.depth, lambda message: message, self._episodes.expects
         )
         subscribe(self, STATE, self._on_state)
         DiagnosticsPublisher(self, lambda: {"states": self._perceived, **self._refusals.counts})
@@ -95,9 +98,17 @@ class PerceptionNode(Node):
 
     def _open(self, episode: Episode, perceiver: Perceiver) -> None:
         self._perceiver = perceiver
-        self._step = BEFORE_FIRST
-        for message in self._early.take(episode):
-            self._perceive(message, episode)
+        assert self._episodes.opened is not None
+        first = self._episodes.opened.initial_state
+        earlier = self._early.take(episode)
+        self._states = NextStates(0)
+        self._take(first, episode)
+        if (
+            len(earlier) >= qos.EPISODE.depth
+        ):  # joined so late that publishers keep the first no more
+            self._states.step = min(message.step for message in earlier)
+        for message in sorted(earlier, key=lambda message: message.step):
+            self._take(message, episode)
 
     def _perceiver_of(self, episode: Episode) -> Perceiver:
         if self._quality.exact:
@@ -109,14 +120,18 @@ class PerceptionNode(Node):
     def _on_state(self, message: ObjectCentricState) -> None:
         episode = self._episodes.current
         if episode is not None and episode.has(message):
-            self._perceive(message, episode)
+            self._take(message, episode)
         else:
             self._early.add(message)  # of an episode whose task is still to come, perhaps
 
+    def _take(self, message: ObjectCentricState, episode: Episode) -> None:
+        """Perceive a state once it is its turn, and those that waited for it."""
+        self._states.add(message)
+        while (following := self._states.pop()) is not None:
+            self._perceive(following, episode)
+
     def _perceive(self, message: ObjectCentricState, episode: Episode) -> None:
-        """Perceive a state, each once and in the order of steps."""
-        if message.step <= self._step:
-            return
+        """Perceive a state; one that cannot be perceived leaves its turn to another."""
         try:
             state = decode_state(message, episode.domain.types_by_name)
             percept = self._perceiver.perceive(state)
@@ -126,13 +141,13 @@ class PerceptionNode(Node):
         except Exception as raised:  # of a domain's predicate
             self._fail(domain_error(self, episode.domain.name, raised), episode, message)
             return
-        self._step = message.step
+        self._states.step = message.step + 1
         self._atoms.publish(encode.percept(percept, message, episode.space, state))
         self._perceived += 1
 
     def _fail(self, error: SlapError, episode: Episode, message: ObjectCentricState) -> None:
         """End the episode: what comes of it later is not perceived."""
-        self._step = AFTER_LAST
+        self._states = NextStates(AFTER_LAST)
         fault = encode.fault(error, episode.number, episode.opened_ns, message.step)
         self._faults.publish(fault)
         self.get_logger().error(f"step {message.step} not perceived: {error}")

@@ -12,6 +12,8 @@ ROS Parameters:
         the simulator announces, in a thread.
     skills (string, ""): whose skills the domain has: none, demonstrator, or a library's folder;
         empty: whichever the simulator announces. A domain that is announced with others is refused.
+    libraries (string, "runs/skills"): folders below which a library that slap/skills names may lie,
+        separated by ':'; others are refused.
     patience (double, 1.0): factor of all deadlines, for slow domains and machines.
 
 Publishers:
@@ -73,7 +75,7 @@ from slap_ros.relational import State
 class PlannerParameters(ShortcutParameters):
     """See the module's docstring."""
 
-    planner: str = parameter("lazy", "lazy, exhaustive, ff or astar")
+    planner: str = parameter("lazy", f"name of the planner: {', '.join(PLANNERS)}")
     observation_timeout: float = parameter(10.0, "s to wait for a perceived state")
     server_timeout: float = parameter(5.0, "s without a skill server until a run fails")
 
@@ -105,7 +107,7 @@ class PlannerNode(Node):
         self._counts = Counter(tried=0, solved=0)
         self._workers = ThreadPoolExecutor(1, thread_name_prefix="planning")
         self._synchronizer = StateSynchronizer(
-            self, lambda _: None, self._shortcuts.prepare_episode, common.skills
+            self, lambda _: None, self._shortcuts.prepare_episode, common
         )
         self._publisher = PlanPublisher(self)
         self._skills = ActionClient(self, EXECUTE_SKILL.type, EXECUTE_SKILL.name)

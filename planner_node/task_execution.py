@@ -22,6 +22,7 @@ from slap_msgs.msg import PlanEvent
 from ensemble import encode
 from ensemble.futures import submit, wait_for_first
 from ensemble.observation import Observation
+from ensemble.patience import load_advice
 from ensemble.state_synchronizer import StateSynchronizer
 from planner_node.plan_publisher import PlanPublisher
 from planner_node.run_statistics import RunStatistics
@@ -184,7 +185,7 @@ class TaskExecution:
             await self._wait(Future(), condition=self.skills.server_is_ready)
         sent = self.skills.send_goal_async(request)
         if not await self._wait(sent, ANSWER_TIMEOUT * self.patience):
-            raise NodeDiedError(f"skill_server did not accept {edge} in time")
+            raise NodeDiedError(f"skill_server did not accept {edge} in time; {load_advice()}")
         handle = sent.result()
         if not handle.accepted:
             raise SkillRejectedError(
@@ -231,7 +232,9 @@ class TaskExecution:
             return
         timeout_s = OBSERVE_TIMEOUT * self.patience
         if not await self._wait(Future(), timeout_s, lambda: self._latest.step >= step):
-            raise NoStateError(f"step {step} was not perceived within {timeout_s} s")
+            raise NoStateError(
+                f"step {step} was not perceived within {timeout_s} s; {load_advice()}"
+            )
 
     async def _wait(
         self,
@@ -266,7 +269,9 @@ class TaskExecution:
             raise EpisodeChangedError("the simulator was reset during the run")
         done = future.done() or condition()
         if not done and self.skill_server.is_lost():
-            raise NodeDiedError("skill_server does not answer: it was stopped or died")
+            raise NodeDiedError(
+                f"skill_server does not answer: it was stopped or died; or {load_advice()}"
+            )
         return done
 
     def _interrupted(self) -> bool:

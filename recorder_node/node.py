@@ -7,6 +7,7 @@ arrives earlier is kept until then.
 
 ROS Parameters:
     bag (string, no default): the folder to write; must not exist.
+    limit (double, 4000.0): MB of messages after which the bag is finished, whoever sends them.
 
 Subscribers:
     every topic of ``ensemble.interfaces.RECORDED``, as raw bytes; joint_states as they are offered.
@@ -20,6 +21,7 @@ Services:
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -33,6 +35,7 @@ from slap_msgs.msg import DomainInfo, Task
 from std_srvs.srv import Trigger
 
 from ensemble.diagnostics import DiagnosticsPublisher
+from ensemble.endpoints import subscribe
 from ensemble.entry_point import run_node
 from ensemble.futures import wait_until
 from ensemble.interfaces import (
@@ -54,6 +57,8 @@ from slap_ros.versions import versions
 # Looks for a message in vain, after which nothing more is expected; one every POLL_PERIOD, 0.2 s in
 # all. Not a time: in that, a process that is kept waiting has not looked.
 QUIET = 10
+LONGEST = 100  # looks in all: strangers may never be quiet
+KNOWN = 100  # domains that are announced, and tasks, before the bag is begun
 ENDLESS = (
     DIAGNOSTICS,
     JOINT_STATES,
@@ -66,6 +71,7 @@ class RecorderParameters:
     """See the module's docstring."""
 
     bag: str = parameter("", "the folder to write; must not exist")
+    limit: float = parameter(4000.0, "MB of messages after which the bag is finished", 1e-3)
 
 
 @dataclass(frozen=True)
@@ -83,14 +89,19 @@ class RecorderNode(Node):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("recorder_node", **kwargs)
-        self._path = _new_folder(read_parameters(self, RecorderParameters).bag)
-        self._domain: DomainInfo | None = None
-        self._task: Task | None = None
+        settings = read_parameters(self, RecorderParameters)
+        self._path = _new_folder(settings.bag)
+        self._limit_bytes = settings.limit * 1e6
+        # Strangers may announce others: the first task whose domain is known begins the bag.
+        self._domains: OrderedDict[str, DomainInfo] = OrderedDict()
+        self._tasks: OrderedDict[str, Task] = OrderedDict()  # by domain
         self._early: list[Record] = []  # before domain and task are known
+        self._bytes = 0  # of messages, those that are early among them
         self._writer: BagWriter | None = None
         self._closed = False
         self._started_ns = self.get_clock().now().nanoseconds - monotonic_ns()
         self._looks = 0  # in vain, since the newest message
+        self._looks_left = LONGEST  # of those of a request
         self._written = 0  # messages
         for topic in RECORDED:
             self._subscribe(topic)
@@ -102,7 +113,11 @@ class RecorderNode(Node):
             self._on_close,
             callback_group=MutuallyExclusiveCallbackGroup(),
         )
-        DiagnosticsPublisher(self, lambda: {"messages": self._written, "closed": self._closed})
+        DiagnosticsPublisher(self, self._diagnostics)
+
+    def _diagnostics(self) -> dict[str, object]:
+        full = self._bytes > self._limit_bytes
+        return {"messages": self._written, "closed": self._closed, "full": full}
 
     def destroy_node(self) -> None:
         """Finish the bag, also on a signal."""
@@ -114,25 +129,39 @@ class RecorderNode(Node):
         if topic is JOINT_STATES:
             subscribe_as_offered(self, topic, callback, raw=True)
         else:
-            self.create_subscription(topic.type, topic.name, callback, topic.qos, raw=True)
+            subscribe(self, topic, callback, raw=True)
 
     def _on_message(self, topic: Topic, name: str, raw: bytes) -> None:
         if self._closed:
             return
         if topic not in ENDLESS:
             self._looks = 0
+        self._bytes += len(raw)
+        if self._bytes > self._limit_bytes:
+            self._finish_full()
+            return
         record = Record(name, topic.type_name, self._now_ns(), bytes(raw))
         if self._writer is not None:
             self._write(record)
             return
         self._early.append(record)
         if topic is DOMAIN:
-            self._domain = deserialize_message(raw, DomainInfo)
+            domain = deserialize_message(raw, DomainInfo)
+            _remember(self._domains, domain.name, domain)
         elif topic is TASK:
-            self._task = deserialize_message(raw, Task)
-        domain, task = self._domain, self._task
-        if domain is not None and task is not None and domain.name == task.domain:
-            self._begin(_of_domain(domain) | _of_task(task))
+            task = deserialize_message(raw, Task)
+            _remember(self._tasks, task.domain, task)
+        if common := self._domains.keys() & self._tasks.keys():
+            known = common.pop()
+            self._begin(_of_domain(self._domains[known]) | _of_task(self._tasks[known]))
+
+    def _finish_full(self) -> None:
+        """End the recording, so that no stranger fills the disk."""
+        self.get_logger().error(
+            f"the bag is finished, as {self._limit_bytes / 1e6:g} MB were published: parameter "
+            "limit allows more"
+        )
+        self._close()
 
     def _now_ns(self) -> int:
         """Time of arrival, from the clock as it was at the start: readers sort messages by it."""
@@ -150,7 +179,7 @@ class RecorderNode(Node):
         self._written += 1
 
     async def _on_close(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self._looks = 0
+        self._looks, self._looks_left = 0, LONGEST
         await wait_until(self, self._is_quiet)
         response.success = self._writer is not None
         response.message = str(self._path) if response.success else "nothing was recorded"
@@ -159,13 +188,22 @@ class RecorderNode(Node):
 
     def _is_quiet(self) -> bool:
         self._looks += 1
-        return self._looks > QUIET
+        self._looks_left -= 1
+        return self._looks > QUIET or self._looks_left < 0
 
     def _close(self) -> None:
         self._closed = True
         if self._writer is not None:
             self._writer.close()
             self._writer = None
+
+
+def _remember(known: OrderedDict[str, Any], name: str, message: object) -> None:
+    """Keep a message by a name, and no more than ``KNOWN`` names: the newest."""
+    known[name] = message
+    known.move_to_end(name)
+    if len(known) > KNOWN:
+        known.popitem(last=False)
 
 
 def _new_folder(name: str) -> Path:

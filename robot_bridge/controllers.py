@@ -24,6 +24,22 @@ from slap_ros.errors import (
 )
 from slap_ros.robot.limits import JointMotion
 
+TRAJECTORY_CODES = {  # control_msgs' names of what a trajectory's result says
+    getattr(FollowJointTrajectory.Result, name): name
+    for name in (
+        "SUCCESSFUL",
+        "INVALID_GOAL",
+        "INVALID_JOINTS",
+        "OLD_HEADER_TIMESTAMP",
+        "PATH_TOLERANCE_VIOLATED",
+        "GOAL_TOLERANCE_VIOLATED",
+    )
+}
+STATUSES = {  # of a goal that did not succeed
+    GoalStatus.STATUS_CANCELED: "canceled",
+    GoalStatus.STATUS_ABORTED: "gave up",
+}
+
 
 class Controllers:
     """Clients of the arm's and the gripper's controller."""
@@ -65,29 +81,41 @@ class Controllers:
         goal = FollowJointTrajectory.Goal(trajectory=trajectory(motion, self._joints))
         outcome = await self._run(self._arm, goal, motion.duration_s + self._grace_s)
         if outcome.status != GoalStatus.STATUS_SUCCEEDED:
-            result = outcome.result
+            code, reason = outcome.result.error_code, outcome.result.error_string
             raise ControllerAbortedError(
-                f"{self._names[self._arm]} gave a motion up: code {result.error_code}, "
-                f"{result.error_string or 'no reason given'}"
+                f"{self._names[self._arm]} {_ending(outcome.status)} a motion: "
+                f"{TRAJECTORY_CODES.get(code, f'unknown code {code}')}, "
+                f"{reason or 'no reason given'}"
             )
 
-    async def move_gripper(self, position: float, effort: float, limit_s: float) -> None:
+    async def move_gripper(self, position: float, effort: float, limit_s: float) -> bool:
         """Move the fingers, or close them around something.
+
+        A controller may succeed with fingers that stall at something, or abort: both are usual.
 
         Args:
             position: As the controller expects it: Franka's half the gap, in m.
             effort: At most, N.
             limit_s: How long it may take.
 
+        Returns:
+            Whether the goal was reached. If not, the controller aborted because the fingers
+            stalled, and only their positions say whether they hold something.
+
         Raises:
             ControllerRejectedError: The goal was not accepted.
-            ControllerAbortedError: It was given up, and the fingers did not stall at something.
+            ControllerAbortedError: It was canceled, or given up while the fingers could move.
             ControllerTimeoutError: No controller, or no answer in time; the goal is canceled.
         """
         command = GripperGoal(position=position, max_effort=effort)
         outcome = await self._run(self._gripper, GripperCommand.Goal(command=command), limit_s)
-        if outcome.status != GoalStatus.STATUS_SUCCEEDED and not outcome.result.stalled:
-            raise ControllerAbortedError(f"{self._names[self._gripper]} gave a goal up")
+        if outcome.status == GoalStatus.STATUS_SUCCEEDED:
+            return True
+        if outcome.status == GoalStatus.STATUS_ABORTED and outcome.result.stalled:
+            return False
+        raise ControllerAbortedError(
+            f"{self._names[self._gripper]} {_ending(outcome.status)} a goal"
+        )
 
     def hold(self) -> None:
         """Have the goal under way canceled, if there is one: controllers then hold."""
@@ -114,6 +142,11 @@ class Controllers:
             raise ControllerTimeoutError(f"{name} was not done within {limit_s:.2f} s")
         self._active = None
         return ended.result()
+
+
+def _ending(status: int) -> str:
+    """How a goal ended that did not succeed, as the middle of a sentence."""
+    return STATUSES.get(status, f"ended with status {status}")
 
 
 def _cancel(sent: Future) -> None:

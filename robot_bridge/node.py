@@ -13,7 +13,7 @@ until ``slap/reset_task``: no state is published then, and ``slap/fault`` ends t
 ROS Parameters:
     domain (string, "obstacle_tower"): which domain; one with a Panda.
     preset (string, ""): one that obeys the joints' speed limit; empty: the domain's first.
-    skills (string, ""): as sim_node's.
+    skills (string, ""), libraries (string, "runs/skills"): as sim_node's.
     seed (int, 0), index (int, 0), goal (string, ""): the task whose objects there are, unless a
         scene says so; the goal as sim_node's.
     scene (string, ""): a scene file; empty: the sampled task's objects, in frames detected_NAME.
@@ -68,6 +68,7 @@ from builtin_interfaces.msg import Time
 from slap_msgs.srv import ResetTask
 
 from ensemble import encode
+from ensemble.endpoints import advertise
 from ensemble.entry_point import run_node
 from ensemble.interfaces import MARKERS
 from ensemble.lockstep_world import LockstepWorld
@@ -111,7 +112,7 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
         )  # when the phase, or the measurement of a state, began
         self._goal: Collection[GroundAtom] = ()
         self._measurement: StepMeasurement  # of the step under way
-        self._markers = self.create_publisher(MARKERS.type, MARKERS.name, MARKERS.qos)
+        self._markers = advertise(self, MARKERS)
         create_timer(self, POLL_PERIOD, self._poll)
         self._publish_domain()
 

@@ -17,11 +17,12 @@ from ensemble.steady_time import JumpFreeClock
 from robot_bridge.controllers import Controllers
 from robot_bridge.sensors import Sensors
 from slap_ros.core import Domain
-from slap_ros.errors import NoDetectionError, NoJointStateError
+from slap_ros.errors import ControllerAbortedError, NoDetectionError, NoJointStateError
 from slap_ros.relational import State
 from slap_ros.robot.robot_world import GAP_OPEN, GAP_SHUT, GripperAction, RobotWorld
 from slap_ros.robot.scene_config import read_scene_config, sampled_scene_config
 
+HELD_GAP = 0.002  # m between fingers that closed, above which there is something between them
 GAP_AGE = 0.1  # s, by which finger positions may be older than their stamp: drivers merge them
 
 
@@ -108,13 +109,30 @@ class Robot:
         """Move the fingers to ``gap`` m, or until they stall; the gap in m at which they stand.
 
         Raises:
-            ControllerRejectedError, ControllerAbortedError, ControllerTimeoutError: Of the gripper.
+            ControllerRejectedError, ControllerTimeoutError: Of the gripper.
+            ControllerAbortedError: Of the gripper; also if it aborted and the fingers, which
+                stalled, hold nothing.
             NoJointStateError: No joint state has their positions.
         """
-        settings, sensors = self._settings, self.sensors
-        await self.controllers.move_gripper(
+        settings = self._settings
+        reached = await self.controllers.move_gripper(
             gap * settings.gripper_scale, settings.gripper_effort, settings.gripper_timeout
         )
+        found = await self._measured_gap()
+        if not reached and found <= gap + HELD_GAP:
+            raise ControllerAbortedError(
+                f"the gripper gave up a goal of {gap:.3f} m: the fingers stalled {found:.3f} m "
+                "apart and hold nothing"
+            )
+        return found
+
+    async def _measured_gap(self) -> float:
+        """The gap in m that joint states have from now on.
+
+        Raises:
+            NoJointStateError: None has it in time.
+        """
+        settings, sensors = self._settings, self.sensors
         done_s = self.clock.now_s() + GAP_AGE
         late_s = done_s + settings.joint_timeout
         await wait_for_first(

@@ -8,6 +8,8 @@ ROS Parameters:
         empty: its first, which of our domains is fair.
     skills (string, ""): none, demonstrator, or the folder of a library of acquired skills; empty:
         what ships, else those that the domain itself has. Announced to the other nodes.
+    libraries (string, "runs/skills"): folders below which a library that slap/skills names may lie,
+        separated by ':'; others are refused.
     seed (int, 0): samples the first task.
     index (int, 0): which of the seed's tasks.
     goal (string, ""): of the first task, by name or as atoms; empty: its own. Where the goal has a

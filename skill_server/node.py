@@ -12,6 +12,8 @@ ROS Parameters:
         the simulator announces, in a thread.
     skills (string, ""): whose skills the domain has: none, demonstrator, or a library's folder;
         empty: whichever the simulator announces. A domain that is announced with others is refused.
+    libraries (string, "runs/skills"): folders below which a library that slap/skills names may lie,
+        separated by ':'; others are refused.
     patience (double, 1.0): factor of all deadlines, for slow domains and machines.
 
 Publishers:
@@ -87,7 +89,7 @@ class SkillServer(Node):
         self._busy = False  # from the acceptance of a goal to its end
         self._workers = ThreadPoolExecutor(1, thread_name_prefix="skill_start")
         self._synchronizer = StateSynchronizer(
-            self, self._on_observation, self._shortcuts.prepare_episode, common.skills
+            self, self._on_observation, self._shortcuts.prepare_episode, common
         )
         self._publisher = SkillPublisher(self)
         self.create_service(LIST_SKILLS.type, LIST_SKILLS.name, self._on_list)

@@ -17,6 +17,7 @@ from ensemble import encode
 from ensemble.answering import error_to_answer
 from ensemble.node_liveness import NodeLiveness
 from ensemble.observation import Observation
+from ensemble.patience import load_advice
 from skill_server.skill_publisher import SkillPublisher
 from slap_ros.core import Action
 from slap_ros.errors import ErrorCode, SlapError
@@ -113,7 +114,8 @@ class SkillExecution:
             return
         silence_s = monotonic() - self._newest_s
         if silence_s > state_timeout_s:
-            self._stop(ErrorCode.NO_STATE, f"no new state for {silence_s:.1f} s")
+            reason = f"no new state for {silence_s:.1f} s; {load_advice()}"
+            self._stop(ErrorCode.NO_STATE, reason)
         elif self.planner.is_lost():
             self._stop(ErrorCode.NODE_DIED, "the planner is gone; the robot holds")
 

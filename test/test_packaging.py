@@ -212,4 +212,13 @@ def test_what_rosdep_does_not_give_is_what_the_readme_installs():
     assert by_pip <= needed
 
 
+def test_rosdep_gives_what_the_launch_file_imports_and_runs():
+    launched = (ROOT / "launch" / "ensemble.launch.py").read_text()
+    used = {name for name in re.findall(r"^from (\w+)", launched, re.M) if name not in STANDARD}
+    used |= set(re.findall(r'package="(\w+)"', launched)) | {"ros2launch"}  # what runs it
+    depends = ET.parse(ROOT / "package.xml").getroot().findall("exec_depend")
+    assert used - {"slap_ros"} <= {tag.text for tag in depends}
+
+
+STANDARD = sys.stdlib_module_names
 LISTS = ("RUNTIME", "PHYSICS")

@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 import pytest
 import rclpy
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.qos import (
@@ -23,6 +24,7 @@ from rclpy.qos import (
     qos_profile_sensor_data,
     qos_profile_system_default,
 )
+from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverridingOptions
 from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.wait_for_message import wait_for_message
 from sensor_msgs.msg import JointState
@@ -136,6 +138,37 @@ def test_qos_that_is_not_provided_is_refused(node: Node) -> None:
     ):
         with pytest.raises(InvalidQoSProfileException, match="is not part of embedded_ros"):
             node.create_publisher(String, "topic", profile)
+
+
+def test_parameters_override_the_qos_that_a_publisher_lets_them(context: None) -> None:
+    given = [
+        rclpy.Parameter("qos_overrides./topic.publisher.reliability", value="best_effort"),
+        rclpy.Parameter("qos_overrides./topic.publisher_twin.depth", value=3),
+    ]
+    node = Node("overridden", parameter_overrides=given)
+    options = QoSOverridingOptions.with_default_policies
+    profile = QoSProfile(depth=7)
+    plain = node.create_publisher(String, "topic", profile)
+    changed = node.create_publisher(String, "topic", profile, qos_overriding_options=options())
+    twin = node.create_publisher(
+        String, "topic", profile, qos_overriding_options=options(entity_id="twin")
+    )
+    heard = node.create_subscription(
+        String, "topic", print, profile, qos_overriding_options=options()
+    )
+    assert plain.qos_profile == heard.qos_profile == profile
+    assert changed.qos_profile == QoSProfile(depth=7, reliability=ReliabilityPolicy.BEST_EFFORT)
+    assert twin.qos_profile == QoSProfile(depth=3)
+    assert node.get_parameter("qos_overrides./topic.subscription.history").value == "keep_last"
+
+    def refuse(_: QoSProfile) -> SetParametersResult:
+        return SetParametersResult(successful=False, reason="too deep")
+
+    with pytest.raises(InvalidQosOverridesError, match="/topic are not valid: too deep"):
+        node.create_publisher(
+            String, "topic", profile, qos_overriding_options=options(callback=refuse)
+        )
+    node.destroy_node()
 
 
 def test_every_other_qos_carries_messages(node: Node) -> None:

@@ -83,13 +83,14 @@ class RunOptions:
         float, typer.Option(min=0.1, callback=at_most(1e9), help="Seconds after which to give up.")
     ] = 600.0
     patience: Annotated[
-        float,
+        float | None,
         typer.Option(
             min=IMPATIENT,
             max=PATIENT,
-            help="Factor of all deadlines except --timeout, for slow domains and machines.",
+            help="Factor of all deadlines except --timeout, for slow domains and machines. "
+            "Default: 1, and up to 10 where the start takes longer than usual.",
         ),
-    ] = 1.0
+    ] = None
     render: Annotated[
         Path | None, typer.Option(help=".gif or .mp4 file for an animation of the run.")
     ] = None

@@ -21,6 +21,7 @@ from ensemble.foxglove_server import SHOWN_TOPICS, FoxgloveServer, foxglove_inst
 from ensemble.interfaces import ACQUISITION_EVENTS
 from ensemble.nodes import RunSettings
 from ensemble.parameters import parse_parameters
+from ensemble.patience import grown_patience
 from ensemble.perception_parameters import PerceptionParameters
 from ensemble.robot_parameters import parse_mock_robot
 from ensemble.run import RunRequest
@@ -57,7 +58,7 @@ def run_task(options: RunOptions) -> int:
     domain = open_chosen(options.domain, options.preset, options.skills)
     imported_s = monotonic() - began
     task = task_with_goal(domain, options.task_seed, options.index, options.goal)
-    request = replace(_request(options, domain, task), import_s=imported_s)
+    request = _request(options, domain, task, imported_s)
     states: list[StateMessage] = []
 
     def keep_states(type_name: str, message: Any) -> None:
@@ -82,8 +83,14 @@ def run_task(options: RunOptions) -> int:
     return int(metrics.error_code) or code
 
 
-def _request(options: RunOptions, domain: Domain, task: Task) -> RunRequest:
+def _request(options: RunOptions, domain: Domain, task: Task, import_s: float) -> RunRequest:
     """What to ask of an ensemble, with no bag yet.
+
+    Args:
+        options: Options of the command.
+        domain: Domain that runs.
+        task: Task to solve.
+        import_s: Seconds that the import of the domain took.
 
     Raises:
         SlapError: The domain, or what perceives it, cannot do what is asked for.
@@ -107,7 +114,7 @@ def _request(options: RunOptions, domain: Domain, task: Task) -> RunRequest:
         goal=options.goal or "",
         skills=options.skills,
         pace=options.pace,
-        patience=options.patience,
+        patience=options.patience or grown_patience(import_s),
         shortcuts=options.shortcuts or "",
         samples=options.samples,
         world=options.world,
@@ -121,6 +128,7 @@ def _request(options: RunOptions, domain: Domain, task: Task) -> RunRequest:
         goal,
         max_replans=options.max_replans,
         timeout_s=options.timeout,
+        import_s=import_s,
         in_process=options.in_process,
         skills=SkillRequest(options.proposer, options.rewarder) if options.acquire else None,
         shown=(ACQUISITION_EVENTS,) if options.acquire else (),

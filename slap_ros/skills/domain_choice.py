@@ -103,11 +103,14 @@ class DomainChoice:
         """The choice that a world announces, or announced when it was recorded.
 
         Raises:
-            InvalidParameterError: Skills that are not known here.
+            InvalidParameterError: Skills that are not known here. A folder is none: whose skills
+                they are is said by a digest, and a path from elsewhere is not opened.
         """
         said = {str(pair.key): str(pair.value) for pair in info.configuration}
         digest = said.get(DIGEST_KEY, "")
         skills = SHIPPED if digest else said.get(SKILLS_KEY, SHIPPED)
+        if skills not in WORDS:
+            raise InvalidParameterError(f"unknown skills {skills!r}, announced without a digest")
         return cls(str(info.name), str(info.preset), skills, digest)
 
     def with_skills_of(self, name: str, given: str) -> DomainChoice:

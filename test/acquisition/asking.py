@@ -55,8 +55,8 @@ def asking(record=None, names=("sim_node", "acquisition_node"), **parameters):
     Yields:
         Who asks, what spins it, and the nodes' launcher.
     """
-    every = node_parameters(replace(SETTINGS, record=record))
-    every |= {"acquisition_node": parameters}
+    every = node_parameters(replace(SETTINGS, record=record, acquisition=parameters))
+    every |= {"acquisition_node": parameters | {"libraries": parameters.get("output", "")}}
     nodes = {name: every[name] for name in (*names, *(("recorder_node",) if record else ()))}
     with ProcessLauncher(nodes) as launcher, temporary_node(Asker) as (asker, spinner):
         assert spinner.spin_until(asker.client.server_is_ready, LIMIT)
@@ -78,9 +78,9 @@ def acquire(asker, spinner, **goal):
     return result.result().result
 
 
-def planner_parameters():
-    """Of a planner that is started again."""
-    return node_parameters(SETTINGS)["planner_node"]
+def planner_parameters(output):
+    """Of a planner that is started again, given where skills are acquired."""
+    return node_parameters(SETTINGS)["planner_node"] | {"libraries": str(output)}
 
 
 def begin_again(asker, spinner):

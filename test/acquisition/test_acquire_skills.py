@@ -191,7 +191,7 @@ def test_a_planner_that_goes_away_meanwhile_takes_the_skills_on_when_it_is_back(
         assert ended.result().result.success
         # Until DDS has missed the killed one, a goal goes to it.
         assert spinner.spin_until(lambda: not asker.solver.server_is_ready(), LIMIT)
-        with ProcessLauncher({"planner_node": planner_parameters()}):
+        with ProcessLauncher({"planner_node": planner_parameters(tmp_path)}):
             number = begin_again(asker, spinner)
             solved = solve(asker, spinner, number)
             assert solved.success, solved.error_msg

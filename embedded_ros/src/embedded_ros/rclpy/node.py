@@ -38,6 +38,7 @@ from .qos import (
     qos_profile_rosout_default,
     qos_profile_services_default,
 )
+from .qos_overriding_options import QoSOverridingOptions, overridden
 from .service import Service
 from .subscription import Subscription
 from .time_source import TimeSource
@@ -234,7 +235,7 @@ class Node:
         *,
         callback_group: CallbackGroup | None = None,
         event_callbacks: object = None,
-        qos_overriding_options: object = None,
+        qos_overriding_options: QoSOverridingOptions | None = None,
         publisher_class: type[Publisher[Any]] = Publisher,
     ) -> Publisher[MsgT]:
         """Create a publisher.
@@ -245,13 +246,13 @@ class Node:
             qos_profile: QoS, or the history depth of a reliable, volatile publisher.
             callback_group: For event callbacks; without effect.
             event_callbacks: Not provided; must be None.
-            qos_overriding_options: Not provided; must be None.
+            qos_overriding_options: Policies that parameters override; None: no policy.
             publisher_class: The class to use.
         """
-        _refuse(event_callbacks=event_callbacks, qos_overriding_options=qos_overriding_options)
+        _refuse(event_callbacks=event_callbacks)
         kind = _checked_type(msg_type, Message, topic)
         name = self._resolve(topic)
-        qos = _profile(qos_profile)
+        qos = overridden(self, "publisher", name, _profile(qos_profile), qos_overriding_options)
         writer = self._participant.create_writer(
             _dds_topic(name, qos), kind.ros_type, to_policies(qos)
         )
@@ -270,7 +271,7 @@ class Node:
         *,
         callback_group: CallbackGroup | None = None,
         event_callbacks: object = None,
-        qos_overriding_options: object = None,
+        qos_overriding_options: QoSOverridingOptions | None = None,
         raw: bool = False,
         content_filter_options: object = None,
     ) -> Subscription[MsgT]:
@@ -283,18 +284,14 @@ class Node:
             qos_profile: QoS, or the history depth of a reliable, volatile subscription.
             callback_group: The callback's group; the node's default one where not given.
             event_callbacks: Not provided; must be None.
-            qos_overriding_options: Not provided; must be None.
+            qos_overriding_options: Policies that parameters override; None: no policy.
             raw: Whether the callback takes serialized bytes.
             content_filter_options: Not provided; must be None.
         """
-        _refuse(
-            event_callbacks=event_callbacks,
-            qos_overriding_options=qos_overriding_options,
-            content_filter_options=content_filter_options,
-        )
+        _refuse(event_callbacks=event_callbacks, content_filter_options=content_filter_options)
         kind = _checked_type(msg_type, Message, topic)
         name = self._resolve(topic)
-        qos = _profile(qos_profile)
+        qos = overridden(self, "subscription", name, _profile(qos_profile), qos_overriding_options)
         group = callback_group or self._default_callback_group
         reader = self._participant.create_reader(
             _dds_topic(name, qos), kind.ros_type, to_policies(qos)

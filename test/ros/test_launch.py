@@ -1,0 +1,63 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the launch file's arguments, a user's parameter file and the shipped one say, in order."""
+
+import subprocess
+
+import pytest
+import yaml
+from commands import LIMIT, ros2, started, wait_for_task
+
+pytestmark = pytest.mark.timeout(300)  # each starts several processes of ROS 2
+LAUNCH = ["ros2", "launch", "slap_ros", "ensemble.launch.py"]
+
+
+def has(node, parameter):
+    return ros2("param", "get", f"/{node}", parameter, "--hide-type").strip()
+
+
+def written(path, **nodes):
+    whole = {f"/**/{name}": {"ros__parameters": values} for name, values in nodes.items()}
+    path.write_text(yaml.safe_dump(whole))
+    return path
+
+
+def test_a_parameter_file_goes_before_defaults_and_arguments_before_the_file(cli, tmp_path):
+    file = written(
+        tmp_path / "mine.yaml",
+        sim_node={"domain": "obstacle2d", "seed": 7, "index": 1, "visualize": False},
+        planner_node={"planner": "astar", "samples": 3},
+        skill_server={"state_timeout": 3.5},
+    )
+    launch = [*LAUNCH, f"params_file:={file}", "index:=2", "patience:=5.0"]
+    with started(launch, tmp_path / "launch.txt"):
+        wait_for_task()
+        assert (has("sim_node", "seed"), has("sim_node", "index")) == ("7", "2")
+        assert has("sim_node", "visualize") == "False"
+        assert (has("planner_node", "planner"), has("planner_node", "samples")) == ("astar", "3")
+        assert has("planner_node", "patience") == "5.0"
+        assert has("skill_server", "state_timeout") == "3.5"
+        assert has("skill_server", "samples") == "16"
+
+
+@pytest.mark.parametrize(
+    ("argument", "words"),
+    [
+        ("params_file:=nowhere.yaml", "nowhere.yaml"),
+        ("world:=moon", "moon"),
+        ("seed:=x", "seed is a number"),
+    ],
+)
+def test_a_wrong_argument_starts_nothing(cli, argument, words):
+    done = subprocess.run([*LAUNCH, argument], capture_output=True, text=True, timeout=LIMIT)
+    assert done.returncode != 0
+    assert words in done.stdout + done.stderr
+    assert "process started" not in done.stdout + done.stderr
+
+
+def test_on_a_robot_a_skill_waits_longer_for_a_state(cli, tmp_path):
+    launch = [*LAUNCH, "world:=mock", "domain:=obstacle_tower"]
+    with started(launch, tmp_path / "launch.txt"):
+        wait_for_task()
+        assert has("skill_server", "state_timeout") == "8.0"
+        assert has("mock_robot", "domain") == has("planner_node", "domain") == "obstacle_tower"
