@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from slap_ros.bags.definitions import is_ours
+from slap_ros.bags.ensembles import Ensembles
 from slap_ros.bags.evaluate import read_contents
 from slap_ros.bags.reader import Bag
 from slap_ros.bags.storage import MCAP, Storage, Survey, open_storage, survey
@@ -36,6 +37,7 @@ class BagInfo:
     topics: tuple[TopicCount, ...]  # by name; those without messages are not listed
     metadata: dict[str, str]  # what the run was made with
     damage: str | None  # where reading had to stop and why
+    ensembles: tuple[str, ...] = ()  # namespaces of those that were recorded; ``/``: without one
 
     @property
     def duration_s(self) -> float:
@@ -73,7 +75,13 @@ def bag_info(path: Path | str) -> BagInfo:
         ),
         metadata=storage.metadata(),
         damage=found.damage,
+        ensembles=_ensembles(found),
     )
+
+
+def _ensembles(found: Survey) -> tuple[str, ...]:
+    ours = [channel for channel in found.counts if is_ours(channel.type_name)]
+    return Ensembles(found.counts).namespaces if ours else ()
 
 
 def _gaps(storage: Storage, found: Survey) -> str | None:

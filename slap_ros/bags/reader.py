@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from slap_ros.bags.definitions import check_versions, decode, is_ours, undecodable
+from slap_ros.bags.ensembles import Ensembles
 from slap_ros.bags.storage import Storage, Survey, open_storage, survey
 from slap_ros.errors import DamagedBagError, ForeignBagError
 
@@ -31,6 +32,7 @@ class Bag:
         damage: Where reading has to stop and why; None for a sound bag. Deserialising may find
             damage that only shows at the end of an iteration.
         undecoded: Types that are left out, and why they cannot be deserialised.
+        ensembles: Which topics belong together.
     """
 
     def __init__(self, storage: Storage, found: Survey) -> None:
@@ -44,6 +46,7 @@ class Bag:
         self.damage = found.damage
         self.undecoded = undecodable(found.counts)
         check_versions(found.counts, self.undecoded)
+        self.ensembles = Ensembles(found.counts)
         self._storage = storage
 
     def __iter__(self) -> Iterator[BagMessage]:

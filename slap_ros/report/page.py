@@ -133,15 +133,15 @@ def _shown(runs: Sequence[RunReport]) -> list[PageRun]:
 
 
 def _labels(runs: Sequence[RunReport]) -> list[str]:
-    """The shortest names that differ from run to run."""
-    approaches = Counter(run.approach for run in runs)
-    bags = Counter((run.approach, run.bag) for run in runs)
+    """The shortest names that differ from run to run; those of several ensembles have theirs."""
+    approaches = Counter((run.approach, run.namespace) for run in runs)
+    bags = Counter((run.approach, run.namespace, run.bag) for run in runs)
     labels = []
     for number, run in enumerate(runs, start=1):
-        label = run.approach
-        if approaches[run.approach] > 1:
+        label = f"{run.approach}, {run.namespace}" if run.namespace else run.approach
+        if approaches[run.approach, run.namespace] > 1:
             label += f", {run.bag}"
-        if bags[run.approach, run.bag] > 1:
+        if bags[run.approach, run.namespace, run.bag] > 1:
             label += f", run {number}"
         labels.append(label)
     return labels
