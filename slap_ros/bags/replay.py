@@ -78,6 +78,9 @@ def replay_bag(path: Path | str, namespace: str | None = None) -> ReplayResult:
 def _replay_ensemble(ensemble: EnsembleContents, domain: Domain, result: ReplayResult) -> None:
     """Replay the episodes of an ensemble, and add what came of it."""
     for number, episode in sorted(ensemble.recording.episodes.items()):
+        if len(episode.states) > 1 and not episode.commands:
+            lost = f"the commands of episode {number} are missing"
+            result.damage = f"{result.damage}; {lost}" if result.damage else lost
         for step, recorded, replayed in _replay(episode, domain):
             if replayed is None:
                 result.unreached += 1

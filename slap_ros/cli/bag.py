@@ -96,6 +96,8 @@ def evaluate(bag: BagPath, namespace: Namespace = None, json: Json = False) -> i
             f"{found.compared} of {found.states} states perceived again, "
             f"{len(found.mismatches)} mismatches"
         )
+    if not found.runs:
+        console.print("no run: nothing was planned, or neither plans nor their events recorded")
     if found.left_out:
         topics = ", ".join(found.left_out)
         console.print(f"left out, as there are others of their types: {topics}")
@@ -117,16 +119,15 @@ def _perception(found: BagEvaluation) -> dict[str, int | str | None]:
 
 
 def _table(namespace: str, run: RunMetrics) -> Table:
-    outcome = "solved" if run.success else f"not solved: {run.error_msg}"
     table = Table(
         "option",
         "kind",
         "steps",
         "outcome",
         title=(
-            f"{_prefix(namespace)}{run.domain}, preset {run.preset}, "
-            f"seed {known(run.seed)}: {outcome}\n"
-            f"{run.plan_length} steps, {known(run.shortcut_steps)} of them in shortcuts, "
+            f"{_prefix(namespace)}{run.domain}, preset {known(run.preset)}, "
+            f"seed {known(run.seed)}: {run.outcome}\n"
+            f"{known(run.plan_length)} steps, {known(run.shortcut_steps)} of them in shortcuts, "
             f"{known(run.planning_seconds, '.3f')} s planning, "
             f"{known(run.replans)} replans, {known(run.edges_rolled_out)} edges rolled out"
         ),

@@ -36,14 +36,14 @@ class RecordedRun:
 
     Args:
         domain: The domain's name; empty where it is not known.
-        preset: Of the domain; empty where it is not known.
+        preset: Of the domain; None where it is not known.
         events: Its plan events.
         episode: The messages of its episode, of which it may be a part.
         announced: The plan that each of its PLANNED events announced; None where it is missing.
     """
 
     domain: str
-    preset: str
+    preset: str | None
     events: RunEvents
     episode: EpisodeLog
     announced: Sequence[PlanMessage | None]
