@@ -110,6 +110,11 @@ def open_data(path: Path) -> Iterator[BinaryIO]:
             yield cast(BinaryIO, stream)
 
 
+def is_compressed(message: RawMessage) -> bool:
+    """Whether a message was compressed by itself."""
+    return message.data[: len(MAGIC)] == MAGIC
+
+
 def unpacked_message(message: RawMessage, budget: ReadingBudget) -> RawMessage:
     """A message as it was before it was compressed; one that is not is left as it is.
 
@@ -120,7 +125,7 @@ def unpacked_message(message: RawMessage, budget: ReadingBudget) -> RawMessage:
     Raises:
         DamagedBagError: It cannot be unpacked, or to more than is allowed.
     """
-    if message.data[: len(MAGIC)] != MAGIC:
+    if not is_compressed(message):
         return message
     most = min(MAX_RECORD_BYTES, budget.left) + 1  # one more than is allowed
     frame = zstd.ZstdDecompressor()

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from slap_ros.bags.compression import SUFFIX, plain_name, unpacked_file, unpacked_message
 from slap_ros.bags.mcap_reader import read_mcap, read_mcap_metadata
+from slap_ros.bags.message_order import in_order_of_arrival
 from slap_ros.bags.raw import Channel, RawMessage
 from slap_ros.bags.reading_budget import ReadingBudget
 from slap_ros.bags.rosbag2 import FILE_NAME, Extent, read_metadata
@@ -48,25 +49,26 @@ class Storage:
         return sum(file.stat().st_size for file in self.files)
 
     def messages(self) -> Iterator[RawMessage]:
-        """The messages, in the order in which they were written.
+        """The messages, in the order in which they were received.
 
         Raises:
             DamagedBagError: After the last message that precedes any damage.
         """
         budget = ReadingBudget(self.path, sum(map(_bytes_on_disk, self.files)))
-        for file in self.files:
-            with unpacked_file(file, budget) as plain:
-                for message in self._stored(plain.path, file, budget):
-                    yield unpacked_message(message, budget)
-                if plain.damage is not None:
-                    raise DamagedBagError(plain.damage)
+        for message in in_order_of_arrival(self._stored(budget)):
+            yield unpacked_message(message, budget)
         self._information()
 
-    def _stored(self, path: Path, shown: Path, budget: ReadingBudget) -> Iterator[RawMessage]:
-        """The messages of a file as they are in it."""
-        if self.suffix == MCAP:
-            return read_mcap(path, shown, budget)
-        return read_sqlite(path, shown)
+    def _stored(self, budget: ReadingBudget) -> Iterator[RawMessage]:
+        """The messages as they are in the files."""
+        for file in self.files:
+            with unpacked_file(file, budget) as plain:
+                if self.suffix == MCAP:
+                    yield from read_mcap(plain.path, file, budget)
+                else:
+                    yield from read_sqlite(plain.path, file)
+                if plain.damage is not None:
+                    raise DamagedBagError(plain.damage)
 
     def metadata(self) -> dict[str, str]:
         """What the run was made with, as far as it can be read."""

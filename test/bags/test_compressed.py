@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -228,6 +229,38 @@ def test_a_message_that_is_no_frame_is_damage(script: Script, tmp_path: Path) ->
         bag = read_bag(path)
         assert len(list(bag)) == 1
         assert bag.damage is not None and "cannot be unpacked" in bag.damage
+
+
+@pytest.mark.parametrize("storage", STORAGES)
+def test_messages_that_overtook_others_while_they_were_compressed(
+    script: Script, honest_bag: Path, tmp_path: Path, storage: StoragePlugin
+) -> None:
+    """The recorder has a thread per core, and each writes a message when it is ready."""
+    rng = random.Random(6)
+    places = {id(m): i + rng.random() * 12 for i, m in enumerate(script.messages)}
+    mixed = sorted(script.messages, key=lambda message: places[id(message)])
+    assert [m.stamp_ns for m in mixed] != sorted(m.stamp_ns for m in mixed)
+    write(tmp_path / "bag", mixed, storage, compress=True)
+    assert bag_digest(tmp_path / "bag") == bag_digest(honest_bag)
+    assert evaluate_bag(tmp_path / "bag") == evaluate_bag(honest_bag)
+
+
+def test_a_clock_that_was_set_back_is_no_overtaking(script: Script, tmp_path: Path) -> None:
+    half, hour = len(script.messages) // 2, 3600 * 10**9
+    messages = [
+        replace(m, stamp_ns=m.stamp_ns - hour * (i >= half)) for i, m in enumerate(script.messages)
+    ]
+    write(tmp_path / "bag", messages, StoragePlugin.MCAP, compress=True)
+    assert [m.stamp_ns for m in read_bag(tmp_path / "bag")] == [m.stamp_ns for m in messages]
+
+
+def test_what_precedes_damage_is_read_though_it_waits(script: Script, tmp_path: Path) -> None:
+    path = compressed(tmp_path, script, CompressionMode.MESSAGE, StoragePlugin.MCAP)
+    (file,) = path.glob("*.mcap")
+    file.write_bytes(file.read_bytes()[:-30_000])
+    bag = read_bag(path)
+    assert 0 < sum(1 for _ in bag) < len(script.messages)
+    assert bag.damage is not None and "ends early" in bag.damage
 
 
 # -- bombs ----------------------------------------------------------------------------------------
