@@ -145,7 +145,8 @@ def solve(seed: int, shortcuts: str, conditions: Conditions) -> BridgeTrial:
     if not metrics.success:
         print(f"seed {seed}: {metrics.error_msg}", file=sys.stderr)
     code = ErrorCode(metrics.error_code).name
-    return BridgeTrial(seed, metrics.success, metrics.plan_length, metrics.replans, code)
+    steps = metrics.plan_length or 0
+    return BridgeTrial(seed, bool(metrics.success), steps, metrics.replans, code)
 
 
 Found = Mapping[str, list[BridgeTrial]]  # by approach

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 MAX_BYTES = 64 * 2**20  # of a file that is read at once, where its reader states no other limit
 JSON_LINE = 1000  # characters, beside the indentation: what fits, as most trials do, is not broken
+MAX_YAML_INTEGER = 100  # characters; Python prints no integer of more than 4,300 digits
 MAX_YAML_NODES = 200_000  # with what is repeated by reference counted as often as it is repeated
 # What PyYAML raises where a scalar is not of the kind that its tag says, beside its own errors.
 SCALAR_ERRORS = (RecursionError, LookupError, TypeError, AttributeError)
@@ -263,13 +264,20 @@ def parse_yaml(text: str) -> Any:
             node = loader.get_single_node()
             if node is None:
                 return None
-            if _expanded_size(node, {}) > MAX_YAML_NODES:
+            known: dict[yaml.Node, int] = {}
+            if _expanded_size(node, known) > MAX_YAML_NODES:
                 raise ValueError(f"more than {MAX_YAML_NODES} values")
+            if any(map(_is_long_integer, known)):
+                raise ValueError(f"no YAML: an integer of more than {MAX_YAML_INTEGER} characters")
             return loader.construct_document(node)
         finally:
             loader.dispose()
     except (yaml.YAMLError, *SCALAR_ERRORS) as error:
         raise ValueError(f"no YAML: {' '.join(str(error).split())[:200]}") from error
+
+
+def _is_long_integer(node: yaml.Node) -> bool:
+    return node.tag == "tag:yaml.org,2002:int" and len(node.value) > MAX_YAML_INTEGER
 
 
 def _expanded_size(node: yaml.Node, known: dict[yaml.Node, int]) -> int:

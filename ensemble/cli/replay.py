@@ -20,7 +20,7 @@ def replay(options: ReplayOptions) -> int:
     With --to robot, execute the recorded motion on a robot, open loop; try --dry-run first.
     """
     if options.to == WORLD:
-        return replay_in_world(options.bag, options.json)
+        return replay_in_world(options.bag, options.namespace, options.json)
     from ensemble.cli.robot_replay import replay_on_robot
 
     return replay_on_robot(options)

@@ -46,6 +46,13 @@ class ReplayOptions:
         str, typer.Option(help="Parameters of the mock robot, such as latency=0.05,pace=5.")
     ] = ""
     yes: Annotated[bool, typer.Option("--yes", help="Move the robot without asking.")] = False
+    namespace: Annotated[
+        str | None,
+        typer.Option(
+            help="Namespace of one ensemble, such as /robot1, where several were recorded. "
+            "Default: all of them, one after the other; a robot executes only one."
+        ),
+    ] = None
     json: Json = False
 
     def __post_init__(self) -> None:

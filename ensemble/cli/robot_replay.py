@@ -38,7 +38,7 @@ def replay_on_robot(options: ReplayOptions) -> int:
         SlapError: The motion must not be executed, or failed; a robot then holds.
     """
     parameters = PlayerParameters(**parse_parameters(options.robot, PlayerParameters, "robot"))
-    recorded = read_recorded_motion(options.bag)
+    recorded = read_recorded_motion(options.bag, options.namespace)
     checked = DryRun.of(recorded, recorded.limits_of(parameters.limits))
     if options.json and options.dry_run:
         print_json(_as_json(recorded, checked))

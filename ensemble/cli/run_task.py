@@ -223,6 +223,7 @@ def _conclude(metrics: RunMetrics, record: Path | None) -> None:
             )
         )
     else:
-        console.print(styled("not solved", "bold red", f": {metrics.error_msg}"))
+        verdict = "not known whether solved" if metrics.success is None else "not solved"
+        console.print(styled(verdict, "bold red", f": {metrics.error_msg}"))
     if record is not None:
         console.print(f"bag: {record}")

@@ -12,7 +12,9 @@ from slap_ros.bags.evaluate import read_runs
 from slap_ros.errors import InvalidParameterError
 
 
-def load_bag(path: Path | str, episode: int | None = None) -> EpisodeArrays:
+def load_bag(
+    path: Path | str, episode: int | None = None, namespace: str | None = None
+) -> EpisodeArrays:
     """Load an episode of a bag as NumPy arrays with names.
 
     The bag may be one of :meth:`Run.bag <slap_ros.api.execution.Run.bag>`, of ``slap run
@@ -20,8 +22,10 @@ def load_bag(path: Path | str, episode: int | None = None) -> EpisodeArrays:
     warning says what is missing.
 
     Args:
-        path: Folder of the bag, or a single ``.mcap`` or ``.db3`` file.
+        path: Folder of the bag, or a single ``.mcap`` or ``.db3`` file, compressed or not.
         episode: Index of the episode, from 0; None for the only one.
+        namespace: Namespace of the ensemble whose episodes are counted, such as ``/robot1``; None
+            for all ensembles in the bag, one after the other.
 
     Returns:
         States, actions and atoms by step, each with the names of its columns; ``to_pandas()`` is
@@ -30,9 +34,10 @@ def load_bag(path: Path | str, episode: int | None = None) -> EpisodeArrays:
     Raises:
         DamagedBagError: Nothing can be read, or there is no domain or no state in it.
         ForeignBagError: The bag is not of an ensemble, or of another version of one.
-        InvalidParameterError: There is no such episode, or more than one to choose from.
+        InvalidParameterError: There is no such ensemble or episode, or more than one episode to
+            choose from.
     """
-    contents = read_runs(path)
+    contents = read_runs(path, namespace)
     if contents.damage is not None:
         warn_caller(f"{path} is damaged: {contents.damage}")
     episodes = episode_arrays(contents)

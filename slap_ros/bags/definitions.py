@@ -6,10 +6,12 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
+from typing import cast
 
-from rosbags.interfaces.typing import Typesdict
+from rosbags.interfaces import Nodetype
+from rosbags.interfaces.typing import FieldDesc, Typesdict
 from rosbags.serde import SerdeError
 from rosbags.typesys import (
     Stores,
@@ -25,8 +27,12 @@ from slap_ros.errors import DamagedBagError, ForeignBagError
 from slap_ros.messages.interfaces import PACKAGE, definition, message_texts, typestore
 
 IDL_SEPARATOR = "=" * 80 + "\n"
-MAX_DEFINITION_FIELDS = 5_000  # with those of nested types, constants included
+# With those of nested types, and constants; an array of fixed length counts as many fields as it
+# has texts or messages, since a program is generated that reads them one after the other.
+MAX_DEFINITION_FIELDS = 5_000
 MAX_DEFINITION_CHARACTERS = 2**20
+MAX_BAG_FIELDS = 10_000  # of all definitions of a bag that are not ours,
+FIELDS_PER_DEFINITION = 10  # each of which takes as long as so many fields
 # Fields and constants of messages that earlier bags do not have, by type. In them they would have
 # been empty, so that being without them means the same.
 ADDED = {
@@ -50,7 +56,7 @@ def decode(channel: Channel, data: bytes | memoryview) -> object:
 
     Raises:
         DamagedBagError: The bytes are no such message.
-        TypesysError: The type is not known; :func:`store_for` tells beforehand.
+        TypesysError: The type is not known; :func:`undecodable` tells beforehand.
     """
     try:
         return store_for(channel).deserialize_cdr(data, channel.type_name)
@@ -60,7 +66,6 @@ def decode(channel: Channel, data: bytes | memoryview) -> object:
         ) from error
 
 
-@lru_cache(maxsize=256)
 def store_for(channel: Channel) -> Typestore:
     """The types by which a channel's messages are deserialised: the bag's own, else ours.
 
@@ -69,20 +74,65 @@ def store_for(channel: Channel) -> Typestore:
     """
     if channel.serialization != "cdr":
         raise TypesysError(f"it is serialised as {channel.serialization!r}, not as cdr")
-    known = channel.type_name in typestore().fielddefs
-    text = channel.definition.text
-    if known and (not text or text == definition(channel.type_name)):
+    if _is_known(channel):
         return typestore()
-    if not text:
-        raise TypesysError("the bag does not define it")
-    _require_short(text)
+    return _compiled(channel.type_name, channel.definition)
+
+
+def undecodable(channels: Iterable[Channel]) -> dict[str, str]:
+    """The types that cannot be deserialised, each with the reason.
+
+    Definitions of slap_msgs are compiled first, and all of them within :data:`MAX_BAG_FIELDS`.
+    """
+    found: dict[str, str] = {}
+    left, compiled = MAX_BAG_FIELDS, set()
+    for channel in sorted(channels, key=lambda channel: not is_ours(channel.type_name)):
+        try:
+            defined = channel.type_name, channel.definition
+            if not _is_known(channel) and defined not in compiled:
+                compiled.add(defined)
+                left -= FIELDS_PER_DEFINITION + _count(_parsed(*defined))
+            if left < 0:
+                raise TypesysError(
+                    f"the definitions of the bag have more than {MAX_BAG_FIELDS} fields"
+                )
+            store_for(channel)
+        except TypesysError as error:
+            found[channel.type_name] = str(error)
+    return found
+
+
+def _is_known(channel: Channel) -> bool:
+    """Whether a channel's type is defined here, and its bag does not define it otherwise."""
+    text = channel.definition.text
+    known = channel.type_name in typestore().fielddefs
+    return known and (not text or text == definition(channel.type_name))
+
+
+@lru_cache(maxsize=2 * MAX_BAG_FIELDS // FIELDS_PER_DEFINITION)
+def _compiled(type_name: str, given: MessageDefinition) -> Typestore:
     store = get_typestore(Stores.EMPTY)
+    types = _parsed(type_name, given)
     try:
-        store.register(_parse(channel.definition, channel.type_name))
-        store.get_msgdef(channel.type_name)
+        store.register(types)
+        store.get_msgdef(type_name)
     except UNDEFINED as error:
         raise TypesysError(f"its definition cannot be read: {one_line(error)}") from error
     return store
+
+
+@lru_cache(maxsize=16)
+def _parsed(type_name: str, given: MessageDefinition) -> Typesdict:
+    """The types of a definition that is short enough to be compiled."""
+    if not given.text:
+        raise TypesysError("the bag does not define it")
+    _require_short(given.text)
+    try:
+        types = _parse(given, type_name)
+    except UNDEFINED as error:
+        raise TypesysError(f"its definition cannot be read: {one_line(error)}") from error
+    _require_few(types)
+    return types
 
 
 def _require_short(text: str) -> None:
@@ -100,6 +150,41 @@ def _require_short(text: str) -> None:
         )
 
 
+def _require_few(types: Typesdict) -> None:
+    """Refuse arrays that make a definition longer than it looks, or take no bytes in a message.
+
+    Raises:
+        TypesysError: It has such arrays.
+    """
+    if 0 in (length for _, length in _arrays(types)):
+        raise TypesysError("its definition has an array of length 0")
+    if (count := _count(types)) > MAX_DEFINITION_FIELDS:
+        raise TypesysError(
+            f"its definition has {count} fields, with the elements of its arrays of texts and "
+            f"messages; at most {MAX_DEFINITION_CHARACTERS} characters, and "
+            f"{MAX_DEFINITION_FIELDS} fields, are read"
+        )
+
+
+def _count(types: Typesdict) -> int:
+    """The number of fields and constants, array elements that are read one by one among them."""
+    fields = sum(len(constants) + len(fields) for constants, fields in types.values())
+    return fields + sum(length for element, length in _arrays(types) if _is_unrolled(element))
+
+
+def _arrays(types: Typesdict) -> Iterator[tuple[FieldDesc, int]]:
+    """Element and length of each array of fixed length."""
+    for _, fields in types.values():
+        for _, (node, content) in fields:
+            if node == Nodetype.ARRAY:
+                yield cast(tuple[FieldDesc, int], content)
+
+
+def _is_unrolled(element: FieldDesc) -> bool:
+    """Whether an array of such elements is read one by one: numbers are read at once."""
+    return element[0] != Nodetype.BASE or element[1][0] == "string"
+
+
 def _parse(given: MessageDefinition, type_name: str) -> Typesdict:
     if given.encoding != "ros2idl":
         return get_types_from_msg(given.text, type_name)
@@ -110,7 +195,24 @@ def _parse(given: MessageDefinition, type_name: str) -> Typesdict:
     return types
 
 
-def check_version(channel: Channel) -> None:
+def check_versions(channels: Iterable[Channel], undecoded: Mapping[str, str]) -> None:
+    """Refuse types of slap_msgs that lack something that this version reads.
+
+    Args:
+        channels: Channels of a bag.
+        undecoded: Types that cannot be deserialised, each with the reason.
+
+    Raises:
+        ForeignBagError: Names the first type, and what it lacks.
+    """
+    for channel in channels:
+        if channel.type_name in undecoded and channel.type_name in message_texts():
+            raise ForeignBagError(_mismatch(channel, undecoded[channel.type_name]))
+        if is_ours(channel.type_name):
+            _check_version(channel)
+
+
+def _check_version(channel: Channel) -> None:
     """Refuse a slap_msgs type that lacks something that this version reads.
 
     Raises:
@@ -119,10 +221,7 @@ def check_version(channel: Channel) -> None:
     ours = typestore()
     if channel.type_name not in message_texts():
         return  # of another version, and nothing here reads it
-    try:
-        theirs = store_for(channel)
-    except TypesysError as error:
-        raise ForeignBagError(_mismatch(channel, str(error))) from error
+    theirs = store_for(channel)
     if theirs is ours:
         return
     for name in _nested(channel.type_name):

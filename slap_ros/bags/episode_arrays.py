@@ -8,7 +8,7 @@ recorded between a reset and the next, and has no run, is an episode as well.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.bags.evaluate import BagContents, read_runs
+from slap_ros.bags.ensembles import ROOT
+from slap_ros.bags.evaluate import BagContents, EnsembleContents, read_runs
 from slap_ros.bags.reader import Bag
 from slap_ros.bags.recording import RecordedEpisode, initial_state
 from slap_ros.bags.taken_commands import taken_commands
@@ -71,6 +72,7 @@ class EpisodeArrays:
         options: Option under execution in each state, as ``Pick(robot, block1, table)``, shape
             (n,); empty where there was none.
         option_kinds: Kind of that option, shape (n,): operator, shortcut or unknown.
+        namespace: Namespace of the ensemble; ``/`` for one without.
     """
 
     bag: str
@@ -96,6 +98,7 @@ class EpisodeArrays:
     rewards: Array
     options: NDArray[np.str_]
     option_kinds: NDArray[np.str_]
+    namespace: str = ROOT
 
     def __len__(self) -> int:
         """The number of rows."""
@@ -105,6 +108,7 @@ class EpisodeArrays:
         """What there is to say of the episode beside its arrays, as JSON has it."""
         return {
             "bag": self.bag,
+            "namespace": self.namespace,
             "number": self.number,
             "domain": self.domain,
             "preset": self.preset,
@@ -162,19 +166,21 @@ class EpisodeArrays:
         )
 
 
-def read_episodes(path: Path | str) -> list[EpisodeArrays]:
+def read_episodes(path: Path | str, namespace: str | None = None) -> list[EpisodeArrays]:
     """The episodes of a whole bag, in order.
 
     Args:
-        path: Folder of the bag, or a single ``.mcap`` or ``.db3`` file.
+        path: Folder of the bag, or a single ``.mcap`` or ``.db3`` file, compressed or not.
+        namespace: Namespace of an ensemble; None for all ensembles, one after the other.
 
     Raises:
         DamagedBagError: Part of it cannot be read or is missing, or it has no states.
         ForeignBagError: It is not of an ensemble, or of another version of one.
+        InvalidParameterError: There is no such ensemble.
         UnknownDomainError: Its domain is not known here.
         InvalidStateError: It has a state that its domain or its task cannot have.
     """
-    contents = read_runs(path)
+    contents = read_runs(path, namespace)
     if contents.damage is not None:
         raise DamagedBagError(f"{path} is damaged: {contents.damage}")
     return episode_arrays(contents)
@@ -192,21 +198,24 @@ def episode_arrays(contents: BagContents) -> list[EpisodeArrays]:
         UnknownDomainError: Its domain is not known here.
         InvalidStateError: It has a state that its domain or its task cannot have.
     """
-    domain = contents.recording.domain()
-    if domain is None:
-        raise DamagedBagError(f"{contents.bag.path} breaks off before it names its domain")
-    traces = contents.log.traces()
-    found: list[EpisodeArrays] = []
-    for number, episode in sorted(contents.recording.episodes.items()):
-        own = [trace for trace in traces if trace.episode == number]
-        parts = [_run_part(trace, episode) for trace in own]
-        parts = parts or [_whole_part(contents.log.executed_in(number), episode)]
-        if any(part.steps for part in parts):
-            reader = _EpisodeReader(contents.bag, domain, number, episode)
-            found += [reader.arrays(part) for part in parts if part.steps]
+    found = [one for part in contents.ensembles for one in _ensemble_arrays(contents.bag, part)]
     if not found:
         raise DamagedBagError(f"{contents.bag.path} has no states")
     return found
+
+
+def _ensemble_arrays(bag: Bag, ensemble: EnsembleContents) -> Iterator[EpisodeArrays]:
+    domain = ensemble.recording.domain()
+    if domain is None:
+        raise DamagedBagError(f"{bag.path} breaks off before it names its domain")
+    traces = ensemble.log.traces()
+    for number, episode in sorted(ensemble.recording.episodes.items()):
+        own = [trace for trace in traces if trace.episode == number]
+        parts = [_run_part(trace, episode) for trace in own]
+        parts = parts or [_whole_part(ensemble.log.executed_in(number), episode)]
+        if any(part.steps for part in parts):
+            reader = _EpisodeReader(bag, ensemble.namespace, domain, number, episode)
+            yield from (reader.arrays(part) for part in parts if part.steps)
 
 
 @dataclass(frozen=True)
@@ -257,11 +266,14 @@ def _whole_part(executed: Iterable[ExecutedOption], episode: RecordedEpisode) ->
 class _EpisodeReader:
     """Makes the arrays of a recorded episode, whose states all have the same objects."""
 
-    def __init__(self, bag: Bag, domain: Domain, number: int, episode: RecordedEpisode) -> None:
+    def __init__(
+        self, bag: Bag, namespace: str, domain: Domain, number: int, episode: RecordedEpisode
+    ) -> None:
         start = initial_state(episode, domain)
         if start is None:  # no part of it has states
             raise DamagedBagError(f"episode {number} has no states")
-        self._bag, self._domain, self._number, self._episode = bag, domain, number, episode
+        self._bag, self._namespace, self._domain = bag, namespace, domain
+        self._number, self._episode = number, episode
         self._space = domain.atom_space(start[1])
         self._columns = {
             (atom.predicate.name, tuple(obj.name for obj in atom.objects)): column
@@ -299,6 +311,7 @@ class _EpisodeReader:
             rewards=self._rewards(part.goal, atoms),
             options=options,
             option_kinds=kinds,
+            namespace=self._namespace,
         )
 
     def _state(self, step: int) -> State:

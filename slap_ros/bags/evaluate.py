@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from slap_ros.bags.ensembles import ROOT
 from slap_ros.bags.reader import Bag, read_bag
 from slap_ros.bags.recording import RecordedEpisode, Recording, initial_state
 from slap_ros.core import Domain
@@ -25,6 +26,7 @@ class AtomMismatch:
     step: int
     missing: tuple[str, ...]  # atoms that hold and were not recorded
     extra: tuple[str, ...]  # atoms that were recorded and do not hold
+    namespace: str = ROOT  # of the ensemble
 
 
 @dataclass(frozen=True)
@@ -38,78 +40,146 @@ class BagEvaluation:
     # with noise cannot be found again.
     compared: int
     damage: str | None  # where reading had to stop and why, or what is missing
+    # The ensemble of each run, not compared: under another name a run is the same run.
+    namespaces: tuple[str, ...] = field(default=(), compare=False)
+    left_out: tuple[str, ...] = ()  # topics of slap_msgs that belong to no ensemble for certain
+
+
+@dataclass(frozen=True)
+class EnsembleContents:
+    """The messages of one ensemble in a bag, sorted by run and by episode."""
+
+    namespace: str
+    log: RunLog
+    recording: Recording
+
+    def gaps(self) -> list[str]:
+        """What is missing, in words; empty for a whole recording."""
+        found = self.log.gaps()
+        if strays := self.recording.not_finite:
+            found.append(f"states that are not finite: {strays}, left out")
+        if others := self.recording.contradicting:
+            found.append(
+                f"{others} states are other ones than those of the same episode and step: of "
+                "another ensemble, or of a simulator that was started again; record them apart"
+            )
+        return found
 
 
 @dataclass(frozen=True)
 class BagContents:
-    """A bag's messages, sorted by run and by episode."""
+    """A bag's messages, sorted by ensemble, by run and by episode."""
 
     bag: Bag
-    log: RunLog
-    recording: Recording
+    ensembles: tuple[EnsembleContents, ...]  # those that were chosen
 
     @property
     def damage(self) -> str | None:
         """What cannot be read, or what is missing of the runs; None for a whole bag."""
-        found = self.log.gaps()
-        if strays := self.recording.not_finite:
-            found.append(f"states that are not finite: {strays}, left out")
+        several = len(self.bag.ensembles.namespaces) > 1
+        found = [
+            f"{one.namespace}: {gap}" if several else gap
+            for one in self.ensembles
+            for gap in one.gaps()
+        ]
         return self.bag.damage or "; ".join(found) or None
 
 
-def read_runs(path: Path | str) -> BagContents:
+def read_runs(path: Path | str, namespace: str | None = None) -> BagContents:
     """Read a bag once, for everything that is to be known of its runs.
 
+    Args:
+        path: Folder of the bag, or a single file of it.
+        namespace: Namespace of an ensemble; None for all ensembles.
+
     Raises:
         DamagedBagError: Nothing in it can be read.
         ForeignBagError: It is not of an ensemble, or of another version of one.
+        InvalidParameterError: There is no such ensemble.
     """
-    return read_contents(read_bag(path))
+    return read_contents(read_bag(path), namespace)
 
 
-def read_contents(bag: Bag) -> BagContents:
-    """Everything that is to be known of the runs in a bag that was opened."""
-    reading = BagContents(bag, RunLog(), Recording())
-    for _, type_name, _, message in reading.bag:
-        reading.log.add(type_name, message)
-        reading.recording.add(type_name, message)
-    return reading
+def read_contents(bag: Bag, namespace: str | None = None) -> BagContents:
+    """Everything that is to be known of the runs in a bag that was opened.
+
+    Args:
+        bag: Bag to read.
+        namespace: Namespace of an ensemble; None for all ensembles.
+
+    Raises:
+        InvalidParameterError: There is no such ensemble.
+    """
+    chosen = {
+        name: EnsembleContents(name, RunLog(), Recording())
+        for name in bag.ensembles.chosen(namespace)
+    }
+    for topic, type_name, _, message in bag:
+        ensemble = chosen.get(bag.ensembles.of(topic, type_name) or "")
+        if ensemble is not None:
+            ensemble.log.add(type_name, message)
+            ensemble.recording.add(type_name, message)
+    return BagContents(bag, tuple(chosen.values()))
 
 
-def evaluate_bag(path: Path | str) -> BagEvaluation:
+def evaluate_bag(path: Path | str, namespace: str | None = None) -> BagEvaluation:
     """Compute the metrics of every run in a bag and recompute the atoms of every state.
 
+    Args:
+        path: Folder of the bag, or a single file of it.
+        namespace: Namespace of an ensemble; None for all ensembles.
+
     Raises:
         DamagedBagError: Nothing in it can be read.
         ForeignBagError: It is not of an ensemble, or of another version of one.
+        InvalidParameterError: There is no such ensemble.
         UnknownDomainError: Its domain is not known here.
         InvalidStateError: It has a state that its domain cannot have.
     """
-    reading = read_runs(path)
-    return evaluate(reading, reading.recording.domain())
+    reading = read_runs(path, namespace)
+    return evaluate(reading, [one.recording.domain() for one in reading.ensembles])
 
 
-def evaluate(reading: BagContents, domain: Domain | None) -> BagEvaluation:
-    """Evaluate a bag that was read; without its domain, no atoms are recomputed.
+def evaluate(reading: BagContents, domains: Sequence[Domain | None]) -> BagEvaluation:
+    """Evaluate a bag that was read.
+
+    Args:
+        reading: What was read of it.
+        domains: Domain of each of its ensembles; without it, no atoms are recomputed.
 
     Raises:
         InvalidStateError: It has a state that its domain cannot have.
     """
-    episodes = reading.recording.episodes
-    perceived = [(e, s) for e, episode in episodes.items() for s in episode.states]
-    comparable = [(e, s) for e, s in perceived if s in episodes[e].exact]
+    each = list(zip(reading.ensembles, domains, strict=True))
+    runs = [(one.namespace, run) for one in reading.ensembles for run in one.log.runs()]
     return BagEvaluation(
-        runs=reading.log.runs(),
+        runs=[run for _, run in runs],
         mismatches=[
             mismatch
-            for number, episode in episodes.items()
+            for one, domain in each
             if domain is not None
-            for mismatch in _mismatches(number, episode, domain)
+            for mismatch in _ensemble_mismatches(one, domain)
         ],
-        states=len(perceived),
-        compared=len(comparable) if domain is not None else 0,
+        states=sum(_count_states(one, exact=False) for one, _ in each),
+        compared=sum(_count_states(one, exact=True) for one, domain in each if domain is not None),
         damage=reading.damage,
+        namespaces=tuple(namespace for namespace, _ in runs),
+        left_out=reading.bag.ensembles.left_out,
     )
+
+
+def _count_states(ensemble: EnsembleContents, exact: bool) -> int:
+    """How many states were recorded, or how many whose atoms can be found again."""
+    return sum(
+        len(episode.states.keys() & episode.exact if exact else episode.states)
+        for episode in ensemble.recording.episodes.values()
+    )
+
+
+def _ensemble_mismatches(ensemble: EnsembleContents, domain: Domain) -> Iterator[AtomMismatch]:
+    for number, episode in ensemble.recording.episodes.items():
+        for mismatch in _mismatches(number, episode, domain):
+            yield replace(mismatch, namespace=ensemble.namespace)
 
 
 def _mismatches(number: int, episode: RecordedEpisode, domain: Domain) -> Iterator[AtomMismatch]:

@@ -7,10 +7,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from slap_ros.bags.definitions import check_version, is_ours
+from slap_ros.bags.definitions import is_ours
+from slap_ros.bags.ensembles import Ensembles
 from slap_ros.bags.evaluate import read_contents
 from slap_ros.bags.reader import Bag
-from slap_ros.bags.storage import Storage, Survey, open_storage, survey
+from slap_ros.bags.storage import MCAP, Storage, Survey, open_storage, survey
 from slap_ros.errors import DamagedBagError, ForeignBagError
 
 
@@ -36,6 +37,7 @@ class BagInfo:
     topics: tuple[TopicCount, ...]  # by name; those without messages are not listed
     metadata: dict[str, str]  # what the run was made with
     damage: str | None  # where reading had to stop and why
+    ensembles: tuple[str, ...] = ()  # namespaces of those that were recorded; ``/``: without one
 
     @property
     def duration_s(self) -> float:
@@ -60,7 +62,7 @@ def bag_info(path: Path | str) -> BagInfo:
         raise DamagedBagError(f"no message can be read: {found.damage}; record it again")
     return BagInfo(
         path=str(path),
-        storage="mcap" if storage.suffix == ".mcap" else "sqlite3",
+        storage="mcap" if storage.suffix == MCAP else "sqlite3",
         size_bytes=storage.size_bytes,
         start_ns=found.extent.start_ns if found.counts else 0,
         duration_ns=found.extent.duration_ns,
@@ -73,15 +75,20 @@ def bag_info(path: Path | str) -> BagInfo:
         ),
         metadata=storage.metadata(),
         damage=found.damage,
+        ensembles=_ensembles(found),
     )
+
+
+def _ensembles(found: Survey) -> tuple[str, ...]:
+    ours = [channel for channel in found.counts if is_ours(channel.type_name)]
+    return Ensembles(found.counts).namespaces if ours else ()
 
 
 def _gaps(storage: Storage, found: Survey) -> str | None:
     """What is missing of an ensemble's runs; None for other bags, which promise nothing."""
-    ours = [channel for channel in found.counts if is_ours(channel.type_name)]
+    if not any(is_ours(channel.type_name) for channel in found.counts):
+        return None
     try:
-        for channel in ours:
-            check_version(channel)
+        return read_contents(Bag(storage, found)).damage
     except ForeignBagError:
         return None
-    return read_contents(Bag(storage, found)).damage if ours else None

@@ -17,6 +17,8 @@ from typing import BinaryIO
 import lz4.frame  # type: ignore[import-untyped]
 from backports import zstd
 
+from slap_ros.bags.compression import SUFFIX, open_data
+from slap_ros.bags.compression import UNREADABLE as UNPACKABLE
 from slap_ros.bags.mcap_records import (
     CHUNK,
     FIRST_PRIVATE_OPCODE,
@@ -30,13 +32,12 @@ from slap_ros.bags.mcap_records import (
     RecordFields,
 )
 from slap_ros.bags.raw import Channel, MessageDefinition, RawMessage, one_line
+from slap_ros.bags.reading_budget import MAX_RECORD_BYTES, ReadingBudget
 from slap_ros.errors import DamagedBagError
 from slap_ros.files import open_regular
 
 UNREADABLE = (MalformedRecordError, UnicodeDecodeError, OSError)
 IGNORED = (Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT, Opcode.METADATA)  # outside of chunks
-# Of a record, and of a chunk uncompressed; recorders begin a new chunk after a few MB at most.
-MAX_RECORD_BYTES = 256 * 2**20
 
 
 class _EndOfFileError(Exception):
@@ -48,34 +49,45 @@ class _EndOfFileError(Exception):
         self.content = content
 
 
-def read_mcap(path: Path) -> Iterator[RawMessage]:
+def read_mcap(
+    path: Path, shown: Path | None = None, budget: ReadingBudget | None = None
+) -> Iterator[RawMessage]:
     """The messages, in the order in which they were written.
+
+    Args:
+        path: File to read.
+        shown: Name of the file for people, where it is another.
+        budget: Budget of the bag for its chunks; None for that of a bag of this file alone.
 
     Raises:
         DamagedBagError: After the last message that precedes the damage.
     """
     try:
         with open_regular(path) as file:
-            yield from _McapScan(file, path.stat().st_size).messages()
+            size = path.stat().st_size
+            scan = _McapScan(file, size, budget or ReadingBudget(path, size))
+            yield from scan.messages()
     except UNREADABLE as error:
-        raise DamagedBagError(f"{path} {_complaint(error)}") from error
+        raise DamagedBagError(f"{shown or path} {_complaint(error)}") from error
 
 
 def read_mcap_metadata(path: Path, name: str) -> dict[str, str]:
     """A metadata record from before the first message; empty where there is none to be read."""
     try:
-        with open_regular(path) as file:
-            return _McapScan(file, path.stat().st_size).metadata(name)
-    except UNREADABLE:
+        with open_data(path) as file:
+            size = MAX_RECORD_BYTES if path.suffix == SUFFIX else path.stat().st_size
+            return _McapScan(file, size, ReadingBudget(path, size)).metadata(name)
+    except (*UNREADABLE, *UNPACKABLE):
         return {}  # reading the messages tells what is wrong
 
 
 class _McapScan:
     """One pass through a file."""
 
-    def __init__(self, file: BinaryIO, size: int) -> None:
+    def __init__(self, file: BinaryIO, size: int, budget: ReadingBudget) -> None:
         self._file = file
         self._size = size
+        self._budget = budget
         self._position = 0
         self._schemas: dict[int, tuple[str, MessageDefinition]] = {}
         self._channels: dict[int, Channel] = {}
@@ -170,6 +182,8 @@ class _McapScan:
             raise MalformedRecordError("a chunk's length contradicts itself")
         if size > MAX_RECORD_BYTES:
             raise MalformedRecordError(_too_large("a chunk", size))
+        if compression:
+            self._budget.spend(size)
         data = _decompress(compression, fields.rest(), size)
         if len(data) != size:
             raise MalformedRecordError(f"a chunk of {size} bytes has {len(data)}")

@@ -8,10 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from rosbags.typesys import TypesysError
-
-from slap_ros.bags.definitions import check_version, decode, is_ours, store_for
-from slap_ros.bags.raw import Channel
+from slap_ros.bags.definitions import check_versions, decode, is_ours, undecodable
+from slap_ros.bags.ensembles import Ensembles
 from slap_ros.bags.storage import Storage, Survey, open_storage, survey
 from slap_ros.errors import DamagedBagError, ForeignBagError
 
@@ -34,18 +32,21 @@ class Bag:
         damage: Where reading has to stop and why; None for a sound bag. Deserialising may find
             damage that only shows at the end of an iteration.
         undecoded: Types that are left out, and why they cannot be deserialised.
+        ensembles: Which topics belong together.
     """
 
     def __init__(self, storage: Storage, found: Survey) -> None:
-        """For :func:`read_bag`."""
+        """Open a bag that was surveyed; for :func:`read_bag`.
+
+        Raises:
+            ForeignBagError: It has topics of slap_msgs of another version.
+        """
         self.path = storage.path
         self.metadata = storage.metadata()
         self.damage = found.damage
-        self.undecoded = {
-            channel.type_name: reason
-            for channel in found.counts
-            if (reason := _why_undecodable(channel)) is not None
-        }
+        self.undecoded = undecodable(found.counts)
+        check_versions(found.counts, self.undecoded)
+        self.ensembles = Ensembles(found.counts)
         self._storage = storage
 
     def __iter__(self) -> Iterator[BagMessage]:
@@ -81,14 +82,4 @@ def read_bag(path: Path | str) -> Bag:
             f"{path} was not recorded from an ensemble: it has no topic of slap_msgs, "
             f"only {topics or 'nothing at all'}"
         )
-    for channel in ours:
-        check_version(channel)
     return Bag(storage, found)
-
-
-def _why_undecodable(channel: Channel) -> str | None:
-    try:
-        store_for(channel)
-    except TypesysError as error:
-        return str(error)
-    return None

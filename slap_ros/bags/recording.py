@@ -57,6 +57,7 @@ class Recording:
         self.markers: dict[int, MarkersMessage] = {}  # by stamp, ns
         self.acquisition: list[AcquisitionEventMessage] = []  # in order of arrival
         self.not_finite = 0  # states
+        self.contradicting = 0  # states of a step of which there is another
         self._add: Mapping[str, Callable[[Any], None]] = {
             DOMAIN_INFO: self._add_domain,
             TASK: self._add_task,
@@ -68,12 +69,27 @@ class Recording:
         }
 
     @classmethod
-    def of(cls, bag: Bag) -> Recording:
-        """Everything in a bag."""
-        recording = cls()
-        for _, type_name, _, message in bag:
-            recording.add(type_name, message)
-        return recording
+    def of(cls, bag: Bag, namespace: str | None = None) -> Recording:
+        """Everything of one ensemble in a bag.
+
+        Args:
+            bag: Bag to read.
+            namespace: Namespace of the ensemble; None for the only one.
+
+        Raises:
+            InvalidParameterError: There is no such ensemble, or several to choose from.
+        """
+        only = bag.ensembles.only(namespace)
+        return cls.by_namespace(bag)[only]
+
+    @classmethod
+    def by_namespace(cls, bag: Bag) -> dict[str, Recording]:
+        """Everything in a bag, by the namespace of its ensemble."""
+        found = {namespace: cls() for namespace in bag.ensembles.namespaces}
+        for topic, type_name, _, message in bag:
+            if (namespace := bag.ensembles.of(topic, type_name)) is not None:
+                found[namespace].add(type_name, message)
+        return found
 
     def add(self, type_name: str, message: object) -> None:
         """Take a message; types that belong to no episode are left out."""
@@ -90,10 +106,11 @@ class Recording:
         self._episode(msg.episode).task = msg
 
     def _add_state(self, msg: StateMessage) -> None:
-        if all(isfinite(value) for obj in msg.objects for value in obj.features):
-            self._episode(msg.episode).states.setdefault(msg.step, msg)
-        else:  # no world publishes it, and no node acts on it
-            self.not_finite += 1
+        if not all(isfinite(value) for obj in msg.objects for value in obj.features):
+            self.not_finite += 1  # no world publishes it, and no node acts on it
+            return
+        kept = self._episode(msg.episode).states.setdefault(msg.step, msg)
+        self.contradicting += kept is not msg and _features(kept) != _features(msg)
 
     def _add_atoms(self, msg: AtomsMessage) -> None:
         episode = self._episode(msg.episode)
@@ -132,6 +149,10 @@ class Recording:
                 f"{here} here; read the bag with the version of slap_ros that wrote it"
             )
         return domain
+
+
+def _features(state: StateMessage) -> list[tuple[str, tuple[float, ...]]]:
+    return [(obj.name, tuple(obj.features)) for obj in state.objects]
 
 
 def _open(choice: DomainChoice) -> Domain:

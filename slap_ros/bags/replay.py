@@ -5,12 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from slap_ros.bags.evaluate import read_runs
+from slap_ros.bags.ensembles import ROOT
+from slap_ros.bags.evaluate import EnsembleContents, read_runs
 from slap_ros.bags.recording import RecordedEpisode, initial_state
 from slap_ros.core import ActionSpace, Domain, World
 from slap_ros.errors import DamagedBagError, InvalidCommandError, InvalidStateError
@@ -29,6 +30,7 @@ class Difference:
     feature: str
     recorded: float  # in the feature's unit
     replayed: float
+    namespace: str = ROOT  # of the ensemble
 
 
 @dataclass
@@ -47,22 +49,38 @@ class ReplayResult:
         return self.compared > 0 and self.different == 0
 
 
-def replay_bag(path: Path | str) -> ReplayResult:
+def replay_bag(path: Path | str, namespace: str | None = None) -> ReplayResult:
     """Feed the commands of each episode to a fresh world and compare every state.
+
+    Args:
+        path: Folder of the bag, or a single file of it.
+        namespace: Namespace of an ensemble; None for all ensembles, one after the other.
 
     Raises:
         DamagedBagError: Nothing in it can be read, or it breaks off before the domain is named.
         ForeignBagError: It is not of an ensemble, or of another version of one.
+        InvalidParameterError: There is no such ensemble.
         UnknownDomainError: Its domain is not known here.
         InvalidStateError: It has a state that its domain or its task cannot have.
     """
-    contents = read_runs(path)
-    recording = contents.recording
-    domain = recording.domain()
-    if domain is None:
-        raise DamagedBagError(f"{path} does not name the domain, so there is nothing to replay in")
+    contents = read_runs(path, namespace)
     result = ReplayResult(damage=contents.damage)
-    for number, episode in sorted(recording.episodes.items()):
+    for ensemble in contents.ensembles:
+        domain = ensemble.recording.domain()
+        if domain is None:
+            raise DamagedBagError(
+                f"{path} does not name the domain, so there is nothing to replay in"
+            )
+        _replay_ensemble(ensemble, domain, result)
+    return result
+
+
+def _replay_ensemble(ensemble: EnsembleContents, domain: Domain, result: ReplayResult) -> None:
+    """Replay the episodes of an ensemble, and add what came of it."""
+    for number, episode in sorted(ensemble.recording.episodes.items()):
+        if len(episode.states) > 1 and not episode.commands:
+            lost = f"the commands of episode {number} are missing"
+            result.damage = f"{result.damage}; {lost}" if result.damage else lost
         for step, recorded, replayed in _replay(episode, domain):
             if replayed is None:
                 result.unreached += 1
@@ -70,8 +88,8 @@ def replay_bag(path: Path | str) -> ReplayResult:
             result.compared += 1
             if recorded != replayed:
                 result.different += 1
-                result.first = result.first or _difference(number, step, recorded, replayed)
-    return result
+                difference = _difference(number, step, recorded, replayed)
+                result.first = result.first or replace(difference, namespace=ensemble.namespace)
 
 
 @dataclass

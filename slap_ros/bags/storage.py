@@ -6,13 +6,16 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from slap_ros.bags.compression import SUFFIX, plain_name, unpacked_file, unpacked_message
 from slap_ros.bags.mcap_reader import read_mcap, read_mcap_metadata
+from slap_ros.bags.message_order import in_order_of_arrival
 from slap_ros.bags.raw import Channel, RawMessage
+from slap_ros.bags.reading_budget import ReadingBudget
 from slap_ros.bags.rosbag2 import FILE_NAME, Extent, read_metadata
 from slap_ros.bags.sqlite_reader import read_sqlite
 from slap_ros.bags.writer import (
@@ -23,11 +26,9 @@ from slap_ros.bags.writer import (
 )
 from slap_ros.errors import DamagedBagError
 
-READERS: Mapping[str, Callable[[Path], Iterator[RawMessage]]] = {
-    ".mcap": read_mcap,
-    ".db3": read_sqlite,
-}
-COMPRESSED = ".zstd"
+MCAP, SQLITE = SUFFIXES = (".mcap", ".db3")
+DISK_BLOCK = 512  # bytes in which stat counts
+ONE_FILE = "a single .mcap or .db3 file, compressed by zstd or not"
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,8 @@ class Storage:
 
     @property
     def suffix(self) -> str:
-        """Of the files: ``.mcap`` or ``.db3``."""
-        return self.files[0].suffix
+        """The ending of the files before any compression: ``.mcap`` or ``.db3``."""
+        return _plain_suffix(self.files[0])
 
     @property
     def size_bytes(self) -> int:
@@ -48,18 +49,30 @@ class Storage:
         return sum(file.stat().st_size for file in self.files)
 
     def messages(self) -> Iterator[RawMessage]:
-        """The messages, in the order in which they were written.
+        """The messages, in the order in which they were received.
 
         Raises:
             DamagedBagError: After the last message that precedes any damage.
         """
-        for file in self.files:
-            yield from READERS[self.suffix](file)
+        budget = ReadingBudget(self.path, sum(map(_bytes_on_disk, self.files)))
+        for message in in_order_of_arrival(self._stored(budget)):
+            yield unpacked_message(message, budget)
         self._information()
+
+    def _stored(self, budget: ReadingBudget) -> Iterator[RawMessage]:
+        """The messages as they are in the files."""
+        for file in self.files:
+            with unpacked_file(file, budget) as plain:
+                if self.suffix == MCAP:
+                    yield from read_mcap(plain.path, file, budget)
+                else:
+                    yield from read_sqlite(plain.path, file)
+                if plain.damage is not None:
+                    raise DamagedBagError(plain.damage)
 
     def metadata(self) -> dict[str, str]:
         """What the run was made with, as far as it can be read."""
-        if self.suffix == ".mcap" and (found := read_mcap_metadata(self.files[0], METADATA_NAME)):
+        if self.suffix == MCAP and (found := read_mcap_metadata(self.files[0], METADATA_NAME)):
             return found
         try:
             return _texts(self._information().get("custom_data"))
@@ -78,7 +91,7 @@ class Storage:
         information = self._information()
         found = list(_contradicted_files(information, self.files))
         found = found or list(_contradicted_counts(information, counts))
-        if self.suffix == ".mcap":
+        if self.suffix == MCAP:
             inside = read_mcap_metadata(self.files[0], METADATA_NAME)
             told = read_mcap_metadata(self.files[0], CHECKSUM_NAME).get(CHECKSUM_KEY)
             outside = _texts(information.get("custom_data"))
@@ -119,25 +132,46 @@ def open_storage(path: Path | str) -> Storage:
     """Find a bag's files.
 
     Args:
-        path: The bag's folder, or a single ``.mcap`` or ``.db3`` file.
+        path: The bag's folder, or a single ``.mcap`` or ``.db3`` file, compressed or not.
 
     Raises:
         DamagedBagError: There is no bag.
     """
     path = Path(path)
-    if path.is_file() and path.suffix in READERS:
+    if path.is_file() and _plain_suffix(path) in SUFFIXES:
         return Storage(path, (path,))
     if not path.exists():
         raise DamagedBagError(f"there is no bag at {path}; check the path")
-    content = sorted(path.iterdir(), key=_recording_order) if path.is_dir() else [path]
-    for suffix in READERS:
-        if files := tuple(file for file in content if file.suffix == suffix):
+    content = _data_files(path.iterdir() if path.is_dir() else [path])
+    for suffix in SUFFIXES:
+        if files := tuple(file for file in content if _plain_suffix(file) == suffix):
             return Storage(path, files)
-    if any(file.suffix == COMPRESSED for file in content):
-        raise DamagedBagError(f"the bag {path} is compressed; unpack it with `unzstd` first")
     raise DamagedBagError(
-        f"{path} is not a bag: give a folder with {' or '.join(READERS)} files, or such a file"
+        f"{path} is not a bag: give a folder with {' or '.join(SUFFIXES)} files, or {ONE_FILE}"
     )
+
+
+def _bytes_on_disk(file: Path) -> int:
+    """The size of a file without holes, which cost whoever sent it nothing."""
+    found = file.stat()
+    return min(found.st_size, found.st_blocks * DISK_BLOCK) if found.st_blocks else found.st_size
+
+
+def _plain_suffix(file: Path) -> str:
+    """The ending of a file before any compression."""
+    return Path(plain_name(file.name)).suffix
+
+
+def _data_files(content: Iterable[Path]) -> list[Path]:
+    """The files of a folder in order of recording.
+
+    Of a file that is there compressed and not, the latter is taken: ``unzstd`` keeps the former,
+    and a recorder that is killed while it compresses leaves half of it.
+    """
+    by_name: dict[str, Path] = {}
+    for file in sorted(content, key=lambda file: file.suffix == SUFFIX):
+        by_name.setdefault(plain_name(file.name), file)
+    return sorted(by_name.values(), key=_recording_order)
 
 
 def survey(storage: Storage) -> Survey:
@@ -161,8 +195,8 @@ def _contradicted_files(information: Mapping[str, object], files: Sequence[Path]
     listed = information.get("relative_file_paths")
     if not isinstance(listed, list):
         return  # a single file, or a metadata.yaml of other software
-    names = {Path(str(name)).name for name in listed}
-    here = {file.name for file in files}
+    names = {plain_name(Path(str(name)).name) for name in listed}
+    here = {plain_name(file.name) for file in files}
     if missing := sorted(names - here):
         yield f"{', '.join(missing)} is missing, which {FILE_NAME} lists"
     if others := sorted(here - names):
@@ -189,4 +223,5 @@ def _contradicted_counts(
 
 def _recording_order(file: Path) -> list[tuple[int, str]]:
     """Sorts ``run_10`` after ``run_9``."""
-    return [(int(digits or 0), text) for text, digits in re.findall(r"(\D*)(\d*)", file.name)]
+    parts = re.findall(r"(\D*)(\d*)", plain_name(file.name))
+    return [(int(digits or 0), text) for text, digits in parts]

@@ -23,6 +23,7 @@ from slap_ros.bags import (
     read_episodes,
     replay_bag,
 )
+from slap_ros.bags.ensembles import ROOT
 from slap_ros.bags.export import choose_format, export_episodes, require_exportable
 from slap_ros.bags.recording import Recording
 from slap_ros.cli.console import console, exits, print_json, styled
@@ -38,7 +39,21 @@ app = typer.Typer(
     no_args_is_help=True,
 )
 
-BagPath = Annotated[Path, typer.Argument(help="Folder of a bag, or one .mcap or .db3 file.")]
+BagPath = Annotated[
+    Path,
+    typer.Argument(help="Folder of a bag, or one .mcap or .db3 file, compressed by zstd or not."),
+]
+Namespace = Annotated[
+    str | None,
+    typer.Option(
+        help="Namespace of one ensemble, such as /robot1, where several were recorded. "
+        "Default: all of them."
+    ),
+]
+OneNamespace = Annotated[
+    str | None,
+    typer.Option(help="Namespace of the ensemble, such as /robot1, where several were recorded."),
+]
 
 
 @app.command("info")
@@ -53,6 +68,8 @@ def info(bag: BagPath, json: Json = False) -> int:
         for topic in found.topics:
             table.add_row(topic.name, topic.type_name, str(topic.message_count))
         console.print(table)
+        if len(found.ensembles) > 1:
+            console.print(f"ensembles: {', '.join(found.ensembles)}")
         for key, value in found.metadata.items():
             console.print(f"{key}: {value}")
     return _warn(found.damage)
@@ -60,26 +77,37 @@ def info(bag: BagPath, json: Json = False) -> int:
 
 @app.command("evaluate")
 @exits
-def evaluate(bag: BagPath, json: Json = False) -> int:
+def evaluate(bag: BagPath, namespace: Namespace = None, json: Json = False) -> int:
     """Compute every number of a run again, and the atoms of every state."""
-    found = evaluate_bag(bag)
+    found = evaluate_bag(bag, namespace)
     for mismatch in found.mismatches:
         console.print(
-            f"episode {mismatch.episode}, step {mismatch.step}: "
+            f"{_prefix(mismatch.namespace)}episode {mismatch.episode}, step {mismatch.step}: "
             f"missing {list(mismatch.missing)}, extra {list(mismatch.extra)}",
         )
+    named = list(zip(found.namespaces, found.runs, strict=True))
     if json:
-        runs = [run.as_json() | _perception(found) for run in found.runs]
+        runs = [run.as_json() | {"namespace": name} | _perception(found) for name, run in named]
         print_json(runs[0] if len(runs) == 1 else runs)
     else:
-        for run in found.runs:
-            console.print(_table(run))
+        for name, run in named:
+            console.print(_table(name, run))
         console.print(
             f"{found.compared} of {found.states} states perceived again, "
             f"{len(found.mismatches)} mismatches"
         )
+    if not found.runs:
+        console.print("no run: nothing was planned, or neither plans nor their events recorded")
+    if found.left_out:
+        topics = ", ".join(found.left_out)
+        console.print(f"left out, as there are others of their types: {topics}")
     code = _warn(found.damage)
     return int(ErrorCode.REPLAY_MISMATCH) if found.mismatches else code
+
+
+def _prefix(namespace: str) -> str:
+    """What names an ensemble before what is said of it; nothing for one without a namespace."""
+    return "" if namespace == ROOT else f"{namespace}: "
 
 
 def _perception(found: BagEvaluation) -> dict[str, int | str | None]:
@@ -90,16 +118,16 @@ def _perception(found: BagEvaluation) -> dict[str, int | str | None]:
     }
 
 
-def _table(run: RunMetrics) -> Table:
-    outcome = "solved" if run.success else f"not solved: {run.error_msg}"
+def _table(namespace: str, run: RunMetrics) -> Table:
     table = Table(
         "option",
         "kind",
         "steps",
         "outcome",
         title=(
-            f"{run.domain}, preset {run.preset}, seed {known(run.seed)}: {outcome}\n"
-            f"{run.plan_length} steps, {known(run.shortcut_steps)} of them in shortcuts, "
+            f"{_prefix(namespace)}{run.domain}, preset {known(run.preset)}, "
+            f"seed {known(run.seed)}: {run.outcome}\n"
+            f"{known(run.plan_length)} steps, {known(run.shortcut_steps)} of them in shortcuts, "
             f"{known(run.planning_seconds, '.3f')} s planning, "
             f"{known(run.replans)} replans, {known(run.edges_rolled_out)} edges rolled out"
         ),
@@ -117,11 +145,12 @@ def render(
     bag: BagPath,
     output: Annotated[Path, typer.Option(help=".gif or .mp4 file to write.")],
     size: Size = None,
+    namespace: OneNamespace = None,
 ) -> int:
     """Write an animation of the recorded states."""
     pixels = picture_size(size)
     found = read_bag(bag)
-    recording = Recording.of(found)
+    recording = Recording.of(found, namespace)
     domain = recording.domain()
     if domain is None:
         raise DamagedBagError(f"{bag} breaks off before it names its domain")
@@ -150,19 +179,20 @@ def export(
             "Default: by the ending of --output.",
         ),
     ] = None,
+    namespace: Namespace = None,
 ) -> None:
     """Write states, commands, atoms and rewards of every episode for numpy, pandas or LeRobot."""
     chosen = choose_format(form, output)
     require_exportable(chosen, output)
-    episodes = [episode for bag in bags for episode in read_episodes(bag)]
+    episodes = [episode for bag in bags for episode in read_episodes(bag, namespace)]
     export_episodes(episodes, output, chosen)
     states = sum(len(episode) for episode in episodes)
     console.print(f"{chosen.name}: {output}, episodes: {len(episodes)}, states: {states}")
 
 
-def replay_in_world(bag: Path, json: bool) -> int:
+def replay_in_world(bag: Path, namespace: str | None, json: bool) -> int:
     """Replay a bag in a fresh world and print how it compares; the exit code."""
-    result = replay_bag(bag)
+    result = replay_bag(bag, namespace)
     if json:
         print_json(asdict(result) | {"identical": result.identical})
     else:
@@ -172,8 +202,9 @@ def replay_in_world(bag: Path, json: bool) -> int:
         if result.first is not None:
             first = result.first
             console.print(
-                f"first: episode {first.episode}, step {first.step}, {first.object}."
-                f"{first.feature}: recorded {first.recorded!r}, replayed {first.replayed!r}",
+                f"first: {_prefix(first.namespace)}episode {first.episode}, step {first.step}, "
+                f"{first.object}.{first.feature}: recorded {first.recorded!r}, "
+                f"replayed {first.replayed!r}",
             )
     code = _warn(result.damage)
     return code if result.identical else int(ErrorCode.REPLAY_MISMATCH)

@@ -21,20 +21,32 @@ def report(
         typer.Argument(metavar="BAG", help="Folders of bags, or single .mcap or .db3 files."),
     ],
     output: Annotated[Path, typer.Option(help=".html file to write.")],
+    namespace: Annotated[
+        str | None,
+        typer.Option(
+            help="Namespace of one ensemble, such as /robot1, where a bag has several. "
+            "Default: all of them."
+        ),
+    ] = None,
 ) -> int:
     """Report a run, or compare several, on one page that opens in any browser."""
     check_output(output)
-    return write_report(bags, output)
+    return write_report(bags, output, namespace)
 
 
-def write_report(bags: Sequence[Path], output: Path) -> int:
+def write_report(bags: Sequence[Path], output: Path, namespace: str | None = None) -> int:
     """Write a page; the exit code, as ``slap bag evaluate`` has it for the same bags.
+
+    Args:
+        bags: Folders of the bags, or single files.
+        output: Page to write.
+        namespace: Namespace of an ensemble; None for all ensembles.
 
     Raises:
         SlapError: A bag cannot be read, or the page not be written; there is no page then.
     """
     with console.status("writing the report"):
-        found = [read_report(bag) for bag in bags]
+        found = [read_report(bag, namespace) for bag in bags]
         write_page(output, render(found))
     console.print(f"report: {output}")
     for bag in found:

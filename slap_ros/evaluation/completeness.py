@@ -52,13 +52,41 @@ def gaps_of(run: RecordedRun, executed: Iterable[ExecutedOption]) -> Iterator[st
     """
     if states := missing_states(run.first_step, run.last_step, run.episode.steps):
         yield states
+    if atoms := missing_atoms(run):
+        yield atoms
+    if _is_solved(run) and run.goal is None:
+        yield "neither the task nor a plan names the goal"
     yield from missing_events(run.events.messages)
     if lost := len(run.announced) - len(run.plans):
         yield f"{lost} of {len(run.announced)} plans are missing"
+    if lost := lost_options(run, executed):
+        yield f"skill events of {lost} executed options are missing"
+
+
+def lost_options(run: RecordedRun, executed: Iterable[ExecutedOption]) -> int:
+    """How many options reached their targets of which no skill event says so."""
     steps = range(run.first_step, run.last_step + 1)
     reached = sum(option.reached for option in executed if option.start.step in steps)
-    if (lost := run.events.count(Kind.EDGE_REACHED) - reached) > 0:
-        yield f"skill events of {lost} executed options are missing"
+    return max(0, run.events.count(Kind.EDGE_REACHED) - reached)
+
+
+def missing_atoms(run: RecordedRun) -> str | None:
+    """Which atoms of a run are missing: those of its end tell whether it was solved.
+
+    Steps between may have none, since perception may be slower than the world.
+    """
+    if not (_is_solved(run) or run.announced):
+        return None  # nothing was planned, so that nothing need have been perceived
+    if not any(run.first_step <= step <= run.last_step for step in run.episode.atoms):
+        return "all perceived atoms are missing"
+    if _is_solved(run) and run.last_step not in run.episode.atoms:
+        return f"the perceived atoms of step {run.last_step}, the last, are missing"
+    return None
+
+
+def _is_solved(run: RecordedRun) -> bool:
+    """Whether the run ended in success, as its planner saw it."""
+    return run.events.end is not None and run.events.end.kind == Kind.SOLVED
 
 
 def missing_states(first: int, last: int, recorded: Collection[int]) -> str | None:

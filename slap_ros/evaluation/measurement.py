@@ -8,16 +8,16 @@ were lost on the way do not make it shorter.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
 from slap_ros.errors import ErrorCode
 from slap_ros.evaluation.atom_names import describe
-from slap_ros.evaluation.completeness import planning_is_whole
+from slap_ros.evaluation.completeness import lost_options, planning_is_whole
 from slap_ros.evaluation.executed_options import ExecutedOption
 from slap_ros.evaluation.metrics import OPERATOR, SHORTCUT, UNKNOWN, OptionMetrics, RunMetrics
-from slap_ros.evaluation.recorded_run import RecordedRun
+from slap_ros.evaluation.recorded_run import EpisodeLog, RecordedRun
 from slap_ros.messages.decode import NANOSECONDS
 from slap_ros.messages.events import PlanEventKind
 from slap_ros.planning.options import OptionKind
@@ -32,9 +32,12 @@ def measure(run: RecordedRun, options: Iterable[ExecutedOption]) -> RunMetrics:
     """
     task, events = run.episode.task, run.events
     success, error_code, error_msg = _verdict(run)
-    measured = tuple(_measure_option(run, option) for option in options)
+    executed = list(options)
+    measured = tuple(measure_option(run.episode, option, run.last_step) for option in executed)
     first = next(iter(run.plans), None)
-    unknown = _unknown(run)
+    unknown = _unknown(run, executed)
+    if success is None:
+        unknown["success"] = error_msg
     known = RunMetrics(
         domain=run.domain,
         preset=run.preset,
@@ -57,18 +60,18 @@ def measure(run: RecordedRun, options: Iterable[ExecutedOption]) -> RunMetrics:
     return replace(known, **blanks, unknown=unknown)
 
 
-def _verdict(run: RecordedRun) -> tuple[bool, ErrorCode, str]:
-    """Whether the run was a success, and if not, why."""
+def _verdict(run: RecordedRun) -> tuple[bool | None, ErrorCode, str]:
+    """Whether the run was a success, None if that is not known, and if it was not, why."""
     end = run.events.end
     if end is None:
         return False, ErrorCode.NODE_DIED, "the recording ends before the run does"
     if end.kind == PlanEventKind.FAILED:
         return False, _error_code(end.error_code), end.error_msg
     if run.goal is None:
-        return False, ErrorCode.UNKNOWN, "solved, but the recording lacks the task"
+        return None, ErrorCode.UNKNOWN, "solved, but the recording lacks the task"
     perceived = run.episode.atoms.get(end.step)
     if perceived is None:
-        return False, ErrorCode.UNKNOWN, f"solved, but no atoms of step {end.step} are known"
+        return None, ErrorCode.UNKNOWN, f"solved, but no atoms of step {end.step} are known"
     if missing := run.goal - perceived:
         return False, ErrorCode.UNKNOWN, f"solved, but {describe(missing)} does not hold"
     return True, ErrorCode.NONE, ""
@@ -79,11 +82,15 @@ def _error_code(value: int) -> ErrorCode:
     return ErrorCode(value) if value in set(ErrorCode) else ErrorCode.UNKNOWN
 
 
-def _unknown(run: RecordedRun) -> dict[str, str]:
+def _unknown(run: RecordedRun, options: Sequence[ExecutedOption]) -> dict[str, str]:
     """The metrics that cannot be computed, and why."""
     reasons: dict[str, str] = {}
+    if run.preset is None:
+        reasons["preset"] = "the domain is missing"
     if run.episode.task is None:
         reasons |= dict.fromkeys(("seed", "index"), "the task is missing")
+    if lost_options(run, options):
+        reasons["shortcut_steps"] = "skill events are missing"
     if len(run.plans) < len(run.announced):
         reasons["shortcut_steps"] = "a plan is missing, which tells shortcuts from operators"
     if run.announced and run.announced[0] is None:
@@ -96,22 +103,29 @@ def _unknown(run: RecordedRun) -> dict[str, str]:
     return reasons
 
 
-def _measure_option(run: RecordedRun, option: ExecutedOption) -> OptionMetrics:
+def measure_option(episode: EpisodeLog, option: ExecutedOption, last_step: int) -> OptionMetrics:
+    """The metrics of an option.
+
+    Args:
+        episode: What was recorded of its episode.
+        option: Option that was executed.
+        last_step: Last step of its run, at which it is taken to end where it was not recorded.
+    """
     end = option.end
-    last = end.step if end is not None else run.last_step
+    last = end.step if end is not None else last_step
     return OptionMetrics(
         name=option.start.skill,
-        kind=_kind(run, option.start.skill),
+        kind=_kind(episode, option.start.skill),
         objects=tuple(option.start.objects),
         steps=max(0, last - option.start.step),
         outcome=option.outcome,
     )
 
 
-def _kind(run: RecordedRun, name: str) -> str:
+def _kind(episode: EpisodeLog, name: str) -> str:
     """Whether plans of the episode call an option a shortcut; unknown where there is no plan."""
-    if not run.episode.plans:
+    if not episode.plans:
         return UNKNOWN
-    edges = (edge for plan in run.episode.plans for edge in plan.edges)
+    edges = (edge for plan in episode.plans for edge in plan.edges)
     shortcuts = {edge.name for edge in edges if edge.kind == OptionKind.SHORTCUT.value}
     return SHORTCUT if name in shortcuts else OPERATOR

@@ -32,11 +32,13 @@ class RunMetrics:
     """One run. The order of the fields is that of reports and of ``--json``."""
 
     domain: str
-    preset: str
+    preset: str | None
     seed: int | None  # -1: the initial state was given explicitly
     index: int | None  # index of the task among those of the seed
-    success: bool  # the run was SOLVED and the goal atoms hold in its last state, as perceived
-    plan_length: int  # environment steps
+    # The run was SOLVED and the goal atoms hold in its last state, as perceived; None: that is not
+    # known, as atoms, goal or events were not recorded.
+    success: bool | None
+    plan_length: int | None  # environment steps
     shortcut_steps: int | None  # environment steps that shortcuts took, out of plan_length
     planning_seconds: float | None  # planning time of all plans together, s
     replans: int | None
@@ -48,6 +50,13 @@ class RunMetrics:
     library: str | None  # digest of the shortcuts that it knew
     samples: int | None  # attempts of a shortcut in its model
     unknown: Mapping[str, str] = field(default_factory=dict)  # why a metric is None, by metric
+
+    @property
+    def outcome(self) -> str:
+        """How the run ended, in words."""
+        if self.success is None:
+            return f"not known whether solved: {self.error_msg}"
+        return "solved" if self.success else f"not solved: {self.error_msg}"
 
     def as_json(self) -> dict[str, Any]:
         """The JSON object of ``--json``, keys in the order of the fields."""

@@ -36,14 +36,14 @@ class RecordedRun:
 
     Args:
         domain: Name of the domain; empty where it is not known.
-        preset: Preset of the domain; empty where it is not known.
+        preset: Preset of the domain; None where it is not known.
         events: Plan events of the run.
         episode: Record of the run's episode, of which the run may be a part.
         announced: Plan that each PLANNED event of the run announced; None where it is missing.
     """
 
     domain: str
-    preset: str
+    preset: str | None
     events: RunEvents
     episode: EpisodeLog
     announced: Sequence[PlanMessage | None]

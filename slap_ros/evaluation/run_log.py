@@ -16,6 +16,7 @@ from slap_ros.evaluation.metrics import RunMetrics
 from slap_ros.evaluation.recorded_run import EpisodeLog, RecordedRun, announced_plans
 from slap_ros.evaluation.run_events import RunEvents, count_without_start, split_into_runs
 from slap_ros.evaluation.run_trace import RunTrace
+from slap_ros.evaluation.unrecorded_run import unrecorded_run
 from slap_ros.messages.interfaces import (
     ATOMS,
     DOMAIN_INFO,
@@ -68,10 +69,11 @@ class RunLog:
         return [trace.metrics for trace in self.traces()]
 
     def traces(self) -> list[RunTrace]:
-        """Every run so far, in order."""
+        """Every run so far, in order; those whose events are missing go last."""
         runs = self._recorded()
         options = options_by_run(executed_options(self._skill_events.messages), runs)
-        return [RunTrace.of(run, own) for run, own in zip(runs, options, strict=True)]
+        found = [RunTrace.of(run, own) for run, own in zip(runs, options, strict=True)]
+        return found + [self._unrecorded(number) for number in self._without_events()]
 
     def executed_in(self, episode: int) -> list[ExecutedOption]:
         """Every option that was executed in an episode, in order, those of no run among them."""
@@ -95,6 +97,11 @@ class RunLog:
             episode = run.events.episode
             where = f"episode {episode}: " if len(runs) > 1 else ""
             found += [where + gap for gap in gaps_of(run, self.executed_in(episode))]
+        found += [
+            f"the plan events of episode {number} are missing" for number in self._without_events()
+        ]
+        if (runs or self._without_events()) and not self._presets:
+            found.append("nothing names its domain")
         if before := count_without_start(self._plan_events.messages):
             found.append(f"{before} plan events belong to a run whose start is missing")
         if repeated := self._plan_events.repeated + self._skill_events.repeated:
@@ -113,10 +120,23 @@ class RunLog:
 
     def _run(self, events: RunEvents, plans: Mapping[int, PlanMessage]) -> RecordedRun:
         episode = self._episode(events.episode)
+        announced = [plans.get(id(event)) for event in events.planned]
+        return RecordedRun(*self._domain(episode), events, episode, announced)
+
+    def _without_events(self) -> list[int]:
+        """The episodes that have plans and no plan event: something was run in them."""
+        told = {event.episode for event in self._plan_events.messages}
+        return [n for n, one in sorted(self._episodes.items()) if one.plans and n not in told]
+
+    def _unrecorded(self, number: int) -> RunTrace:
+        episode = self._episode(number)
+        return unrecorded_run(number, *self._domain(episode), episode, self.executed_in(number))
+
+    def _domain(self, episode: EpisodeLog) -> tuple[str, str | None]:
+        """Name and preset of an episode's domain, as far as they are known."""
         task = episode.task
         domain = task.domain if task is not None else next(iter(self._presets), "")
-        announced = [plans.get(id(event)) for event in events.planned]
-        return RecordedRun(domain, self._presets.get(domain, ""), events, episode, announced)
+        return domain, self._presets.get(domain)
 
     def _episode(self, number: int) -> EpisodeLog:
         return self._episodes.get(number, EpisodeLog())

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 
-from slap_ros.bags.evaluate import BagContents, BagEvaluation, evaluate, read_runs
+from slap_ros.bags.evaluate import BagEvaluation, EnsembleContents, evaluate, read_runs
 from slap_ros.bags.recording import RecordedEpisode, Recording
 from slap_ros.core import Domain
 from slap_ros.core.notebook import ShownInNotebooks
@@ -49,6 +49,7 @@ class RunReport:
     control_period_s: float
     configuration: dict[str, str]
     versions: dict[str, str]
+    namespace: str = ""  # of its ensemble, where the bag has several
 
     @property
     def approach(self) -> str:
@@ -83,41 +84,67 @@ class BagReport(ShownInNotebooks):
         return f"{self.name}, {len(self.runs)} runs"
 
 
-def read_report(path: Path | str) -> BagReport:
+def read_report(path: Path | str, namespace: str | None = None) -> BagReport:
     """Gather what a page shows of a bag.
 
     A domain that cannot be imported here, as one without its simulator, costs only the second
     opinion on perception: all else is in the bag.
 
+    Args:
+        path: Folder of the bag, or a single file of it.
+        namespace: Namespace of an ensemble; None for all ensembles.
+
     Raises:
         DamagedBagError: Nothing in it can be read.
         ForeignBagError: It is not of an ensemble, or of another version of one.
+        InvalidParameterError: There is no such ensemble.
         UnknownDomainError: Its domain is not known here.
         InvalidStateError: It has a state that its domain cannot have.
     """
-    reading = read_runs(path)
-    unchecked, domain = "", None
-    try:
-        domain = reading.recording.domain()
-    except InvalidDomainError as error:
-        unchecked = str(error)
-    if domain is None and not unchecked:
-        unchecked = "the recording does not name its domain"
+    reading = read_runs(path, namespace)
+    opened = [_domain(ensemble.recording) for ensemble in reading.ensembles]
+    domains = [domain for domain, _ in opened]
+    unchecked = next((reason for _, reason in opened if reason), "")
     name = Path(path).resolve().name
-    runs = tuple(_report(name, reading, trace, domain) for trace in reading.log.traces())
-    events = reading.recording.acquisition
+    several = len(reading.bag.ensembles.namespaces) > 1
+    runs = tuple(
+        _report(name, ensemble, several, trace, domain)
+        for ensemble, domain in zip(reading.ensembles, domains, strict=True)
+        for trace in ensemble.log.traces()
+    )
+    events = [event for ensemble in reading.ensembles for event in ensemble.recording.acquisition]
     return BagReport(
         name,
         runs,
-        evaluate(reading, domain),
+        evaluate(reading, domains),
         recorded_proposals(events),
         recorded_acquisitions(events),
         unchecked,
     )
 
 
-def _report(name: str, reading: BagContents, trace: RunTrace, domain: Domain | None) -> RunReport:
-    recording = reading.recording
+def _domain(recording: Recording) -> tuple[Domain | None, str]:
+    """The domain that was recorded, or why it is not at hand."""
+    try:
+        domain = recording.domain()
+    except InvalidDomainError as error:
+        return None, str(error)
+    return domain, "" if domain is not None else "the recording does not name its domain"
+
+
+def _report(
+    name: str, ensemble: EnsembleContents, several: bool, trace: RunTrace, domain: Domain | None
+) -> RunReport:
+    """What there is of a run.
+
+    Args:
+        name: Name of the bag.
+        ensemble: Ensemble that ran.
+        several: Whether the bag has others.
+        trace: Trace of the run.
+        domain: Domain of the run; None if it is not at hand.
+    """
+    recording = ensemble.recording
     episode = recording.episodes.get(trace.episode, RecordedEpisode())
     info = recording.domain_info
     return RunReport(
@@ -135,6 +162,7 @@ def _report(name: str, reading: BagContents, trace: RunTrace, domain: Domain | N
         control_period_s=_period(recording),
         configuration=_setting(episode, info.configuration if info is not None else ()),
         versions={v.key: v.value for v in info.versions} if info is not None else {},
+        namespace=ensemble.namespace if several else "",
     )
 
 

@@ -133,15 +133,15 @@ def _shown(runs: Sequence[RunReport]) -> list[PageRun]:
 
 
 def _labels(runs: Sequence[RunReport]) -> list[str]:
-    """The shortest names that differ from run to run."""
-    approaches = Counter(run.approach for run in runs)
-    bags = Counter((run.approach, run.bag) for run in runs)
+    """The shortest names that differ from run to run; those of several ensembles have theirs."""
+    approaches = Counter((run.approach, run.namespace) for run in runs)
+    bags = Counter((run.approach, run.namespace, run.bag) for run in runs)
     labels = []
     for number, run in enumerate(runs, start=1):
-        label = run.approach
-        if approaches[run.approach] > 1:
+        label = f"{run.approach}, {run.namespace}" if run.namespace else run.approach
+        if approaches[run.approach, run.namespace] > 1:
             label += f", {run.bag}"
-        if bags[run.approach, run.bag] > 1:
+        if bags[run.approach, run.namespace, run.bag] > 1:
             label += f", run {number}"
         labels.append(label)
     return labels
@@ -149,11 +149,12 @@ def _labels(runs: Sequence[RunReport]) -> list[str]:
 
 def _relative_length(run: RunReport, runs: Sequence[RunReport]) -> float | None:
     """Plan length against that of pure planning, of the first such run of the same task."""
+    length = run.metrics.plan_length
     for other in runs if len(runs) > 1 else ():
         if other.task == run.task and other.approach == PURE_PLANNING and other.metrics.success:
-            if not run.metrics.success or not other.metrics.plan_length:
+            if not run.metrics.success or length is None or not other.metrics.plan_length:
                 return None
-            return run.metrics.plan_length / other.metrics.plan_length
+            return length / other.metrics.plan_length
     return None
 
 
@@ -162,8 +163,9 @@ def _summary(shown: Sequence[PageRun]) -> list[str]:
     sentences = []
     for one in shown:
         metrics = one.run.metrics
-        if not metrics.success:
-            sentences.append(f"{one.label}: not solved. {metrics.error_msg}")
+        if not metrics.success or metrics.plan_length is None:
+            verdict = "not known whether solved" if metrics.success is None else "not solved"
+            sentences.append(f"{one.label}: {verdict}. {metrics.error_msg}")
             continue
         sentence = f"{one.label}: solved in {counted(metrics.plan_length, 'step')}"
         if metrics.shortcut_steps:

@@ -60,16 +60,21 @@ class RecordedMotion:
         return replace(arm, step=step)
 
 
-def read_recorded_motion(path: Path) -> RecordedMotion:
-    """The motion of the newest episode in a bag.
+def read_recorded_motion(path: Path, namespace: str | None = None) -> RecordedMotion:
+    """The motion of the newest episode of an ensemble in a bag.
+
+    Args:
+        path: Folder of the bag, or a single file of it.
+        namespace: Namespace of the ensemble; None for the only one.
 
     Raises:
         DamagedBagError: It breaks off, or lacks a state: half a plan is none for a robot.
-        InvalidParameterError: Its domain has no Panda, or it begins with something in the hand.
+        InvalidParameterError: There is no such ensemble, or several to choose from; its domain has
+            no Panda, or it begins with something in the hand.
         ForeignBagError, UnknownDomainError, InvalidStateError: As for any replay.
     """
     bag = read_bag(path)
-    recording = Recording.of(bag)
+    recording = Recording.of(bag, namespace)
     domain = recording.domain()
     if bag.damage is not None or domain is None:
         reason = bag.damage or "it does not name its domain"

@@ -5,27 +5,31 @@
 from __future__ import annotations
 
 import os
+import re
 import sqlite3
 import struct
 import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import closing
+from itertools import pairwise
 from pathlib import Path
 
 import lz4.frame
 import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import TypesysError
 from truthful_run import Script
+from truthful_run import record as write_bag
 
-from slap_ros.bags import read_bag
-from slap_ros.bags.definitions import MAX_DEFINITION_FIELDS, store_for
+from slap_ros.bags import definitions, evaluate_bag, read_bag
+from slap_ros.bags.definitions import MAX_DEFINITION_FIELDS, decode, store_for, undecodable
 from slap_ros.bags.mcap_reader import MAX_RECORD_BYTES, read_mcap
 from slap_ros.bags.mcap_records import CHUNK, MAGIC, RECORD, Opcode, prefixed, record
 from slap_ros.bags.raw import Channel, MessageDefinition
 from slap_ros.bags.sqlite_reader import read_sqlite
 from slap_ros.errors import DamagedBagError
-from slap_ros.messages.interfaces import definition, typestore
+from slap_ros.messages.interfaces import STATE, definition, typestore
 
 GIGABYTES_3 = 3 * 10**9
 # Peak resident memory, kB, of the command with everything that it imports, and a record.
@@ -164,3 +168,145 @@ def test_tables_of_a_bag_are_tables(tmp_path: Path, script: str) -> None:
         database.executescript(script)
     with pytest.raises(DamagedBagError):
         list(read_sqlite(tmp_path / "bag.db3"))
+
+
+ODD = "=" * 80 + "\nMSG: odd/Inner\nuint8 a\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "string[2000000000] a\n",
+        "string<=5[2000000000] a\n",
+        "odd/Inner[2000000000] a\n" + ODD,
+        "".join(f"string[500] a{i}\n" for i in range(100)),
+        "odd/Inner[10] a\n" + ODD + "odd/Inner2[6000] b\n" + ODD.replace("Inner", "Inner2"),
+        "int32[0] a\n",
+    ],
+    ids=["texts", "bounded texts", "messages", "several", "nested", "of nothing"],
+)
+def test_an_array_makes_no_definition_without_end(text: str) -> None:
+    """A program is generated that reads its elements one after the other."""
+    channel = Channel("/odd", "odd/msg/Odd", "cdr", MessageDefinition("ros2msg", text))
+    assert list(undecodable([channel])) == ["odd/msg/Odd"]
+    with pytest.raises(TypesysError, match="its definition has"):
+        store_for(channel)
+
+
+def test_a_long_array_of_numbers_is_read_at_once() -> None:
+    text = "uint8[900000] image\n"
+    channel = Channel("/odd", "odd/msg/Odd", "cdr", MessageDefinition("ros2msg", text))
+    message = decode(channel, b"\0\1\0\0" + bytes(900_000))
+    assert message.image.nbytes == 900_000  # type: ignore[attr-defined]
+    with pytest.raises(DamagedBagError):
+        decode(channel, b"\0\1\0\0" + bytes(800_000))
+
+
+def test_many_definitions_share_a_budget_and_ours_come_first(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(definitions, "MAX_BAG_FIELDS", 300)
+
+    def channel(number: int) -> Channel:
+        text = "int32 a\nstring[20] b\n" + "#" * number
+        return Channel(f"/t{number}", f"odd/msg/T{number}", "cdr", MessageDefinition("", text))
+
+    commented = MessageDefinition("ros2msg", "# ours\n" + definition(STATE))
+    ours = Channel("/slap/state", STATE, "cdr", commented)
+    found = undecodable([*(channel(number) for number in range(2_000)), ours])
+    assert STATE not in found
+    assert 1_980 < len(found) < 2_000
+    assert "definitions of the bag" in found["odd/msg/T1999"]
+
+
+def test_a_count_of_messages_is_a_number_that_can_be_printed(
+    script: Script, tmp_path: Path
+) -> None:
+    """Python reads hexadecimal digits of any number, and prints no more than 4,300 decimal ones."""
+    bag = tmp_path / "bag"
+    write_bag(bag, script.messages)
+    text = (bag / "metadata.yaml").read_text()
+    count = re.search(r"message_count: \d+", text)
+    assert count is not None
+    for number in ("0x" + "f" * 100_000, "0b" + "1" * 100_000, "9" * 4_000, "1:" * 3_000 + "1"):
+        (bag / "metadata.yaml").write_text(text.replace(count[0], f"message_count: {number}"))
+        damage = evaluate_bag(bag).damage
+        assert damage is not None and "metadata.yaml cannot be read" in damage
+        assert len(damage) < 1_000
+
+
+# What a database may have in its tables without having it in its file.
+TOPICS = """CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT,
+ serialization_format TEXT, offered_qos_profiles TEXT);
+INSERT INTO topics VALUES (1, '/slap/state', 'slap_msgs/msg/ObjectCentricState', 'cdr', '');"""
+ROWS = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 5000) SELECT"
+MESSAGES = "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER"
+FILL = f"INSERT INTO messages(topic_id, timestamp) {ROWS} 1, i FROM n;"
+
+
+@pytest.mark.parametrize(
+    ("script", "complaint"),
+    [
+        (f"{TOPICS} {MESSAGES}, data AS (zeroblob(250000000))); {FILL}", "computed"),
+        (f"{TOPICS} {MESSAGES}, data AS (zeroblob(9)) STORED); {FILL}", "computed"),
+        (
+            (
+                f"{TOPICS} CREATE TABLE messages(id, timestamp, data, topic_id AS "
+                f"(length(zeroblob(250000000)))); INSERT INTO messages(timestamp) {ROWS} i FROM n;"
+            ),
+            "computed",
+        ),
+        (
+            (
+                f"{MESSAGES}, data); CREATE TABLE topics(id, type, serialization_format, name AS "
+                f"(hex(zeroblob(100000000)))); INSERT INTO topics(type) {ROWS} '' FROM n;"
+            ),
+            "computed",
+        ),
+        (
+            (
+                f"{TOPICS} {MESSAGES}); {FILL} "
+                f"ALTER TABLE messages ADD COLUMN data BLOB DEFAULT x'{'00' * 100_000}';"
+            ),
+            "more in its tables",
+        ),
+        (f"{TOPICS} CREATE VIEW Messages AS SELECT 1 id", "no table"),
+    ],
+    ids=["blob", "stored", "topic", "name", "default", "capital"],
+)
+def test_a_database_has_no_more_than_its_file(tmp_path: Path, script: str, complaint: str) -> None:
+    with closing(sqlite3.connect(tmp_path / "bag.db3")) as database:
+        database.executescript(script)
+        database.commit()
+    with pytest.raises(DamagedBagError, match=complaint):
+        list(read_sqlite(tmp_path / "bag.db3"))
+
+
+def test_pages_that_several_refer_to_end_as_well(tmp_path: Path) -> None:
+    """Of ten pages, each has the next one dozens of times: the rows have no end in sight."""
+    path, size = tmp_path / "bag.db3", 512
+    with closing(sqlite3.connect(path)) as database:
+        database.executescript(f"PRAGMA page_size={size}; {TOPICS} {MESSAGES}, data BLOB);")
+        database.executemany("INSERT INTO messages VALUES (?, 1, 1, x'')", zip(range(40_000)))
+        database.commit()
+        table = "SELECT rootpage FROM sqlite_master WHERE name = 'messages'"
+        (root,) = database.execute(table).fetchone()
+    pages = bytearray(path.read_bytes())
+
+    def children(page: int) -> list[int]:
+        """Where an inner page has the numbers of those below it."""
+        start = (page - 1) * size
+        (cells,) = struct.unpack_from(">H", pages, start + 3)
+        places = struct.unpack_from(f">{cells}H", pages, start + 12)
+        return [start + 8, *(start + place for place in places)]
+
+    kinds = {page: pages[(page - 1) * size] for page in range(root, len(pages) // size + 1)}
+    inner = [page for page, kind in kinds.items() if kind == 5]
+    leaf = next(page for page, kind in kinds.items() if kind == 13)
+    for page, below in pairwise([*inner[:10], leaf]):
+        for place in children(page):
+            struct.pack_into(">I", pages, place, below)
+    path.write_bytes(pages)
+    with pytest.raises(DamagedBagError, match="more in its tables"):
+        for count, _ in enumerate(read_sqlite(path)):
+            assert count < len(pages)

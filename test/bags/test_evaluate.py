@@ -83,7 +83,7 @@ def test_without_perception_nothing_is_compared(script: Script, tmp_path: Path) 
     record(tmp_path / "bag", without(script.messages, "/slap/atoms"))
     evaluation = evaluate_bag(tmp_path / "bag")
     assert evaluation.compared == 0 < evaluation.states
-    assert not evaluation.runs[0].success
+    assert evaluation.runs[0].success is None
     assert "no atoms of step" in evaluation.runs[0].error_msg
 
 

@@ -19,8 +19,8 @@ from slap_ros.bags import bag_info, evaluate_bag, read_bag, replay_bag
 from slap_ros.bags.rosbag2 import ROOT
 from slap_ros.errors import ErrorCode
 from slap_ros.messages.events import PlanEventKind, SkillEventKind
-from slap_ros.messages.interfaces import PLAN, PLAN_EVENT, SKILL_EVENT, STATE, TASK
-from slap_ros.report import read_report
+from slap_ros.messages.interfaces import ATOMS, PLAN, PLAN_EVENT, SKILL_EVENT, STATE, TASK
+from slap_ros.report import read_report, render
 
 
 def states(script: Script) -> list[Published]:
@@ -126,6 +126,94 @@ def test_without_the_task_its_seed_is_unknown_and_not_minus_one(
     record(tmp_path / "bag", [item for item in script.messages if item.type_name != TASK])
     (run,) = evaluate_bag(tmp_path / "bag").runs
     assert run.seed is run.index is None
+
+
+def test_without_perceived_atoms_nobody_knows_whether_it_was_solved(
+    script: Script, tmp_path: Path
+) -> None:
+    record(tmp_path / "bag", [item for item in script.messages if item.type_name != ATOMS])
+    (run,) = evaluate_bag(tmp_path / "bag").runs
+    assert run.success is None
+    assert run.unknown.keys() == {"success"}
+    assert run.plan_length == script.truth.plan_length
+    assert damages(tmp_path / "bag") == {"all perceived atoms are missing"}
+    assert "not known whether solved" in render([read_report(tmp_path / "bag")])
+
+
+def test_without_the_last_atoms_nobody_knows_either(script: Script, tmp_path: Path) -> None:
+    last = script.truth.plan_length
+    lost = [m for m in script.messages if m.type_name == ATOMS and m.message.step == last]
+    record(tmp_path / "bag", but(script, lost))
+    (run,) = evaluate_bag(tmp_path / "bag").runs
+    assert run.success is None
+    told = f"the perceived atoms of step {last}, the last, are missing"
+    assert damages(tmp_path / "bag") == {told}
+
+
+def test_perception_may_be_slower_than_the_world(script: Script, tmp_path: Path) -> None:
+    lost = [m for m in script.messages if m.type_name == ATOMS and m.message.step in (2, 3, 5)]
+    record(tmp_path / "bag", but(script, lost))
+    (run,) = evaluate_bag(tmp_path / "bag").runs
+    assert run.success
+    assert damages(tmp_path / "bag") == {None}
+
+
+def test_without_plan_events_there_was_a_run_all_the_same(script: Script, tmp_path: Path) -> None:
+    record(tmp_path / "bag", [item for item in script.messages if item.type_name != PLAN_EVENT])
+    (run,) = evaluate_bag(tmp_path / "bag").runs
+    plain = run.as_json()
+    assert {name for name, value in plain.items() if value is None} == plain["unknown"].keys()
+    assert set(plain["unknown"].values()) == {"the plan events are missing"}
+    assert {"success", "plan_length", "replans", "shortcut_steps"} <= plain["unknown"].keys()
+    assert (run.seed, run.planner, run.preset) == (7, "lazy", "fair")
+    assert [o.name for o in run.options] == [o["name"] for o in script.truth.options]
+    assert damages(tmp_path / "bag") == {"the plan events of episode 1 are missing"}
+    page = render([read_report(tmp_path / "bag")])
+    assert "not known whether solved" in page and "unknown length" in page
+
+
+def test_the_command_says_what_is_not_known(script: Script, tmp_path: Path) -> None:
+    for lost in (ATOMS, PLAN_EVENT):
+        path = tmp_path / lost.rpartition("/")[2]
+        record(path, [item for item in script.messages if item.type_name != lost])
+        told = CliRunner().invoke(app, ["bag", "evaluate", str(path), "--json"])
+        assert told.exit_code == ErrorCode.DAMAGED_BAG
+        assert json.loads(told.stdout)["success"] is None
+        table = CliRunner().invoke(app, ["bag", "evaluate", str(path)])
+        assert table.exit_code == ErrorCode.DAMAGED_BAG
+        assert "not known whether solved" in table.stderr
+
+
+def test_where_nothing_was_planned_nothing_is_missing(script: Script, tmp_path: Path) -> None:
+    """Skills may have been asked for one by one."""
+    record(tmp_path / "bag", without(script.messages, "/slap/plan", "/slap/plan_events"))
+    assert evaluate_bag(tmp_path / "bag").runs == []
+    assert damages(tmp_path / "bag") == {None}
+    said = CliRunner().invoke(app, ["bag", "evaluate", str(tmp_path / "bag")])
+    assert said.exit_code == 0 and "no run" in said.stderr
+
+
+def test_without_skill_events_nobody_knows_what_shortcuts_took(
+    script: Script, tmp_path: Path
+) -> None:
+    record(tmp_path / "bag", [item for item in script.messages if item.type_name != SKILL_EVENT])
+    (run,) = evaluate_bag(tmp_path / "bag").runs
+    assert run.shortcut_steps is None
+    assert run.unknown["shortcut_steps"] == "skill events are missing"
+
+
+def test_without_the_domain_its_preset_is_not_known(script: Script, tmp_path: Path) -> None:
+    record(tmp_path / "bag", without(script.messages, "/slap/domain"))
+    found = evaluate_bag(tmp_path / "bag")
+    assert found.runs[0].preset is None and "preset" in found.runs[0].unknown
+    assert found.damage == "nothing names its domain" == bag_info(tmp_path / "bag").damage
+
+
+def test_a_replay_without_commands_is_none(script: Script, tmp_path: Path) -> None:
+    record(tmp_path / "bag", without(script.messages, "/slap/command"))
+    replayed = replay_bag(tmp_path / "bag")
+    assert replayed.unreached == script.truth.plan_length
+    assert replayed.damage == "the commands of episode 1 are missing"
 
 
 def split(script: Script, folder: Path, parts: int = 3) -> Path:

@@ -234,12 +234,13 @@ def test_a_goal_of_the_users_own_is_what_counts() -> None:
     assert [run.success for run in story.runs()] == [True, False]
 
 
-def test_without_a_task_nothing_is_a_success() -> None:
+def test_without_a_goal_nobody_knows_what_is_a_success() -> None:
     story = solved()
     story.messages = [m for m in story.messages if m[0] != TASK]
     run = story.run()
-    assert (run.success, run.seed, run.index, run.domain) == (False, None, None, "obstacle2d")
-    assert run.unknown == dict.fromkeys(("seed", "index"), "the task is missing")
+    assert (run.success, run.seed, run.index, run.domain) == (None, None, None, "obstacle2d")
+    missing = dict.fromkeys(("seed", "index"), "the task is missing")
+    assert run.unknown == missing | {"success": run.error_msg}
     assert "lacks the task" in run.error_msg
 
 
