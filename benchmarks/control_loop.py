@@ -29,6 +29,7 @@ from ensemble.run import RunRequest, run
 from slap_ros.bags import read_bag
 from slap_ros.messages.decode import stamp_ns
 from slap_ros.messages.interfaces import STATE as STATE_TYPE
+from slap_ros.skills.domain_choice import DomainChoice
 
 RUNS = 10  # of the whole ensemble
 
@@ -66,7 +67,7 @@ def state_command_state(steps: int) -> list[float]:
     rclpy.init()
     executor, stepper = SingleThreadedExecutor(), Stepper()
     executor.add_node(stepper.node)
-    settings = RunSettings("obstacle2d", "fair", 0, 0, "lazy", None)
+    settings = RunSettings(DomainChoice("obstacle2d", "fair"), 0, 0, "lazy", None)
     with ProcessLauncher({"sim_node": node_parameters(settings)["sim_node"]}):
         while not stepper.connected():
             executor.spin_once(timeout_sec=0.1)
@@ -86,7 +87,7 @@ def ensemble() -> list[float]:
         for seed in range(RUNS):
             bag = Path(folder) / str(seed)
             run(
-                RunRequest(RunSettings("obstacle2d", "fair", seed, 0, "lazy", bag)),
+                RunRequest(RunSettings(DomainChoice("obstacle2d", "fair"), seed, 0, "lazy", bag)),
                 lambda _type, _message: None,
             )
             states: list[Any] = [m for _, kind, _, m in read_bag(bag) if kind == STATE_TYPE]

@@ -28,6 +28,7 @@ from slap_ros.evaluation.statistics import wilson_interval
 from slap_ros.robot.worlds import MOCK
 from slap_ros.shortcuts.shipped import NONE, shipped_library
 from slap_ros.shortcuts.shortcut_library import load_library
+from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.comparison import format_spread, spread_of
 from slap_ros.studies.figures import APPROACH_STYLES, label, require_matplotlib
 from slap_ros.studies.results import (
@@ -122,8 +123,7 @@ def solve(seed: int, shortcuts: str, conditions: Conditions) -> BridgeTrial:
         conditions: Properties of the mock robot.
     """
     settings = RunSettings(
-        DOMAIN,
-        "fair",
+        DomainChoice(DOMAIN, "fair"),
         seed,
         0,
         "lazy",

@@ -36,6 +36,7 @@ from slap_ros.evaluation.run_log import RunLog
 from slap_ros.files import pretty_json
 from slap_ros.shortcuts.shipped import shipped_library
 from slap_ros.shortcuts.shortcut_library import load_library
+from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.figures import LINES, picture, require_matplotlib
 from slap_ros.studies.results import MarkdownTable, describe_library
 from slap_ros.versions import versions
@@ -197,7 +198,7 @@ def soak(tasks: int, every: int) -> Soaked:
         ExitStack() as stack,
     ):
         bag = Path(folder) / "bag"
-        settings = RunSettings(DOMAIN, "fair", 0, 0, "lazy", bag)
+        settings = RunSettings(DomainChoice(DOMAIN, "fair"), 0, 0, "lazy", bag)
         launcher = stack.enter_context(ProcessLauncher(node_parameters(settings)))
         spinner.check = launcher.check
         bench = Bench(client, spinner)

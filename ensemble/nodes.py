@@ -12,6 +12,7 @@ from typing import Any
 
 from slap_ros.robot.worlds import MOCK, SIM
 from slap_ros.shortcuts.shortcut import DEFAULT
+from slap_ros.skills.domain_choice import DomainChoice
 
 # What shares a process with others is reached by name: nodes build on the ensemble, not it on them.
 NODE_CLASSES: Mapping[str, str] = {  # by the name of the module that is run as a process
@@ -40,14 +41,12 @@ def node_class(name: str) -> Any:
 class RunSettings:
     """What is to be run."""
 
-    domain: str
-    preset: str
+    domain: DomainChoice
     seed: int
     index: int
     planner: str
     record: Path | None  # the bag's folder; None: no recorder
     goal: str = ""  # by name, or as atoms; empty: the task's own
-    skills: str = ""  # see slap_ros.skills.domain_choice
     pace: float = 0.0  # environment steps per second; 0: as fast as commands come
     shortcuts: str = ""  # a library's folder, or none; empty: the shipped one
     samples: int = DEFAULT.samples  # attempts of a shortcut in the model
@@ -73,9 +72,9 @@ def node_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int |
     if "debounce" in settings.perception:  # what is debounced is late
         waiting["hold_steps"] = int(settings.perception["debounce"]) - 1
     common: dict[str, str | int | float] = {
-        "domain": settings.domain,
-        "preset": settings.preset,
-        "skills": settings.skills,
+        "domain": settings.domain.name,
+        "preset": settings.domain.preset,
+        "skills": settings.domain.skills,
         "patience": settings.patience,
     }
     common |= _libraries(settings)
@@ -101,9 +100,9 @@ def _libraries(settings: RunSettings) -> dict[str, str]:
 def _world_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int | float]]:
     """Whatever is in the world's place."""
     task: dict[str, str | int | float] = {
-        "domain": settings.domain,
-        "preset": settings.preset,
-        "skills": settings.skills,
+        "domain": settings.domain.name,
+        "preset": settings.domain.preset,
+        "skills": settings.domain.skills,
         "seed": settings.seed,
         "index": settings.index,
         "goal": settings.goal,

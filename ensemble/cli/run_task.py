@@ -43,6 +43,7 @@ from slap_ros.planning.planner import make_planner
 from slap_ros.relational import GroundAtom
 from slap_ros.robot.worlds import SIM
 from slap_ros.shortcuts.shipped import chosen_library
+from slap_ros.skills.domain_choice import DomainChoice
 
 LOOK_S = 0.05  # s, between two looks at whether somebody watches
 
@@ -105,14 +106,12 @@ def _request(options: RunOptions, domain: Domain, task: Task, import_s: float) -
     quality = PerceptionParameters(**perception).quality
     quality.require_known(task.initial_state.layout.by_name.keys())
     settings = RunSettings(
-        options.domain,
-        domain.preset,
+        DomainChoice(options.domain, domain.preset, options.skills),
         options.task_seed,
         options.index,
         options.planner,
         record=None,
         goal=options.goal or "",
-        skills=options.skills,
         pace=options.pace,
         patience=options.patience or grown_patience(import_s),
         shortcuts=options.shortcuts or "",

@@ -14,6 +14,7 @@ from ensemble.interfaces import ACQUIRE_SKILLS, ACQUISITION_EVENTS, RESET_TASK, 
 from ensemble.launcher import ProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.spinner import temporary_node
+from slap_ros.skills.domain_choice import DomainChoice
 
 LIMIT = 120.0  # s
 # Both skills of `points` are learned with these in seconds.
@@ -30,7 +31,7 @@ BRIEF = {
     ),
     "steps": 2400,
 }
-SETTINGS = RunSettings("points", "two", 3, 0, "lazy", None, patience=5.0)
+SETTINGS = RunSettings(DomainChoice("points", "two"), 3, 0, "lazy", None, patience=5.0)
 
 
 class Asker(Node):

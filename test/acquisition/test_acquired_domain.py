@@ -317,7 +317,7 @@ def solved_by(nodes):
 
 @pytest.mark.timeout(180)  # runs an ensemble three times, and waits for one that refuses
 def test_nodes_with_another_library_refuse_and_those_with_a_copy_do_not(network, library, tmp_path):
-    run = RunSettings("points", "two", 0, 0, "lazy", None, skills=str(library), patience=5.0)
+    run = RunSettings(DomainChoice("points", "two", str(library)), 0, 0, "lazy", None, patience=5.0)
     nodes = {name: dict(given) for name, given in node_parameters(run).items()}
     elsewhere = shutil.copytree(library, tmp_path / "elsewhere")
     nodes["planner_node"]["skills"] = str(elsewhere)
@@ -333,7 +333,7 @@ def test_nodes_with_another_library_refuse_and_those_with_a_copy_do_not(network,
 
 @pytest.mark.timeout(180)  # runs an ensemble twice, and waits for one that refuses
 def test_nodes_that_were_given_none_need_the_library_that_is_announced(network, library, shipped):
-    run = RunSettings("points", "two", 0, 0, "lazy", None, skills=str(library), patience=5.0)
+    run = RunSettings(DomainChoice("points", "two", str(library)), 0, 0, "lazy", None, patience=5.0)
     nodes = {name: dict(given) for name, given in node_parameters(run).items()}
     for name in ("perception_node", "skill_server", "planner_node"):
         nodes[name] |= {"skills": "", "domain": ""}

@@ -33,6 +33,7 @@ from slap_ros.messages.interfaces import ACQUISITION_EVENT
 from slap_ros.relational.pddl import parse_domain
 from slap_ros.report.content import read_report
 from slap_ros.report.page import render
+from slap_ros.skills.domain_choice import DomainChoice
 
 LIMIT = 120.0  # s
 KEY = "sk-this-is-nobodys-key"
@@ -66,7 +67,7 @@ def _no_settings_of_this_machine(monkeypatch):
 @contextmanager
 def asking(record=None, **parameters):
     """A simulator, the acquisition node and whoever asks it."""
-    settings = RunSettings("obstacle2d", "fair", 3, 0, "lazy", record)
+    settings = RunSettings(DomainChoice("obstacle2d", "fair"), 3, 0, "lazy", record)
     every = node_parameters(settings) | {"acquisition_node": parameters}
     nodes = {k: every[k] for k in ("sim_node", "acquisition_node", "recorder_node") if k in every}
     with ProcessLauncher(nodes), temporary_node(Asker) as (asker, spinner):

@@ -45,7 +45,7 @@ LIMIT_S = 200.0  # far more than anything here takes
 
 def settings(record: Path | None = None, **options: object) -> RunSettings:
     return RunSettings(
-        DOMAIN, "fair", SEED, 0, "lazy", record, skills=DEMONSTRATOR, patience=5.0, **options
+        DomainChoice(DOMAIN, "fair", DEMONSTRATOR), SEED, 0, "lazy", record, patience=5.0, **options
     )
 
 

@@ -15,6 +15,7 @@ from ensemble.spinner import temporary_node
 from slap_ros.bags import evaluate_bag
 from slap_ros.errors import ErrorCode
 from slap_ros.messages.interfaces import STATE
+from slap_ros.skills.domain_choice import DomainChoice
 
 LIMIT = 120.0  # s, far more than anything here takes
 FRAGILE = """
@@ -104,7 +105,7 @@ class Bench:
 @pytest.fixture
 def bench(network, install_domain, tmp_path):
     settings = RunSettings(
-        install_domain("fragile", FRAGILE), "default", 3, 0, "lazy", tmp_path / "bag",
+        DomainChoice(install_domain("fragile", FRAGILE), "default"), 3, 0, "lazy", tmp_path / "bag",
         pace=50.0, shortcuts="none", patience=5.0,
     )  # fmt: skip
     nodes = node_parameters(settings)

@@ -17,6 +17,7 @@ from ensemble.launcher import InProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.spinner import temporary_node
 from slap_ros.messages.interfaces import typestore
+from slap_ros.skills.domain_choice import DomainChoice
 
 CONFIG = Path(__file__).parents[2] / "config"
 RVIZ_TYPES = {"rviz_default_plugins/MarkerArray": "visualization_msgs/msg/MarkerArray"}
@@ -52,7 +53,9 @@ def foxglove_paths():
 def published(network):
     """Types by topic, where the nodes of a run in Obstacle Tower publish whatever is shown."""
     pytest.importorskip("pybullet")
-    settings = RunSettings("obstacle_tower", "fair", 1, 0, "lazy", None, shortcuts="none")
+    settings = RunSettings(
+        DomainChoice("obstacle_tower", "fair"), 1, 0, "lazy", None, shortcuts="none"
+    )
     with (
         temporary_node(lambda: RunClient(lambda *_: None)) as (client, spinner),
         InProcessLauncher(node_parameters(settings), spinner.executor),

@@ -26,6 +26,7 @@ from ensemble.state_synchronizer import StateSynchronizer
 from slap_ros.bags import evaluate_bag
 from slap_ros.messages.events import PlanEventKind
 from slap_ros.messages.interfaces import PLAN_EVENT, STATE
+from slap_ros.skills.domain_choice import DomainChoice
 
 LIBRARY = Path(__file__).parent.parent / "shortcuts" / "data" / "obstacle2d"
 ALL = ("sim_node", "perception_node", "skill_server", "planner_node", "recorder_node")
@@ -44,7 +45,14 @@ class Listener(RunClient):
 def parameters(record=None, seed=3, pace=0.0):
     return node_parameters(
         RunSettings(
-            "obstacle2d", "fair", seed, 0, "lazy", record, pace=pace, shortcuts="none", patience=5.0
+            DomainChoice("obstacle2d", "fair"),
+            seed,
+            0,
+            "lazy",
+            record,
+            pace=pace,
+            shortcuts="none",
+            patience=5.0,
         )
     )
 

@@ -13,13 +13,21 @@ from ensemble.patience import MOST_GROWN, USUAL_IMPORT, grown_patience
 from ensemble.run import RunRequest, run
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode, NotReadyError
+from slap_ros.skills.domain_choice import DomainChoice
 
 SLOWEST = 0.001  # steps per second: the next state is 1,000 s away, as on a machine that hangs
 
 
 def impatient(factor, **settings):
     settings = RunSettings(
-        "obstacle2d", "fair", 3, 0, "lazy", None, shortcuts="none", patience=factor, **settings
+        DomainChoice("obstacle2d", "fair"),
+        3,
+        0,
+        "lazy",
+        None,
+        shortcuts="none",
+        patience=factor,
+        **settings,
     )
     return RunRequest(settings, in_process=True)
 

@@ -15,6 +15,7 @@ from ensemble.nodes import RunSettings, node_parameters
 from ensemble.spinner import temporary_node
 from recorder_node.node import RecorderNode
 from slap_ros.bags import read_bag
+from slap_ros.skills.domain_choice import DomainChoice
 
 LIMIT = 120.0  # s, far more than anything here takes
 SENT = 50  # messages
@@ -24,7 +25,7 @@ SENT = 50  # messages
 def test_a_recorder_that_was_kept_waiting_reads_what_waits_for_it(network, tmp_path, late):
     """As on a busy machine: nothing of this process runs for longer than the recorder's quiet."""
     bag = tmp_path / "bag"
-    settings = RunSettings("obstacle2d", "fair", 3, 0, "lazy", bag, shortcuts="none")
+    settings = RunSettings(DomainChoice("obstacle2d", "fair"), 3, 0, "lazy", bag, shortcuts="none")
     nodes = {name: node_parameters(settings)[name] for name in ("sim_node", "recorder_node")}
     with (
         temporary_node(lambda: RunClient(lambda *_: None)) as (client, spinner),
@@ -52,7 +53,7 @@ def test_a_recorder_that_was_kept_waiting_reads_what_waits_for_it(network, tmp_p
 @contextmanager
 def recorded(bag, **parameters):
     """A simulator and a recorder, a client of both, and whoever sends commands."""
-    settings = RunSettings("obstacle2d", "fair", 3, 0, "lazy", bag, shortcuts="none")
+    settings = RunSettings(DomainChoice("obstacle2d", "fair"), 3, 0, "lazy", bag, shortcuts="none")
     nodes = {name: node_parameters(settings)[name] for name in ("sim_node", "recorder_node")}
     nodes["recorder_node"] |= parameters
     with (

@@ -11,6 +11,7 @@ from ensemble.launcher import InProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.spinner import temporary_node
 from slap_ros.errors import ErrorCode
+from slap_ros.skills.domain_choice import DomainChoice
 
 LIMIT = 120.0  # s, far more than anything here takes
 
@@ -40,7 +41,9 @@ class RejectingServer(Node):
 
 
 def test_a_rejected_goal_ends_the_run_and_says_which(network):
-    settings = RunSettings("obstacle2d", "fair", 3, 0, "lazy", None, shortcuts="none", patience=5.0)
+    settings = RunSettings(
+        DomainChoice("obstacle2d", "fair"), 3, 0, "lazy", None, shortcuts="none", patience=5.0
+    )
     nodes = node_parameters(settings)
     del nodes["skill_server"]
     with temporary_node(lambda: RunClient(lambda *_: None)) as (client, spinner):

@@ -26,6 +26,7 @@ from slap_ros.messages.interfaces import ATOMS, MARKERS, STATE
 from slap_ros.perception import NoisyPerceiver, Quality
 from slap_ros.planning.execution import Executor
 from slap_ros.planning.planner import make_planner
+from slap_ros.skills.domain_choice import DomainChoice
 
 FRAMES = "tf2_msgs/msg/TFMessage"
 PATIENCE = 5.0  # for a loaded machine
@@ -39,7 +40,13 @@ def ignore(type_name, message):
 
 def request(record=None, seed=3, in_process=True, **options):
     settings = RunSettings(
-        "obstacle2d", "fair", seed, 0, "lazy", record, shortcuts="none", patience=PATIENCE
+        DomainChoice("obstacle2d", "fair"),
+        seed,
+        0,
+        "lazy",
+        record,
+        shortcuts="none",
+        patience=PATIENCE,
     )
     return RunRequest(settings, timeout_s=200, in_process=in_process, **options)
 
@@ -116,8 +123,7 @@ def test_with_noise_the_ensemble_errs_as_an_experiment_does(network, tmp_path, s
     """The same looks, plans and replans, whoever runs them; bags tell what cannot be checked."""
     noise = {"position_noise": 0.005, "threshold_noise": 0.002, "noise_seed": 2}
     settings = RunSettings(
-        "obstacle2d",
-        "fair",
+        DomainChoice("obstacle2d", "fair"),
         seed,
         0,
         "lazy",
@@ -242,8 +248,7 @@ def test_10_runs_leave_no_thread_no_file_and_no_process(network, tmp_path):
 @pytest.mark.timeout(180)  # starts an ensemble, each node a process, and plans for a tower
 def test_a_tower_is_taken_apart_by_the_ensemble_and_replayed_bit_for_bit(network, tmp_path):
     settings = RunSettings(
-        "obstacle_tower",
-        "fair",
+        DomainChoice("obstacle_tower", "fair"),
         1,
         0,
         "lazy",

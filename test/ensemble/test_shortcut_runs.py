@@ -34,6 +34,7 @@ from slap_ros.planning.problem import Problem
 from slap_ros.relational import Target
 from slap_ros.shortcuts.shortcut import DEFAULT
 from slap_ros.shortcuts.shortcut_library import load_library
+from slap_ros.skills.domain_choice import DomainChoice
 
 DATA = Path(__file__).parent.parent / "shortcuts" / "data" / "obstacle2d"
 SHORTCUT = "Clear_On-e41568a9"
@@ -44,7 +45,13 @@ LIMIT = 120.0  # s, far more than anything here takes
 
 def request(record=None, shortcuts=DATA, seed=SEED):
     settings = RunSettings(
-        "obstacle2d", "fair", seed, 0, "lazy", record, shortcuts=str(shortcuts), patience=PATIENCE
+        DomainChoice("obstacle2d", "fair"),
+        seed,
+        0,
+        "lazy",
+        record,
+        shortcuts=str(shortcuts),
+        patience=PATIENCE,
     )
     return RunRequest(settings, timeout_s=200, in_process=True)
 

@@ -16,6 +16,7 @@ from ensemble.client import RunClient
 from ensemble.interfaces import ATOMS, COMMAND, DOMAIN, LATCHED, RESET_TASK, STATE, TASK
 from ensemble.nodes import RunSettings, node_class, node_parameters
 from ensemble.spinner import Spinner
+from slap_ros.skills.domain_choice import DomainChoice
 
 LIMIT = 120.0  # s, within which every case must have ended, on a loaded machine too
 HEARD = {
@@ -206,7 +207,9 @@ class Laboratory:
 @contextmanager
 def laboratory(case, bag):
     """Everything in this process; ``bag`` is recorded."""
-    settings = RunSettings("obstacle2d", "fair", case.seed, 0, "lazy", bag, shortcuts="none")
+    settings = RunSettings(
+        DomainChoice("obstacle2d", "fair"), case.seed, 0, "lazy", bag, shortcuts="none"
+    )
     rclpy.init()
     executor, nodes = SingleThreadedExecutor(), []
     try:

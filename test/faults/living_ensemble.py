@@ -13,6 +13,7 @@ from ensemble.launcher import ProcessLauncher
 from ensemble.node_liveness import NodeLiveness
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.spinner import temporary_node
+from slap_ros.skills.domain_choice import DomainChoice
 
 # By which a node is told from its successor.
 PUBLISHED = {
@@ -80,7 +81,14 @@ class Laboratory:
 def laboratory(seed, bag, pace, patience=1.0):
     """An ensemble on a task, at so many steps a second; ``bag`` may be None."""
     settings = RunSettings(
-        "obstacle2d", "fair", seed, 0, "lazy", bag, pace=pace, shortcuts="none", patience=patience
+        DomainChoice("obstacle2d", "fair"),
+        seed,
+        0,
+        "lazy",
+        bag,
+        pace=pace,
+        shortcuts="none",
+        patience=patience,
     )
     heard = []
 

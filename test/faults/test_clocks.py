@@ -15,6 +15,7 @@ from ensemble.nodes import RunSettings, node_class, node_parameters
 from ensemble.spinner import Spinner
 from slap_ros.bags import evaluate_bag
 from slap_ros.messages.interfaces import ATOMS, PLAN_EVENT, STATE
+from slap_ros.skills.domain_choice import DomainChoice
 
 LIMIT = 120.0  # s, far more than anything here takes
 PACE = 40.0  # environment steps per second
@@ -53,7 +54,14 @@ class ClockLaboratory(Laboratory):
 def laboratory(bag):
     """Everything in this process; ``bag`` is recorded."""
     settings = RunSettings(
-        "obstacle2d", "fair", 3, 0, "lazy", bag, pace=PACE, shortcuts="none", patience=5.0
+        DomainChoice("obstacle2d", "fair"),
+        3,
+        0,
+        "lazy",
+        bag,
+        pace=PACE,
+        shortcuts="none",
+        patience=5.0,
     )
     heard = []
     rclpy.init()

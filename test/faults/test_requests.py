@@ -30,6 +30,7 @@ from ensemble.nodes import RunSettings, node_class, node_parameters
 from ensemble.spinner import Spinner
 from slap_ros.errors import ErrorCode
 from slap_ros.messages.interfaces import TASK
+from slap_ros.skills.domain_choice import DomainChoice
 
 pytestmark = pytest.mark.timeout(300)  # dozens of requests, some of which wait in vain
 LIMIT = 120.0  # s, far more than anything here takes
@@ -130,7 +131,7 @@ def bench(parameters):
 
 @contextmanager
 def recorded_ensemble(bag, changed):
-    settings = RunSettings("obstacle2d", "fair", 3, 0, "lazy", bag, shortcuts="none")
+    settings = RunSettings(DomainChoice("obstacle2d", "fair"), 3, 0, "lazy", bag, shortcuts="none")
     nodes = node_parameters(settings)
     with bench({name: {**nodes[name], **changed.get(name, {})} for name in nodes}) as found:
         found.until(lambda: found.client.ready(True) and found.task)
@@ -203,7 +204,13 @@ def test_a_bag_can_be_closed_again_and_again(ensemble):
 def test_whatever_a_robot_is_asked_to_begin_with_it_answers(network):
     pytest.importorskip("pybullet")
     settings = RunSettings(
-        "obstacle_tower", "fair", 1, 0, "lazy", None, world="mock", mock={"pace": 50.0}
+        DomainChoice("obstacle_tower", "fair"),
+        1,
+        0,
+        "lazy",
+        None,
+        world="mock",
+        mock={"pace": 50.0},
     )
     nodes = node_parameters(settings)
     with bench({name: nodes[name] for name in ("robot_bridge.mock", "robot_bridge")}) as found:
@@ -218,7 +225,13 @@ def test_whatever_a_robot_is_asked_to_begin_with_it_answers(network):
 def test_whatever_the_controllers_are_asked_they_answer(network):
     pytest.importorskip("pybullet")
     settings = RunSettings(
-        "obstacle_tower", "fair", 1, 0, "lazy", None, world="mock", mock={"pace": 50.0}
+        DomainChoice("obstacle_tower", "fair"),
+        1,
+        0,
+        "lazy",
+        None,
+        world="mock",
+        mock={"pace": 50.0},
     )
     only = {"robot_bridge.mock": node_parameters(settings)["robot_bridge.mock"]}
     with bench(only) as found:

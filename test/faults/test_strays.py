@@ -23,6 +23,7 @@ from ensemble.refusals import Refusals
 from ensemble.spinner import Spinner
 from sim_node.node import SimNode
 from slap_ros.bags import evaluate_bag
+from slap_ros.skills.domain_choice import DomainChoice
 
 pytestmark = pytest.mark.timeout(180)  # an ensemble is heard of in heartbeats alone
 LIMIT = 120.0  # s, far more than anything here takes
@@ -87,7 +88,9 @@ class StrayLaboratory(Laboratory):
 
 @contextmanager
 def laboratory(bag):
-    settings = RunSettings("obstacle2d", "fair", 3, 0, "lazy", bag, shortcuts="none", patience=5.0)
+    settings = RunSettings(
+        DomainChoice("obstacle2d", "fair"), 3, 0, "lazy", bag, shortcuts="none", patience=5.0
+    )
     rclpy.init()
     executor, nodes = SingleThreadedExecutor(), []
     try:

@@ -18,6 +18,7 @@ from ensemble.spinner import temporary_node
 from slap_ros.bags import evaluate_bag, read_bag
 from slap_ros.domains import get_domain
 from slap_ros.evaluation.experiment import Experiment
+from slap_ros.skills.domain_choice import DomainChoice
 
 NODES = ("sim_node", "perception_node", "skill_server", "planner_node", "recorder_node")
 # Of every node of ROS 2, wherever it is; nothing of an ensemble is on these.
@@ -44,7 +45,13 @@ def test_namespaces_keep_two_ensembles_apart(network, tmp_path):
         for side, seed in SEEDS.items():
             bag = tmp_path / side
             settings = RunSettings(
-                "obstacle2d", "fair", seed, 0, "lazy", bag, shortcuts="none", patience=PATIENCE
+                DomainChoice("obstacle2d", "fair"),
+                seed,
+                0,
+                "lazy",
+                bag,
+                shortcuts="none",
+                patience=PATIENCE,
             )
             for node in ensemble(side, settings):
                 stack.callback(node.destroy_node)

@@ -20,6 +20,7 @@ from slap_ros.policies.action_map import ActionMap
 from slap_ros.relational import Feature
 from slap_ros.shortcuts.explore import Explorer
 from slap_ros.shortcuts.settings import ExplorationSettings
+from slap_ros.skills.domain_choice import DomainChoice
 
 FLAT = get_domain("obstacle2d", "fair")
 SWEEPING, FIRST = sweeping.make(), gripper_first.make()
@@ -129,7 +130,9 @@ def test_without_a_gripper_every_axis_explores():
 def test_the_ensemble_runs_records_and_replays_it(name, network, tmp_path, install):
     install({name: f"{name}:make"})
     bag = str(tmp_path / "bag")
-    settings = RunSettings(name, "default", 3, 0, "lazy", bag, shortcuts="none", patience=5.0)
+    settings = RunSettings(
+        DomainChoice(name, "default"), 3, 0, "lazy", bag, shortcuts="none", patience=5.0
+    )
     result = run(RunRequest(settings, timeout_s=200, in_process=True), lambda *_: None)
     assert result.success
     assert replay_bag(tmp_path / "bag").identical

@@ -17,6 +17,7 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode, SkillNotApplicableError, UnsolvableError
 from slap_ros.messages.interfaces import PLAN_EVENT
 from slap_ros.planning.planner import make_planner
+from slap_ros.skills.domain_choice import DomainChoice
 
 OUT_OF_REACH = patchy.make("none")
 # What the skill does is not what its operator promises.
@@ -115,7 +116,9 @@ def test_command_line_bag_and_result_say_the_same(install, network, tmp_path):
     assert planned.exit_code == ErrorCode.UNSOLVABLE
     assert CAME_OUT in planned.stderr
     bag = tmp_path / "bag"
-    settings = RunSettings("patchy", "none", 0, 0, "lazy", str(bag), shortcuts="none", patience=5.0)
+    settings = RunSettings(
+        DomainChoice("patchy", "none"), 0, 0, "lazy", str(bag), shortcuts="none", patience=5.0
+    )
     metrics = run(RunRequest(settings, timeout_s=200, in_process=True), lambda *_: None)
     assert metrics.error_code == ErrorCode.UNSOLVABLE
     assert CAME_OUT in metrics.error_msg

@@ -27,6 +27,7 @@ from ensemble.spinner import temporary_node
 from slap_ros.bags import evaluate_bag, read_bag
 from slap_ros.errors import ErrorCode, InvalidParameterError
 from slap_ros.messages.interfaces import STATE
+from slap_ros.skills.domain_choice import DomainChoice
 
 LIMIT = 120.0  # s, far more than anything here takes: a loaded machine takes its time
 # All nodes share this process and a loaded machine's time: joint positions may be late.
@@ -38,7 +39,14 @@ STILL = [0.0] * 7
 def settings(mock=None, bridge=None, record=None, **options):
     options = {"shortcuts": "none", "world": "mock", "mock": QUICK | (mock or {})} | options
     return RunSettings(
-        "obstacle_tower", "fair", 1, 0, "lazy", record, patience=5.0, bridge=bridge or {}, **options
+        DomainChoice("obstacle_tower", "fair"),
+        1,
+        0,
+        "lazy",
+        record,
+        patience=5.0,
+        bridge=bridge or {},
+        **options,
     )
 
 

@@ -24,6 +24,7 @@ from slap_ros.robot.dry_run import DryRun
 from slap_ros.robot.limits import FR3, PANDA, Limits, Workspace
 from slap_ros.robot.recorded_motion import read_recorded_motion
 from slap_ros.robot.robot_world import GripperAction
+from slap_ros.skills.domain_choice import DomainChoice
 
 QUICK = "pace=20,rate=200,latency=0.01"
 PATIENT = "joint_timeout=60,controller_timeout=60,start_timeout=60"
@@ -34,7 +35,9 @@ HALF = PANDA.scaled(0.5, Workspace())
 def bag(tmp_path_factory, module_network):
     """A run of Obstacle Tower with the shipped shortcuts. Shared: not to be changed."""
     folder = tmp_path_factory.mktemp("replay") / "bag"
-    settings = RunSettings("obstacle_tower", "fair", 1, 0, "lazy", folder, patience=5.0)
+    settings = RunSettings(
+        DomainChoice("obstacle_tower", "fair"), 1, 0, "lazy", folder, patience=5.0
+    )
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("ROS_DOMAIN_ID", str(module_network))
         metrics = run(RunRequest(settings, timeout_s=200, in_process=True), lambda *_: None)
@@ -208,7 +211,13 @@ def test_a_recording_that_begins_with_something_in_the_hand_is_refused(bag, tmp_
 
 def test_a_domain_without_an_arm_is_refused(network, tmp_path):
     settings = RunSettings(
-        "obstacle2d", "fair", 3, 0, "lazy", tmp_path / "bag", shortcuts="none", patience=5.0
+        DomainChoice("obstacle2d", "fair"),
+        3,
+        0,
+        "lazy",
+        tmp_path / "bag",
+        shortcuts="none",
+        patience=5.0,
     )
     run(RunRequest(settings, timeout_s=200, in_process=True), lambda *_: None)
     with pytest.raises(InvalidParameterError, match="no Panda"):
