@@ -116,7 +116,7 @@ def acquire(
         work: Folder for checkpoints; None for one beside the library's folder.
         jobs: Number of processes; None for this one. A script that uses processes needs
             ``if __name__ == "__main__"``.
-        watch: Receives what happens.
+        watch: Functions that are called while skills are acquired.
 
     Returns:
         The library; its record says how far plans get with it.
@@ -170,7 +170,7 @@ def carry_out(
         request: Request: what to acquire, and how.
         jobs: Number of processes; None for this one.
         ray: Address of a Ray cluster to run on instead.
-        watch: Receives what happens.
+        watch: Functions that are called while skills are acquired.
 
     Returns:
         The library.
@@ -244,7 +244,7 @@ def _proposed(request: AcquisitionRequest, watch: AcquisitionWatch) -> _Proposed
 
     Args:
         request: Request: what to acquire.
-        watch: Receives every answer.
+        watch: Functions that are called; one of them receives every answer.
 
     Raises:
         InvalidParameterError: The work folder has another training, or is damaged.
@@ -327,10 +327,10 @@ def _kept(
     """The skills of a library that are for the operators proposed, by folder.
 
     Args:
-        path: The library's folder; None for none.
-        library: Read from there.
-        proposal: Says what is to be acquired.
-        tell: Receives what is said of the others.
+        path: Folder of the library; None for none.
+        library: Library that was read from the folder.
+        proposal: Proposal, which says which skills are to be acquired.
+        tell: Function that receives warnings about skills that are not kept.
     """
     if path is None:
         return {}

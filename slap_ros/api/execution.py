@@ -29,7 +29,7 @@ class Run(ShownInNotebooks):
     Args:
         domain: Domain of the task.
         task: Task that was to be solved.
-        episode: Everything that happened.
+        episode: Record of the executed episode.
         began_ns: Time at which it began, ns since the epoch; the only thing in a bag that differs
             from one run of the same plan to the next.
     """

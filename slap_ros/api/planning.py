@@ -59,7 +59,7 @@ def plan_task(
         shortcuts: Shortcuts to plan with.
         planner: Name of the planner.
         samples: Attempts of a shortcut in the model.
-        tell: Receives what is said of shortcuts that are left out.
+        tell: Function that receives warnings about shortcuts that are left out.
     """
     maker = planner_for(domain, task, shortcuts, planner, samples, tell)
     goal = domain.atom_space(task.initial_state).mask(task.goal)
@@ -71,7 +71,7 @@ class NamedPlanner:
     """A planner whose plans say what made them, and how long that took.
 
     Args:
-        planner: The planner.
+        planner: Planner that makes the plans.
         origin: Record, kept in each plan, of what made it.
     """
 
@@ -102,7 +102,7 @@ def planner_for(
         shortcuts: Shortcuts to plan with.
         planner: Name of the planner.
         samples: Attempts of a shortcut in the model.
-        tell: Receives what is said of shortcuts that are left out.
+        tell: Function that receives warnings about shortcuts that are left out.
     """
     library = choose_library(shortcuts, domain, planner, tell)
     approach = approaches(library, sampling(samples))[-1]

@@ -41,8 +41,8 @@ class Proposers:
         base_url: Address of a server with the OpenAI-compatible interface; None likewise.
         language_settings: JSON file with settings of the model.
         cassette: ``live``, ``record:FILE``, ``replay:FILE``, or ``off`` to ask no model.
-        attempts: Most answers to ask for.
-        tokens: Most tokens to spend.
+        attempts: Largest number of answers to ask for.
+        tokens: Largest number of tokens to spend.
         seconds: Longest time to wait for answers, s.
 
     Raises:
@@ -89,9 +89,9 @@ class Proposers:
         """What the proposer ``induced`` works from: read from bags, or recorded now.
 
         Args:
-            domain: Domain in which it is shown.
-            tell: Receives what is said of damaged bags.
-            status: Shows what lasts.
+            domain: Domain of the demonstrations.
+            tell: Function that receives warnings about damaged bags.
+            status: Function that shows a text while something lasts.
 
         Raises:
             InvalidParameterError: There are no bags, and no demonstrator.
@@ -141,7 +141,7 @@ def read_bags(bags: list[Path], domain: Domain, tell: Tell) -> Demonstrations:
     Args:
         bags: Bags to read.
         domain: Domain that was recorded in them.
-        tell: Receives what is said of damaged bags.
+        tell: Function that receives warnings about damaged bags.
 
     Raises:
         ForeignBagError: One of them is of another domain, or has no states.

@@ -74,7 +74,7 @@ def train(
         jobs: Number of processes; None for this one. A script that uses processes needs
             ``if __name__ == "__main__"``.
         ray: Address of a Ray cluster to run on instead, or ``local``.
-        callback: Receives what happens.
+        callback: Receiver of the events of training.
 
     Returns:
         The library, which :func:`plan` takes as ``shortcuts``.

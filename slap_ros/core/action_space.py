@@ -21,9 +21,9 @@ class GripperAxis:
     """The axis of an action that closes and opens a gripper; 0 leaves it as it is.
 
     Args:
-        axis: The axis' name.
-        closes: The command that closes it, in the axis' unit.
-        opens: The command that opens it, in the axis' unit.
+        axis: Name of the gripper's axis.
+        closes: Command that closes the gripper, in the axis' unit.
+        opens: Command that opens the gripper, in the axis' unit.
     """
 
     axis: str

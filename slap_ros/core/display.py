@@ -46,10 +46,10 @@ class Display:
     """What a person is shown of a state; nothing of it matters to planning.
 
     Args:
-        bodies: The bodies of a state, in an order that does not change.
-        arm: The robot's own shapes in a state, unless it is one of the bodies.
-        frames: Poses of a state by name, for TF; without it, those of the bodies.
-        animate: Writes an animation; without it, the bodies are drawn plainly.
+        bodies: Function from a state to its bodies, in an order that does not change.
+        arm: Function from a state to the robot's own shapes, unless the robot is one of the bodies.
+        frames: Function from a state to poses by name, for TF; None: the poses of the bodies.
+        animate: Function that writes an animation; None: the bodies are drawn plainly.
     """
 
     bodies: Callable[[State], Sequence[VisibleBody]] = lambda _: ()

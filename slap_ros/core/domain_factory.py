@@ -22,7 +22,8 @@ class DomainFactory:
     """Makes a domain under each of its presets; see :func:`presets`.
 
     Args:
-        make: Takes nothing, or a preset's name, or that and settings to change; gives the domain.
+        make: Function that makes the domain; it takes nothing, or a preset's name, or that and
+            settings to change.
         presets: Names; the first is used where none is asked for.
 
     Raises:

@@ -116,7 +116,8 @@ class KinderBridge:
         """Learn the objects and types from a first reset.
 
         Args:
-            make_environment: Makes environments that have the same objects, whatever the seed.
+            make_environment: Function that makes environments, which have the same objects for
+                every seed.
             subtypes: KinDER tells some roles of one type apart by names alone: objects whose
                 names begin with a key get a type of their own, named by the value, below KinDER's.
 

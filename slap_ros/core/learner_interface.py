@@ -61,7 +61,7 @@ class LearnerInterface:
             skill ends where it can.
         grasping: Predicates about what is held. Only shortcuts that change one of their atoms
             have the gripper among their actions.
-        length_m: The scale of distances and margins.
+        length_m: Scale of distances and margins, m.
         frames: (state, objects) to where what is done with them happens, and how it is turned
             there: positions, m, shape (n, objects, 3), and quaternions (x, y, z, w), shape (n,
             objects, 4). None: of two objects, skills observe the distance alone.

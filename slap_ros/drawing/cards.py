@@ -97,7 +97,7 @@ def list_bodies(selection: Selection, words: AtomNaming, start: int) -> list[lis
     """Lines that each card would have, given the room.
 
     Args:
-        selection: The nodes.
+        selection: Nodes and edges that are drawn.
         words: Names of the task's atoms.
         start: Atoms of the start node, as a mask.
 
@@ -117,7 +117,7 @@ def cut(lines: list[CardLine], limit: int, common: Counter[str]) -> list[CardLin
 
     Args:
         lines: Lines of one card.
-        limit: Greatest number of lines.
+        limit: Largest number of lines.
         common: Number of cards that have each line. The rarest lines say most about a card.
     """
     if len(lines) <= limit:

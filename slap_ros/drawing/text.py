@@ -28,8 +28,8 @@ def width_px(text: str, size_px: float, bold: bool = False) -> float:
     """An upper estimate of the width of a line of text, px.
 
     Args:
-        text: The line.
-        size_px: Font size.
+        text: Line of text.
+        size_px: Font size, px.
         bold: Whether it is set in bold, which is wider.
     """
     ems = sum(_WIDTHS.get(character, _WIDEST) for character in text)
@@ -40,9 +40,9 @@ def shorten(text: str, size_px: float, limit_px: float, bold: bool = False) -> s
     """The text, or its beginning and an ellipsis where it is wider than the limit.
 
     Args:
-        text: A line.
-        size_px: Font size.
-        limit_px: Greatest width.
+        text: Line of text.
+        size_px: Font size, px.
+        limit_px: Largest width of the line, px.
         bold: Whether it is set in bold.
     """
     if width_px(text, size_px, bold) <= limit_px:
@@ -56,9 +56,9 @@ def wrap(text: str, size_px: float, limit_px: float, bold: bool = False) -> list
     """Break text at spaces into lines; a word that is too long for a line is shortened.
 
     Args:
-        text: A paragraph.
-        size_px: Font size.
-        limit_px: Greatest width of a line.
+        text: Paragraph of text.
+        size_px: Font size, px.
+        limit_px: Largest width of a line, px.
         bold: Whether it is set in bold.
 
     Returns:

@@ -43,8 +43,8 @@ class MessageEncoder:
     rosbags, which have nothing in common but their fields.
 
     Args:
-        make: Makes a message, given its type, as ``slap_msgs/msg/Task``, and fields by name;
-            fields that are not given are zero or empty.
+        make: Function that makes a message, given its type, as ``slap_msgs/msg/Task``, and fields
+            by name; fields that are not given are zero or empty.
     """
 
     make: Callable[..., Any]
@@ -142,8 +142,8 @@ class MessageEncoder:
         """The message of what is perceived of a state.
 
         Args:
-            value: The percept.
-            of: The message that was perceived; header, episode and step are taken from it.
+            value: Percept to encode.
+            of: Message that was perceived; header, episode and step are taken from it.
             space: Atom space of the episode.
             known: ``of``, decoded: only objects that are perceived otherwise go into the message.
 

@@ -31,7 +31,7 @@ class SceneEncoder:
     """Makes messages of what is visible.
 
     Args:
-        encoder: Makes their headers, and all of their parts.
+        encoder: Encoder that makes the messages' headers, and all of their parts.
     """
 
     encoder: MessageEncoder

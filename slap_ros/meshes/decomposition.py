@@ -50,7 +50,7 @@ def load_mesh(
 
     Args:
         file: OBJ, GLB, STL, PLY or what else trimesh reads.
-        size_m: The longest edge that the box around the solid is to have.
+        size_m: Longest edge that the box around the solid is to have, m.
         settings: Settings that say how closely the pieces follow the mesh.
 
     Returns:

@@ -51,9 +51,9 @@ def plan_path(
         start: Configuration to start from, rad, shape (7,).
         goal: Configuration to reach, rad, shape (7,).
         free: Checker of which configurations are free of collisions.
-        seed: Fixes the result.
+        seed: Seed of the random numbers; it fixes the result.
         attempts: Random paths to find if a via point will not do; fewer if one is nearly straight.
-        max_samples: Samples of the joint space after which an attempt fails.
+        max_samples: Number of samples of the joint space after which an attempt fails.
         shortening_tries: Pairs of points to try to join, for each path.
         resolution: Control steps between checked configurations.
 

@@ -89,11 +89,11 @@ def rrt_connect(
     """A collision-free path, as found: neither short nor smooth.
 
     Args:
-        start: Free, rad, shape (7,).
-        goal: Free, rad, shape (7,).
+        start: Free configuration to start from, rad, shape (7,).
+        goal: Free configuration to reach, rad, shape (7,).
         free: Checker of which configurations are free of collisions.
         rng: Source of random numbers for the samples.
-        max_samples: Samples after which to give up.
+        max_samples: Number of samples after which the search gives up.
         resolution: Control steps between checked configurations.
 
     Returns:

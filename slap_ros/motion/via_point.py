@@ -38,8 +38,8 @@ def via_point_path(
     """The free path of fewest control steps, of many with one via point.
 
     Args:
-        start: Free, rad, shape (7,).
-        goal: Free, rad, shape (7,).
+        start: Free configuration to start from, rad, shape (7,).
+        goal: Free configuration to reach, rad, shape (7,).
         free: Checker of which configurations are free of collisions.
         rng: Source of random numbers for the via points.
         resolution: Control steps between checked configurations.

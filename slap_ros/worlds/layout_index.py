@@ -73,7 +73,7 @@ def robot_columns(layout: Layout, robot: Type, features: Sequence[Feature]) -> C
     Args:
         layout: Objects of the states.
         robot: Type of the robot.
-        features: Features that it has.
+        features: Features of the robot to find.
 
     Raises:
         InvalidStateError: Not exactly one robot.
@@ -109,7 +109,7 @@ def optional_columns(
     Args:
         layout: Objects of the states.
         name: Name of the body.
-        features: Features in question.
+        features: Features to find.
     """
     obj = layout.by_name.get(name)
     if obj is None or not set(features) <= set(obj.type.features):

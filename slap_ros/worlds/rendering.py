@@ -146,11 +146,11 @@ def write_animation(
     """Write an animation in real time, one frame per control step.
 
     Args:
-        path: The file; its ending says the format, see ``slap_ros.worlds.animation``.
+        path: Path of the file; its ending says the format, see ``slap_ros.worlds.animation``.
         camera: Camera that draws the frames.
         states: States, one per control step; not empty.
         period_s: Duration of a control step, s.
-        progress: Told the number of frames drawn so far, after each.
+        progress: Function that receives the number of frames drawn so far, after each.
     """
 
     def pictures() -> Iterator[Picture]:

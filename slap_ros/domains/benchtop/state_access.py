@@ -153,7 +153,7 @@ def in_base(state: State, column: Column, points: Array) -> Array:
 
     Args:
         state: A state or a batch of states.
-        column: The objects.
+        column: Objects that have the points.
         points: Points in the objects' own frames, m, shape (..., objects, 3).
 
     Returns:

@@ -43,7 +43,7 @@ def make(
     """The domain: preset ``fair`` samples different tasks, ``paper`` fewer, at the paper's pace.
 
     Args:
-        preset: ``fair`` or ``paper``.
+        preset: Name of the preset: ``fair`` or ``paper``.
         changes: Settings of the preset to change.
         shapes: Toys by kind, and the ``wiper``, in place of those that are shipped; None for these.
             Any mesh will do (``slap_ros.meshes``) that the fingers fit around from above.

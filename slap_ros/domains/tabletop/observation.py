@@ -115,7 +115,7 @@ def scaled_displacements(state: State, hand: Array, column: Column) -> Array:
     Args:
         state: A batch of n states.
         hand: Frames of the hand, from :func:`hand_frame`, maybe with more columns.
-        column: The objects.
+        column: Objects whose displacements are wanted.
 
     Returns:
         Along the base's axes, shape (n, objects, 3).
@@ -202,7 +202,7 @@ def displacements(state: State, hand: Array, column: Column) -> Array:
     Args:
         state: A batch of n states.
         hand: Frames of the hand, from :func:`hand_frame`, maybe with more columns.
-        column: The objects.
+        column: Objects whose displacements are wanted.
 
     Returns:
         Along the base's axes, m, shape (n, objects, 3).

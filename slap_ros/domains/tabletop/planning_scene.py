@@ -26,7 +26,8 @@ class PlanningScene:
         solid: The boxes that things fill in a state, base frame, each with the object that it is
             a part of; one object may have several, and the held body's are left out by whoever
             asks.
-        carried: The box around a body in that body's own frame, were it in the hand.
+        carried: Function from a state and a body to the box around the body, in the body's own
+            frame, were it in the hand.
     """
 
     solid: Callable[[State], Iterable[tuple[Object, OrientedBox]]]

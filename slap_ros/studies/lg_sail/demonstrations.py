@@ -82,12 +82,12 @@ class GoalDemonstrations:
 
     @property
     def steps(self) -> Spread | None:
-        """Environment steps of solved tasks; None without any."""
+        """Spread of the environment steps of solved tasks; None without any."""
         return spread_of([float(task.steps) for task in self.tasks if task.success])
 
     @property
     def replans(self) -> Spread:
-        """Replans of all tasks."""
+        """Spread of the replans over all tasks."""
         return Spread.of([float(task.replans) for task in self.tasks])
 
     @property

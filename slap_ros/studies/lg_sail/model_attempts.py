@@ -94,8 +94,8 @@ class Attempt:
 
     Args:
         errors: Classes of what is wrong, by what was asked for; none where it passed.
-        tokens: Spent on it.
-        seconds: Waited.
+        tokens: Number of tokens spent on the attempt.
+        seconds: Time waited for answers, s.
     """
 
     errors: Mapping[str, tuple[str, ...]]

@@ -193,7 +193,8 @@ def study(
         problems: Problems, one per plan.
         variants: Names of variants, of :data:`VARIANTS`.
         most_attempts: Largest number of attempts at one plan.
-        runner: Runner of the jobs. It must be in this process: models cannot be sent to others.
+        runner: Runner of the jobs. It keeps earlier answers. It must be in this process: models
+            cannot be sent to others.
 
     Returns:
         The report.

@@ -121,12 +121,12 @@ class ReplanningRow:
 
     @property
     def replans(self) -> Spread:
-        """Replans of all tasks."""
+        """Spread of the replans over all tasks."""
         return Spread.of([float(trial.replans) for trial in self.trials])
 
     @property
     def steps(self) -> Spread | None:
-        """Environment steps of solved tasks; None without any."""
+        """Spread of the environment steps of solved tasks; None without any."""
         return spread_of([float(trial.plan_length) for trial in self.trials if trial.success])
 
     @property

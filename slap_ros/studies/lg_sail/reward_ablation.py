@@ -102,7 +102,8 @@ def study(
         operators: Operators that need rewards.
         shown: What is shown of the metrics: some of :data:`METRICS`.
         trials: Number of trials for each of ``shown``.
-        runner: Runner of the jobs. It must be in this process: models cannot be sent to others.
+        runner: Runner of the jobs. It keeps earlier answers. It must be in this process: models
+            cannot be sent to others.
 
     Returns:
         The report.

@@ -95,10 +95,10 @@ def explore(
     """Explore the first tasks of trainings, as these do.
 
     Args:
-        trainings: The tasks that each draws; all of one domain.
+        trainings: Task distributions of the trainings, all of one domain.
         tasks: Number of tasks per training.
         settings: Settings of exploration.
-        runner: Explores.
+        runner: Runner of the jobs.
 
     Returns:
         What is left of each task's candidates; tasks that could not be explored are left out.

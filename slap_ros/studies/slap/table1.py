@@ -180,10 +180,10 @@ def study(
     """Evaluate every library under every preset.
 
     Args:
-        experiments: The tasks of each preset.
+        experiments: Tasks of each preset.
         libraries: Libraries; each is evaluated under every preset.
         sampling: Settings of how shortcuts are tried out.
-        runner: Solves tasks.
+        runner: Runner of the jobs.
 
     Returns:
         The report.

@@ -90,7 +90,8 @@ class Scene:
     """All bodies around a Panda whose base is at the origin.
 
     Args:
-        bodies: Free and fixed ones; the order of the free ones is part of the physics.
+        bodies: Bodies of the scene, free and fixed; the order of the free ones is part of the
+            physics.
         floor_m: Height of the floor, which catches what falls off the table.
 
     Raises:
