@@ -19,7 +19,7 @@ from slap_ros.relational import (
     RewardTerm,
     Variable,
 )
-from slap_ros.relational.pddl import write_domain, write_problem
+from slap_ros.relational.pddl import with_different_objects, write_domain, write_problem
 
 VERSION = 1
 
@@ -94,21 +94,25 @@ class Proposal:
         Raises:
             MalformedPddlError: A name that PDDL cannot hold, as an object's may be.
         """
-        domain = write_domain(self.problem, problem.types, problem.predicates, self.operators)
+        operators = self.operators
+        if problem.start is not None:  # a world, whose atoms relate different objects
+            operators = tuple(with_different_objects(operators))
+        domain = write_domain(self.problem, problem.types, problem.predicates, operators)
         init = sorted(problem.init, key=str)
         task = write_problem("task", self.problem, problem.layout.objects, init, problem.goal)
         return domain, task
 
 
 def operator_data(operator: LiftedOperator) -> dict[str, Any]:
-    """What JSON can hold of an operator."""
+    """What JSON can hold of an operator; which parameters must differ only where some must."""
+    differing = [[one.name, other.name] for one, other in operator.inequalities]
     return {
         "name": operator.name,
         "parameters": [{"name": v.name, "type": v.type.name} for v in operator.parameters],
         "preconditions": _atoms_data(operator.preconditions),
         "delete_effects": _atoms_data(operator.delete_effects),
         "add_effects": _atoms_data(operator.add_effects),
-    }
+    } | ({"inequalities": differing} if differing else {})
 
 
 def _atoms_data(atoms: frozenset[LiftedAtom]) -> list[dict[str, Any]]:
@@ -181,6 +185,7 @@ def read_operator(data: Any, domain: Domain) -> LiftedOperator:
         atoms("preconditions"),
         atoms("add_effects"),
         atoms("delete_effects"),
+        tuple((variables[one], variables[other]) for one, other in data.get("inequalities", ())),
     )
 
 
