@@ -46,7 +46,8 @@ def plan_with_engine(domain: str, problem: str, engine: str) -> SymbolicPlan:
         status = result.status.name
         if result.plan is None:
             failure = UnsolvableError if status.startswith("UNSOLVABLE") else PlanningLimitError
-            raise failure(f"unified-planning's {engine} found no plan: {status}")
+            reasons = "; ".join(entry.message for entry in result.log_messages or ())
+            raise failure(f"unified-planning's {engine} found no plan: {status} {reasons}".rstrip())
         steps = tuple(map(str, result.plan.actions))
         return SymbolicPlan(steps, _cost(task, result.plan), status == "SOLVED_OPTIMALLY")
 
