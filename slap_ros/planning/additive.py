@@ -18,7 +18,7 @@ from slap_ros.planning.relaxation import Costs, Indices, RelaxedTask, Truth
 
 
 @dataclass(frozen=True, slots=True)
-class RelaxedPlan:
+class RelaxedPlanEstimate:
     """A plan for the task in which operators delete nothing.
 
     Args:
@@ -30,7 +30,7 @@ class RelaxedPlan:
     helpful: Indices
 
 
-def relaxed_plan(relaxed: RelaxedTask, truth: Truth) -> RelaxedPlan | None:
+def relaxed_plan(relaxed: RelaxedTask, truth: Truth) -> RelaxedPlanEstimate | None:
     """A plan for the relaxed task; None where there is none, hence none for the task either.
 
     Args:
@@ -45,7 +45,7 @@ def relaxed_plan(relaxed: RelaxedTask, truth: Truth) -> RelaxedPlan | None:
     ready = operators[chosen] == relaxed.costs[chosen]  # what they need costs nothing
     helpful = np.unique(relaxed.action[chosen[ready]])
     cost = relaxed.costs[chosen[first]].sum()  # several effects of one action cost it once
-    return RelaxedPlan(float(cost), helpful[helpful >= 0])
+    return RelaxedPlanEstimate(float(cost), helpful[helpful >= 0])
 
 
 def _supporters(relaxed: RelaxedTask, atoms: Costs, operators: Costs) -> set[int]:

@@ -101,7 +101,7 @@ def parse_domain(text: str, source: str = "<domain>") -> PddlDomain:
 
 
 @dataclass(frozen=True)
-class _Signature:
+class _Declaration:
     """A predicate or a function as it is declared."""
 
     name: Word
@@ -140,12 +140,12 @@ def _has_quantifier(node: Node) -> bool:
     return node.head in ("forall", "exists") or any(map(_has_quantifier, node.items))
 
 
-def _read_signature(node: Node) -> _Signature:
+def _read_signature(node: Node) -> _Declaration:
     listed = expect_list(node, "a predicate")
     if not listed.items:
         raise MalformedPddlError(f"{listed.position}: expected a predicate, found an empty list")
     name = expect_word(listed.items[0], "the name of a predicate")
-    return _Signature(name, read_signature(listed.items[1:]))
+    return _Declaration(name, read_signature(listed.items[1:]))
 
 
 def _read_functions(definition: PddlDefinition) -> dict[str, int]:
@@ -182,7 +182,7 @@ def _action_parts(name: Word, nodes: tuple[Node, ...]) -> dict[str, Node]:
 # -- the relational layer's classes ---------------------------------------------------------------
 
 
-def _make_predicate(signature: _Signature, types: TypeNames) -> Predicate:
+def _make_predicate(signature: _Declaration, types: TypeNames) -> Predicate:
     name = signature.name.text
     return Predicate(name, tuple(map(types.of, signature.parameters)), _no_classifier(name))
 
