@@ -56,6 +56,9 @@ LOCAL_LANGUAGE = ["torch>=2.4", "transformers>=5", "gguf>=0.10", "accelerate>=1"
 # For examples/kinder_obstruction alone, in an environment of its own: it brings pyperplan (GPL-3)
 # and another build of PyBullet. Nothing here imports any of it.
 KINDER = ["kindergarden>=0.2.5,<0.3"]
+# `slap plan --planner up:NAME`: engines of the field to compare with; Apache-2.0, and MIT (aries).
+# Some other engines are GPL: whoever wants them installs them.
+UP = ["unified-planning>=1.1", "up-aries>=0.4"]
 DOCS = [
     "mkdocs>=1.6,<2",
     "mkdocs-material>=9.7,<10",
@@ -83,8 +86,7 @@ TEST = [
     *LANGUAGE,
     *EXPORT,
     "websocket-client>=1.8",  # watches a live run as Foxglove does
-    "unified-planning>=1.1",
-    "up-aries>=0.4",
+    *UP,
     "colcon-common-extensions>=0.3",
     "build>=1",  # makes the sdists and wheels that a test installs
     "hatchling>=1.24",  # embedded_ros is built with it
@@ -173,6 +175,7 @@ setup(
         "local-language": LOCAL_LANGUAGE,
         "kinder": KINDER,
         "meshes": MESHES,
+        "up": UP,
         "test": TEST,
     },
     entry_points={

@@ -11,11 +11,12 @@ from slap_ros.relational import LiftedOperator, RewardTemplate
 def print_operator(operator: LiftedOperator, reward: RewardTemplate | None) -> None:
     """Print an operator's preconditions and effects, and its reward if it has one."""
     console.print(f"{operator}")
-    for label, atoms in (
-        ("PRE", operator.preconditions),
-        ("EFF-", operator.delete_effects),
-        ("EFF+", operator.add_effects),
+    different = [f"{one} != {other}" for one, other in operator.inequalities]
+    for label, atoms, more in (
+        ("PRE", operator.preconditions, different),
+        ("EFF-", operator.delete_effects, []),
+        ("EFF+", operator.add_effects, []),
     ):
-        console.print(f"  {label:5}{', '.join(sorted(map(str, atoms))) or '-'}")
+        console.print(f"  {label:5}{', '.join([*sorted(map(str, atoms)), *more]) or '-'}")
     if reward is not None:
         console.print(f"  {'R':5}{' + '.join(map(str, reward.terms))}")

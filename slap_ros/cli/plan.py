@@ -54,13 +54,14 @@ def plan(
 ) -> None:
     """Plan one task without executing it; write its PDDL and draw its abstract graph.
 
-    A domain without skills is planned with its hand-written operators alone. Two PDDL files are
-    planned symbolically, with the FF heuristic.
+    A domain without skills is planned with its hand-written operators alone. Two PDDL files, or one
+    that has domain and problem, are planned symbolically: with the FF heuristic (lazy, ff), for the
+    least cost or the fewest operators (astar), or by an engine of unified-planning (up:NAME).
     """
-    if problem is not None:
+    if problem is not None or domain.lower().endswith(".pddl"):
         from slap_ros.cli.plan_pddl import plan_pddl
 
-        plan_pddl(Path(domain), problem, effort, json)
+        plan_pddl(Path(domain), problem or Path(domain), planner, effort, json)
         return
     # Not above: what plans symbolically needs none of it.
     from slap_ros.cli.plan_task import plan_task

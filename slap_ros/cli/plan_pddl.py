@@ -4,80 +4,132 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 from slap_ros.cli.console import console, print_json
 from slap_ros.errors import InvalidParameterError, PlanningLimitError
-from slap_ros.files import read_text
-from slap_ros.planning.ff import MAX_EXPANSIONS, MAX_TESTS, find_operator_sequence
-from slap_ros.relational import AtomSpace, ground_operators
-from slap_ros.relational.grounding import MAX_BINDINGS
+from slap_ros.files import read_bytes
+from slap_ros.planning.greedy import MAX_EXPANSIONS, MAX_TESTS, find_plan
 from slap_ros.relational.pddl import PddlDomain, PddlProblem, parse_domain, parse_problem
+from slap_ros.relational.pddl.grounder import MAX_BINDINGS, ground_task
+from slap_ros.relational.pddl.tokens import decode
+
+OTHER_PLANNERS = "up:"  # engines of unified-planning, by name
+PLANNERS = ("lazy", "ff", "astar")  # lazy, the default, is ff, and then cheaper where costs count
 
 
-def plan_pddl(domain_file: Path, problem_file: Path, effort: int, json: bool) -> None:
-    """Plan with the FF heuristic and print the operators.
+@dataclass(frozen=True)
+class SymbolicPlan:
+    """A plan as it is printed.
 
     Args:
-        domain_file: PDDL domain.
+        steps: Operators with their objects.
+        cost: What they cost; None where the problem asks for no least cost.
+        is_cheapest: Whether it is proven that no plan has fewer operators or, where costs count,
+            costs less.
+    """
+
+    steps: tuple[str, ...]
+    cost: float | None
+    is_cheapest: bool = False
+
+    def __str__(self) -> str:
+        """How many operators, and what they cost."""
+        count = f"{len(self.steps)} operators"
+        if self.cost is None:
+            return f"{count}, the fewest" if self.is_cheapest else count
+        known = "the least" if self.is_cheapest else "not proven to be the least"
+        return f"{count}, cost {self.cost:g}, {known}"
+
+
+def plan_pddl(domain_file: Path, problem_file: Path, planner: str, effort: int, json: bool) -> None:
+    """Plan with the FF heuristic, or as asked for, and print the operators.
+
+    Args:
+        domain_file: PDDL domain; it may have the problem as well.
         problem_file: PDDL problem of that domain.
+        planner: Name of the planner.
         effort: Factor of the limits of planning.
         json: Whether stdout gets JSON.
 
     Raises:
-        InvalidParameterError: A file cannot be read.
+        InvalidParameterError: A file cannot be read, or there is no such planner.
         InvalidDomainError: What is in it is not understood.
         UnsolvableError: The goal cannot be reached.
         PlanningLimitError: A limit was reached first.
     """
-    domain = parse_domain(_read(domain_file), str(domain_file))
-    problem = parse_problem(_read(problem_file), domain, str(problem_file))
-    space = problem.atom_space(domain)
-    try:
-        names = _plan_symbolically(domain, problem, space, effort)
-    except PlanningLimitError as error:
-        raise PlanningLimitError(
-            f"{error}; --effort {10 * effort} allows ten times as much"
-        ) from error
+    if planner.startswith(OTHER_PLANNERS):
+        # Not above: unified-planning is an extra.
+        from slap_ros.cli.unified_planning import plan_with_engine
+
+        engine = planner.removeprefix(OTHER_PLANNERS)
+        found = plan_with_engine(read_pddl(domain_file), read_pddl(problem_file), engine)
+    else:
+        domain = parse_domain(read_pddl(domain_file), str(domain_file))
+        problem = parse_problem(read_pddl(problem_file), domain, str(problem_file))
+        try:
+            found = plan_symbolically(domain, problem, planner, effort)
+        except PlanningLimitError as error:
+            raise PlanningLimitError(
+                f"{error}; --effort {10 * effort} allows ten times as much"
+            ) from error
     if json:
-        print_json({"plan": names})
+        costs = {} if found.cost is None else {"cost": found.cost}
+        print_json({"plan": list(found.steps)} | costs)
         return
-    for name in names:
-        console.print(name)
-    console.print(f"{len(names)} operators")
+    for step in found.steps:
+        console.print(step)
+    console.print(str(found))
 
 
-def _plan_symbolically(
-    domain: PddlDomain, problem: PddlProblem, space: AtomSpace, effort: int
-) -> list[str]:
-    """The names of operators that lead to the goal.
+def plan_symbolically(
+    domain: PddlDomain, problem: PddlProblem, planner: str = "lazy", effort: int = 1
+) -> SymbolicPlan:
+    """A plan for a PDDL problem.
 
     Args:
         domain: Types, predicates and operators.
         problem: Objects, start and goal.
-        space: The atoms over the objects.
+        planner: ``ff`` finds some plan fast. ``lazy`` makes it cheaper where the problem asks for
+            least cost. ``astar`` finds a plan of least cost, or of the fewest operators.
         effort: Factor of the limits of planning.
 
-    Returns:
-        Operators with their objects, in order.
-
     Raises:
+        InvalidParameterError: There is no such planner.
         UnsolvableError: The goal cannot be reached.
         PlanningLimitError: A limit was reached first.
     """
-    operators = ground_operators(domain.operators, space, effort * MAX_BINDINGS)
-    sequence = find_operator_sequence(
-        problem.initial_mask(space),
-        problem.goal_mask(space),
-        operators,
-        max_expansions=effort * MAX_EXPANSIONS,
-        max_tests=effort * MAX_TESTS,
-    )
-    return [str(operators[number]) for number in sequence]
+    if planner not in PLANNERS:
+        raise InvalidParameterError(
+            f"unknown planner {planner!r} for PDDL files; there are {', '.join(PLANNERS)} and "
+            f"{OTHER_PLANNERS}NAME"
+        )
+    task = ground_task(domain, problem, effort * MAX_BINDINGS)
+    if planner == "astar":
+        from slap_ros.planning.least_cost import find_cheapest_plan
+
+        actions, is_cheapest = find_cheapest_plan(task).actions, True
+    else:
+        actions = find_plan(task, effort * MAX_EXPANSIONS, effort * MAX_TESTS)
+        is_cheapest = not actions
+        if problem.minimises_cost and planner != "ff":
+            from slap_ros.planning.least_cost import make_cheaper
+
+            best = make_cheaper(task, actions, effort)
+            actions, is_cheapest = best.actions, best.is_cheapest
+    cost = sum(task.actions[index].cost for index in actions)
+    steps = tuple(task.actions[index].name for index in actions)
+    return SymbolicPlan(steps, cost if problem.minimises_cost else None, is_cheapest)
 
 
-def _read(path: Path) -> str:
+def read_pddl(path: Path) -> str:
+    """The text of a PDDL file in any encoding.
+
+    Raises:
+        InvalidParameterError: It cannot be read.
+    """
     try:
-        return read_text(path)
+        return decode(read_bytes(path))
     except (OSError, UnicodeDecodeError) as error:
         raise InvalidParameterError(f"cannot read {path}: {error}") from error

@@ -19,7 +19,7 @@ from slap_ros.planning.plan import PlanningResult
 from slap_ros.planning.problem import Problem
 from slap_ros.planning.symbolic_planner import plan_symbolically
 from slap_ros.relational import AtomSpace, LiftedOperator, ground_operators
-from slap_ros.relational.pddl import write_domain, write_problem
+from slap_ros.relational.pddl import with_different_objects, write_domain, write_problem
 from slap_ros.versions import versions
 
 
@@ -130,7 +130,9 @@ def _pddl(domain: Domain, operators: Sequence[LiftedOperator], task: Task) -> di
     init = tuple(space.decode(space.abstract(task.initial_state)))
     objects = space.layout.objects
     return {
-        "domain.pddl": write_domain(domain.name, domain.types, domain.predicates, operators),
+        "domain.pddl": write_domain(
+            domain.name, domain.types, domain.predicates, with_different_objects(operators)
+        ),
         "problem.pddl": write_problem("task", domain.name, objects, init, task.goal),
     }
 

@@ -27,11 +27,12 @@ from slap_ros.api.proposing import answer, request_for
 from slap_ros.cli.console import console, print_json
 from slap_ros.cli.operators import print_operator
 from slap_ros.cli.options import DomainOrFile, Goal, Index, Json, Preset, Seed
+from slap_ros.cli.plan_pddl import read_pddl
 from slap_ros.cli.proposer_options import ProposerOptions
 from slap_ros.core import task_with_goal
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError, StorageFullError
-from slap_ros.files import read_text, require_writable, write_whole
+from slap_ros.files import require_writable, write_whole
 from slap_ros.relational.pddl import parse_domain, parse_problem
 
 
@@ -121,10 +122,13 @@ def _posed_by_files(options: ProposeOptions, problem: Path, proposer: str) -> Pr
             "--proposer induced needs a domain with a world, in which something can be shown"
         )
     path = Path(options.domain)
-    stated = parse_domain(_read(path), str(path))
-    task = parse_problem(_read(problem), stated, str(problem))
+    stated = parse_domain(read_pddl(path), str(path))
+    task = parse_problem(read_pddl(problem), stated, str(problem))
     posed = AcquisitionProblem.of_pddl(stated, task)
-    return ProposalRequest(posed, proposer, options.rewarder, stated.operators, source=path.name)
+    # Nobody else looks at the file's actions, which may be more than skills can be learned for.
+    manual = proposer == MANUAL and options.operators is None
+    operators = stated.operators if manual else ()
+    return ProposalRequest(posed, proposer, options.rewarder, operators, source=path.name)
 
 
 def show_entry(entry: Entry) -> None:
@@ -167,10 +171,3 @@ def _write(folder: Path, proposal: Proposal, problem: AcquisitionProblem) -> lis
     except OSError as error:
         raise StorageFullError(f"cannot write to {folder}: {error.strerror}") from error
     return [str(folder / name) for name in (*files, "attempts.jsonl")]
-
-
-def _read(path: Path) -> str:
-    try:
-        return read_text(path)
-    except (OSError, UnicodeDecodeError) as error:
-        raise InvalidParameterError(f"cannot read {path}: {error}") from error

@@ -164,6 +164,8 @@ class Domain(ShownInNotebooks):
                     f"{where}: unknown predicate {atom.predicate.name!r} in {atom}; the domain has "
                     f"{', '.join(p.name for p in self.predicates)}"
                 )
+            if len(set(atom.variables)) != len(atom.variables):
+                raise InvalidDomainError(f"{where}: {atom} relates a parameter to itself")
         for variable in operator.parameters:
             if variable.type not in self.types:
                 raise InvalidDomainError(f"{where}: unknown type {variable.type.name!r}")

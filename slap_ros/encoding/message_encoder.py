@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -83,7 +83,11 @@ class MessageEncoder:
                 for p in domain.predicates
             ],
             operators_pddl=write_domain(
-                domain.name, domain.types, domain.predicates, domain.operators
+                domain.name,
+                domain.types,
+                domain.predicates,
+                # The text of format 1: which parameters must differ is left out, as it always was.
+                [replace(operator, inequalities=()) for operator in domain.operators],
             ),
             action_names=[axis.name for axis in moved],
             action_units=[axis.unit for axis in moved],

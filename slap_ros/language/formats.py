@@ -74,6 +74,7 @@ class OperatorDraft:
     preconditions: tuple[AtomDraft, ...]
     delete_effects: tuple[AtomDraft, ...]
     add_effects: tuple[AtomDraft, ...]
+    inequalities: tuple[tuple[str, str], ...] = ()  # parameters that must differ; PDDL says so
 
 
 @dataclass(frozen=True)

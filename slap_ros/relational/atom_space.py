@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice, permutations
+from itertools import islice, permutations, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +26,8 @@ class AtomSpace:
     """The ground atoms of a task, each with a bit.
 
     An abstract state is an ``int`` with the bits of the atoms that hold. The space has every
-    atom whose objects have the right types and are pairwise different. Atoms of static
-    predicates (those that no operator changes) are evaluated once.
+    atom whose objects have the right types and, except in PDDL, are pairwise different. Atoms of
+    static predicates (those that no operator changes) are evaluated once.
     """
 
     def __init__(
@@ -38,6 +38,8 @@ class AtomSpace:
         holds: Callable[[GroundAtom], bool],
         rarely_read: Collection[Type] = (),
         readers: Collection[Predicate] = (),
+        *,
+        one_object_twice: bool = False,
     ) -> None:
         """Enumerate the atoms over the objects of ``layout``.
 
@@ -49,6 +51,7 @@ class AtomSpace:
             rarely_read: Types of objects whose features few predicates read, the robot as a rule:
                 for states that differ only there, all other predicates are evaluated once.
             readers: These few predicates.
+            one_object_twice: Whether there are atoms that relate an object to itself, as in PDDL.
 
         Raises:
             PlanningLimitError: There are more than ``MAX_ATOMS``.
@@ -58,7 +61,7 @@ class AtomSpace:
         atoms = (
             predicate(*objects)
             for predicate in predicates
-            for objects in _type_consistent(predicate, layout.objects)
+            for objects in _type_consistent(predicate, layout.objects, one_object_twice)
         )
         self.atoms = tuple(islice(atoms, MAX_ATOMS + 1))
         if len(self.atoms) > MAX_ATOMS:
@@ -165,6 +168,10 @@ class AtomSpace:
                 f"{atom} is not an atom of this task: atoms relate different objects of the task"
             ) from None
 
+    def has(self, atom: GroundAtom) -> bool:
+        """Whether it is an atom of this space."""
+        return atom in self._bits
+
     def mask(self, atoms: Iterable[GroundAtom]) -> int:
         """The bits of several atoms."""
         mask = 0
@@ -247,8 +254,12 @@ def _columns_of(layout: Layout, left_out: Collection[Type]) -> NDArray[np.intp]:
 
 
 def _type_consistent(
-    predicate: Predicate, objects: tuple[Object, ...]
+    predicate: Predicate, objects: tuple[Object, ...], one_object_twice: bool
 ) -> Iterator[tuple[Object, ...]]:
+    if one_object_twice:
+        fitting = ([obj for obj in objects if obj.type.is_a(kind)] for kind in predicate.types)
+        yield from product(*fitting)
+        return
     if math.perm(len(objects), len(predicate.types)) > MAX_TUPLES:
         raise PlanningLimitError(
             f"more than {MAX_TUPLES} tuples of {len(predicate.types)} from {len(objects)} objects "

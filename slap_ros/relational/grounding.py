@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
+from itertools import combinations
 
 from slap_ros.errors import PlanningLimitError
 from slap_ros.relational.atom_space import AtomSpace
@@ -13,15 +15,20 @@ from slap_ros.relational.operators import GroundOperator, LiftedAtom, LiftedOper
 
 MAX_BINDINGS = 300_000  # of parameters, partial ones included; some seconds
 
+_Test = Callable[[Mapping[Variable, Object]], bool]  # of a binding, partial or complete
+
 
 def ground_operators(
     operators: Iterable[LiftedOperator], space: AtomSpace, max_bindings: int = MAX_BINDINGS
 ) -> tuple[GroundOperator, ...]:
-    """Every application of the operators to different objects that could ever be applicable.
+    """Every application of the operators to objects that could ever be applicable.
 
-    Parameters are bound one by one, and a static precondition is tested as soon as its variables
-    are bound, so that whole branches fall away: grounding first and filtering afterwards costs
-    seconds in domains with many objects.
+    One object may stand for two parameters, unless these must differ, or an atom that is needed or
+    added would relate the object to itself and the space has no such atoms.
+
+    Parameters are bound one by one, and an inequality or a static precondition is tested as soon as
+    its variables are bound, so that whole branches fall away: grounding first and filtering
+    afterwards costs seconds in domains with many objects.
 
     Args:
         operators: To be applied.
@@ -66,18 +73,17 @@ def ground_operator(
     def mask(atoms: Iterable[LiftedAtom]) -> int:
         return space.mask(atom.ground(binding) for atom in atoms)
 
-    return GroundOperator(
-        operator,
-        objects,
-        mask(operator.preconditions),
-        mask(operator.add_effects),
-        mask(operator.delete_effects),
-    )
+    added = mask(operator.add_effects)
+    grounds = (atom.ground(binding) for atom in operator.delete_effects)
+    # What relates an object to itself may not be an atom of the space: it never holds. What is
+    # added as well is added: of two parameters, both effects may be of one object.
+    deleted = space.mask(atom for atom in grounds if space.has(atom)) & ~added
+    return GroundOperator(operator, objects, mask(operator.preconditions), added, deleted)
 
 
 def _bindings(operator: LiftedOperator, space: AtomSpace) -> Iterator[dict[Variable, Object]]:
     """Bindings as they grow, one parameter more each; a complete one is in use until the next."""
-    tests = _static_tests(operator, space)
+    tests = _tests(operator, space)
 
     def extend(depth: int, binding: dict[Variable, Object]) -> Iterator[dict[Variable, Object]]:
         yield binding
@@ -85,21 +91,44 @@ def _bindings(operator: LiftedOperator, space: AtomSpace) -> Iterator[dict[Varia
             return
         variable = operator.parameters[depth]
         for obj in space.layout.of_type(variable.type):
-            if obj in binding.values():
-                continue
             binding[variable] = obj
-            if all(space.bit(atom.ground(binding)) & space.static_truth for atom in tests[depth]):
+            if all(test(binding) for test in tests[depth]):
                 yield from extend(depth + 1, binding)
             del binding[variable]
 
     return extend(0, {})
 
 
-def _static_tests(operator: LiftedOperator, space: AtomSpace) -> list[list[LiftedAtom]]:
-    """The static preconditions that become testable with each parameter."""
-    tests: list[list[LiftedAtom]] = [[] for _ in operator.parameters]
-    for atom in operator.preconditions:
-        if atom.predicate in space.static_predicates and tests:
-            bound = [operator.parameters.index(variable) for variable in atom.variables]
-            tests[max(bound, default=0)].append(atom)
+def _tests(operator: LiftedOperator, space: AtomSpace) -> list[list[_Test]]:
+    """What can be tested once each parameter is bound."""
+    tests: list[list[_Test]] = [[] for _ in operator.parameters]
+    position = operator.parameters.index
+    for one, other in operator.inequalities:
+        tests[max(position(one), position(other))].append(partial(_differ, one, other))
+    for atom in operator.preconditions | operator.add_effects:
+        if not atom.variables:
+            continue
+        depth = max(map(position, atom.variables))
+        if atom.predicate in space.static_predicates and atom in operator.preconditions:
+            tests[depth].append(partial(_holds, atom, space))
+        elif _may_coincide(atom.variables):
+            tests[depth].append(partial(_exists, atom, space))
     return tests
+
+
+def _differ(one: Variable, other: Variable, binding: Mapping[Variable, Object]) -> bool:
+    return binding[one] != binding[other]
+
+
+def _holds(atom: LiftedAtom, space: AtomSpace, binding: Mapping[Variable, Object]) -> bool:
+    ground = atom.ground(binding)
+    return space.has(ground) and bool(space.bit(ground) & space.static_truth)
+
+
+def _exists(atom: LiftedAtom, space: AtomSpace, binding: Mapping[Variable, Object]) -> bool:
+    return space.has(atom.ground(binding))
+
+
+def _may_coincide(variables: Sequence[Variable]) -> bool:
+    """Whether one object may stand for two of some variables."""
+    return any(one.type.overlaps(other.type) for one, other in combinations(variables, 2))

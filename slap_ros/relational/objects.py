@@ -38,7 +38,17 @@ class Type:
 
     def is_a(self, other: Type) -> bool:
         """Whether this type is ``other`` or descends from it."""
-        return self == other or (self.parent is not None and self.parent.is_a(other))
+        if self == other or (self.parent is not None and self.parent.is_a(other)):
+            return True
+        return other.includes(self)
+
+    def overlaps(self, other: Type) -> bool:
+        """Whether an object can be of both types."""
+        return self.is_a(other) or other.is_a(self)
+
+    def includes(self, other: Type) -> bool:
+        """Whether this type has ``other`` among its alternatives; a plain type has none."""
+        return self == other
 
     def __hash__(self) -> int:
         # As for objects: the name tells types apart, and types are looked up in every step.

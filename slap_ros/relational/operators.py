@@ -40,13 +40,26 @@ class LiftedAtom:
 
 @dataclass(frozen=True)
 class LiftedOperator:
-    """What an option needs and what it changes: PAR, PRE, EFF+, EFF-."""
+    """What an option needs and what it changes: PAR, PRE, EFF+, EFF-.
+
+    As in PDDL, one object may stand for several parameters, except for those that must differ.
+
+    Args:
+        name: Name of the operator.
+        parameters: Variables that objects are bound to.
+        preconditions: Atoms that must hold.
+        add_effects: Atoms that hold afterwards.
+        delete_effects: Atoms that no longer hold afterwards.
+        inequalities: Pairs of parameters that must stand for different objects, in the order of
+            the parameters; in PDDL ``(not (= ?a ?b))``.
+    """
 
     name: str
     parameters: tuple[Variable, ...]
     preconditions: frozenset[LiftedAtom]
     add_effects: frozenset[LiftedAtom]
     delete_effects: frozenset[LiftedAtom]
+    inequalities: tuple[tuple[Variable, Variable], ...] = ()
 
     def __post_init__(self) -> None:
         """Check that atoms use the operator's own parameters with the right types.
@@ -60,10 +73,6 @@ class LiftedOperator:
                     f"operator {self.name}: {atom} has {len(atom.variables)} arguments, "
                     f"{atom.predicate.name} takes {len(atom.predicate.types)}"
                 )
-            if len(set(atom.variables)) != len(atom.variables):
-                raise InvalidDomainError(
-                    f"operator {self.name}: {atom} relates a parameter to itself"
-                )
             for variable, wanted in zip(atom.variables, atom.predicate.types, strict=True):
                 if variable not in self.parameters:
                     raise InvalidDomainError(
@@ -74,6 +83,13 @@ class LiftedOperator:
                         f"operator {self.name}: {variable} in {atom} is a {variable.type}, "
                         f"{atom.predicate.name} wants a {wanted}"
                     )
+        for pair in self.inequalities:
+            if pair[0] == pair[1] or not set(pair) <= set(self.parameters):
+                names = " and ".join(map(str, pair))
+                raise InvalidDomainError(
+                    f"operator {self.name}: {names} cannot have to differ: give two of its "
+                    "parameters"
+                )
         if clash := self.add_effects & self.delete_effects:
             raise InvalidDomainError(
                 f"operator {self.name} both adds and deletes {', '.join(sorted(map(str, clash)))}"

@@ -20,14 +20,15 @@ from slap_ros.relational import (
 
 
 def operator_data(operator: LiftedOperator) -> dict[str, Any]:
-    """An operator as data that JSON can hold."""
+    """An operator as data that JSON can hold, with inequalities only where it has some."""
+    differing = [[one.name, other.name] for one, other in operator.inequalities]
     return {
         "name": operator.name,
         "parameters": [{"name": v.name, "type": v.type.name} for v in operator.parameters],
         "preconditions": _atoms_data(operator.preconditions),
         "delete_effects": _atoms_data(operator.delete_effects),
         "add_effects": _atoms_data(operator.add_effects),
-    }
+    } | ({"inequalities": differing} if differing else {})
 
 
 def _atoms_data(atoms: frozenset[LiftedAtom]) -> list[dict[str, Any]]:
@@ -78,6 +79,7 @@ def read_operator(data: Any, domain: Domain) -> LiftedOperator:
         atoms("preconditions"),
         atoms("add_effects"),
         atoms("delete_effects"),
+        tuple((variables[one], variables[other]) for one, other in data.get("inequalities", ())),
     )
 
 

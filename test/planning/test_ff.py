@@ -23,6 +23,7 @@ from slap_ros.planning.ff import find_operator_sequence
 from slap_ros.planning.options import Option, OptionKind
 from slap_ros.relational import GroundOperator, LiftedOperator, ground_operators
 from slap_ros.relational.pddl import parse_domain, parse_problem
+from slap_ros.relational.pddl.grounder import ground_task
 
 Task = tuple[int, int, list[GroundOperator]]  # start, goal, operators
 NOTHING: frozenset[Any] = frozenset()
@@ -260,6 +261,25 @@ def wide(parameters, predicate=1):
     )
 
 
+def filled(arguments):
+    """An operator that adds atoms of so many arguments."""
+    variables = " ".join(f"?x{i}" for i in range(arguments))
+    domain = f"""(define (domain filled) (:predicates (a {variables}) (b))
+      (:action go :parameters ({variables}) :precondition () :effect (and (a {variables}) (b))))"""
+    objects = " ".join(f"o{i}" for i in range(20))
+    return (
+        domain,
+        f"""(define (problem filled) (:domain filled) (:objects {objects})
+      (:init) (:goal (and (a {" ".join(["o1"] * arguments)}) (b))))""",
+    )
+
+
+def test_atoms_that_nothing_reaches_cost_nothing(tmp_path):
+    result = plan_files(tmp_path, wide(1, predicate=13))
+    assert result.exit_code == 0, result.stderr
+    assert "1 operators" in result.stderr
+
+
 def plan_files(tmp_path, texts, *options):
     for name, text in zip(("domain.pddl", "problem.pddl"), texts, strict=True):
         (tmp_path / name).write_text(text)
@@ -272,14 +292,14 @@ def plan_files(tmp_path, texts, *options):
     [
         (hanoi(14), "--effort 10"),
         (wide(13), "--effort 10"),
-        (wide(1, predicate=13), "fewer objects"),  # memory: no effort is of use
-        (wide(1, predicate=4), "fewer objects"),
+        (filled(4), "fewer objects"),  # memory: no effort is of use
     ],
-    ids=["hanoi", "operator", "predicate", "atoms"],
+    ids=["hanoi", "operator", "atoms"],
 )
 def test_planning_without_end_is_given_up_and_says_what_helps(tmp_path, monkeypatch, texts, advice):
-    monkeypatch.setattr("slap_ros.cli.plan_pddl.MAX_TESTS", 400_000)  # else ten seconds, or four
+    monkeypatch.setattr("slap_ros.cli.plan_pddl.MAX_TESTS", 400_000)  # else minutes
     monkeypatch.setattr("slap_ros.cli.plan_pddl.MAX_BINDINGS", 20_000)
+    monkeypatch.setattr("slap_ros.relational.pddl.grounder.MAX_ATOMS", 5_000)
     result = plan_files(tmp_path, texts)
     assert result.exit_code == ErrorCode.PLANNING_LIMIT, result.stderr
     assert advice in result.stderr
@@ -303,3 +323,7 @@ def test_the_limits_are_those_that_are_stated():
         ground_operators(stated.operators, space, max_bindings=1_000)
     whole = ground_operators(stated.operators, space)
     assert whole == ground_operators(stated.operators, space, max_bindings=10_000)
+    small = parse_problem(hanoi(6)[1], stated)
+    with pytest.raises(PlanningLimitError, match="more than 100 bindings"):
+        ground_task(stated, small, max_bindings=100)
+    assert ground_task(stated, small) == ground_task(stated, small, max_bindings=10_000)

@@ -229,7 +229,8 @@ def check_operator(
     _check_size(checker, tuple(variables.values()))
     if serious(checker.complaints):
         return None, checker.complaints
-    operator = LiftedOperator(name, tuple(variables.values()), before, added, deleted)
+    differ = tuple((variables[one], variables[other]) for one, other in draft.inequalities)
+    operator = LiftedOperator(name, tuple(variables.values()), before, added, deleted, differ)
     return operator, checker.complaints
 
 

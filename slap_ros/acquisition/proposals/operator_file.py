@@ -13,7 +13,7 @@ from slap_ros.acquisition.proposals.complaints import Complaint, serious
 from slap_ros.acquisition.proposals.drafts import check_operator
 from slap_ros.acquisition.proposals.problem import AcquisitionProblem
 from slap_ros.errors import InvalidParameterError, MalformedAnswerError, ProposalRejectedError
-from slap_ros.files import parse_json, read_text
+from slap_ros.files import parse_json, read_bytes
 from slap_ros.language.formats import (
     LABELS,
     AtomDraft,
@@ -23,6 +23,7 @@ from slap_ros.language.formats import (
 )
 from slap_ros.relational import LiftedAtom, LiftedOperator
 from slap_ros.relational.pddl import parse_domain
+from slap_ros.relational.pddl.tokens import decode
 
 _TITLE = re.compile(r"([A-Za-z][\w-]*)(\([^()]*\))?:?")  # Pick, Pick: or Pick(?peg):
 
@@ -42,7 +43,7 @@ def read_operators(path: Path, problem: AcquisitionProblem) -> tuple[LiftedOpera
         ProposalRejectedError: An operator is wrong by itself, with all complaints.
     """
     try:
-        text = read_text(path)
+        text = decode(read_bytes(path))
     except (OSError, UnicodeDecodeError) as error:
         raise InvalidParameterError(f"cannot read {path}: {error}") from error
     operators: list[LiftedOperator] = []
@@ -114,6 +115,7 @@ def _draft(operator: LiftedOperator) -> OperatorDraft:
         _atoms(operator.preconditions),
         _atoms(operator.delete_effects),
         _atoms(operator.add_effects),
+        tuple((one.name, other.name) for one, other in operator.inequalities),
     )
 
 

@@ -50,7 +50,7 @@ class AcquisitionProblem:
 
         Which predicates are static is taken from them, though: it is a fact about the world.
         """
-        static = domain.static_predicates if domain.operators else frozenset()
+        static = domain.static_predicates if domain.actions else frozenset()
         return cls(
             domain.name,
             domain.types,
@@ -92,7 +92,13 @@ class AcquisitionProblem:
     @cached_property
     def space(self) -> AtomSpace:
         """The ground atoms over the problem's objects; static ones are as they are at first."""
-        return AtomSpace(self.predicates, self.static, self.layout, self.init.__contains__)
+        return AtomSpace(
+            self.predicates,
+            self.static,
+            self.layout,
+            self.init.__contains__,
+            one_object_twice=self.start is None,  # as in PDDL
+        )
 
     @cached_property
     def start_mask(self) -> int:

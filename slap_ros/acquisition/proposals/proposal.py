@@ -12,7 +12,7 @@ from typing import Any
 from slap_ros.acquisition.proposals.problem import AcquisitionProblem
 from slap_ros.core import Domain
 from slap_ros.relational import LiftedOperator, RewardTemplate
-from slap_ros.relational.pddl import write_domain, write_problem
+from slap_ros.relational.pddl import with_different_objects, write_domain, write_problem
 from slap_ros.skills.operator_json import (
     operator_data,
     read_operator,
@@ -95,7 +95,10 @@ class Proposal:
         Raises:
             MalformedPddlError: A name that PDDL cannot hold, as an object's may be.
         """
-        domain = write_domain(self.problem, problem.types, problem.predicates, self.operators)
+        operators = self.operators
+        if problem.start is not None:  # a world, whose atoms relate different objects
+            operators = tuple(with_different_objects(operators))
+        domain = write_domain(self.problem, problem.types, problem.predicates, operators)
         init = sorted(problem.init, key=str)
         task = write_problem("task", self.problem, problem.layout.objects, init, problem.goal)
         return domain, task

@@ -397,10 +397,14 @@ def _same(one: LiftedOperator, other: LiftedOperator) -> bool:
 
 
 def _parts(operator: LiftedOperator, numbers: dict[Variable, int]) -> list[frozenset[object]]:
-    """PRE, EFF+ and EFF- with numbers for variables."""
+    """PRE, EFF+, EFF- and what must differ, with numbers for variables."""
+    differ = (frozenset((numbers[one], numbers[other])) for one, other in operator.inequalities)
     return [
-        frozenset((atom.predicate, tuple(numbers[v] for v in atom.variables)) for atom in atoms)
-        for atoms in (operator.preconditions, operator.add_effects, operator.delete_effects)
+        frozenset(differ),
+        *(
+            frozenset((atom.predicate, tuple(numbers[v] for v in atom.variables)) for atom in atoms)
+            for atoms in (operator.preconditions, operator.add_effects, operator.delete_effects)
+        ),
     ]
 
 

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations
 from types import MappingProxyType
 
 from slap_ros.domains.cluttered_drawer.blocking import SIDES
@@ -86,7 +87,7 @@ def _grasp(
     on: AtomPattern = ("On", block, D)
     free: AtomPattern = ("NotHolding", R, block)
     blocking: list[AtomPattern] = [(f"Blocking{side}", b, block) for side, b in blocked.items()]
-    return _operator(
+    operator = _operator(
         name,
         (R, block, *blocked.values(), D),
         [EMPTY, ready, on, free, *blocking, *((f"{side}Clear", block) for side in clear)],
@@ -98,6 +99,8 @@ def _grasp(
         ],
         [EMPTY, ready, on, free, *blocking],
     )
+    # One block can block two sides; then the other skills take it out.
+    return replace(operator, inequalities=tuple(combinations(blocked.values(), 2)))
 
 
 def _place_blocker(side: str) -> LiftedOperator:

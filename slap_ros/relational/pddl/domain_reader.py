@@ -1,37 +1,48 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""PDDL domains into the relational layer's own classes: STRIPS with types, nothing more.
-
-Where PDDL is laxer than the relational layer, ours holds: atoms relate different objects, and the
-parameters of an operator stand for different objects.
-"""
+"""PDDL domains: types, predicates and operators, with their names looked up."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from slap_ros.errors import InvalidDomainError, MalformedPddlError, UnknownPredicateError
-from slap_ros.relational.objects import Column, Type
-from slap_ros.relational.operators import LiftedAtom, LiftedOperator, Variable
-from slap_ros.relational.pddl.formulas import Formula, read_conjunction, read_effect
-from slap_ros.relational.pddl.names import OBJECT, Names, check_words
-from slap_ros.relational.pddl.sections import read_definition
-from slap_ros.relational.pddl.sexpr import (
-    MAX_DEPTH,
-    ListNode,
-    Node,
-    Word,
-    expect_list,
-    expect_word,
+from slap_ros.errors import (
+    InvalidDomainError,
+    MalformedPddlError,
+    UnknownObjectError,
+    UnknownPredicateError,
 )
-from slap_ros.relational.pddl.task import PddlDomain
-from slap_ros.relational.pddl.tokens import located
-from slap_ros.relational.pddl.typed_list import TypedName, read_names, read_variables
-from slap_ros.relational.predicates import Bools, Classifier, Predicate
+from slap_ros.relational.objects import Column, Object
+from slap_ros.relational.operators import Variable
+from slap_ros.relational.pddl.conditions import TRUE, Scope, read_condition
+from slap_ros.relational.pddl.effects import TOTAL_COST, EffectReader, read_literals
+from slap_ros.relational.pddl.names import Names, check_words
+from slap_ros.relational.pddl.sections import PddlDefinition, read_definition
+from slap_ros.relational.pddl.sexpr import ListNode, Node, Word, expect_list, expect_word
+from slap_ros.relational.pddl.task import Action, PddlDomain
+from slap_ros.relational.pddl.typed_list import (
+    TypedName,
+    read_names,
+    read_repeated_names,
+    read_signature,
+    read_variables,
+)
+from slap_ros.relational.pddl.types import TypeNames, make_types
+from slap_ros.relational.predicates import Bools, Classifier, GroundAtom, Predicate
 from slap_ros.relational.state import State
 
-_SECTIONS = (":requirements", ":types", ":predicates", ":action")
-_ACTION_PARTS = (":parameters", ":precondition", ":effect")
+_SECTIONS = (
+    ":requirements",
+    ":types",
+    ":constants",
+    ":predicates",
+    ":functions",
+    ":timeless",
+    ":action",
+)
+# What PDDL 1.2 calls :vars are parameters that follow from the others; a plan names them too.
+_ACTION_PARTS = (":parameters", ":vars", ":precondition", ":effect")
 
 
 def parse_domain(text: str, source: str = "<domain>") -> PddlDomain:
@@ -41,33 +52,48 @@ def parse_domain(text: str, source: str = "<domain>") -> PddlDomain:
     name or by leaving a parameter untyped; all types descend from it then.
 
     Args:
-        text: PDDL.
+        text: PDDL, which may have a problem besides.
         source: Where the text comes from, for messages.
 
     Raises:
-        MalformedPddlError: Not PDDL, or more than STRIPS with types.
+        MalformedPddlError: Not PDDL, or with derived predicates, numeric fluents other than costs,
+            durative actions, constraints or preferences.
         UnknownPredicateError: An operator uses a predicate that is not declared.
-        InvalidDomainError: The atoms of an operator do not fit its parameters or each other.
+        UnknownObjectError: An operator uses a constant that is not declared.
+        InvalidDomainError: The atoms of an operator do not fit its parameters.
     """
     definition = read_definition(text, source, "domain", _SECTIONS)
-    declared = read_names("type", definition.optional(":types"))
     signatures = [_read_signature(node) for node in definition.optional(":predicates")]
-    actions = [_read_action(listed) for listed in definition.sections.get(":action", [])]
+    actions = [_ActionText.of(listed) for listed in definition.sections.get(":action", [])]
+    functions = _read_functions(definition)
+    constants = read_names("constant", definition.optional(":constants"))
     check_words("predicate", (signature.name for signature in signatures))
     check_words("operator", (action.name for action in actions))
 
-    parameter_lists = [part.parameters for part in signatures]
-    parameter_lists += [part.parameters for part in actions]
-    uses_object = any(p.type.keyword == OBJECT for ps in parameter_lists for p in ps)
-    types = _make_types(declared, uses_object)
-    type_names = Names("type", types, MalformedPddlError)
+    lists = [signature.parameters for signature in signatures]
+    lists += [action.parameters for action in actions]
+    untyped = any(entry.is_untyped for entries in (*lists, constants) for entry in entries)
+    declared = read_repeated_names("type", definition.optional(":types"))
+    types = make_types(declared, untyped or any(action.has_quantifier for action in actions))
+    type_names = TypeNames(types)
     predicates = {s.name.text: _make_predicate(s, type_names) for s in signatures}
-    predicate_names = Names("predicate", predicates, UnknownPredicateError)
+    objects = {
+        entry.word.text: Object(entry.word.text, type_names.of(entry)) for entry in constants
+    }
+    scope = Scope(
+        type_names,
+        Names("predicate", predicates, UnknownPredicateError),
+        Names("object", objects, UnknownObjectError),
+        {},
+    )
     return PddlDomain(
         definition.name.text,
         tuple(types.values()),
         tuple(predicates.values()),
-        tuple(_make_operator(action, type_names, predicate_names) for action in actions),
+        tuple(_make_action(action, scope, functions) for action in actions),
+        tuple(objects.values()),
+        functions,
+        frozenset(_timeless(definition.optional(":timeless"), scope, objects)),
     )
 
 
@@ -75,48 +101,64 @@ def parse_domain(text: str, source: str = "<domain>") -> PddlDomain:
 
 
 @dataclass(frozen=True)
-class _PredicateDeclaration:
-    """A predicate as it is declared."""
+class _Declaration:
+    """A predicate or a function as it is declared."""
 
     name: Word
     parameters: list[TypedName]
 
 
 @dataclass(frozen=True)
-class _ActionDefinition:
+class _ActionText:
     """An operator as it is written."""
 
     name: Word
     parameters: list[TypedName]
-    preconditions: list[Formula]
-    add_effects: list[Formula]
-    delete_effects: list[Formula]
+    parts: dict[str, Node]
+
+    @classmethod
+    def of(cls, listed: ListNode) -> _ActionText:
+        if len(listed.items) < 2:
+            raise MalformedPddlError(f"{listed.position}: an action without a name")
+        name = expect_word(listed.items[1], "the name of an action")
+        parts = _action_parts(name, listed.items[2:])
+        nodes: list[Node] = []
+        for keyword in (":parameters", ":vars"):
+            nothing = ListNode((), name.position)
+            nodes += expect_list(parts.get(keyword, nothing), "a list of parameters").items
+        return cls(name, read_variables(nodes), parts)
+
+    @property
+    def has_quantifier(self) -> bool:
+        """Whether a condition or an effect is about all or some objects."""
+        return any(map(_has_quantifier, self.parts.values()))
 
 
-def _read_signature(node: Node) -> _PredicateDeclaration:
+def _has_quantifier(node: Node) -> bool:
+    if isinstance(node, Word):
+        return False
+    return node.head in ("forall", "exists") or any(map(_has_quantifier, node.items))
+
+
+def _read_signature(node: Node) -> _Declaration:
     listed = expect_list(node, "a predicate")
     if not listed.items:
         raise MalformedPddlError(f"{listed.position}: expected a predicate, found an empty list")
     name = expect_word(listed.items[0], "the name of a predicate")
-    return _PredicateDeclaration(name, read_variables(listed.items[1:]))
+    return _Declaration(name, read_signature(listed.items[1:]))
 
 
-def _read_action(listed: ListNode) -> _ActionDefinition:
-    if len(listed.items) < 2:
-        raise MalformedPddlError(f"{listed.position}: an action without a name")
-    name = expect_word(listed.items[1], "the name of an action")
-    parts = _action_parts(name, listed.items[2:])
-    if ":parameters" not in parts:
-        raise MalformedPddlError(f"{name.position}: action {name.text} has no :parameters")
-    nothing = ListNode((), name.position)
-    add_effects, delete_effects = read_effect(parts.get(":effect", nothing))
-    return _ActionDefinition(
-        name,
-        read_variables(expect_list(parts[":parameters"], "a list of parameters").items),
-        read_conjunction(parts.get(":precondition", nothing)),
-        add_effects,
-        delete_effects,
-    )
+def _read_functions(definition: PddlDefinition) -> dict[str, int]:
+    """Numbers of arguments by the name of a function; what type its values have means nothing."""
+    found: dict[str, int] = {}
+    for node in definition.optional(":functions"):
+        if isinstance(node, ListNode):
+            signature = _read_signature(node)
+            found[signature.name.keyword] = len(signature.parameters)
+    if found.get(TOTAL_COST):
+        place = definition.sections[":functions"][0].position
+        raise MalformedPddlError(f"{place}: ({TOTAL_COST}) takes no objects")
+    return found
 
 
 def _action_parts(name: Word, nodes: tuple[Node, ...]) -> dict[str, Node]:
@@ -140,38 +182,9 @@ def _action_parts(name: Word, nodes: tuple[Node, ...]) -> dict[str, Node]:
 # -- the relational layer's classes ---------------------------------------------------------------
 
 
-def _make_types(declared: list[TypedName], with_object: bool) -> dict[str, Type]:
-    """The types by name: ``object`` first where it is wanted, then the declared ones in order."""
-    for entry in declared:
-        if entry.word.keyword == OBJECT and entry.type.keyword != OBJECT:
-            raise MalformedPddlError(f"{entry.word.position}: type {OBJECT!r} cannot have a parent")
-    entries = {entry.word.text: entry for entry in declared if entry.word.keyword != OBJECT}
-    names = Names("type", entries, MalformedPddlError)
-    root = Type(OBJECT) if with_object else None
-    built: dict[str, Type] = {}
-
-    def build(entry: TypedName, below: tuple[str, ...]) -> Type:
-        name, position = entry.word.text, entry.word.position
-        if name in below:
-            raise MalformedPddlError(f"{position}: type {name} descends from itself")
-        if len(below) > MAX_DEPTH:
-            raise MalformedPddlError(f"{position}: more than {MAX_DEPTH} types below {name}")
-        if name not in built:
-            is_root = entry.type.keyword == OBJECT
-            built[name] = Type(
-                name, parent=root if is_root else build(names.find(entry.type), (*below, name))
-            )
-        return built[name]
-
-    types = {OBJECT: root} if root else {}
-    return types | {name: build(entry, ()) for name, entry in entries.items()}
-
-
-def _make_predicate(signature: _PredicateDeclaration, types: Names[Type]) -> Predicate:
+def _make_predicate(signature: _Declaration, types: TypeNames) -> Predicate:
     name = signature.name.text
-    return Predicate(
-        name, tuple(types.find(entry.type) for entry in signature.parameters), _no_classifier(name)
-    )
+    return Predicate(name, tuple(map(types.of, signature.parameters)), _no_classifier(name))
 
 
 def _no_classifier(name: str) -> Classifier:
@@ -184,24 +197,33 @@ def _no_classifier(name: str) -> Classifier:
     return classifier
 
 
-def _make_operator(
-    action: _ActionDefinition, types: Names[Type], predicates: Names[Predicate]
-) -> LiftedOperator:
-    name = action.name.text
-    parameters = tuple(Variable(p.word.text, types.find(p.type)) for p in action.parameters)
-    variables = Names("parameter", {v.name: v for v in parameters}, MalformedPddlError)
+def _make_action(text: _ActionText, scope: Scope, functions: dict[str, int]) -> Action:
+    name = text.name.text
+    parameters = tuple(Variable(p.word.text, scope.types.of(p)) for p in text.parameters)
+    inside = Scope(
+        scope.types, scope.predicates, scope.objects, {v.name: v for v in parameters}, name
+    )
+    condition = text.parts.get(":precondition")
+    before = TRUE if condition is None else read_condition(condition, inside)
+    reader = EffectReader(inside, functions)
+    if ":effect" in text.parts:
+        reader.read(text.parts[":effect"])
+    return Action(
+        name,
+        parameters,
+        before,
+        tuple(reader.effects),
+        tuple(reader.costs),
+        text.name.position,
+    )
 
-    def atom(formula: Formula) -> LiftedAtom:
-        lifted = LiftedAtom(
-            predicates.find(formula.predicate),
-            tuple(variables.find(word) for word in formula.arguments),
-        )
-        with located(formula.position):  # an operator checks its atoms, but knows no positions
-            LiftedOperator(name, parameters, frozenset({lifted}), frozenset(), frozenset())
-        return lifted
 
-    preconditions = frozenset(map(atom, action.preconditions))
-    add_effects = frozenset(map(atom, action.add_effects))
-    delete_effects = frozenset(map(atom, action.delete_effects))
-    with located(action.name.position):
-        return LiftedOperator(name, parameters, preconditions, add_effects, delete_effects)
+def _timeless(
+    nodes: Iterable[Node], scope: Scope, constants: Mapping[str, Object]
+) -> Iterator[GroundAtom]:
+    for node in nodes:
+        for position, literal in read_literals(node, scope):
+            if not literal.positive:
+                raise MalformedPddlError(f"{position}: what always holds is an atom")
+            objects = tuple(constants[term] for term in literal.terms)
+            yield GroundAtom(literal.predicate, objects)

@@ -36,6 +36,8 @@ UNSUPPORTED = {
 }
 RESERVED = frozenset({"and", "define", *UNSUPPORTED})
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+# Of objects and problems, which others number and date: 1st, p5.1, 2004-07-01.
+_FREE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.+*/@#-]*")
 
 T = TypeVar("T")
 
@@ -52,6 +54,16 @@ def check_name(kind: str, name: str) -> None:
         )
     if name.lower() in RESERVED:
         raise MalformedPddlError(f"{name!r} cannot name a {kind}: PDDL reserves the word")
+
+
+def check_free_name(kind: str, name: str) -> None:
+    """Refuse what is no name of an object or a problem, even in files that others write.
+
+    Raises:
+        MalformedPddlError: Says what is wrong with it.
+    """
+    if not _FREE_NAME.fullmatch(name) or name.lower() in RESERVED:
+        check_name(kind, name)
 
 
 def check_new_name(kind: str, name: str, taken: set[str]) -> None:

@@ -4,22 +4,45 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 from slap_ros.errors import MalformedPddlError
-from slap_ros.relational.pddl.names import check_name
-from slap_ros.relational.pddl.sexpr import ListNode, Node, Word, expect_list, expect_word, read_list
+from slap_ros.relational.pddl.names import check_free_name, check_name
+from slap_ros.relational.pddl.sexpr import (
+    ListNode,
+    Node,
+    Word,
+    expect_list,
+    expect_word,
+    read_lists,
+)
 from slap_ros.relational.pddl.tokens import located
 
-REQUIREMENTS = (":strips", ":typing")
+REQUIREMENTS = (":strips", ":typing")  # of what is written, where nothing else is needed
+DIFFERING = (":negative-preconditions", ":equality")  # of parameters that must differ
+# Requirements that may be stated. Where one of those at the end is really used, that is refused.
+_KNOWN = frozenset(
+    re.findall(
+        r"\S+",
+        """
+        :strips :typing :negative-preconditions :disjunctive-preconditions :equality
+        :existential-preconditions :universal-preconditions :quantified-preconditions
+        :conditional-effects :adl :ucpop :action-costs :domain-axioms :safety-constraints
+        :expression-evaluation :subgoal-through-axioms :true-negation :fluents :numeric-fluents
+        :goal-utilities :preferences :constraints :derived-predicates :durative-actions
+        :duration-inequalities :continuous-effects :timed-initial-literals
+        """,
+    )
+)
 _UNSUPPORTED = {
-    ":constants": "constants",
-    ":functions": "numeric fluents",
     ":derived": "derived predicates",
+    ":axiom": "derived predicates",
     ":durative-action": "durative actions",
+    ":process": "durative actions",
+    ":event": "durative actions",
     ":constraints": "constraints",
-    ":metric": "plan metrics",
 }
 
 
@@ -71,7 +94,7 @@ def read_definition(text: str, source: str, kind: str, keywords: Collection[str]
     Raises:
         MalformedPddlError: No such definition, or with a section or requirement unknown to us.
     """
-    listed = read_list(text, source)
+    listed = _definition_of(kind, read_lists(text, source))
     title = listed.items[1] if len(listed.items) > 1 else None
     if listed.head != "define" or not isinstance(title, ListNode) or title.head != kind:
         raise MalformedPddlError(f"{listed.position}: expected (define ({kind} NAME) ...)")
@@ -79,7 +102,7 @@ def read_definition(text: str, source: str, kind: str, keywords: Collection[str]
         raise MalformedPddlError(f"{title.position}: expected ({kind} NAME)")
     name = expect_word(title.items[1], f"the name of the {kind}")
     with located(name.position):
-        check_name(kind, name.text)
+        (check_name if kind == "domain" else check_free_name)(kind, name.text)
     sections: dict[str, list[ListNode]] = {}
     for node in listed.items[2:]:
         section = expect_list(node, "a section")
@@ -88,6 +111,28 @@ def read_definition(text: str, source: str, kind: str, keywords: Collection[str]
     definition = PddlDefinition(name, sections)
     _check_requirements(definition.optional(":requirements"))
     return definition
+
+
+def _definition_of(kind: str, lists: list[ListNode]) -> ListNode:
+    """The definition of a kind, in a text that may have one of the other kind as well.
+
+    Raises:
+        MalformedPddlError: There is something besides definitions, or several of the kind.
+    """
+    if len(lists) == 1:
+        return lists[0]
+    for listed in lists[1:]:
+        if listed.head != "define":
+            raise MalformedPddlError(f"{listed.position}: the text should end before {listed}")
+    found = [listed for listed in lists if _kind_of(listed) == kind]
+    if len(found) > 1:
+        raise MalformedPddlError(f"{found[1].position}: a second {kind}")
+    return found[0] if found else lists[0]
+
+
+def _kind_of(listed: ListNode) -> str:
+    title = listed.items[1] if len(listed.items) > 1 else None
+    return title.head if isinstance(title, ListNode) else ""
 
 
 def _check_section(section: ListNode, keywords: Collection[str]) -> None:
@@ -103,8 +148,5 @@ def _check_section(section: ListNode, keywords: Collection[str]) -> None:
 def _check_requirements(nodes: Iterable[Node]) -> None:
     for node in nodes:
         word = expect_word(node, "a requirement")
-        if word.keyword not in REQUIREMENTS:
-            raise MalformedPddlError(
-                f"{word.position}: requirement {word.text} is not supported; "
-                f"there are {' '.join(REQUIREMENTS)}"
-            )
+        if word.keyword not in _KNOWN:
+            raise MalformedPddlError(f"{word.position}: requirement {word.text} is not supported")

@@ -54,6 +54,18 @@ def read_list(text: str, source: str) -> ListNode:
     Raises:
         MalformedPddlError: Parentheses do not match, or there is nothing or more than one list.
     """
+    first, *others = read_lists(text, source)
+    if others:
+        raise MalformedPddlError(f"{others[0].position}: the text should end before {others[0]}")
+    return first
+
+
+def read_lists(text: str, source: str) -> list[ListNode]:
+    """The lists that a text consists of, at least one.
+
+    Raises:
+        MalformedPddlError: Parentheses do not match, or there is nothing, or a word outside.
+    """
     starts: list[Position] = []  # of the lists that are still open
     levels: list[list[Node]] = [[]]  # what they hold so far; the text itself is the outermost
     for token in tokenise(text, source):
@@ -71,15 +83,16 @@ def read_list(text: str, source: str) -> ListNode:
             levels[-1].append(Word(token.text, token.position))
     if starts:
         raise MalformedPddlError(f"{starts[-1]}: '(' is never closed")
-    return _only(levels[0], Position(source, 1, 1))
-
-
-def _only(nodes: list[Node], start: Position) -> ListNode:
-    if not nodes:
+    if not levels[0]:
+        start = Position(source, 1, 1)
         raise MalformedPddlError(f"{start}: there is nothing but blanks and comments")
-    if len(nodes) > 1 and isinstance(nodes[0], ListNode):
-        raise MalformedPddlError(f"{nodes[1].position}: the text should end before {nodes[1]}")
-    return expect_list(nodes[0], "'('")
+    first, *others = levels[0]
+    found = [expect_list(first, "'('")]
+    for node in others:
+        if isinstance(node, Word):
+            raise MalformedPddlError(f"{node.position}: the text should end before {node}")
+        found.append(node)
+    return found
 
 
 def expect_word(node: Node, what: str) -> Word:

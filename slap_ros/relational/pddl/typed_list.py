@@ -8,17 +8,22 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from slap_ros.errors import MalformedPddlError
-from slap_ros.relational.pddl.names import OBJECT, UNSUPPORTED, bare_variable, check_words
+from slap_ros.relational.pddl.names import OBJECT, bare_variable, check_words
 from slap_ros.relational.pddl.sexpr import ListNode, Node, Word, expect_word
 from slap_ros.relational.pddl.tokens import located
 
 
 @dataclass(frozen=True)
 class TypedName:
-    """A name and the name of its type."""
+    """A name and the names of its types: several where the text has ``either``."""
 
     word: Word
-    type: Word  # OBJECT where the text says nothing
+    types: tuple[Word, ...]  # OBJECT where the text says nothing
+
+    @property
+    def is_untyped(self) -> bool:
+        """Whether its type is ``object``, said or not."""
+        return any(word.keyword == OBJECT for word in self.types)
 
 
 def read_names(kind: str, nodes: Iterable[Node]) -> list[TypedName]:
@@ -27,9 +32,14 @@ def read_names(kind: str, nodes: Iterable[Node]) -> list[TypedName]:
     Raises:
         MalformedPddlError: With the position of the word at fault.
     """
-    found = _read(kind, nodes)
+    found = read_repeated_names(kind, nodes)
     check_words(kind, (entry.word for entry in found))
     return found
+
+
+def read_repeated_names(kind: str, nodes: Iterable[Node]) -> list[TypedName]:
+    """A typed list of names, any of which may occur again."""
+    return _read(kind, nodes)
 
 
 def read_variables(nodes: Iterable[Node]) -> list[TypedName]:
@@ -40,6 +50,18 @@ def read_variables(nodes: Iterable[Node]) -> list[TypedName]:
     """
     found = _read("variable", nodes)
     check_words("variable", (_bare(entry.word) for entry in found))
+    return found
+
+
+def read_signature(nodes: Iterable[Node]) -> list[TypedName]:
+    """The variables of a declaration, where only types matter: a name may occur again.
+
+    Raises:
+        MalformedPddlError: With the position of the word at fault.
+    """
+    found = _read("variable", nodes)
+    for entry in found:
+        check_words("variable", [_bare(entry.word)])
     return found
 
 
@@ -55,20 +77,23 @@ def _read(kind: str, nodes: Iterable[Node]) -> list[TypedName]:
     for node in remaining:
         word = expect_word(node, f"the name of a {kind}")
         if word.text != "-":
-            found.append(TypedName(word, Word(OBJECT, word.position)))
+            found.append(TypedName(word, (Word(OBJECT, word.position),)))
             untyped += 1
             continue
         if not untyped:
             raise MalformedPddlError(f"{word.position}: nothing stands before '-'")
-        type_word = _type_name(next(remaining, None), word)
-        found[-untyped:] = [replace(entry, type=type_word) for entry in found[-untyped:]]
+        types = _type_names(next(remaining, None), word)
+        found[-untyped:] = [replace(entry, types=types) for entry in found[-untyped:]]
         untyped = 0
     return found
 
 
-def _type_name(node: Node | None, dash: Word) -> Word:
+def _type_names(node: Node | None, dash: Word) -> tuple[Word, ...]:
     if node is None:
         raise MalformedPddlError(f"{dash.position}: the name of a type is missing after '-'")
-    if isinstance(node, ListNode) and node.head in UNSUPPORTED:
-        raise MalformedPddlError(f"{node.position}: {UNSUPPORTED[node.head]} are not supported")
-    return expect_word(node, "the name of a type")
+    if isinstance(node, ListNode) and node.head == "either":
+        words = tuple(expect_word(item, "the name of a type") for item in node.items[1:])
+        if not words:
+            raise MalformedPddlError(f"{node.position}: 'either' names no type")
+        return words
+    return (expect_word(node, "the name of a type"),)

@@ -1,20 +1,19 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The relational layer's classes as PDDL text: STRIPS with types.
-
-PDDL lets two parameters of an operator stand for one object, where the relational layer binds
-them to different ones. An operator for which this matters has to say so by a precondition.
-"""
+"""The relational layer's classes as PDDL text: STRIPS with types, and parameters that differ."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
+from dataclasses import replace
+from itertools import combinations, permutations
 
 from slap_ros.errors import InvalidDomainError, UnknownObjectError
 from slap_ros.relational.objects import Object, Type
 from slap_ros.relational.operators import LiftedAtom, LiftedOperator, Variable
 from slap_ros.relational.pddl.names import OBJECT, bare_variable, check_name, check_new_name
-from slap_ros.relational.pddl.sections import REQUIREMENTS
+from slap_ros.relational.pddl.sections import DIFFERING, REQUIREMENTS
+from slap_ros.relational.pddl.types import EitherType
 from slap_ros.relational.predicates import GroundAtom, Predicate
 
 
@@ -43,13 +42,40 @@ def write_domain(
     _check_distinct("predicate", (predicate.name for predicate in predicates))
     _check_distinct("operator", (operator.name for operator in operators))
     _check_types(types)
+    differing = any(operator.inequalities for operator in operators)
     sections = [
-        f"(:requirements {' '.join(REQUIREMENTS)})",
+        f"(:requirements {' '.join((*REQUIREMENTS, *(DIFFERING if differing else ())))})",
         _block(":types", _typed((kind.name, kind.parent) for kind in types if kind.name != OBJECT)),
         _block(":predicates", [_signature(predicate, types) for predicate in predicates]),
         *(_action(operator, types, predicates) for operator in operators),
     ]
     return _definition(f"(domain {name})", sections)
+
+
+def with_different_objects(operators: Iterable[LiftedOperator]) -> list[LiftedOperator]:
+    """The operators of a domain with a world, as PDDL has to be told what they mean.
+
+    Atoms of such a domain relate different objects, so parameters of one atom that is needed or
+    added stand for different objects. PDDL has atoms of one object twice.
+
+    Args:
+        operators: Operators in the domain's own words.
+    """
+    return [replace(operator, inequalities=_different(operator)) for operator in operators]
+
+
+def _different(operator: LiftedOperator) -> tuple[tuple[Variable, Variable], ...]:
+    related = {
+        pair
+        for atom in operator.preconditions | operator.add_effects
+        for pair in permutations(atom.variables, 2)
+    }
+    return tuple(
+        (one, other)
+        for one, other in combinations(operator.parameters, 2)
+        if (one, other) in operator.inequalities
+        or ((one, other) in related and one.type.overlaps(other.type))
+    )
 
 
 def write_problem(
@@ -116,7 +142,10 @@ def _check_types(types: Sequence[Type]) -> None:
 def _check_known(
     used: Type | Predicate, known: Sequence[Type] | Sequence[Predicate], where: str
 ) -> None:
-    if used not in known:
+    if isinstance(used, EitherType):
+        for kind in used.alternatives:
+            _check_known(kind, known, where)
+    elif used not in known:
         raise InvalidDomainError(
             f"{where} uses {used}, which is not among those given: {', '.join(map(str, known))}"
         )
@@ -142,10 +171,11 @@ def _action(
         _check_known(atom.predicate, predicates, f"operator {operator}")
     effects = [*_atoms(operator.add_effects)]
     effects += [f"(not {atom})" for atom in _atoms(operator.delete_effects)]
+    differ = [f"(not (= {one} {other}))" for one, other in operator.inequalities]
     lines = [
         f"(:action {operator.name}",
         f"  :parameters ({' '.join(_typed((v.name, v.type) for v in operator.parameters))})",
-        f"  :precondition {_indent(_block('and', _atoms(operator.preconditions)))}",
+        f"  :precondition {_indent(_block('and', [*_atoms(operator.preconditions), *differ]))}",
         f"  :effect {_indent(_block('and', effects))})",
     ]
     return "\n".join(lines)
