@@ -29,7 +29,8 @@ from slap_ros.messages.interfaces import PACKAGE, definition, message_texts, typ
 IDL_SEPARATOR = "=" * 80 + "\n"
 # With those of nested types, and constants; an array of fixed length counts as many fields as it
 # has texts or messages, since a program is generated that reads them one after the other.
-MAX_DEFINITION_FIELDS = 5_000
+# The compiler of Python takes 2 ms for a field, and much more in longer programs.
+MAX_DEFINITION_FIELDS = 2_000
 MAX_DEFINITION_CHARACTERS = 2**20
 MAX_BAG_FIELDS = 10_000  # of all definitions of a bag that are not ours,
 FIELDS_PER_DEFINITION = 10  # each of which takes as long as so many fields

@@ -14,7 +14,7 @@ from pathlib import Path
 from slap_ros.errors import DamagedBagError
 
 MAX_RECORD_BYTES = 256 * 2**20  # of a record or message, and of a chunk uncompressed
-# Recordings of the shipped domains shrink to a ninth to a twentieth of their size by zstd.
+# Recordings of the shipped domains shrink to a tenth to a thirteenth of their size by zstd.
 MAX_GROWTH = 50  # bytes unpacked per byte on the disk,
 FREE_BYTES = 64 * 2**20  # beside so many, in which small bags may be as regular as they like
 

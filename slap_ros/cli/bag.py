@@ -191,7 +191,16 @@ def export(
 
 
 def replay_in_world(bag: Path, namespace: str | None, json: bool) -> int:
-    """Replay a bag in a fresh world and print how it compares; the exit code."""
+    """Replay a bag in a fresh world and print how it compares.
+
+    Args:
+        bag: Folder of the bag, or a single file of it.
+        namespace: Namespace of an ensemble; None for all ensembles.
+        json: Whether to print JSON.
+
+    Returns:
+        The exit code.
+    """
     result = replay_bag(bag, namespace)
     if json:
         print_json(asdict(result) | {"identical": result.identical})

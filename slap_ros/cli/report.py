@@ -35,12 +35,15 @@ def report(
 
 
 def write_report(bags: Sequence[Path], output: Path, namespace: str | None = None) -> int:
-    """Write a page; the exit code, as ``slap bag evaluate`` has it for the same bags.
+    """Write a page about the runs in bags.
 
     Args:
         bags: Folders of the bags, or single files.
         output: Page to write.
         namespace: Namespace of an ensemble; None for all ensembles.
+
+    Returns:
+        The exit code, as ``slap bag evaluate`` has it for the same bags.
 
     Raises:
         SlapError: A bag cannot be read, or the page not be written; there is no page then.

@@ -179,7 +179,7 @@ ODD = "=" * 80 + "\nMSG: odd/Inner\nuint8 a\n"
         "string[2000000000] a\n",
         "string<=5[2000000000] a\n",
         "odd/Inner[2000000000] a\n" + ODD,
-        "".join(f"string[500] a{i}\n" for i in range(100)),
+        "".join(f"string[50] a{i}\n" for i in range(100)),
         "odd/Inner[10] a\n" + ODD + "odd/Inner2[6000] b\n" + ODD.replace("Inner", "Inner2"),
         "int32[0] a\n",
     ],

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import pytest
 from damage import DAMAGES
-from rosbags.rosbag2 import StoragePlugin, Writer
-from truthful_run import Script, record
+from marks import slow
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from truthful_run import Script, record, under
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
@@ -81,8 +82,11 @@ def script():
     return script
 
 
-def with_sqlite(path, messages):
-    with Writer(path, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+def with_sqlite(path, messages, compression=None):
+    writer = Writer(path, version=9, storage_plugin=StoragePlugin.SQLITE3)
+    if compression is not None:
+        writer.set_compression(compression, CompressionFormat.ZSTD)
+    with writer:
         connections = {}
         for item in messages:
             if item.topic not in connections:
@@ -93,6 +97,18 @@ def with_sqlite(path, messages):
                     rihs01=typestore().hash_rihs01(item.type_name),
                 )
             writer.write(connections[item.topic], item.stamp_ns, item.cdr)
+
+
+def with_compressed_messages(path, messages):
+    with_sqlite(path, messages, CompressionMode.MESSAGE)
+
+
+def with_compressed_files(path, messages):
+    with_sqlite(path, messages, CompressionMode.FILE)
+
+
+def of_two_ensembles(path, messages):
+    record(path, [*messages, *under("robot1", messages)])
 
 
 def page(bag):
@@ -116,8 +132,14 @@ def told(bag, tool):
 
 @pytest.mark.parametrize(
     ("write", "name"),
-    [(record, "bag_0.mcap"), (record, "metadata.yaml"), (with_sqlite, "bag.db3")],
-    ids=["mcap", "metadata", "sqlite"],
+    [
+        (record, "bag_0.mcap"),
+        (record, "metadata.yaml"),
+        (with_sqlite, "bag.db3"),
+        (with_compressed_files, "bag.db3.zstd"),
+        *slow((with_compressed_messages, "bag.db3"), (of_two_ensembles, "bag_0.mcap")),
+    ],
+    ids=["mcap", "metadata", "sqlite", "files", "messages", "ensembles"],
 )
 def test_a_damaged_bag_is_told_as_far_as_it_goes(script, tmp_path, write, name, count):
     bag = tmp_path / "bag"
@@ -132,7 +154,7 @@ def test_a_damaged_bag_is_told_as_far_as_it_goes(script, tmp_path, write, name, 
         except SlapError as error:
             assert refused(error)
             continue
-        if name != "bag.db3":  # which has no checksums
+        if write is record:  # a database has no checksums
             assert found == whole[: len(found)], case
     assert incomplete
 
