@@ -20,7 +20,7 @@ def require_known(what: str, name: str, known: Sequence[str]) -> None:
     Args:
         what: Word for what has the name, such as ``proposer``.
         name: Name that was given.
-        known: Names that there are.
+        known: Names that are accepted.
 
     Raises:
         InvalidParameterError: It lists them.
