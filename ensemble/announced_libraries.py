@@ -15,7 +15,6 @@ from pathlib import Path
 from slap_msgs.msg import SkillLibrary
 
 from slap_ros.errors import InvalidLibraryError
-from slap_ros.skills.skill_library import read_library_record
 
 KEPT = 32  # folders: those that were announced last
 
@@ -82,6 +81,8 @@ class AnnouncedLibraries:
 
 
 def _require_library(folder: Path, domain: str) -> None:
+    from slap_ros.skills.skill_library import read_library_record  # only where one is announced
+
     found = read_library_record(folder)["domain"]
     if found != domain:
         raise InvalidLibraryError(f"{folder}: skills of domain {found!r}, not of {domain!r}")

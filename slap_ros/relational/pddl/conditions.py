@@ -147,7 +147,8 @@ class Scope:
         """The atom that a list consists of.
 
         Raises:
-            SlapError: It is none, or does not fit its predicate.
+            MalformedPddlError: It is not an atom.
+            SlapError: It does not fit its predicate.
         """
         if not listed.items:
             raise MalformedPddlError(f"{listed.position}: expected an atom, found an empty list")
