@@ -13,9 +13,7 @@ from pathlib import Path
 import pytest
 from rclpy.logging import LoggingSeverity, set_logger_level
 
-sys.path.insert(0, str(Path(__file__).parent))  # for the helpers of all tests
-
-import leftovers
+from support import leftovers
 
 # Apart from those of embedded_ros' own tests, and below the ports that the kernel gives to anybody.
 DOMAIN_IDS = range(2, 60)

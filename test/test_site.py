@@ -11,7 +11,8 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import pytest
-from made_once import made_once
+
+from support.made_once import made_once
 
 pytest.importorskip("material")
 pytest.importorskip("mkdocstrings")

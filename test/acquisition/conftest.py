@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Iterator
 from contextlib import nullcontext
 from pathlib import Path
@@ -17,7 +16,6 @@ from slap_ros.domains import forget_domains
 from slap_ros.learning.workers import SequentialWorkers
 
 HERE = Path(__file__).parent
-sys.path[:0] = [str(HERE), str(HERE.parent / "language")]
 
 
 @pytest.fixture(autouse=True)
@@ -36,8 +34,10 @@ def points_installed(
     information = tmp_path_factory.mktemp("site") / "points-1.0.dist-info"
     information.mkdir()
     (information / "METADATA").write_text("Name: points\nVersion: 1.0\n")
-    (information / "entry_points.txt").write_text("[slap_ros.domains]\npoints = points:make\n")
-    folders = [str(information.parent), str(HERE)]
+    (information / "entry_points.txt").write_text(
+        "[slap_ros.domains]\npoints = support.points:make\n"
+    )
+    folders = [str(information.parent), str(HERE.parent)]
     monkeypatch.syspath_prepend(folders[0])
     before = filter(None, [os.environ.get("PYTHONPATH")])
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([*folders, *before]))

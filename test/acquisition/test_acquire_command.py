@@ -7,15 +7,15 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from model_answers import good_script
-from points import PICK, POINTS, PUT
-from scripted_server import serving
 from typer.testing import CliRunner
 
 from slap_ros.acquisition.proposals.problem import AcquisitionProblem
 from slap_ros.cli import app
 from slap_ros.cli.acquire import why_left
 from slap_ros.errors import ErrorCode
+from support.model_answers import good_script
+from support.points import PICK, POINTS, PUT
+from support.scripted_server import serving
 
 pytestmark = pytest.mark.usefixtures("points_installed")
 SMALL = [
@@ -102,7 +102,7 @@ def test_what_a_script_said_is_never_taken_for_a_models(tmp_path, in_this_proces
         (["points", "--goal", "nope"], "no goal 'nope'"),
         (["points", "--steps", "10"], "a skill is judged after 480; give more --steps"),
         (["points", "--settings", "huge"], "unknown settings 'huge'"),
-        (["points", "--set", "sac.nonsense=1"], "unknown setting 'sac.gamma'"),
+        (["points", "--set", "sac.nonsense=1"], "unknown setting 'sac.nonsense'"),
         (["points", "--proposer", "oracle"], "--proposer 'oracle'"),
         (["points", "--rewarder", "none"], "--rewarder 'none'"),
         (["points", "--demonstrations", "3"], "are for --proposer induced"),

@@ -12,21 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from asking import (
-    BRIEF,
-    LEARNED,
-    LIMIT,
-    acquire,
-    asking,
-    begin_again,
-    planner_parameters,
-    send,
-    solve,
-)
-from marks import slow
-from points import POINTS
 from slap_msgs.msg import AcquisitionEvent, GroundAtom
-from steady_skills import PICKING, write_library
 
 from ensemble.launcher import ProcessLauncher
 from slap_ros.bags import evaluate_bag, read_bag, replay_bag
@@ -38,6 +24,20 @@ from slap_ros.relational.pddl import parse_domain
 from slap_ros.report.content import read_report
 from slap_ros.report.page import render
 from slap_ros.skills.skill_library import load_skill_library
+from support.asking import (
+    BRIEF,
+    LEARNED,
+    LIMIT,
+    acquire,
+    asking,
+    begin_again,
+    planner_parameters,
+    send,
+    solve,
+)
+from support.marks import slow
+from support.points import POINTS
+from support.steady_skills import PICKING, write_library
 
 pytestmark = pytest.mark.usefixtures("points_installed")
 

@@ -10,8 +10,6 @@ from dataclasses import replace
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from points import LOOSE, POINTS, PUT
-from steady_skills import PICKING, PUTTING, towards, write_library
 from typer.testing import CliRunner
 
 from ensemble import encode
@@ -40,6 +38,8 @@ from slap_ros.policies import shipped_models
 from slap_ros.report import read_report
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.skills.skill_library import SKILL
+from support.points import LOOSE, POINTS, PUT
+from support.steady_skills import PICKING, PUTTING, towards, write_library
 
 SHARED = HealthCheck.function_scoped_fixture  # the library, which nothing changes
 LIMIT_S = 120.0  # far more than anything here takes

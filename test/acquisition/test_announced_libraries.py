@@ -11,7 +11,6 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from slap_msgs.msg import DomainInfo, SkillLibrary
 from slap_msgs.srv import ResetTask
-from steady_skills import PICKING, PUTTING, write_library
 
 from ensemble.announced_libraries import KEPT, AnnouncedLibraries
 from ensemble.common_parameters import CommonParameters
@@ -22,6 +21,7 @@ from sim_node.node import SimNode
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.skills.skill_library import SKILL
+from support.steady_skills import PICKING, PUTTING, write_library
 
 LIMIT = 60.0  # s, far more than anything here takes
 pytestmark = pytest.mark.usefixtures("points_installed")

@@ -10,16 +10,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from model_answers import operator_data
-from paper_problems import (
-    ALL,
-    METRICS,
-    Printed,
-    make_coffee,
-    peg_in_hole,
-    printed_insert,
-    stow_hammer,
-)
 
 from slap_ros.acquisition.proposals.complaints import (
     REWARD_ERROR_GROUPS,
@@ -37,6 +27,16 @@ from slap_ros.errors import ProposalRejectedError
 from slap_ros.language.formats import parse_decomposition, parse_operator, parse_plan, parse_rewards
 from slap_ros.relational import Layout, LiftedOperator
 from slap_ros.relational.pddl import parse_domain, parse_problem
+from support.model_answers import operator_data
+from support.paper_problems import (
+    ALL,
+    METRICS,
+    Printed,
+    make_coffee,
+    peg_in_hole,
+    printed_insert,
+    stow_hammer,
+)
 
 ROOT = Path(__file__).parents[2]
 PEGS = peg_in_hole()

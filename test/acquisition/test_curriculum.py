@@ -9,8 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from points import HORIZON, PICK, POINTS, PUT, REWARDS, begin
-from steady_skills import PICKING, PUTTING, towards, write_library
 
 from slap_ros.acquisition.curriculum import curriculum
 from slap_ros.acquisition.curriculum.curriculum import Curriculum
@@ -40,6 +38,8 @@ from slap_ros.skills.skill_library import (
     save_skill_library,
 )
 from slap_ros.skills.skill_signature import signature_of
+from support.points import HORIZON, PICK, POINTS, PUT, REWARDS, begin
+from support.steady_skills import PICKING, PUTTING, towards, write_library
 
 pytestmark = pytest.mark.usefixtures("points_installed")
 SAC = SacSettings(
@@ -224,7 +224,7 @@ def test_acquired_skills_solve_what_training_never_saw(whole, finished):
         world = domain.make_world(task.initial_state)
         episode = Executor(domain, planner, world, space, goal, task.step_limit).run()
         assert episode.success, episode.error
-    from points import _make
+    from support.points import _make
 
     three = acquired_domain(_make("three"), whole[0])
     skills = {skill.operator.name: skill.in_domain(three) for skill in whole[0].skills}

@@ -9,8 +9,6 @@ from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
-from points import PICK, PUT
-from steady_skills import PICKING, PUTTING, write_library
 from typer.testing import CliRunner
 
 from slap_ros.acquisition.training.embedding_encoder import EmbeddingEncoder, operator_sentence
@@ -24,6 +22,8 @@ from slap_ros.errors import (
 )
 from slap_ros.language.settings import KEY_VARIABLE, LanguageSettings, RetryPolicy
 from slap_ros.learning.work_folder import WorkFolder
+from support.points import PICK, PUT
+from support.steady_skills import PICKING, PUTTING, write_library
 
 pytest.importorskip("openai")
 SIZE = 64

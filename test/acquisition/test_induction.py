@@ -9,7 +9,6 @@ from dataclasses import replace
 from random import Random
 
 import pytest
-from paper_problems import ALL, Printed, peg_in_hole, stow_hammer
 
 from slap_ros.acquisition.proposals.induction import (
     InducedProposer,
@@ -25,6 +24,7 @@ from slap_ros.errors import InvalidParameterError, ProposalRejectedError
 from slap_ros.planning.execution import Executor
 from slap_ros.planning.planner import make_planner
 from slap_ros.relational import GroundAtom, GroundOperator, LiftedOperator
+from support.paper_problems import ALL, Printed, peg_in_hole, stow_hammer
 
 PEGS = peg_in_hole()
 Trace = list[frozenset[GroundAtom]]

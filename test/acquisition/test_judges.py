@@ -6,7 +6,6 @@ from dataclasses import replace
 from multiprocessing import active_children
 
 import pytest
-from points import POINTS, REWARDS
 
 from slap_ros.acquisition.curriculum import jobs
 from slap_ros.acquisition.curriculum.initiation_states import InitiationStates
@@ -16,6 +15,7 @@ from slap_ros.acquisition.training.judges import JudgeElsewhere
 from slap_ros.acquisition.training.sac import SkillLearner
 from slap_ros.acquisition.training.sac_settings import SacSettings
 from slap_ros.acquisition.training.settings import AcquisitionSettings
+from support.points import POINTS, REWARDS
 
 pytestmark = pytest.mark.usefixtures("points_installed")
 

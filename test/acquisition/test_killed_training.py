@@ -3,10 +3,10 @@
 """A curriculum whose process is killed ten times, at random moments."""
 
 import subprocess
-import sys
-from pathlib import Path
 
 import pytest
+
+from support.programs import ENVIRONMENT, program
 
 pytestmark = pytest.mark.usefixtures("points_installed")
 
@@ -21,8 +21,9 @@ def files(folder):
 @pytest.mark.timeout(300)  # six trainings' worth of processor time
 def test_killed_ten_times_it_makes_the_same_library_to_the_byte(tmp_path):
     """And the same work folder: plans carried out, episodes, judgements."""
-    program = Path(__file__).with_name("killed_training.py")
-    ran = subprocess.run([sys.executable, program, tmp_path], capture_output=True, text=True)
+    ran = subprocess.run(
+        [*program("killed_training"), tmp_path], env=ENVIRONMENT, capture_output=True, text=True
+    )
     assert ran.returncode == 0, ran.stderr
     kills = (tmp_path / "kills").read_text().splitlines()
     assert len(kills) == 10

@@ -11,9 +11,6 @@ from dataclasses import dataclass, replace
 from random import Random
 from typing import Any
 
-from model_answers import operator_data, operator_json, operator_text, reward_data
-from paper_problems import ALL, Printed, symbol
-
 from slap_ros.acquisition.proposals.complaints import ComplaintClass, serious
 from slap_ros.acquisition.proposals.drafts import check_operator
 from slap_ros.acquisition.proposals.problem import AcquisitionProblem
@@ -22,6 +19,8 @@ from slap_ros.acquisition.proposals.verification import verify
 from slap_ros.errors import MalformedAnswerError
 from slap_ros.language.formats import OperatorDraft, parse_operator, parse_rewards
 from slap_ros.relational import GroundOperator, Layout, LiftedOperator, Object, ground_operators
+from support.model_answers import operator_data, operator_json, operator_text, reward_data
+from support.paper_problems import ALL, Printed, symbol
 
 C = ComplaintClass
 Data = dict[str, Any]

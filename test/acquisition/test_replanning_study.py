@@ -5,12 +5,12 @@
 import json
 
 import pytest
-from points import HORIZON, PUT, REWARDS
-from steady_skills import PICKING, towards, write_library
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
 from slap_ros.skills.skill_library import AcquiredSkill
+from support.points import HORIZON, PUT, REWARDS
+from support.steady_skills import PICKING, towards, write_library
 
 pytestmark = pytest.mark.usefixtures("points_installed")
 

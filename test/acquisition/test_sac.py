@@ -8,7 +8,6 @@ import gymnasium as gym
 import numpy as np
 import pytest
 import torch
-from points import HORIZON, INTERFACE, PICK, POINTS, REWARDS, begin
 from stable_baselines3 import SAC
 from stable_baselines3.common.torch_layers import create_mlp
 
@@ -23,6 +22,7 @@ from slap_ros.relational import RewardTemplate
 from slap_ros.skills.groundings import Groundings
 from slap_ros.skills.observations import SIZE
 from slap_ros.skills.reward import SkillReward
+from support.points import HORIZON, INTERFACE, PICK, POINTS, REWARDS, begin
 
 QUICK = replace(SMALL, learning_starts=192)
 STARTS = begin(PICK, range(40))

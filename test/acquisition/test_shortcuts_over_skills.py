@@ -8,7 +8,6 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
-from steady_skills import PICKING, PUTTING, write_library
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
@@ -16,6 +15,7 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode
 from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
+from support.steady_skills import PICKING, PUTTING, write_library
 
 pytestmark = pytest.mark.usefixtures("points_installed")
 SMALL = [

@@ -6,7 +6,15 @@ import math
 
 import numpy as np
 import pytest
-from points import (
+
+from slap_ros.acquisition.training.skill_env import Initiation, SkillMdp, SkillVecEnv
+from slap_ros.errors import InvalidRewardError
+from slap_ros.relational import RewardTemplate, RewardTerm, State
+from slap_ros.relational.operators import Variable
+from slap_ros.skills.groundings import Grounding, Groundings
+from slap_ros.skills.observations import SIZE
+from slap_ros.skills.reward import SkillReward
+from support.points import (
     AT,
     DIS_TO_OBJ,
     HOLDING,
@@ -22,14 +30,6 @@ from points import (
     hand_xy,
     sample_task,
 )
-
-from slap_ros.acquisition.training.skill_env import Initiation, SkillMdp, SkillVecEnv
-from slap_ros.errors import InvalidRewardError
-from slap_ros.relational import RewardTemplate, RewardTerm, State
-from slap_ros.relational.operators import Variable
-from slap_ros.skills.groundings import Grounding, Groundings
-from slap_ros.skills.observations import SIZE
-from slap_ros.skills.reward import SkillReward
 
 
 def scattered(count, things=2, seed=0):

@@ -4,10 +4,10 @@
 
 import numpy as np
 import pytest
-from points import HORIZON, INTERFACE, PICK, POINTS, REWARDS, begin
 
 from slap_ros.acquisition.training.validation import RANDOM, RANDOM_ROUNDS, SkillTrials
 from slap_ros.skills.reward import SkillReward
+from support.points import HORIZON, INTERFACE, PICK, POINTS, REWARDS, begin
 
 REWARD = SkillReward(PICK, REWARDS["Pick"], INTERFACE)
 

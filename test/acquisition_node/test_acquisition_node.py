@@ -5,22 +5,14 @@
 from __future__ import annotations
 
 import json
-import sys
 from contextlib import contextmanager
 from html import unescape
-from pathlib import Path
 
 import pytest
 from rclpy.action import ActionClient
 from rclpy.node import Node
 from slap_msgs.action import ProposeOperators
 from slap_msgs.msg import AcquisitionEvent, GroundAtom
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "acquisition"))
-sys.path.insert(0, str(Path(__file__).parent.parent / "language"))  # for the scripted server
-
-from model_answers import decomposition_json, operator_json
-from scripted_server import Step, serving
 
 from ensemble.interfaces import ACQUISITION_EVENTS, CLOSE_BAG, PROPOSE_OPERATORS
 from ensemble.launcher import ProcessLauncher
@@ -34,6 +26,8 @@ from slap_ros.relational.pddl import parse_domain
 from slap_ros.report.content import read_report
 from slap_ros.report.page import render
 from slap_ros.skills.domain_choice import DomainChoice
+from support.model_answers import decomposition_json, operator_json
+from support.scripted_server import Step, serving
 
 LIMIT = 120.0  # s
 KEY = "sk-this-is-nobodys-key"

@@ -2,14 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))  # for the helpers of these tests
-
-from truthful_run import Script, record
+from support.truthful_run import Script, record
 
 
 @pytest.fixture(scope="session")

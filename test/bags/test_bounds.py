@@ -19,8 +19,6 @@ import lz4.frame
 import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import TypesysError
-from truthful_run import Script
-from truthful_run import record as write_bag
 
 from slap_ros.bags import definitions, evaluate_bag, read_bag
 from slap_ros.bags.definitions import MAX_DEFINITION_FIELDS, decode, store_for, undecodable
@@ -30,6 +28,8 @@ from slap_ros.bags.raw import Channel, MessageDefinition
 from slap_ros.bags.sqlite_reader import read_sqlite
 from slap_ros.errors import DamagedBagError
 from slap_ros.messages.interfaces import STATE, definition, typestore
+from support.truthful_run import Script
+from support.truthful_run import record as write_bag
 
 GIGABYTES_3 = 3 * 10**9
 # Peak resident memory, kB, of the command with everything that it imports, and a record.

@@ -17,7 +17,6 @@ import pytest
 import yaml
 from backports import zstd
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
-from truthful_run import Published, Script, make
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
@@ -32,6 +31,7 @@ from slap_ros.bags.reading_budget import MAX_GROWTH
 from slap_ros.bags.rosbag2 import ROOT
 from slap_ros.errors import DamagedBagError, SlapError
 from slap_ros.messages.interfaces import STATE, definition, typestore
+from support.truthful_run import Published, Script, make
 
 MODES = (CompressionMode.FILE, CompressionMode.MESSAGE)
 STORAGES = (StoragePlugin.MCAP, StoragePlugin.SQLITE3)

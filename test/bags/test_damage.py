@@ -9,7 +9,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from truthful_run import Script, record
 
 from slap_ros.bags import (
     bag_digest,
@@ -22,6 +21,7 @@ from slap_ros.bags import (
 from slap_ros.bags.mcap_records import MAGIC, RECORD, Opcode
 from slap_ros.errors import DamagedBagError, SlapError
 from slap_ros.messages.interfaces import typestore
+from support.truthful_run import Script, record
 
 Truth = list[tuple[str, int, bytes]]
 

@@ -3,29 +3,24 @@
 from __future__ import annotations
 
 import copy
-import os
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
-from truthful_run import Script, record, without
 
 from slap_ros.bags import bag_digest
 from slap_ros.messages.interfaces import STATE
+from support.programs import ENVIRONMENT, program
+from support.truthful_run import Script, record, without
 
 HERE = Path(__file__).parent
 
 
 def record_in_a_process(path: Path, clock_ns: int) -> None:
-    environment = os.environ | {
-        "PYTHONPATH": str(HERE.parent.parent),
-        "PYTHONHASHSEED": str(clock_ns % 100),
-    }
     subprocess.run(
-        [sys.executable, str(HERE / "truthful_run.py"), str(path), "7", str(clock_ns)],
+        [*program("truthful_run"), str(path), "7", str(clock_ns)],
         check=True,
-        env=environment,
+        env=ENVIRONMENT | {"PYTHONHASHSEED": str(clock_ns % 100)},
     )
 
 

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from truthful_run import Published, Script, record, under
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
@@ -23,6 +22,7 @@ from slap_ros.errors import ErrorCode, InvalidParameterError
 from slap_ros.messages.interfaces import STATE
 from slap_ros.report import read_report, render
 from slap_ros.robot.recorded_motion import read_recorded_motion
+from support.truthful_run import Published, Script, record, under
 
 SEEDS = {"/": 7, "/fleet/robot1": 11, "/robot2": 23}
 

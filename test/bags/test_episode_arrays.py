@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from truthful_run import Script, record, without
 
 from slap_ros.bags import read_bag
 from slap_ros.bags.episode_arrays import episode_arrays, read_episodes
@@ -18,6 +17,7 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import DamagedBagError, ForeignBagError
 from slap_ros.messages.decode import stamp_ns
 from slap_ros.messages.interfaces import ATOMS, COMMAND, STATE
+from support.truthful_run import Script, record, without
 
 SHORTCUT_BAG = Path(__file__).parent / "data" / "recorded_by_0.1.0"
 

@@ -6,12 +6,12 @@ import copy
 from pathlib import Path
 
 import pytest
-from truthful_run import Script, record, without
 
 from slap_ros.bags import evaluate_bag
 from slap_ros.bags.evaluate import AtomMismatch
 from slap_ros.errors import ErrorCode, ForeignBagError, UnknownDomainError
 from slap_ros.messages.interfaces import ATOMS, DOMAIN_INFO
+from support.truthful_run import Script, record, without
 
 
 @pytest.mark.parametrize("seed", [7, 11, 23])

@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet
 import pytest
-from truthful_run import Script, record
 
 from slap_ros.bags import EpisodeArrays, read_episodes
 from slap_ros.bags.export import choose_format, export_episodes, require_exportable
 from slap_ros.errors import InvalidParameterError, StorageFullError
+from support.truthful_run import Script, record
 
 OTHER_INDEX = 2  # of a task of the same seed with fewer blocks
 

@@ -6,9 +6,8 @@ from collections import Counter
 from dataclasses import asdict
 from pathlib import Path
 
-from truthful_run import METADATA, Script
-
 from slap_ros.bags import TopicCount, bag_info
+from support.truthful_run import METADATA, Script
 
 
 def test_it_counts_what_is_there(script: Script, honest_bag: Path) -> None:

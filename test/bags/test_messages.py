@@ -6,7 +6,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from truthful_run import Script
 
 from slap_ros.domains import get_domain
 from slap_ros.errors import (
@@ -27,6 +26,7 @@ from slap_ros.messages.decode import (
 from slap_ros.messages.events import PlanEventKind, SkillEventKind
 from slap_ros.messages.interfaces import COMMAND, STATE, TASK, message_texts, typestore
 from slap_ros.planning.options import OptionKind
+from support.truthful_run import Script
 
 
 def constants(type_name: str) -> dict[str, int]:

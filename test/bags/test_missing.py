@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 import yaml
-from truthful_run import Published, Script, record, without
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
@@ -21,6 +20,7 @@ from slap_ros.errors import ErrorCode
 from slap_ros.messages.events import PlanEventKind, SkillEventKind
 from slap_ros.messages.interfaces import ATOMS, PLAN, PLAN_EVENT, SKILL_EVENT, STATE, TASK
 from slap_ros.report import read_report, render
+from support.truthful_run import Published, Script, record, without
 
 
 def states(script: Script) -> list[Published]:

@@ -12,12 +12,11 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
-from truthful_run import make
-
 from slap_ros.bags import evaluate_bag, read_bag, replay_bag
 from slap_ros.bags.digest import _canonical, bag_digest
 from slap_ros.messages.interfaces import PLAN
 from slap_ros.report import read_report, render
+from support.truthful_run import make
 
 DATA = Path(__file__).parent / "data"
 BAG = DATA / "recorded_by_0.1.0"

@@ -14,13 +14,13 @@ import pytest
 import yaml
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from truthful_run import Published, Script, make, record, under
 
 from slap_ros.bags import bag_digest, bag_info, evaluate_bag, read_bag, replay_bag
 from slap_ros.bags.mcap_records import CHUNK
 from slap_ros.bags.rosbag2 import ROOT
 from slap_ros.errors import DamagedBagError, ForeignBagError, SlapError
 from slap_ros.messages.interfaces import TASK, definition, message_texts, typestore
+from support.truthful_run import Published, Script, make, record, under
 
 SEPARATOR = "=" * 80
 

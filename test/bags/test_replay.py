@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from truthful_run import Script, record, without
 
 from slap_ros.bags import Difference, replay_bag
 from slap_ros.errors import DamagedBagError
 from slap_ros.messages.interfaces import COMMAND, STATE
+from support.truthful_run import Script, record, without
 
 
 def test_an_honest_recording_is_reproduced(script: Script, honest_bag: Path) -> None:

@@ -7,24 +7,20 @@ import os
 import random
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
-from counting_writer import STATE, cdr
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability
-from truthful_run import METADATA, Script
 
 from slap_ros.bags import BagWriter, bag_info, read_bag
 from slap_ros.errors import BagExistsError, ErrorCode, InvalidParameterError, StorageFullError
-
-HERE = Path(__file__).parent
-ROOT = HERE.parent.parent
-ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT)}
+from support.counting_writer import STATE, cdr
+from support.programs import ENVIRONMENT, program
+from support.truthful_run import METADATA, Script
 
 
 def steps(path: Path) -> list[int]:
@@ -120,7 +116,7 @@ def test_a_writer_that_is_not_closed_leaves_everything(script: Script, tmp_path:
 @pytest.mark.parametrize("seed", range(8))
 def test_a_killed_recording_has_all_that_was_acknowledged(tmp_path: Path, seed: int) -> None:
     process = subprocess.Popen(
-        [sys.executable, str(HERE / "counting_writer.py"), str(tmp_path / "bag")],
+        [*program("counting_writer"), str(tmp_path / "bag")],
         stdout=subprocess.PIPE,
         env=ENVIRONMENT,
     )
@@ -139,7 +135,7 @@ def test_a_killed_recording_has_all_that_was_acknowledged(tmp_path: Path, seed: 
 @pytest.mark.parametrize("limit", [20_000, 70_001, 150_000])
 def test_a_full_disk_is_named_and_leaves_a_readable_bag(tmp_path: Path, limit: int) -> None:
     result = subprocess.run(
-        [sys.executable, str(HERE / "counting_writer.py"), str(tmp_path / "bag"), str(limit)],
+        [*program("counting_writer"), str(tmp_path / "bag"), str(limit)],
         capture_output=True,
         text=True,
         env=ENVIRONMENT,

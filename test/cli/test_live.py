@@ -11,16 +11,12 @@ import random
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from rich.console import Console
 
 from ensemble.cli.live import RunView
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "bags"))  # for the scripted run
-
-from truthful_run import Published, Script
+from support.truthful_run import Published, Script
 
 RUN = ["run", "obstacle2d", "--seed", "3", "--shortcuts", "none", "--in-process", "--live"]
 RUN += ["--patience", "10"]  # for a loaded machine

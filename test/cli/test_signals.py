@@ -13,9 +13,9 @@ from pathlib import Path
 
 import psutil
 import pytest
-from process_state import handles_signals
 
 from slap_ros.bags import evaluate_bag
+from support.process_state import handles_signals
 
 LIBRARY = Path(__file__).parents[1] / "shortcuts" / "data" / "obstacle2d"
 LIMIT_S = 120.0  # far more than anything here takes

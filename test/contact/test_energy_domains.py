@@ -8,7 +8,6 @@ import math
 
 import numpy as np
 import pytest
-from domain_transitions import demonstrator_of
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.benchtop.features import THING
@@ -16,6 +15,7 @@ from slap_ros.domains.benchtop.state_access import LINEAR, position_of
 from slap_ros.domains.registry import OURS
 from slap_ros.skills.demonstrator import demonstrate
 from slap_ros.worlds.contact.features import ROBOT
+from support.domain_transitions import demonstrator_of
 
 DOMAINS = [name for name in OURS if get_domain(name).acquisition is not None]
 STEPS = 500

@@ -5,18 +5,17 @@
 from __future__ import annotations
 
 import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-from contact_transitions import Transitions, record
-from marks import slow
 
 from benchmarks.workbench import BENCH, start
 from slap_ros.relational import State
 from slap_ros.worlds.contact.simulation_pool import close_idle
 from slap_ros.worlds.contact.world import ContactWorld
+from support.contact_transitions import Transitions, record
+from support.marks import slow
+from support.programs import ENVIRONMENT, program
 
 COUNT = 600
 
@@ -69,9 +68,12 @@ def test_the_same_in_worlds_of_their_own(recorded):
 
 def test_the_same_in_another_process(recorded, tmp_path):
     recorded.save(tmp_path / "steps.npz")
-    script = Path(__file__).with_name("contact_transitions.py")
     answer = subprocess.run(
-        [sys.executable, script, tmp_path / "steps.npz"], capture_output=True, text=True, check=True
+        [*program("contact_transitions"), tmp_path / "steps.npz"],
+        env=ENVIRONMENT,
+        capture_output=True,
+        text=True,
+        check=True,
     )
     assert f"0 of {COUNT} differ" in answer.stdout
 

@@ -5,17 +5,16 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 
-import domain_transitions
 import numpy as np
 import pytest
-from domain_transitions import differing, orders, record, save
-from marks import slow
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.registry import OURS
 from slap_ros.worlds.contact.features import ROBOT
+from support.domain_transitions import differing, orders, record, save
+from support.marks import slow
+from support.programs import ENVIRONMENT, program
 
 DOMAINS = [name for name in OURS if get_domain(name).acquisition is not None]
 COUNT = 120  # steps; ``domain_transitions`` is a command for more
@@ -48,6 +47,6 @@ def test_the_same_in_any_order(recorded, order):
 def test_the_same_in_another_process(recorded, tmp_path):
     name, steps = recorded
     save(steps, tmp_path / "steps.npz")
-    command = [sys.executable, domain_transitions.__file__, name, "--file", tmp_path / "steps.npz"]
-    answer = subprocess.run(command, capture_output=True, text=True, check=True)
+    command = [*program("domain_transitions"), name, "--file", tmp_path / "steps.npz"]
+    answer = subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True, check=True)
     assert answer.stdout == f"0 of {COUNT} differ\n"

@@ -2,9 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Environments as others write them: what is wrong with what they return, and what is wanted."""
 
-import sys
 from dataclasses import dataclass, field
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,7 +15,6 @@ from slap_ros.errors import InvalidDomainError, InvalidStateError
 from slap_ros.relational import Layout, State
 
 gymnasium = pytest.importorskip("gymnasium")
-sys.path.insert(0, str(Path(__file__).parents[2] / "examples" / "marbles"))
 import marbles  # noqa: E402
 from gymnasium.wrappers import (  # noqa: E402
     FlattenObservation,

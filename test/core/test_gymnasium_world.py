@@ -10,14 +10,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from executed import executed
 
 from slap_ros.core.gymnasium_world import GymnasiumWorld, state_of
 from slap_ros.errors import InvalidCommandError, InvalidDomainError, InvalidStateError
 from slap_ros.relational import State
+from support.executed import executed
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "marbles"
-sys.path.insert(0, str(EXAMPLE))
 marbles = pytest.importorskip("marbles")
 from marbles.environment import MarblesEnv  # noqa: E402
 

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """KinDER's object-centric environments as worlds, with KinDER itself, where it is installed."""
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,11 +9,9 @@ import numpy as np
 import pytest
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "kinder_obstruction"
-sys.path.insert(0, str(EXAMPLE))
 pytest.importorskip("kinder", reason="KinDER is not installed: see docs/new-domain.md")
 
 import kinder_obstruction  # noqa: E402
-from executed import executed  # noqa: E402
 from kinder_obstruction.environment import BRIDGE, make_environment  # noqa: E402
 
 from slap_ros.core.kinder_world import KinderBridge  # noqa: E402
@@ -25,6 +22,7 @@ from slap_ros.evaluation.approaches import approaches  # noqa: E402
 from slap_ros.relational import Feature  # noqa: E402
 from slap_ros.shortcuts.shortcut import Sampling  # noqa: E402
 from slap_ros.shortcuts.shortcut_library import load_library  # noqa: E402
+from support.executed import executed  # noqa: E402
 
 DOMAIN = kinder_obstruction.make()
 TASK = DOMAIN.task(7)  # evaluation begins at seed 0

@@ -8,10 +8,10 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from scattered_states import BENCHTOP, STATES, metrics_of, scattered
 
 from slap_ros.domains import get_domain
 from slap_ros.relational import Column, State
+from support.scattered_states import BENCHTOP, STATES, metrics_of, scattered
 
 ONE_BY_ONE = 60  # states, in which every metric and predicate is spelled out
 EXACT = 1e-9

@@ -8,7 +8,6 @@ import math
 
 import numpy as np
 import pytest
-from skill_starts import CONSTANT, achieves, skill_starts
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.benchtop.state_access import pose_of, position_of
@@ -18,6 +17,7 @@ from slap_ros.domains.bowls.tasks import bowl_station, fixed_station
 from slap_ros.errors import InvalidParameterError, UnknownObjectError
 from slap_ros.skills.demonstrator import demonstrate
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
+from support.skill_starts import CONSTANT, achieves, skill_starts
 
 DOMAIN = get_domain("bowls")
 

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from executed import executed, fluent_atoms
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.cleanup_table import make
@@ -34,6 +33,7 @@ from slap_ros.relational import Column, State, Target
 from slap_ros.worlds.joint_space.features import ROBOT
 from slap_ros.worlds.joint_space.world import PandaWorld
 from slap_ros.worlds.panda import JOINT_HIGH, JOINT_LOW, MAX_STEP, grasp_pose
+from support.executed import executed, fluent_atoms
 
 FAIR, PAPER = get_domain("cleanup_table"), get_domain("cleanup_table", "paper")
 PLACES = {"duck": (0.4, 0.1, 0.0), "toy_robot": (0.5, 0.2, 0.0), "dinosaur": (0.6, 0.1, 0.0)}

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from executed import executed, fluent_atoms
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.cluttered_drawer.blocking import SIDES, FingerClearance
@@ -34,6 +33,7 @@ from slap_ros.planning.search import search_exhaustively, search_lazily
 from slap_ros.relational import Column, State, Target
 from slap_ros.worlds.joint_space.scene import TABLE_TOP
 from slap_ros.worlds.panda import MAX_STEP, grasp_pose
+from support.executed import executed, fluent_atoms
 
 FAIR, PAPER = get_domain("cluttered_drawer"), get_domain("cluttered_drawer", "paper")
 HALF = 0.025  # m, half a block

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from skill_starts import CONSTANT, achieves, skill_starts
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.benchtop.room import within_reach
@@ -19,6 +18,7 @@ from slap_ros.relational import Column
 from slap_ros.skills.demonstrator import demonstrate
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.worlds.panda import FINGER_OPEN
+from support.skill_starts import CONSTANT, achieves, skill_starts
 
 DOMAIN = get_domain("groceries")
 

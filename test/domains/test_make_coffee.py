@@ -9,15 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawer_states import (
-    assert_margins_agree,
-    assert_metrics_agree,
-    atoms,
-    carry_out,
-    changed,
-    constant_motions,
-    put,
-)
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.benchtop import drawers
@@ -44,6 +35,15 @@ from slap_ros.relational import State
 from slap_ros.skills.demonstrator import demonstrate
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.worlds.contact.world import MAX_SHIFT
+from support.drawer_states import (
+    assert_margins_agree,
+    assert_metrics_agree,
+    atoms,
+    carry_out,
+    changed,
+    constant_motions,
+    put,
+)
 
 DOMAIN = get_domain("make_coffee")
 SCRIPTED = open_domain(DomainChoice("make_coffee", skills="demonstrator"))

@@ -4,8 +4,6 @@
 
 import numpy as np
 import pytest
-from random_states import one_by_one, random_states
-from scattered_states import BENCHTOP, scattered
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.obstacle2d.model import RESTING_TOLERANCE
@@ -14,6 +12,8 @@ from slap_ros.domains.obstacle_tower.support import TOUCHING
 from slap_ros.domains.obstacle_tower.tasks import TowerArrangement
 from slap_ros.relational import Column, State
 from slap_ros.worlds.joint_space.scene import CUBE_EDGE
+from support.random_states import one_by_one, random_states
+from support.scattered_states import BENCHTOP, scattered
 
 DOMAINS = {name: get_domain(name) for name in ("obstacle2d", "obstacle_tower")}
 TOWER, FLAT = DOMAINS["obstacle_tower"], DOMAINS["obstacle2d"]

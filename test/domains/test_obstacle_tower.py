@@ -7,8 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from executed import executed, fluent_atoms
-from random_states import random_states
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.obstacle_tower.features import BLOCK
@@ -28,6 +26,8 @@ from slap_ros.relational import State
 from slap_ros.worlds.bodies import Material
 from slap_ros.worlds.joint_space.scene import CUBE_EDGE
 from slap_ros.worlds.panda import MAX_STEP
+from support.executed import executed, fluent_atoms
+from support.random_states import random_states
 
 FAIR, PAPER = get_domain("obstacle_tower"), get_domain("obstacle_tower", "paper")
 

@@ -6,8 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from executed import fluent_atoms
-from skill_starts import CONSTANT, achieves, skill_starts
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.benchtop.state_access import POSE_NAMES, pose_of
@@ -17,6 +15,8 @@ from slap_ros.geometry.pose import IDENTITY, Pose, from_rotation_vector, from_ya
 from slap_ros.relational import Column, State
 from slap_ros.skills.demonstrator import demonstrate
 from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
+from support.executed import fluent_atoms
+from support.skill_starts import CONSTANT, achieves, skill_starts
 
 DOMAIN = get_domain("peg_in_hole")
 INITIAL = {"HandEmpty()", "OnTable(peg1)", "OnTable(peg2)", "IsClear(hole1)", "IsClear(hole2)"}

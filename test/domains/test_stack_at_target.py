@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from executed import fluent_atoms
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.benchtop.approach import ASIDE, DISTANCE
@@ -17,6 +16,7 @@ from slap_ros.relational import State
 from slap_ros.skills.demonstrator import demonstrate
 from slap_ros.skills.domain_choice import DEMONSTRATOR, DomainChoice, open_domain
 from slap_ros.studies.lg_sail.vacuity import gather_starts, try_policies
+from support.executed import fluent_atoms
 
 NAME = "stack_at_target"
 DOMAIN = get_domain(NAME)

@@ -8,15 +8,6 @@ import math
 
 import numpy as np
 import pytest
-from drawer_states import (
-    assert_margins_agree,
-    assert_metrics_agree,
-    atoms,
-    carry_out,
-    changed,
-    constant_motions,
-    put,
-)
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.benchtop import drawers
@@ -28,6 +19,15 @@ from slap_ros.geometry.pose import Pose, from_yaw
 from slap_ros.relational import State
 from slap_ros.skills.demonstrator import demonstrate
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
+from support.drawer_states import (
+    assert_margins_agree,
+    assert_metrics_agree,
+    atoms,
+    carry_out,
+    changed,
+    constant_motions,
+    put,
+)
 
 DOMAIN = get_domain("stow_hammer")
 SCRIPTED = open_domain(DomainChoice("stow_hammer", skills="demonstrator"))

@@ -30,6 +30,7 @@ from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract
 from slap_ros.planning.options import Option, OptionKind, given_option
 from slap_ros.planning.plan import Plan, PlanEdge
 from slap_ros.relational import AtomSpace, Target
+from support.programs import ENVIRONMENT, PATH
 
 SVG = "{http://www.w3.org/2000/svg}"
 PAPER = (0.8, 0.4)  # m, block positions
@@ -350,14 +351,19 @@ def test_two_pictures_on_a_page_have_different_identifiers() -> None:
 
 def test_deterministic_across_processes_and_hash_seeds() -> None:
     program = (
-        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "import sys\n"
         "import test_abstract_graph as t\n"
         "sys.stdout.write(t.obstacle2d(t.TWO_OBSTACLES).draw() + t.tangled(2, 50).draw())"
     )
     outputs = [
         subprocess.run(
-            [sys.executable, "-c", program, str(Path(__file__).parent)],
-            env=os.environ | {"PYTHONHASHSEED": seed, "PYTHONIOENCODING": "utf-8"},
+            [sys.executable, "-c", program],
+            env=ENVIRONMENT
+            | {
+                "PYTHONPATH": os.pathsep.join([PATH, str(Path(__file__).parent)]),
+                "PYTHONHASHSEED": seed,
+                "PYTHONIOENCODING": "utf-8",
+            },
             cwd=Path(__file__).parents[2],
             capture_output=True,
             check=True,

@@ -12,7 +12,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from threading import Thread
 
-import leftovers
 import pytest
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -20,6 +19,7 @@ from rclpy.executors import SingleThreadedExecutor
 from ensemble.interfaces import STATE
 from ensemble.network import is_embedded
 from ensemble.nodes import node_class
+from support import leftovers
 
 ROOT = Path(__file__).parents[2]
 LIMIT_S = 120.0
@@ -65,7 +65,7 @@ def test_that_leaves_a_process():
     print("left")
 
 def test_that_it_is_gone():
-    import leftovers
+    from support import leftovers
     kept = leftovers.marked(leftovers.RUN, os.environ[leftovers.RUN])
     print("marked", sum(not leftovers.is_zombie(pid) for pid in kept))
 

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 import rclpy
-from marks import slow
 
 from ensemble.network import DISCOVERY_RANGE, is_embedded, join_network
 from slap_ros.errors import ErrorCode, InvalidParameterError
+from support.marks import slow
 
 HERE = Path(__file__).parent
 

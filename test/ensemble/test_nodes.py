@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from marks import slow
 from rcl_interfaces.srv import GetParameters
 from slap_msgs.msg import RobotCommand
 from slap_msgs.srv import ListSkills, ResetTask
@@ -27,6 +26,7 @@ from slap_ros.bags import evaluate_bag
 from slap_ros.messages.events import PlanEventKind
 from slap_ros.messages.interfaces import PLAN_EVENT, STATE
 from slap_ros.skills.domain_choice import DomainChoice
+from support.marks import slow
 
 LIBRARY = Path(__file__).parent.parent / "shortcuts" / "data" / "obstacle2d"
 ALL = ("sim_node", "perception_node", "skill_server", "planner_node", "recorder_node")

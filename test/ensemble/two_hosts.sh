@@ -4,7 +4,7 @@
 # `unshare -rn bash two_hosts.sh PYTHON FOLDER SECONDS`.
 set -euo pipefail
 here="$(dirname "$0")"
-node="$here/lonely_node.py"
+node="$here/../support/lonely_node.py"
 python="$1" folder="$2" seconds="$3"
 port=$((7410 + 250 * ROS_DOMAIN_ID)) # where a domain's first participant listens
 
@@ -23,8 +23,8 @@ there ip addr add 10.9.0.2/24 dev outside
 there ip link set outside up
 
 "$python" "$node" inside "$folder" & one=$!
-"$python" "$here/knock.py" 127.0.0.1 $port open
-if there "$python" "$here/knock.py" 10.9.0.1 $port refused; then echo door:False; else echo door:True; fi
+"$python" "$here/../support/knock.py" 127.0.0.1 $port open
+if there "$python" "$here/../support/knock.py" 10.9.0.1 $port refused; then echo door:False; else echo door:True; fi
 export CYCLONEDDS_URI='<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="outside"/>
   </Interfaces></General><Discovery><ParticipantIndex>auto</ParticipantIndex>
   <Peers><Peer address="10.9.0.1"/></Peers></Discovery></Domain></CycloneDDS>'

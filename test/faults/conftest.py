@@ -1,14 +1,9 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-import sys
-from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent))  # for the helpers of these tests
-sys.path.insert(0, str(Path(__file__).parent.parent / "bags"))  # and for theirs
 
-import faulty_links
-import process_faults
-from marks import slow
+from support import faulty_links, process_faults
+from support.marks import slow
 
 SAMPLED = {
     "message_case": faulty_links.Case.sampled,

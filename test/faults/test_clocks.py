@@ -5,8 +5,6 @@
 from contextlib import contextmanager
 
 import rclpy
-from clocks import BY_THE_CLOCK, SettableClock
-from faulty_links import Laboratory
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
@@ -16,6 +14,8 @@ from ensemble.spinner import Spinner
 from slap_ros.bags import evaluate_bag
 from slap_ros.messages.interfaces import ATOMS, PLAN_EVENT, STATE
 from slap_ros.skills.domain_choice import DomainChoice
+from support.clocks import BY_THE_CLOCK, SettableClock
+from support.faulty_links import Laboratory
 
 LIMIT = 120.0  # s, far more than anything here takes
 PACE = 40.0  # environment steps per second

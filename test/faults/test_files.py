@@ -10,10 +10,7 @@ from itertools import cycle
 from pathlib import Path
 
 import pytest
-from damage import DAMAGES
-from marks import slow
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
-from truthful_run import Script, record, under
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
@@ -39,6 +36,9 @@ from slap_ros.shortcuts.training import Training
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.slap.trainings import TrainingFolder
+from support.damage import DAMAGES
+from support.marks import slow
+from support.truthful_run import Script, record, under
 
 pytestmark = pytest.mark.timeout(3600)  # for as many cases as somebody may ask for
 ROOT = Path(__file__).parents[2]

@@ -2,19 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """A stranger who never stops publishing: runs succeed beside it, and nodes do not grow."""
 
+import os
 import subprocess
-import sys
 from contextlib import contextmanager
-from pathlib import Path
 
 import psutil
 import pytest
-from flood import KINDS
-from living_ensemble import laboratory
-from marks import slow
-from process_faults import LIMIT
 from slap_msgs.msg import AbstractState, ObjectCentricState, ObjectState, PlanEvent
-from test_strays import laboratory as laboratory_in_process
 
 from ensemble.domain_announcements import DomainAnnouncements
 from ensemble.early_messages import EarlyMessages
@@ -23,6 +17,12 @@ from ensemble.next_states import AHEAD, NextStates
 from ensemble.waiting_room import NUMBERS, WaitingRoom, key_of
 from slap_ros.bags import read_bag
 from slap_ros.skills.domain_choice import DomainChoice
+from support.flood import KINDS
+from support.living_ensemble import laboratory
+from support.marks import slow
+from support.process_faults import LIMIT
+from support.programs import PATH, program
+from support.stray_laboratory import laboratory as laboratory_in_process
 
 BURST = 120  # messages of a stranger between two of this process' turns, every PERIOD
 PERIOD = 0.03  # s
@@ -88,9 +88,11 @@ def test_runs_succeed_beside_a_flood_and_nodes_do_not_grow(network, tmp_path, ki
     with laboratory(3, bag, 0.0, patience=20.0) as bench:
         bench.until(lambda: bench.told("slap_msgs/msg/AbstractState"))
         before = memory(bench)
-        command = [sys.executable, str(Path(__file__).with_name("flood.py")), kind, str(RATE)]
+        command = [*program("flood"), kind, str(RATE)]
         with said.open("w") as file:
-            flood = subprocess.Popen(command, stdout=file, stderr=file)
+            flood = subprocess.Popen(
+                command, env=os.environ | {"PYTHONPATH": PATH}, stdout=file, stderr=file
+            )
         try:
             bench.until(lambda: "flooding" in said.read_text())
             for seed in (None, 5, 6):

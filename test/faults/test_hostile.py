@@ -15,7 +15,6 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from rosbags.rosbag2 import StoragePlugin, Writer
 from slap_msgs.msg import DomainInfo, Task
-from truthful_run import Script, record
 
 from ensemble.interfaces import DOMAIN, TASK
 from ensemble.spinner import Spinner
@@ -24,6 +23,7 @@ from slap_ros.bags import bag_info, evaluate_bag
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError, SlapError, UnknownDomainError
 from slap_ros.shortcuts.shortcut_library import load_library
+from support.truthful_run import Script, record
 
 ROOT = Path(__file__).parents[2]
 LIBRARY = ROOT / "test" / "shortcuts" / "data" / "obstacle2d"

@@ -9,12 +9,12 @@ import sys
 import time
 
 import pytest
-from process_state import handles_signals
 
 from slap_ros.domains import get_domain
 from slap_ros.domains.registry import OURS
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_yaml
+from support.process_state import handles_signals
 
 pytestmark = pytest.mark.timeout(3600)  # for as many cases as somebody may ask for
 LIMIT = 120.0  # s, far more than anything here takes

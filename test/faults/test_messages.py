@@ -3,10 +3,10 @@
 """Messages that are lost, late, out of order or repeated: a run succeeds or says what failed."""
 
 import pytest
-from faulty_links import LIMIT, laboratory
 
 from slap_ros.bags import evaluate_bag
 from slap_ros.errors import ErrorCode
+from support.faulty_links import LIMIT, laboratory
 
 
 @pytest.mark.timeout(4 * LIMIT)

@@ -5,12 +5,12 @@
 import signal
 
 import pytest
-from living_ensemble import laboratory
-from process_faults import LIMIT, RUNNER, Run, recorded
 
 from slap_ros.bags import evaluate_bag, read_bag
 from slap_ros.errors import ErrorCode
 from slap_ros.messages.interfaces import STATE
+from support.living_ensemble import laboratory
+from support.process_faults import LIMIT, RUNNER, Run, recorded
 
 PACE = 20.0  # environment steps a second, so that there is a middle of a run
 

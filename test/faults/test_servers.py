@@ -4,7 +4,6 @@
 
 import json
 import random
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,13 +11,11 @@ import pytest
 
 pytest.importorskip("openai")
 TESTS = Path(__file__).parents[1]
-sys.path[:0] = [str(TESTS / "language"), str(TESTS / "acquisition")]
-from model_answers import LIMITS, SETTINGS, good_script, operator_json, run  # noqa: E402
-from paper_problems import peg_in_hole  # noqa: E402
-from scripted_server import Step, envelope, serving  # noqa: E402
-
 from slap_ros.errors import ErrorCode  # noqa: E402
 from slap_ros.language.settings import RetryPolicy  # noqa: E402
+from support.model_answers import LIMITS, SETTINGS, good_script, operator_json, run  # noqa: E402
+from support.paper_problems import peg_in_hole  # noqa: E402
+from support.scripted_server import Step, envelope, serving  # noqa: E402
 
 pytestmark = pytest.mark.timeout(3600)  # for as many cases as somebody may ask for
 KEY = "sk-secret-0123456789abcdef"

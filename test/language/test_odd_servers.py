@@ -11,15 +11,15 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from model_answers import LIMITS, SETTINGS, Outcome, good_script, operator_json, run
-from paper_problems import peg_in_hole
-from scripted_server import Step, serving
 
 from slap_ros.errors import ErrorCode, InvalidParameterError, LanguageUnavailableError, SlapError
 from slap_ros.language.client import OpenAIClient
 from slap_ros.language.failures import address_advice
 from slap_ros.language.route import is_on_this_host, proxy_of
 from slap_ros.language.settings import LanguageSettings
+from support.model_answers import LIMITS, SETTINGS, Outcome, good_script, operator_json, run
+from support.paper_problems import peg_in_hole
+from support.scripted_server import Step, serving
 
 PEGS = peg_in_hole()
 GOOD = operator_json(PEGS.operators[1])

@@ -8,13 +8,13 @@ import json
 from pathlib import Path
 
 import pytest
-from model_answers import good_script, operator_json
-from paper_problems import peg_in_hole, printed_insert
-from scripted_server import Step, serving
 from typer.testing import CliRunner, Result
 
 from slap_ros.cli import app
 from slap_ros.errors import ErrorCode
+from support.model_answers import good_script, operator_json
+from support.paper_problems import peg_in_hole, printed_insert
+from support.scripted_server import Step, serving
 
 EXAMPLE = Path(__file__).parent.parent.parent / "examples" / "peg_in_hole"
 PEGS = peg_in_hole()
@@ -27,7 +27,7 @@ def slap(*arguments: object, **environment: str) -> Result:
 
 
 def test_the_example_replays_to_a_plan_that_slap_plan_finds_too(tmp_path: Path) -> None:
-    """If a prompt was changed on purpose: ``python test/language/record_example.py``."""
+    """If a prompt was changed on purpose: ``cd test && python -m support.record_example``."""
     command = ("propose", *TASK, "--proposer", "language", "--cassette", REPLAY, "--json")
     result = slap(*command, "--output", tmp_path)
     assert result.exit_code == 0, result.stderr

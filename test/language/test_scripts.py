@@ -9,7 +9,11 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from model_answers import (
+
+from slap_ros.acquisition.proposals.attempt_log import MAX_ANSWER
+from slap_ros.errors import ErrorCode
+from slap_ros.relational import Layout
+from support.model_answers import (
     LIMITS,
     SETTINGS,
     decomposition_json,
@@ -20,12 +24,8 @@ from model_answers import (
     reward_data,
     run,
 )
-from paper_problems import ALL, peg_in_hole, printed_insert
-from scripted_server import Step, serving
-
-from slap_ros.acquisition.proposals.attempt_log import MAX_ANSWER
-from slap_ros.errors import ErrorCode
-from slap_ros.relational import Layout
+from support.paper_problems import ALL, peg_in_hole, printed_insert
+from support.scripted_server import Step, serving
 
 PEGS = peg_in_hole()
 PICK, INSERT = PEGS.operators

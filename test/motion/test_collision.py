@@ -4,7 +4,13 @@
 
 import numpy as np
 import pytest
-from motion_scenes import (
+
+from slap_ros.geometry.box_separation import separated
+from slap_ros.geometry.oriented_box import OrientedBox
+from slap_ros.motion import CollisionChecker, inverse_kinematics
+from slap_ros.motion.kinematics import matrix
+from slap_ros.worlds.panda import FINGER_OPEN, HAND, LINKS, Pose, link_poses
+from support.motion_scenes import (
     HELD,
     START,
     STRAIGHT,
@@ -15,12 +21,6 @@ from motion_scenes import (
     top_down,
     tower,
 )
-
-from slap_ros.geometry.box_separation import separated
-from slap_ros.geometry.oriented_box import OrientedBox
-from slap_ros.motion import CollisionChecker, inverse_kinematics
-from slap_ros.motion.kinematics import matrix
-from slap_ros.worlds.panda import FINGER_OPEN, HAND, LINKS, Pose, link_poses
 
 
 def place(obstacles, x, y, z, **options):

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from motion_scenes import START, TABLE, random_configurations, top_down
 
 from slap_ros.motion import (
     CollisionChecker,
@@ -21,6 +20,7 @@ from slap_ros.motion import (
 )
 from slap_ros.motion.kinematics import arm_frames, matrix
 from slap_ros.worlds.panda import JOINT_HIGH, JOINT_LOW, Pose, grasp_pose, link_poses
+from support.motion_scenes import START, TABLE, random_configurations, top_down
 
 
 def offsets(q, pose):

@@ -5,7 +5,6 @@
 import math
 
 import numpy as np
-from motion_scenes import START, TABLE, block, random_configurations, top_down
 
 from slap_ros.motion import (
     CollisionChecker,
@@ -18,6 +17,7 @@ from slap_ros.motion import (
 )
 from slap_ros.motion.joints import path_configurations
 from slap_ros.worlds.panda import Pose, grasp_pose
+from support.motion_scenes import START, TABLE, block, random_configurations, top_down
 
 
 def off_the_line(pose, start, goal):

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Paths: free all along, exact at their ends, the same in every process, given up by count."""
 
+import os
 import subprocess
 import sys
 
@@ -9,16 +10,6 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from motion_scenes import (
-    HELD,
-    START,
-    TABLE,
-    block,
-    random_box,
-    random_configurations,
-    top_down,
-    tower,
-)
 
 from slap_ros.errors import ErrorCode, SkillNotApplicableError
 from slap_ros.motion import (
@@ -34,6 +25,17 @@ from slap_ros.motion import (
 from slap_ros.motion.joints import LOW, free_count, interpolate, path_configurations
 from slap_ros.motion.shortcutting import shorten
 from slap_ros.motion.via_point import via_point_path
+from support.motion_scenes import (
+    HELD,
+    START,
+    TABLE,
+    block,
+    random_box,
+    random_configurations,
+    top_down,
+    tower,
+)
+from support.programs import ENVIRONMENT, PATH
 
 OVER_TOWER = [TABLE, *tower(0.5, 0.0)]
 
@@ -135,8 +137,6 @@ def test_a_seed_fixes_the_path():
 
 
 IN_ANOTHER_PROCESS = """
-import sys
-sys.path.insert(0, sys.argv[1])
 from test_planning import across_the_tower
 from slap_ros.motion import plan_path
 start, goal, free = across_the_tower()
@@ -149,7 +149,8 @@ def test_another_process_finds_the_same_path(request):
     plan_path(start, goal, free, seed=5)  # what went before does not matter
     path = plan_path(start, goal, free, seed=3)
     other = subprocess.run(
-        [sys.executable, "-c", IN_ANOTHER_PROCESS, str(request.path.parent)],
+        [sys.executable, "-c", IN_ANOTHER_PROCESS],
+        env=ENVIRONMENT | {"PYTHONPATH": os.pathsep.join([PATH, str(request.path.parent)])},
         capture_output=True,
         text=True,
         check=True,

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from motion_scenes import START
 
 from slap_ros.motion import path_steps, retime, retime_fixed_steps
 from slap_ros.motion.joints import path_configurations
 from slap_ros.worlds.panda import MAX_STEP
+from support.motion_scenes import START
 
 PATHS = st.builds(
     lambda seed, rows, scale: np.random.default_rng(seed).normal(0.0, scale, (rows, 7)),

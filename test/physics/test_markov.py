@@ -5,13 +5,9 @@
 from __future__ import annotations
 
 import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-from marks import slow
-from transitions import Transitions, record
 
 from benchmarks.physics_step import BLOCK, NAMES, SCENE, tower
 from slap_ros.geometry.pose import Pose
@@ -20,6 +16,9 @@ from slap_ros.worlds.features import POSE_FEATURES, pose_features
 from slap_ros.worlds.joint_space.scene import TABLE, Box, Scene
 from slap_ros.worlds.joint_space.simulation_pool import close_idle
 from slap_ros.worlds.joint_space.world import PandaWorld
+from support.marks import slow
+from support.programs import ENVIRONMENT, program
+from support.transitions import Transitions, record
 
 COUNTS = {"alike": 1000, "mixed": 1000, "toys": 400}  # toys have many pieces
 
@@ -69,9 +68,9 @@ def test_the_same_in_fresh_worlds(transitions):
 
 def test_the_same_in_another_process(transitions, tmp_path):
     transitions.save(tmp_path / "transitions.npz")
-    script = Path(__file__).with_name("transitions.py")
     answer = subprocess.run(
-        [sys.executable, script, tmp_path / "transitions.npz"],
+        [*program("transitions"), tmp_path / "transitions.npz"],
+        env=ENVIRONMENT,
         capture_output=True,
         text=True,
         check=True,

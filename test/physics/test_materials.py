@@ -6,8 +6,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from materials import tower_of
-from transitions import GRASP, holding
 
 from benchmarks.physics_step import NAMES, SCENE, reach, tower
 from slap_ros.errors import InvalidStateError
@@ -18,6 +16,8 @@ from slap_ros.worlds.joint_space.simulation import GRAVITY
 from slap_ros.worlds.joint_space.simulation_pool import close_idle
 from slap_ros.worlds.joint_space.world import PandaWorld
 from slap_ros.worlds.panda import HOME
+from support.materials import tower_of
+from support.transitions import GRASP, holding
 
 STAY = np.zeros(8)
 

@@ -4,8 +4,6 @@
 
 import numpy as np
 import pytest
-from toys import TOYS, heap
-from transitions import GRASP, holding
 
 from benchmarks.physics_step import BLOCK, NAMES, SCENE, tower
 from slap_ros.domains.cleanup_table.shapes import make, shipped
@@ -28,6 +26,8 @@ from slap_ros.worlds.joint_space.visuals import SceneVisuals
 from slap_ros.worlds.joint_space.world import PandaWorld
 from slap_ros.worlds.panda import HOME
 from slap_ros.worlds.rendering import Camera
+from support.toys import TOYS, heap
+from support.transitions import GRASP, holding
 
 CUBE = Solid.of([make.block((0.0, 0.0, 0.0), (CUBE_EDGE,) * 3)])
 CUBES = Scene((TABLE, *(Mesh(name, CUBE).with_material(CUBE_MATERIAL) for name in NAMES)))

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from transitions import HIGH, holding
 
 from benchmarks.physics_step import NAMES, SCENE, pushes, tower, truth, with_joints
 from slap_ros.geometry.oriented_box import OrientedBox
@@ -18,6 +17,7 @@ from slap_ros.worlds.joint_space.simulation import Drive, Simulation, Stepping
 from slap_ros.worlds.joint_space.world import PandaWorld
 from slap_ros.worlds.layout_index import BodyState
 from slap_ros.worlds.panda import FINGER_OPEN, HOME, MAX_STEP
+from support.transitions import HIGH, holding
 
 PUSHES = 40  # of the 200 that benchmarks/physics_step.py --pushes 200 compares
 FASTEST = 6.0  # m/s; falling to the floor gives 3

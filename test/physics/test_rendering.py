@@ -10,7 +10,6 @@ import cv2
 import numpy as np
 import pytest
 from PIL import Image, ImageSequence
-from transitions import holding
 
 from benchmarks.physics_step import NAMES, tower
 from slap_ros.relational import State
@@ -20,6 +19,7 @@ from slap_ros.worlds.joint_space.scene import TABLE, Scene, cube
 from slap_ros.worlds.joint_space.visuals import SceneVisuals
 from slap_ros.worlds.panda import CONTROL_PERIOD_S
 from slap_ros.worlds.rendering import Camera, Viewpoint, write_animation
+from support.transitions import holding
 
 RED, BLUE = (0.9, 0.1, 0.1, 1.0), (0.1, 0.1, 0.9, 1.0)
 SCENE = Scene((TABLE, *(cube(n, RED if n == "T" else BLUE) for n in NAMES)))

@@ -8,7 +8,6 @@ import gc
 
 import numpy as np
 import pytest
-from transitions import HIGH, holding
 
 from benchmarks.physics_step import BLOCK, NAMES, SCENE, pushes, reach, tower, with_joints
 from slap_ros.errors import InvalidCommandError, InvalidDomainError, InvalidStateError
@@ -31,6 +30,7 @@ from slap_ros.worlds.panda import (
     hand_pose,
 )
 from slap_ros.worlds.simulation_pool import MAX_IDLE
+from support.transitions import HIGH, holding
 
 CLOSE, OPEN = np.eye(8)[7], -np.eye(8)[7]
 STAY = np.zeros(8)

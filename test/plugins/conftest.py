@@ -10,8 +10,6 @@ import pytest
 
 from slap_ros.domains import forget_domains
 
-sys.path.insert(0, str(Path(__file__).parent))
-
 
 @pytest.fixture
 def install(tmp_path, monkeypatch):
@@ -33,7 +31,7 @@ def install(tmp_path, monkeypatch):
             monkeypatch.delitem(sys.modules, name, raising=False)
         folders.append(folder)
         monkeypatch.syspath_prepend(folder)
-        path = [*map(str, folders), str(Path(__file__).parent)]
+        path = [*map(str, folders), str(Path(__file__).parents[1])]
         monkeypatch.setenv("PYTHONPATH", os.pathsep.join([*path, *filter(None, [before])]))
         forget_domains()
 

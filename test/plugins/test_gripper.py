@@ -2,10 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A robot's gripper may be any axis, close either way, or not be there."""
 
-import gripper_first
 import numpy as np
 import pytest
-import sweeping
 
 from ensemble import encode
 from ensemble.nodes import RunSettings
@@ -21,6 +19,7 @@ from slap_ros.relational import Feature
 from slap_ros.shortcuts.explore import Explorer
 from slap_ros.shortcuts.settings import ExplorationSettings
 from slap_ros.skills.domain_choice import DomainChoice
+from support import gripper_first, sweeping
 
 FLAT = get_domain("obstacle2d", "fair")
 SWEEPING, FIRST = sweeping.make(), gripper_first.make()

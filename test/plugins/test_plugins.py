@@ -39,7 +39,7 @@ RAISING = {
         "from slap_ros.errors import InvalidParameterError; raise InvalidParameterError('x')"
     ),
 }
-SOUND = "from sweeping import make\n"
+SOUND = "from support.sweeping import make\n"
 
 
 def refused(name):
@@ -93,15 +93,15 @@ def test_ctrl_c_is_not_a_fault_of_the_domain(install):
 
 
 def test_a_name_that_two_distributions_register_is_nobodys(install):
-    install({"sweeping": "sweeping:make"}, "one")
-    install({"sweeping": "gripper_first:make"}, "two")
+    install({"sweeping": "support.sweeping:make"}, "one")
+    install({"sweeping": "support.gripper_first:make"}, "two")
     said = refused("sweeping")
-    assert "one (sweeping:make)" in said
-    assert "two (gripper_first:make)" in said
+    assert "one (support.sweeping:make)" in said
+    assert "two (support.gripper_first:make)" in said
 
 
 def test_a_domain_of_ours_cannot_be_replaced(install):
-    install({"obstacle2d": "sweeping:make"})
+    install({"obstacle2d": "support.sweeping:make"})
     assert get_domain("obstacle2d").name == "obstacle2d"
 
 
@@ -110,7 +110,7 @@ def test_entry_points_that_cannot_be_read_cost_only_their_distribution(content, 
     install({}, "broken")
     (points,) = tmp_path.glob("**/broken-1.0.dist-info/entry_points.txt")
     points.write_bytes(content)
-    install({"sweeping": "sweeping:make"}, "sound")
+    install({"sweeping": "support.sweeping:make"}, "sound")
     assert "sweeping" in domain_names()
     assert get_domain("sweeping").name == "sweeping"
     check = doctor.others()
@@ -121,7 +121,7 @@ def test_entry_points_that_cannot_be_read_cost_only_their_distribution(content, 
 def test_commands_go_on_beside_broken_domains(install):
     """The case that was seen: `slap domains` ended in a traceback of the stranger's."""
     pytest.importorskip("pybullet")
-    install({"sweeping": "sweeping:make"}, "sound")
+    install({"sweeping": "support.sweeping:make"}, "sound")
     install({"exits": "exits:make"}, "exits", exits="raise SystemExit(7)")
     install({"dies": "dies:make"}, "dies", dies="def make():\n    raise RuntimeError('no GPU')")
     listed = CliRunner().invoke(app, ["domains", "--json"])
@@ -148,7 +148,7 @@ def test_the_doctor_survives_a_domain_that_takes_python_down(install):
 
 
 def test_a_domain_without_names_of_presets_has_one(install):
-    install({"sweeping": "sweeping:make"})
+    install({"sweeping": "support.sweeping:make"})
     assert preset_names("sweeping") == ("default",)
     assert get_domain("sweeping") is get_domain("sweeping", "default")
     for preset in ("fair", "paper", "default:pucks=3"):
@@ -163,7 +163,7 @@ def test_a_domain_without_names_of_presets_has_one(install):
 PRESETS = """
 from dataclasses import replace
 from slap_ros.core import presets
-from sweeping import make as make_one
+from support.sweeping import make as make_one
 
 @presets("narrow", "wide")
 def make(preset, changes={}):

@@ -4,7 +4,6 @@
 
 from dataclasses import replace
 
-import patchy
 import pytest
 from typer.testing import CliRunner
 
@@ -18,6 +17,7 @@ from slap_ros.learning.workers import SequentialWorkers
 from slap_ros.shortcuts.settings import GENERAL, OURS, TrainingSettings, training_settings
 from slap_ros.shortcuts.training import Training
 from slap_ros.skills.domain_choice import DomainChoice
+from support import patchy
 
 PATCHY = patchy.make("some")
 WRONG = [
@@ -167,7 +167,7 @@ def train(folder, preset, listener):
 
 
 def test_tasks_without_a_plan_are_named_and_left_out(install, tmp_path):
-    install({"patchy": "patchy:make"})
+    install({"patchy": "support.patchy:make"})
     listener = Listener()
     library = train(tmp_path / "work", "some", listener)
     uses = [use for use, _, _ in listener.left_out]
@@ -186,7 +186,7 @@ def test_tasks_without_a_plan_are_named_and_left_out(install, tmp_path):
 
 def test_without_any_plan_training_ends_before_exploring(install, tmp_path):
     """What was seen: infinite lengths, every candidate skipped, and a traceback at the end."""
-    install({"patchy": "patchy:make"})
+    install({"patchy": "support.patchy:make"})
     with pytest.raises(UnsolvableError, match="none of 6 tasks for validation has a plan"):
         train(tmp_path / "work", "none", Listener())
     assert not (tmp_path / "work" / "explored.json").exists()

@@ -6,7 +6,6 @@ import json
 from dataclasses import replace
 
 import pytest
-import untaught
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
@@ -26,6 +25,7 @@ from slap_ros.planning.symbolic_planner import SymbolicPlanner
 from slap_ros.skills.demonstrator import demonstrate
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.skills.scripted_skill import with_scripts
+from support import untaught
 
 DOMAIN = untaught.make()
 TAUGHT = get_domain("obstacle2d")
@@ -33,7 +33,7 @@ TAUGHT = get_domain("obstacle2d")
 
 @pytest.fixture
 def installed(install):
-    install({"untaught": "untaught:make"})
+    install({"untaught": "support.untaught:make"})
 
 
 def slap(*arguments):

@@ -2,16 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))  # for the helpers of these tests
-sys.path.insert(0, str(Path(__file__).parent.parent / "bags"))  # and for theirs
-
-from staged_runs import HOSTILE, hostile, tower, with_a_shortcut, with_markers
-from truthful_run import Script, record
+from support.staged_runs import HOSTILE, hostile, tower, with_a_shortcut, with_markers
+from support.truthful_run import Script, record
 
 
 @pytest.fixture(scope="session")

@@ -8,13 +8,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from browser import Browser, chromium
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.remote.webelement import WebElement
 from selenium.webdriver.support.wait import WebDriverWait
 
 from slap_ros.report import read_report, render, write_page
+from support.browser import Browser, chromium
 
 NAMES = ["compared", "tower", "hostile"]
 # The paths of what is drawn, live or at the end, in the order in which it is painted.

@@ -13,9 +13,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from page_reader import Page
-from staged_runs import HOSTILE, with_markers
-from truthful_run import Script, record
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
@@ -27,6 +24,9 @@ from slap_ros.messages.interfaces import ATOMS, DOMAIN_INFO, MARKERS, STATE
 from slap_ros.relational import Type
 from slap_ros.report import check_output, read_report, render, write_page
 from slap_ros.report.traces import robot_series
+from support.page_reader import Page
+from support.staged_runs import HOSTILE, with_markers
+from support.truthful_run import Script, record
 
 MIB = 2**20
 Bags = dict[str, Path]

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 from builtin_interfaces.msg import Time
-from clocks import BY_THE_CLOCK, SettableClock
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import JointState
@@ -28,6 +27,7 @@ from slap_ros.bags import evaluate_bag, read_bag
 from slap_ros.errors import ErrorCode, InvalidParameterError
 from slap_ros.messages.interfaces import STATE
 from slap_ros.skills.domain_choice import DomainChoice
+from support.clocks import BY_THE_CLOCK, SettableClock
 
 LIMIT = 120.0  # s, far more than anything here takes: a loaded machine takes its time
 # All nodes share this process and a loaded machine's time: joint positions may be late.

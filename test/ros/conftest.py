@@ -12,8 +12,6 @@ import pytest
 
 from ensemble.network import is_embedded
 
-sys.path.insert(0, str(Path(__file__).parent))  # for the helpers of these tests
-
 ROOT = Path(__file__).parents[2]
 # Without a ROS 2 there is nothing to test here: `make test-ros` says what is missing.
 collect_ignore_glob = ["test_*.py"] if is_embedded() or not shutil.which("ros2") else []

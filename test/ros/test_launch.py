@@ -6,7 +6,8 @@ import subprocess
 
 import pytest
 import yaml
-from commands import LIMIT, ros2, started, wait_for_task
+
+from support.commands import LIMIT, ros2, started, wait_for_task
 
 pytestmark = pytest.mark.timeout(300)  # each starts several processes of ROS 2
 LAUNCH = ["ros2", "launch", "slap_ros", "ensemble.launch.py"]

@@ -12,12 +12,12 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from commands import LIMIT, ros2, solve, started, wait_for_task
 
 from ensemble.client import RunClient
 from ensemble.interfaces import DOMAIN, JOINT_STATES, MARKERS, PLAN_EVENTS, STATE, TASK
 from ensemble.spinner import temporary_node
 from slap_ros.bags import evaluate_bag, read_bag, replay_bag
+from support.commands import LIMIT, ros2, solve, started, wait_for_task
 
 ROOT = Path(__file__).parents[2]
 pytestmark = pytest.mark.timeout(300)  # each starts several processes of ROS 2

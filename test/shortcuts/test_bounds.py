@@ -6,9 +6,9 @@
 """
 
 import pytest
-from marks import slow
 
 from benchmarks.shortcut_bounds import measure
+from support.marks import slow
 
 
 @pytest.mark.parametrize(

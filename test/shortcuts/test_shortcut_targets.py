@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from pushing import DOMAIN, start_of
 
 from slap_ros.evaluation.approaches import approaches
 from slap_ros.planning.model import Model
@@ -14,6 +13,7 @@ from slap_ros.relational import Target
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
 from slap_ros.shortcuts.shortcut import Sampling
 from slap_ros.shortcuts.shortcut_library import load_library
+from support.pushing import DOMAIN, start_of
 
 LIBRARY = load_library(Path(__file__).parent / "data" / "obstacle2d", DOMAIN)
 LOOSE = replace(DOMAIN, exact=False)  # other atoms may appear

@@ -4,7 +4,6 @@
 
 import numpy as np
 import pytest
-from pushing import DOMAIN, SIGNATURE, STARTS, overlap
 
 from slap_ros.policies.action_map import ActionMap
 from slap_ros.relational import State
@@ -12,6 +11,7 @@ from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.rewards import Rewards
 from slap_ros.shortcuts.shortcut_vec_env import ShortcutVecEnv
 from slap_ros.shortcuts.signature import Change, Signature
+from support.pushing import DOMAIN, SIGNATURE, STARTS, overlap
 
 OURS = Rewards()
 

@@ -7,7 +7,6 @@ from multiprocessing import active_children
 
 import numpy as np
 import pytest
-from pushing import SIGNATURE, STARTS
 
 from slap_ros.errors import InvalidStateError
 from slap_ros.learning.subproc_vec_env import make_vec_env
@@ -16,6 +15,7 @@ from slap_ros.shortcuts.rewards import Rewards
 from slap_ros.shortcuts.shortcut_env_spec import ShortcutEnvSpec
 from slap_ros.shortcuts.starts import StartRecord
 from slap_ros.skills.domain_choice import DomainChoice
+from support.pushing import SIGNATURE, STARTS
 
 RECORDS = tuple(
     StartRecord(21, index, tuple(start.state.data), start.change.add, start.change.delete)

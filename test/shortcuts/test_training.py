@@ -3,6 +3,7 @@
 """Training from exploration to a library on disk, small."""
 
 import json
+import os
 import subprocess
 import sys
 from dataclasses import replace
@@ -23,6 +24,7 @@ from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.training import CandidateGroup, Training, rank
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 from slap_ros.skills.domain_choice import DomainChoice
+from support.programs import ENVIRONMENT, PATH
 
 TASKS = TaskDistribution(DomainChoice("obstacle2d", "fair"), 5)
 OURS = training_settings("ours", get_domain("obstacle2d"))
@@ -137,12 +139,11 @@ def test_it_goes_on_where_it_was_interrupted(tmp_path):
 
 
 KILLED = """
-import os, sys
+import os
 from pathlib import Path
 from slap_ros.shortcuts import progress as checkpoints
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 checkpoints.CHECKPOINT_S = 0.0
-sys.path.insert(0, {tests!r})
 import test_training as t
 original = ShortcutWorkFolder.append
 def append(self, progress):
@@ -156,9 +157,14 @@ t.train(Path({work!r}))
 
 @pytest.mark.slow
 def test_a_killed_training_resumes_from_its_checkpoint(tmp_path):
-    work, tests = tmp_path / "work", str(Path(__file__).parent)
-    code = KILLED.format(tests=tests, work=str(work))
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == -9
+    work = tmp_path / "work"
+    path = os.pathsep.join([PATH, str(Path(__file__).parent)])
+    killed = subprocess.run(
+        [sys.executable, "-c", KILLED.format(work=str(work))],
+        env=ENVIRONMENT | {"PYTHONPATH": path},
+        check=False,
+    )
+    assert killed.returncode == -9
     (progress,) = work.glob("*/progress.jsonl")
     before = len(progress.read_text().splitlines())
     library, _ = train(work)

@@ -2,14 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Studies here do their jobs in the process of the test."""
 
-import sys
-from pathlib import Path
-
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-
-from study_helpers import in_this_process
+from support.study_helpers import in_this_process
 
 
 @pytest.fixture(autouse=True)

@@ -9,13 +9,13 @@ import sys
 from pathlib import Path
 
 import pytest
-from marks import slow
-from study_helpers import without_seconds
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
 from slap_ros.errors import ErrorCode
 from slap_ros.learning.workers import SequentialWorkers
+from support.marks import slow
+from support.study_helpers import without_seconds
 
 FOLDER = Path(__file__).parent
 LIBRARY = FOLDER.parent / "shortcuts" / "data" / "obstacle2d"
@@ -33,7 +33,7 @@ STUDIES = {
 KILLED = """
 import os, signal, sys
 from pytest import MonkeyPatch
-from study_helpers import in_this_process
+from support.study_helpers import in_this_process
 from slap_ros.studies.study_log import StudyLog
 
 left, add = int(sys.argv.pop(1)), StudyLog.add
@@ -82,7 +82,7 @@ def done(monkeypatch):
 @pytest.mark.parametrize("name", ["goals", *slow(*sorted(STUDIES.keys() - {"goals"}))])
 def test_a_study_that_is_killed_goes_on_and_comes_to_the_same(tmp_path, name, done, monkeypatch):
     killed, whole = tmp_path / "killed", tmp_path / "whole"
-    monkeypatch.setenv("PYTHONPATH", str(FOLDER), prepend=":")
+    monkeypatch.setenv("PYTHONPATH", str(FOLDER.parent), prepend=":")
     ended = subprocess.run(
         [sys.executable, "-c", KILLED, str(DONE), *command(name, killed)],
         check=False,
@@ -113,7 +113,7 @@ def test_a_study_that_is_killed_goes_on_and_comes_to_the_same(tmp_path, name, do
 @pytest.fixture
 def log(tmp_path, monkeypatch):
     """What a study has done that is killed after its first result."""
-    monkeypatch.setenv("PYTHONPATH", str(FOLDER), prepend=":")
+    monkeypatch.setenv("PYTHONPATH", str(FOLDER.parent), prepend=":")
     subprocess.run([sys.executable, "-c", KILLED, "1", *command("goals", tmp_path)], check=False)
     return tmp_path / ".goals_obstacle2d.jsonl"
 

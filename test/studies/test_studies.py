@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from study_helpers import without_seconds
 from typer.testing import CliRunner
 
 from ensemble.cli.application import COMMANDS, app
@@ -35,6 +34,7 @@ from slap_ros.studies.slap import perception, pruning
 from slap_ros.studies.slap.trainings import TrainingFolder, read_curve
 from slap_ros.studies.slap.variations import Variation, offered, parse_variation
 from slap_ros.studies.study_log import StudyLog
+from support.study_helpers import without_seconds
 
 PUBLISHED = Path(__file__).parent.parent.parent / "docs" / "results"
 LIBRARY = Path(__file__).parent.parent / "shortcuts" / "data" / "obstacle2d"

@@ -7,13 +7,13 @@ import shutil
 from pathlib import Path
 
 import pytest
-from study_helpers import in_this_process
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode
 from slap_ros.evaluation.experiment import Experiment
+from support.study_helpers import in_this_process
 
 LIBRARY = Path(__file__).parent.parent / "shortcuts" / "data" / "obstacle2d"
 NAME = "table1_obstacle2d"

@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 import torch._dynamo  # noqa: F401, which the first optimiser imports, in a second
-from points import POINTS, REWARDS
 
 from slap_ros.acquisition.curriculum.curriculum import Curriculum
 from slap_ros.acquisition.curriculum.task_source import TaskSource
@@ -23,6 +22,7 @@ from slap_ros.acquisition.training.sac_settings import SacSettings
 from slap_ros.acquisition.training.settings import AcquisitionSettings
 from slap_ros.learning.workers import SequentialWorkers
 from slap_ros.skills.skill_library import save_skill_library
+from support.points import POINTS, REWARDS
 
 KILLS = 10
 SHARE = 1 / 4  # of an undisturbed training's processor time: a process has half of it, on average

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Steps of demonstrations and random motion in a domain with contact, to be taken once more.
 
-``python domain_transitions.py DOMAIN [--count 600]`` takes them forwards, backwards, in three
-shuffles and each in a world of its own, and prints how many differ in any bit.
+``python -m support.domain_transitions DOMAIN [--count 600]`` takes them forwards, backwards, in
+three shuffles and each in a world of its own, and prints how many differ in any bit.
 """
 
 from __future__ import annotations

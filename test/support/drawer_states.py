@@ -5,12 +5,12 @@
 from __future__ import annotations
 
 import numpy as np
-from skill_starts import CONSTANT, achieves
 
 from slap_ros.core import Domain, Policy, World
 from slap_ros.domains.benchtop.state_access import POSE_NAMES
 from slap_ros.geometry.pose import Pose
 from slap_ros.relational import Column, Object, State
+from support.skill_starts import CONSTANT, achieves
 
 
 def atoms(domain: Domain, state: State) -> set[str]:

@@ -7,7 +7,6 @@ It listens to an ensemble and publishes what does not belong there, RATE message
 
 import sys
 from copy import deepcopy
-from pathlib import Path
 from time import monotonic, sleep
 
 import rclpy
@@ -15,8 +14,6 @@ from diagnostic_msgs.msg import KeyValue
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from slap_msgs.msg import RobotCommand, SkillLibrary
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from ensemble.interfaces import ATOMS, COMMAND, DOMAIN, FAULT, SKILLS, STATE, TASK
 

@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Makes the small library in ``data/obstacle2d``: ``python test/shortcuts/make_library.py``.
+"""Makes the library in ``shortcuts/data/obstacle2d``.
+
+``cd test && python -m support.make_library`` runs it.
 
 It has one shortcut: with a block in the hand, push the obstacle off the target area.
 """
@@ -25,7 +27,7 @@ from slap_ros.shortcuts.shortcut_vec_env import ShortcutVecEnv
 from slap_ros.shortcuts.signature import Change, Signature
 from slap_ros.shortcuts.starts import Start
 
-DATA = Path(__file__).parent / "data" / "obstacle2d"
+DATA = Path(__file__).parents[1] / "shortcuts" / "data" / "obstacle2d"
 DOMAIN = get_domain("obstacle2d")
 TASKS, STEPS, HORIZON = 200, 40_000, 30
 

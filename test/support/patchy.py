@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-import sweeping
 
 from slap_ros.core import Domain, Learning, Task, presets
 from slap_ros.domains.variation import varied
+from support import sweeping
 
 
 @dataclass(frozen=True)

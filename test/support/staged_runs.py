@@ -11,12 +11,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from truthful_run import Published, Script, make
 
 from slap_ros.domains import get_domain
 from slap_ros.messages import interfaces
 from slap_ros.messages.decode import decode_state
 from slap_ros.messages.events import PlanEventKind
+from support.truthful_run import Published, Script, make
 
 HOSTILE = [
     "</script><script>window.pwned = 1</script>",

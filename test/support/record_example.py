@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Record the example's cassette again: ``python test/language/record_example.py``.
+"""Record the example's cassette again: ``cd test && python -m support.record_example``.
 
 No model answers but a script, and the cassette says so. It shows what a recording is and what a
 complaint does; it is no result.
@@ -8,19 +8,16 @@ complaint does; it is no result.
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 HERE = Path(__file__).parent
-sys.path[:0] = [str(HERE), str(HERE.parent / "acquisition")]
-
-from model_answers import LIMITS, SETTINGS, good_script, operator_json, run  # noqa: E402
-from paper_problems import peg_in_hole, printed_insert  # noqa: E402
-from scripted_server import serving  # noqa: E402
 
 from slap_ros.acquisition.proposals.problem import AcquisitionProblem  # noqa: E402
 from slap_ros.relational.pddl import parse_domain, parse_problem  # noqa: E402
+from support.model_answers import LIMITS, SETTINGS, good_script, operator_json, run  # noqa: E402
+from support.paper_problems import peg_in_hole, printed_insert  # noqa: E402
+from support.scripted_server import serving  # noqa: E402
 
 EXAMPLE = HERE.parent.parent / "examples" / "peg_in_hole"
 CASSETTE = EXAMPLE / "scripted.jsonl"

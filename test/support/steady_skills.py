@@ -3,12 +3,12 @@
 """A library for the domain `points` whose weights were written by hand: its skills always work."""
 
 import numpy as np
-from points import HORIZON, PICK, POINTS, PUT, REWARDS
 
 from slap_ros.acquisition.training.sac import AS_OBSERVED
 from slap_ros.policies.mlp_policy import MlpPolicy
 from slap_ros.skills.observations import OBJECT_FEATURES, ROBOT_FEATURES, SIZE
 from slap_ros.skills.skill_library import AcquiredSkill, SkillLibrary, save_skill_library
+from support.points import HORIZON, PICK, POINTS, PUT, REWARDS
 
 GAIN = 2.5  # of the hand's way to the object
 RELEASE = 0.15  # where it lets go, as observed: 7.5 mm

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """States in the thick of it, what was done in them, and what came of it.
 
-``python contact_transitions.py FILE`` replays recorded ones and prints how many differ.
+``python -m support.contact_transitions FILE`` replays recorded ones and prints how many differ.
 """
 
 from __future__ import annotations
@@ -14,8 +14,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parent.parent.parent))
 
 from benchmarks.workbench import BENCH, HANDLE_AT, Move, Setting, action_towards, position, start
 from slap_ros.geometry.pose import Pose

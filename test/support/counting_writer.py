@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Writes messages and says how many it has written, until something stops it.
 
-``python counting_writer.py FOLDER [FILE_SIZE_LIMIT_BYTES]``
+``python -m support.counting_writer FOLDER [FILE_SIZE_LIMIT_BYTES]``
 """
 
 from __future__ import annotations

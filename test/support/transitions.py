@@ -5,7 +5,8 @@
 All blocks are alike, or each is of a material of its own that differs from push to push, or they
 are no blocks but toys of many pieces.
 
-``python transitions.py FILE`` replays recorded pairs and prints how many come out differently.
+``python -m support.transitions FILE`` replays recorded pairs and prints how many come out
+differently.
 """
 
 from __future__ import annotations
@@ -17,11 +18,6 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parent.parent.parent))
-
-from materials import mixed
-from toys import TOYS, heap
-
 from benchmarks.physics_step import SCENE, pushes, tower, with_joints
 from slap_ros.geometry.pose import Pose
 from slap_ros.relational import State
@@ -31,6 +27,8 @@ from slap_ros.worlds.joint_space.gripper import finger_around
 from slap_ros.worlds.joint_space.scene import Scene
 from slap_ros.worlds.joint_space.world import PandaWorld
 from slap_ros.worlds.panda import GRASP_POINT, HOME, MAX_STEP, hand_pose
+from support.materials import mixed
+from support.toys import TOYS, heap
 
 HIGH = np.array([*MAX_STEP, 1.0])
 GRASP = Pose((0.002, -0.003, GRASP_POINT))  # not quite in the middle

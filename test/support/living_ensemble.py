@@ -4,7 +4,6 @@
 
 from contextlib import contextmanager
 
-from process_faults import LIMIT
 from slap_msgs.srv import ResetTask
 
 from ensemble.client import RunClient
@@ -14,6 +13,7 @@ from ensemble.node_liveness import NodeLiveness
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.spinner import temporary_node
 from slap_ros.skills.domain_choice import DomainChoice
+from support.process_faults import LIMIT
 
 # By which a node is told from its successor.
 PUBLISHED = {

@@ -10,9 +10,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from paper_problems import Printed
-from scripted_server import Script, Step
-
 from slap_ros.acquisition.proposals.attempt_log import AttemptLog
 from slap_ros.acquisition.proposals.inquiry import Inquiry
 from slap_ros.acquisition.proposals.language_proposer import LanguageProposer, LanguageRewarder
@@ -24,6 +21,8 @@ from slap_ros.language.budget import Budget, BudgetLimits
 from slap_ros.language.cassette import open_client, with_recorded
 from slap_ros.language.settings import LanguageSettings, RetryPolicy
 from slap_ros.relational import LiftedAtom, LiftedOperator
+from support.paper_problems import Printed
+from support.scripted_server import Script, Step
 
 SETTINGS = LanguageSettings(
     model="scripted",

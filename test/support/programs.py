@@ -1,0 +1,16 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Modules of this package as programs of their own."""
+
+import os
+import sys
+from pathlib import Path
+
+TESTS = Path(__file__).parents[1]
+PATH = os.pathsep.join([str(TESTS.parent), str(TESTS)])  # of benchmarks, and of this package
+ENVIRONMENT = os.environ | {"PYTHONPATH": PATH}
+
+
+def program(name: str) -> list[str]:
+    """The command that runs a module of this package; give it :data:`ENVIRONMENT`."""
+    return [sys.executable, "-m", f"support.{name}"]
