@@ -24,7 +24,7 @@ from slap_ros.relational.pddl.ground_task import GroundTask
 MAX_STATES = 200_000  # to be evaluated for a proof
 MAX_TESTS = 10_000_000_000  # of operators, for a proof
 STATES_TO_IMPROVE = 15_000  # to be evaluated by each search for a cheaper plan; some seconds
-TESTS_TO_IMPROVE = 200_000_000
+TESTS_TO_IMPROVE = 15_000_000
 WEIGHT = 3.0  # of the heuristic of the first of them
 
 Heuristic = Callable[[Truth], float | None]  # what it takes to reach the goal; None: impossible
