@@ -3,7 +3,6 @@
 """Tests beside other programs on this host: neither is disturbed, and nothing is left."""
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -20,6 +19,7 @@ from ensemble.interfaces import STATE
 from ensemble.network import is_embedded
 from ensemble.nodes import node_class
 from support import leftovers
+from support.programs import ENVIRONMENT
 
 ROOT = Path(__file__).parents[2]
 LIMIT_S = 120.0
@@ -87,7 +87,7 @@ def nested(tmp_path):
     ))  # fmt: skip
     (tmp_path / "test_nested.py").write_text(TESTS)
     # ROS 2 brings plug-ins for versions of pytest that are long past.
-    environment = {**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+    environment = {**ENVIRONMENT, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
 
     def start(*options):
         return subprocess.Popen(

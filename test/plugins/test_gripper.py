@@ -127,7 +127,7 @@ def test_without_a_gripper_every_axis_explores():
 
 @pytest.mark.parametrize("name", ["sweeping", "gripper_first"])
 def test_the_ensemble_runs_records_and_replays_it(name, network, tmp_path, install):
-    install({name: f"{name}:make"})
+    install({name: f"support.{name}:make"})
     bag = str(tmp_path / "bag")
     settings = RunSettings(
         DomainChoice(name, "default"), 3, 0, "lazy", bag, shortcuts="none", patience=5.0
