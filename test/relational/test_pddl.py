@@ -468,7 +468,7 @@ DOMAIN_ERRORS = [
         "    :parameters (?r - robot ?b - block)\n",
         "",
         MalformedPddlError,
-        "6:24: unknown parameter '?r'; known here: none",
+        "6:30: unknown parameter '?r'; known here: none",
     ),
     ("(and (Free ?r))", "(not)", MalformedPddlError, "7:19: 'not' takes one condition"),
     (
