@@ -105,9 +105,9 @@ class AcquisitionPublisher:
         """A library is there, for everyone to take on.
 
         Args:
-            folder: Absolute.
-            library: As it was read there.
-            operators: As PDDL text.
+            folder: Absolute path of the library's folder.
+            library: The library as it was read from the folder.
+            operators: Operators as PDDL text.
         """
         progress = float(library.record["progress_on_fresh_tasks"])
         self._publish(AcquisitionEvent.ACQUIRED, digest=library.digest, progress=progress)

@@ -146,7 +146,7 @@ class AcquisitionNode(Node):
         Args:
             goal: What is asked for.
             answer: Makes the result.
-            subject: Of the event.
+            subject: Subject of the event after an error; empty for a proposal.
 
         Returns:
             The result of the goal's action.

@@ -25,10 +25,10 @@ class ProposalJob:
     """A proposal that the node is asked for.
 
     Args:
-        domain: Of the task.
+        domain: Domain of the task.
         task: With the goal that is to be reached.
-        proposer: Of operators, by name.
-        rewarder: Of rewards, by name.
+        proposer: Name of the proposer of operators.
+        rewarder: Name of the proposer of rewards.
         settings: Whom to ask, and what it may cost.
     """
 

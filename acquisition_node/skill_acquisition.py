@@ -25,9 +25,9 @@ class SkillAcquisition:
 
     Args:
         goal: Gets feedback.
-        domain: Whose skills are acquired.
+        domain: Domain whose skills are acquired.
         trainer: Learns them.
-        publisher: Of events and of the library.
+        publisher: Publisher of events and of the library.
     """
 
     goal: ServerGoalHandle

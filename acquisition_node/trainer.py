@@ -31,7 +31,7 @@ class Trainer:
         """Run nothing yet.
 
         Args:
-            arguments: Of ``slap acquire``.
+            arguments: Command-line arguments of ``slap acquire``.
         """
         self._command = [sys.executable, "-m", "ensemble.cli", "acquire", *arguments, "--events"]
         self._process: subprocess.Popen[bytes] | None = None

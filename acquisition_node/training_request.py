@@ -21,12 +21,12 @@ class TrainingRequest:
     """Which skills to acquire.
 
     Args:
-        domain: Whose.
+        domain: Domain whose skills are acquired.
         goal: A name of the domain's, or atoms as PDDL.
-        proposer: Of operators, by name; empty: manual.
-        rewarder: Of rewards, by name; empty: manual.
+        proposer: Name of the proposer of operators; empty for ``manual``.
+        rewarder: Name of the proposer of rewards; empty for ``manual``.
         steps: Environment steps; 0: as many as the node allows.
-        seed: Of everything.
+        seed: Seed of all random numbers.
         kept: The library of the skills that the domain has; None where they are no library.
     """
 
@@ -67,7 +67,7 @@ def goal_in_words(domain: Domain, task: Task, goal: frozenset[GroundAtom]) -> st
     Args:
         domain: The task's.
         task: Where the goal is to be reached.
-        goal: Its atoms.
+        goal: Atoms of the goal.
     """
     for name, goal_of in domain.goals.items():
         if goal_of(task.initial_state) == goal:

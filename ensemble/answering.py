@@ -16,8 +16,8 @@ def error_to_answer(node: Node, error: Exception) -> SlapError:
     """The error that goes into an answer. To be called where the error was caught.
 
     Args:
-        node: Who answers. Its log gets the traceback of what nobody foresaw, for instance of a bug
-            in another distribution's domain.
+        node: Node that answers. Its log gets the traceback of an error that is not one of slap_ros,
+            for instance of a bug in another distribution's domain.
         error: What was raised.
 
     Returns:
@@ -35,7 +35,7 @@ def domain_error(node: Node, domain: str, error: Exception) -> SlapError:
     """The error that stands for what a domain's code raised. To be called where it was caught.
 
     Args:
-        node: Whose log gets the traceback of what is no error of slap_ros.
+        node: Node whose log gets the traceback of an error that is not one of slap_ros.
         domain: The domain's name.
         error: What was raised.
 

@@ -116,7 +116,7 @@ class RunClient(Node):
             goal: Atoms to reach; empty for the task's own.
             step_limit: Environment steps; 0 for the task's own limit.
             max_replans: Plans after the first.
-            episode: Whose task; 0 for the current episode's.
+            episode: Number of the episode whose task is solved; 0 for the current episode.
 
         Returns:
             A future whose result is the goal handle.

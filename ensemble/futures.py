@@ -35,7 +35,7 @@ async def wait_for_first(node: Node, future: Future, condition: Callable[[], boo
     """Wait for a future or for a condition, whichever comes first.
 
     Args:
-        node: Whose timer looks at the condition, every ``POLL_PERIOD``.
+        node: Node whose timer checks the condition, every ``POLL_PERIOD``.
         future: What to wait for.
         condition: What else to wait for.
 

@@ -56,7 +56,7 @@ class Observation:
     Args:
         episode: The episode that it belongs to.
         step: Environment steps taken before it.
-        state: As perceived, without the objects that are missing.
+        state: The state as perceived, without the objects that are missing.
         abstract: The atoms that hold, as a mask over the episode's atom space.
         missing: Names of objects whose place is not known.
         exact: Whether perceiving the same state again would give the same.

@@ -25,10 +25,10 @@ def subscribe_as_offered(
     which keeps nothing.
 
     Args:
-        node: Who subscribes.
+        node: Node that subscribes.
         topic: What to. Its own QoS is the most that is asked for.
         callback: Called with each message.
-        options: Of the subscription, such as ``raw``.
+        options: Options of the subscription, such as ``raw``.
     """
     name = node.resolve_topic_name(topic.name)
 

@@ -26,8 +26,8 @@ def parameter(default: Any, description: str, low: float = 0.0, high: float = MA
     Args:
         default: What it is where nothing else is said.
         description: What it means, with its unit.
-        low: Of a number, the lowest that is allowed.
-        high: The highest.
+        low: Lowest value that is allowed, for a number.
+        high: Highest value that is allowed, for a number.
 
     Returns:
         The field, for :func:`read_parameters`.
@@ -61,7 +61,7 @@ def parse_parameters(
     Args:
         text: The parameters.
         kind: The dataclass that they are of.
-        what: Whose they are, for messages.
+        what: Name of what the parameters belong to, for messages.
         given: Names of those that come from elsewhere, and are refused here.
 
     Returns:

@@ -26,7 +26,7 @@ class Refusals:
         """Count a refusal; it is logged unless one of its kind just was.
 
         Args:
-            kind: As in diagnostics.
+            kind: Kind of the refusal, as the diagnostics name it.
             reason: In words, or as an error.
         """
         self.counts[kind] += 1

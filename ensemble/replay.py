@@ -54,8 +54,8 @@ class RobotReplayResult:
     """The result of a replay that got to its end.
 
     Args:
-        steps: Executed.
-        final: As measured; None where the recording ends with something in the hand.
+        steps: Number of steps executed.
+        final: State measured at the end; None where the recording ends with something in the hand.
     """
 
     steps: int
@@ -80,8 +80,8 @@ def replay_on_robot(
 
     Args:
         recorded: What to execute.
-        dry_run: Of ``recorded``, within the limits of this robot.
-        parameters: Of the robot.
+        dry_run: Dry run of ``recorded``, within the limits of this robot.
+        parameters: Parameters of the robot.
         mock: Parameters of a mock robot to start; None where there is a real one.
         on_step: Called with the number of steps executed, often.
 

@@ -166,7 +166,7 @@ def _solve(
         client: Follows it.
         spinner: Spins the client.
         end: When to give up, s.
-        episode: Its number; 0: whichever is under way.
+        episode: Number of the episode; 0 for the current one.
 
     Raises:
         SlapError: Why it is not solved, where that is not in the log.

@@ -43,9 +43,9 @@ class SkillRequest:
     """Which skills to acquire where a run lacks some.
 
     Args:
-        proposer: Of operators, by name.
-        rewarder: Of rewards, by name.
-        seed: Of training.
+        proposer: Name of the proposer of operators.
+        rewarder: Name of the proposer of rewards.
+        seed: Seed of all random numbers of the training.
     """
 
     proposer: str
@@ -82,7 +82,7 @@ class SkillRequester:
         """Have the skills acquired that a goal takes.
 
         Args:
-            request: By whom operators and rewards are proposed.
+            request: Names of the proposers of operators and rewards, and the seed.
             goal: Atoms to reach; empty for the task's own.
             timeout_s: For how long to wait, s.
 
@@ -117,7 +117,7 @@ class SkillRequester:
         """Set the newest task again, in a world that has taken the library on.
 
         Args:
-            digest: Of the library.
+            digest: Digest of the library.
 
         Returns:
             The new episode's number.

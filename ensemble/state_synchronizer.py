@@ -74,7 +74,7 @@ class StateSynchronizer:
         """Subscribe to task, state and atoms.
 
         Args:
-            node: Who subscribes.
+            node: Node that subscribes.
             on_observation: Called with each observation that is newer than the last.
             prepare: Called in a thread for each new episode, before its first observation.
             common: Parameters of the node, see :class:`EpisodeTracker`.

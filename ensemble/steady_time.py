@@ -23,8 +23,8 @@ def create_timer(node: Node, period_s: float, callback: Callable[[], None]) -> T
     """A timer that no clock that is set can stop.
 
     Args:
-        node: Whose executor calls back.
-        period_s: Between two calls, s.
+        node: Node whose executor calls back.
+        period_s: Time between two calls, s.
         callback: What to call.
 
     Returns:

@@ -42,7 +42,7 @@ class PlanPublisher:
             plan: The plan.
             goal: What it is to reach, as a mask over the episode's atom space.
             number: Which plan of the run, from 0 on.
-            at: From where it starts.
+            at: Observation from which the plan starts.
             provenance: What made it, as the message has it.
         """
         space, episode = at.episode.space, at.episode.number

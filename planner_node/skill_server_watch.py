@@ -20,8 +20,8 @@ class SkillServerWatch:
         """Begin to watch.
 
         Args:
-            node: Who watches.
-            skills: Its client of the skill server.
+            node: Node that watches.
+            skills: Action client of the skill server.
             timeout_s: How long the server may be away, s.
         """
         self._node, self._skills, self._timeout_s = node, skills, timeout_s

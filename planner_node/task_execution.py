@@ -57,7 +57,7 @@ class TaskExecution:
         node: Makes the timers.
         goal: The goal.
         synchronizer: What is known of the world.
-        publisher: Of plans and events.
+        publisher: Publisher of plans and events.
         skills: Client of the skill server.
         skill_server: Tells when the skill server has been away for too long.
         workers: Where planning runs.

@@ -48,7 +48,7 @@ class Controllers:
         """Make the clients.
 
         Args:
-            node: Who asks.
+            node: Node that sends the goals.
             arm: Name of the arm's FollowJointTrajectory action.
             gripper: Name of the gripper's GripperCommand action.
             joints: Names of the arm's joints.
@@ -94,8 +94,8 @@ class Controllers:
         A controller may succeed with fingers that stall at something, or abort: both are usual.
 
         Args:
-            position: As the controller expects it: Franka's half the gap, in m.
-            effort: At most, N.
+            position: Position as the controller expects it: for Franka's, half the gap, m.
+            effort: Largest force, N.
             limit_s: How long it may take.
 
         Returns:

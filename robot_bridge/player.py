@@ -56,8 +56,8 @@ class Player(Node):
 
         Args:
             recorded: What to execute.
-            dry_run: Of ``recorded``, within the limits of this robot.
-            settings: Of the robot.
+            dry_run: Dry run of ``recorded``, within the limits of this robot.
+            settings: Parameters of the robot.
             kwargs: The node's.
 
         Raises:

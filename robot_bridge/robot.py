@@ -35,10 +35,10 @@ class Robot:
         """Subscribe to its sensors and connect to its controllers.
 
         Args:
-            node: Who does.
+            node: Node that subscribes and connects.
             domain: What the robot is to do.
             sampled: The state whose objects there are, where no scene says which.
-            settings: Of the robot.
+            settings: Parameters of the robot.
 
         Raises:
             InvalidParameterError: An unknown arm, or a speed or workspace that there is not.

@@ -37,7 +37,7 @@ class Sensors:
         """Subscribe to joint states and frames.
 
         Args:
-            node: Who subscribes.
+            node: Node that subscribes.
             world: What takes the measurements.
             arm: Prefix of the names of joints and frames.
             clock: What measurements are dated by.

@@ -29,13 +29,13 @@ class SkillExecution:
     """A skill under way.
 
     Args:
-        node: Whose time counts.
+        node: Node whose log gets the traceback of an error that is not one of slap_ros.
         goal: What was asked for.
         execution: The option on its way to the expected atoms.
         start: Where it starts.
         step_budget: Environment steps that it may take.
         planner: Whether it is there: without it the skill is given up.
-        publisher: Of commands and events.
+        publisher: Publisher of commands and events.
     """
 
     node: Node

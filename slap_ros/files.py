@@ -92,8 +92,8 @@ def read_bytes(path: Path, limit: int = MAX_BYTES) -> bytes:
     """The content of a regular file.
 
     Args:
-        path: Of the file.
-        limit: Its largest size, bytes.
+        path: Path of the file.
+        limit: Largest size of the file, bytes.
 
     Returns:
         All of it.
@@ -115,8 +115,8 @@ def read_text(path: Path, limit: int = MAX_BYTES) -> str:
     """The text of a regular file in UTF-8, its lines ended as Python has it.
 
     Args:
-        path: Of the file.
-        limit: Its largest size, bytes.
+        path: Path of the file.
+        limit: Largest size of the file, bytes.
 
     Returns:
         The text.
@@ -184,8 +184,8 @@ def require_sole_use(descriptor: int, path: Path) -> None:
     """Lock an open file or folder for this process, until it closes it or ends, however it ends.
 
     Args:
-        descriptor: Of what is open.
-        path: Of the same, for the complaint.
+        descriptor: File descriptor of the open file or folder.
+        path: Path of the file or folder, for the error message.
 
     Raises:
         BusyError: Another process has locked it.

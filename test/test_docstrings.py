@@ -57,22 +57,6 @@ NOT_ALONE = re.compile(
     r"(Of|Whose|Who|Is|Are|By|As|Its|That|Was|Were|Has|Have|(In|From|To|With|For|Under) which"
     r"|(From|To) where)\b"
 )
-ROOMS_TO_DO = frozenset(  # rooms with entries that cannot be read alone yet
-    {
-        "acquisition_node",
-        "ensemble",
-        "planner_node",
-        "robot_bridge",
-        "skill_server",
-        "slap_ros/bags",
-        "slap_ros/cli",
-        "slap_ros/core",
-        "slap_ros/files.py",
-        "slap_ros/language",
-        "slap_ros/planning",
-        "slap_ros/relational",
-    }
-)
 PROTOCOL = re.compile(r"See :(class|meth|func):`~?[\w.]+`")
 SECTION = re.compile(r"^(Args|Attributes|Returns|Yields|Raises):$", re.MULTILINE)
 ERRORS = {
@@ -219,16 +203,10 @@ def test_no_summary_is_a_stub(documented):
     assert not stubs, "\n".join(stubs)
 
 
-def room_of(path):
-    """The folder of a file: ``slap_ros/shortcuts``, or ``ensemble``."""
-    return "/".join(path.parts[:2]) if path.parts[0] == "slap_ros" else path.parts[0]
-
-
 def test_every_entry_can_be_read_alone():
     documented = (
         Documented(node, path)
         for path, tree in sources()
-        if room_of(path) not in ROOMS_TO_DO
         for node in ast.walk(tree)
         if isinstance(node, Function | ast.ClassDef)
     )

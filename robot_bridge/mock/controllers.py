@@ -41,10 +41,10 @@ class MockControllers:
         """Open both action servers.
 
         Args:
-            node: Whose they are.
+            node: Node that has the action servers.
             plant: What they move.
-            noise: By how much they are late.
-            settings: Of the mock robot.
+            noise: Noise model that draws how late each action begins.
+            settings: Parameters of the mock robot.
             period_s: How long a control period lasts here, s.
             counts: Where goals are counted by outcome.
         """

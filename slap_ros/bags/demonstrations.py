@@ -18,7 +18,7 @@ def read_demonstrations(bag: Bag, domain: Domain) -> list[Demonstration]:
     """The episodes of a bag as atoms, from the recorded states.
 
     Args:
-        bag: Of an ensemble.
+        bag: Bag of one or more ensembles.
         domain: The one that was recorded.
 
     Returns:

@@ -144,7 +144,7 @@ class McapWriter:
         """Append a message.
 
         Args:
-            channel: Its number, from :meth:`add_channel`.
+            channel: Number of the message's channel, from :meth:`add_channel`.
             stamp_ns: When it was received, ns since the epoch.
             data: The message, serialised.
 

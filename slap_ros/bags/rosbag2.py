@@ -85,7 +85,7 @@ def bag_information(
     """The content of ``metadata.yaml`` for a bag of one MCAP file.
 
     Args:
-        file_name: Of the MCAP file.
+        file_name: Name of the MCAP file.
         topics: In the order of their channels.
         extent: Number of messages and the time from the first to the last.
         custom: What the run was made with.

@@ -52,7 +52,7 @@ class BagWriter:
         """Create the bag.
 
         Args:
-            path: Its folder, which must not exist; missing parents are made.
+            path: Folder of the bag. It must not exist; missing parents are made.
             metadata: What the run was made with: configuration, seed, versions, git revision.
 
         Raises:

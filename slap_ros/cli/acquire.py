@@ -177,7 +177,7 @@ def why_left(found: dict[str, Any]) -> str:
     """Why a skill was given up, in words: from how many states, and what its failures share.
 
     Args:
-        found: As the curriculum records it.
+        found: Record of the given-up skill, as the curriculum writes it.
     """
     if "states" not in found:
         return str(found["why"])

@@ -32,7 +32,7 @@ class Bars(Progress):
         """Show nothing yet.
 
         Args:
-            columns: Of each bar.
+            columns: Columns of each bar.
             on: Where they are shown.
             log_period_s: Time between two lines about a bar, at least.
         """

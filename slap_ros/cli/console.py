@@ -77,7 +77,7 @@ def styled(label: str, style: str, rest: str = "") -> Text:
 
     Args:
         label: The word.
-        style: As rich names it, ``bold red``.
+        style: Style of the word as rich names it, such as ``bold red``.
         rest: The text.
 
     Returns:

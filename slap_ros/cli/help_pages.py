@@ -81,7 +81,7 @@ def arrange(command: Any, path: str) -> None:
 
     Args:
         command: Click's command, or a group of commands.
-        path: Its name after ``slap``, such as ``bag info``.
+        path: Name of the command after ``slap``, such as ``bag info``.
     """
     for name, inner in getattr(command, "commands", {}).items():
         arrange(inner, f"{path} {name}")

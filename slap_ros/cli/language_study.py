@@ -128,7 +128,7 @@ def planning(
     """Who plans with a model's operators; see :mod:`slap_ros.studies.lg_sail.planning_ablation`.
 
     Args:
-        domain: Its name.
+        domain: Name of the domain.
         variants: Separated by commas.
         plans: Tasks.
         attempts: For one plan at most.
@@ -167,9 +167,9 @@ def rewards(
     """What rewards are worth; see :mod:`slap_ros.studies.lg_sail.reward_ablation`.
 
     Args:
-        domain: Its name.
+        domain: Name of the domain.
         metrics: What is shown of them, separated by commas.
-        trials: Of each.
+        trials: Number of trials for each of ``metrics``.
         options: Whom to ask.
 
     Returns:

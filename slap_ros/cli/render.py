@@ -53,10 +53,10 @@ def render(
     """Write an animation.
 
     Args:
-        domain: Of the states.
+        domain: Domain of the states.
         states: One per frame.
         path: The file; its ending gives the format.
-        size: Of the frames; None: as the domain has it.
+        size: Width and height of the frames, pixels; None for the domain's own size.
 
     Raises:
         StorageFullError: It cannot be written.

@@ -28,9 +28,9 @@ def open_chosen(domain: str, preset: str | None, skills: str) -> Domain:
     """The domain with the skills that were chosen; warns about skills that are left out.
 
     Args:
-        domain: Its name.
-        preset: Its preset; None for the first.
-        skills: As ``--skills`` has it.
+        domain: Name of the domain.
+        preset: Preset of the domain; None for the first.
+        skills: Value of ``--skills``.
 
     Raises:
         SlapError: There is no such domain, preset, or library.

@@ -82,8 +82,8 @@ def beginning(found: Mapping[str, Any]) -> str:
     """What a skill began with, in words.
 
     Args:
-        found: As the curriculum records it: the known skill, how similar it is, and what it was
-            worth before anything was learned.
+        found: Record of the beginning, as the curriculum writes it: the known skill, how similar it
+            is, and its share of successes before anything was learned.
     """
     if "skill" not in found:
         return "random weights"

@@ -377,7 +377,7 @@ class _Compared:
         """What the command line asks for.
 
         Args:
-            domain: Its name.
+            domain: Name of the domain.
             options: The command's.
             settings: The study's own that a report names.
             needs_library: Whether there is nothing to study without shortcuts.
@@ -413,7 +413,7 @@ class _Compared:
         """Make and write the report of a study.
 
         Args:
-            study: As in ``slap study``.
+            study: Name of the study, as in ``slap study``.
             make: Makes the report.
             given: What its command has besides.
         """

@@ -45,8 +45,8 @@ def provenance(study: str, domain: str, settings: Data, **given: Any) -> Provena
     """From what a report is made.
 
     Args:
-        study: As in ``slap study``.
-        domain: Its name.
+        study: Name of the study, as in ``slap study``.
+        domain: Name of the domain.
         settings: What the report names, and the command repeats.
         given: What the command has besides, or says otherwise than the report.
 
@@ -68,7 +68,7 @@ def make_report(
     """Make a report and write it. Whoever stops it goes on with the same command.
 
     Args:
-        study: As in ``slap study``.
+        study: Name of the study, as in ``slap study``.
         origin: From what it is made.
         output: Folder for its files, and until they are written for what is done so far.
         jobs: Number of processes.

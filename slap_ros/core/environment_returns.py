@@ -66,7 +66,7 @@ def reset_observation(returned: object, environment: object) -> Any:
 
     Args:
         returned: What it returned.
-        environment: Whose method it is.
+        environment: Environment whose method returned it.
 
     Raises:
         InvalidDomainError: It is not a pair.
@@ -84,7 +84,7 @@ def step_observation(returned: object, environment: object) -> Any:
 
     Args:
         returned: What it returned.
-        environment: Whose method it is.
+        environment: Environment whose method returned it.
 
     Raises:
         InvalidDomainError: It is not what a step returns.
@@ -150,7 +150,7 @@ def require_begun(wanted: State, begun: State, how: str) -> None:
     Args:
         wanted: The state it was given.
         begun: The state it has.
-        how: By what it is to continue from a state, in words.
+        how: Code of the call that must continue from the given state, for the message.
 
     Raises:
         InvalidDomainError: They differ; the message names the first feature that does.

@@ -18,8 +18,8 @@ class BudgetLimits:
     Args:
         attempts: Answers asked for. Repetitions after a busy server or a lost connection are part
             of one attempt.
-        tokens: Of questions and answers together. An answer's length is known when it is there, so
-            the last one may exceed this; no other is asked for then.
+        tokens: Tokens of questions and answers together. An answer's length is known when it is
+            there, so the last one may exceed this; no other is asked for then.
         seconds: Waiting for answers, pauses included. A wait ends when they are spent.
     """
 

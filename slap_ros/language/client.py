@@ -170,7 +170,7 @@ class OpenAIClient:
         """The server's answer; a failure only where it does not accept the request as such.
 
         Args:
-            endpoint: Of the ``openai`` package's client.
+            endpoint: Endpoint of the ``openai`` package's client.
             body: What is sent there.
             read: Makes of the bytes that come back what is returned.
             deadline: On the clock of :func:`time.monotonic`, s.

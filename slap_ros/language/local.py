@@ -61,7 +61,7 @@ class LocalClient:
         """Load the weights.
 
         Args:
-            settings: Its base URL is ``local:`` and the name of the package with the weights.
+            settings: Settings whose base URL is ``local:`` and the name of the weights' package.
             model: Instead of that package's.
 
         Raises:
@@ -118,7 +118,7 @@ class _Writer:
         """A value.
 
         Args:
-            schema: Of the kinds that ``slap_ros.language.schema`` makes.
+            schema: Schema of one of the kinds that ``slap_ros.language.schema`` makes.
             key: The property that it is the value of.
             begun: How it begins, where that is written already; see :func:`_opening`.
         """

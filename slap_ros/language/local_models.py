@@ -41,7 +41,7 @@ def load_model(package: str) -> TokenModel:
     """The weights of a package, loaded into memory.
 
     Args:
-        package: As it is imported; it has one ``.gguf`` file.
+        package: Name of the package as it is imported; it has one ``.gguf`` file.
 
     Raises:
         LanguageUnavailableError: The package is missing, or what runs it.

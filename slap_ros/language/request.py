@@ -96,10 +96,12 @@ class Reply:
         text: The answer; empty where the model gave none.
         refusal: The model's words where it refused, else None.
         finish_reason: Why it stopped, in the server's words: ``stop``, ``length``, ...
-        prompt_tokens: Of the question, as the server counts; estimated where it does not.
-        completion_tokens: Of the answer, likewise.
+        prompt_tokens: Number of tokens of the question, as the server counts them; estimated where
+            it does not.
+        completion_tokens: Number of tokens of the answer, as the server counts them; estimated
+            where it does not.
         model: What the server says answered.
-        degree: To which degree structure was asked for.
+        degree: Degree to which structure was asked for.
         seconds: From the question to the answer, repetitions and pauses included.
         scripted: Whether the server says that no model answered, but a script.
     """
@@ -132,7 +134,7 @@ class Client(Protocol):
 
         Args:
             request: What is asked.
-            seconds_left: Of the budget; the wait ends then.
+            seconds_left: Time that is left of the budget, s; the wait ends then.
 
         Returns:
             The answer, whatever its quality.

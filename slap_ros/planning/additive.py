@@ -22,8 +22,8 @@ class RelaxedPlanEstimate:
     """A plan for the task in which operators delete nothing.
 
     Args:
-        cost: Its cost: an estimate of what it takes to reach the goal.
-        helpful: Those of its actions that are applicable now, as indices.
+        cost: Cost of the plan: an estimate of what it takes to reach the goal.
+        helpful: Indices of the plan's actions that are applicable now.
     """
 
     cost: float

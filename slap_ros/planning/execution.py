@@ -91,7 +91,7 @@ class EpisodeResult:
         shortcut_steps: Environment steps executed that shortcuts took.
         edges: What was executed, in order, of all plans.
         replans: Plans that replaced a diverged one.
-        planning_seconds: Of all plans together, s.
+        planning_seconds: Planning time of all plans together, s.
         edges_rolled_out: Options simulated while planning.
         error: Why it ended, unless it is a success.
         plans: Every plan, in order, with what came of it.
@@ -120,7 +120,7 @@ class Executor:
 
     Args:
         domain: The task's domain.
-        planner: Has a model of its own, not this world.
+        planner: Planner with a model of its own, not this world.
         world: Where environment steps count.
         space: The task's atoms.
         goal: Mask of the atoms to reach.

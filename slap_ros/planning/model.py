@@ -22,7 +22,7 @@ class Rollout:
         reached: Whether it ended in its target.
         steps: Environment steps taken.
         final: The state in which it ended.
-        abstract: Its abstract state, a mask.
+        abstract: Abstract state of ``final``, as a mask.
         result: How it ended, with the reason where its target was not reached.
     """
 
@@ -49,7 +49,7 @@ class Model:
         """Start with an empty cache.
 
         Args:
-            world: In which options are rolled out; nobody else may use it.
+            world: World in which options are rolled out; nobody else may use it.
             space: The task's atoms.
             actions: What the robot can do.
         """

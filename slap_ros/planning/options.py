@@ -80,7 +80,7 @@ def given_option(domain: Domain, name: str, objects: Sequence[Object]) -> Option
 
     Args:
         domain: Which has the operator and its skill.
-        name: Of the operator.
+        name: Name of the operator.
         objects: For the operator's parameters, in order.
 
     Returns:
@@ -195,8 +195,8 @@ class OptionExecution:
         """The next action, or how the option ended.
 
         Args:
-            state: The newest one, as perceived.
-            abstract: Its abstract state, as perceived.
+            state: The newest state, as perceived.
+            abstract: Abstract state of ``state``, as perceived; a mask.
             missing: Names of objects that were not detected for too long; the option ends where it
                 is about one of them.
 
@@ -231,7 +231,7 @@ class OptionExecution:
         Args:
             code: How it ended.
             start: The abstract state in which it began.
-            abstract: That in which it ended.
+            abstract: The abstract state in which it ended.
         """
         why = self.target.why_missed(start, abstract, self.space)
         return OptionResult(code, f"{self.option} ended after {self.steps} steps{why}")

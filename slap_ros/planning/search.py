@@ -78,7 +78,7 @@ class FailedPath:
     """A path whose last edge fails in the model.
 
     Args:
-        plan: Its edges, with the steps that they take, the last one's until it fails.
+        plan: Edges of the path, with the steps that they take; for the last edge, until it fails.
         node: Index of the node that the last edge should have led to.
         abstract: The abstract state in which it ends instead.
     """
@@ -120,8 +120,8 @@ class LowLevelGraph:
 
     Args:
         start: The vertex to start from.
-        successors: Of each vertex: edge, environment steps, and the vertex reached, whose own
-            cost is not used.
+        successors: Successors of each vertex: edge, environment steps, and the vertex reached,
+            whose own cost is not used.
         failures: What was tried, and what of it failed.
     """
 

@@ -126,8 +126,8 @@ class AtomSpace:
 
         Args:
             state: The state.
-            shifts: By how much each atom's threshold is higher, in the unit of its predicate's
-                margin, shape (atoms,). Of predicates without a margin, it means nothing.
+            shifts: Increase of each atom's threshold, in the unit of its predicate's margin, shape
+                (atoms,). It is ignored for predicates without a margin.
         """
         truth = self.truth(state)
         for block in self._fluents:

@@ -195,7 +195,7 @@ class Condition:
         """The condition in words, as in ``radial_dis(?peg, ?hole) <= 0.01 m``.
 
         Args:
-            names: Of the predicate's objects.
+            names: Names of the predicate's objects, in order.
         """
         term = f"{self.metric.name}({', '.join(names[i] for i in self.arguments)})"
         if self.metric.unit == TRUTH and 0.0 < self.lower <= 1.0 <= self.upper:

@@ -47,7 +47,7 @@ class Predicate:
 
         Args:
             name: The predicate's.
-            types: Of the objects it relates.
+            types: Types of the objects that the predicate relates.
             margin: Signed distance to the threshold, in the unit of the metric behind it.
         """
 
@@ -68,7 +68,7 @@ class Predicate:
 
         Args:
             name: The predicate's.
-            types: Of the objects it relates.
+            types: Types of the objects that the predicate relates.
             conditions: At least one; their arguments are positions in ``types``.
             description: What its conditions do not say, for people and for prompts.
 

@@ -39,8 +39,8 @@ class Target:
         """What is expected of an operator in an abstract state; other atoms may appear.
 
         Args:
-            operator: That is carried out.
-            abstract: Where it begins.
+            operator: Operator that is carried out.
+            abstract: Abstract state in which the operator begins.
         """
         return cls(operator.apply(abstract), operator.delete_effects)
 
@@ -61,7 +61,7 @@ class Target:
         """The same with the atoms of another space, where those that it lacks must not hold.
 
         Args:
-            space: Of the masks.
+            space: Atom space of the target's masks.
             onto: Over more objects.
         """
         required = space.project(self.required, onto)
@@ -75,7 +75,7 @@ class Target:
         Args:
             start: The abstract state from which it was to be reached.
             abstract: The one that was reached instead.
-            space: Of the atoms.
+            space: Atom space of the masks.
 
         Returns:
             The atoms, and whether what was to change did not, or something else did; empty where

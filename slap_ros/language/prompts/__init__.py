@@ -113,7 +113,7 @@ def plan_question(
     """A plan, by the model itself: for comparison with the planner's.
 
     Args:
-        operators: That it may use.
+        operators: Operators that the plan may use.
         objects: The task's.
         init: What holds at first.
         goal: What shall hold in the end.
@@ -127,9 +127,9 @@ def feedback(template: str, complaints: Sequence[str], name: str, number: int) -
     Args:
         template: ``decomposition``, ``operator``, ``reward`` or ``plan``.
         complaints: What the checks say, worded for the model.
-        name: Of what was asked for.
-        number: Of the answer. So no two questions are the same, and a model that always gives the
-            most likely answer does not give the same one for ever.
+        name: Name of what was asked for.
+        number: Number of the rejected answer. It makes each question different, so that a model
+            that always gives the most likely answer does not repeat itself for ever.
     """
     return _render(template, "feedback", complaints=complaints, name=name, number=number)
 

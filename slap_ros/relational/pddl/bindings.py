@@ -127,7 +127,7 @@ class ActionBindings:
         """Prepare the joins of an action.
 
         Args:
-            action: Whose parameters are bound.
+            action: Action whose parameters are bound.
             fluents: Names of predicates whose atoms are reached one after the other; the index has
                 all atoms of the others.
             objects: Objects of each parameter's type, by the parameter's name.

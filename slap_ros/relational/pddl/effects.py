@@ -98,7 +98,7 @@ class EffectReader:
         scope: What names mean.
         functions: Numbers of arguments, by the name of a function in lower case.
         effects: What was read so far.
-        costs: By how much each ``increase`` raises the cost.
+        costs: Amount that each ``increase`` adds to the total cost.
     """
 
     scope: Scope

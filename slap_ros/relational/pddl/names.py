@@ -71,7 +71,7 @@ def check_new_name(kind: str, name: str, taken: set[str]) -> None:
 
     Args:
         kind: What it names, for messages.
-        name: As it is written.
+        name: Name to check, in upper and lower case as written.
         taken: Names in lower case; it is added to them.
 
     Raises:
@@ -116,7 +116,7 @@ class Names(Generic[T]):
 
         Args:
             kind: What they name, for messages.
-            things: By name.
+            things: What each name stands for, by name.
             error: To be raised for a name that is not among them.
         """
         self._kind = kind

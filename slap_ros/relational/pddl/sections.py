@@ -86,7 +86,7 @@ def read_definition(text: str, source: str, kind: str, keywords: Collection[str]
         text: PDDL.
         source: Where the text comes from, for messages.
         kind: ``domain`` or ``problem``.
-        keywords: Of the sections that such a text may have.
+        keywords: Keywords of the sections that such a text may have.
 
     Returns:
         The name and the sections.
