@@ -173,7 +173,7 @@ def test_the_shipped_library_is_found_and_used_unless_told_otherwise(
     overlays = f"{tmp_path / 'none'}:{tmp_path / 'overlay'}"
     monkeypatch.setenv("AMENT_PREFIX_PATH", overlays)
     root = tmp_path / "overlay/share/slap_ros/models" if where == "overlay" else None
-    folder = (root or nothing_shipped / where) / "obstacle2d"
+    folder = (root or nothing_shipped / where) / "shortcuts" / "obstacle2d"
     shutil.copytree(DATA, folder)
     assert shipped_library("obstacle2d") == folder
     assert shipped_library("obstacle_tower") is None
