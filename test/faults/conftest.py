@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 
-from support import faulty_links, process_faults
+from support import faulty_links, flood, process_faults
 from support.marks import slow
 
 SAMPLED = {
@@ -15,6 +15,9 @@ QUICK = {"message_case": (0, 5, 10, 15), "process_case": (0,), "restart_case": (
 SLOW = {"message_case": range(20, 80, 5), "process_case": (1, 2, 15), "restart_case": (2, 3)}
 
 
+FLOODS = ("state of a later step", "unknown domain")  # `make faults` has every kind
+
+
 def pytest_generate_tests(metafunc):
     asked = metafunc.config.getoption("--fault-cases")
     for name, sampled in SAMPLED.items():
@@ -22,3 +25,5 @@ def pytest_generate_tests(metafunc):
             quick, others = (range(asked), ()) if asked else (QUICK[name], SLOW[name])
             cases = [*map(sampled, quick), *slow(*map(sampled, others))]
             metafunc.parametrize(name, cases, ids=str)
+    if "flood_kind" in metafunc.fixturenames:
+        metafunc.parametrize("flood_kind", tuple(flood.KINDS) if asked else FLOODS)
