@@ -6,7 +6,7 @@ import subprocess
 
 import pytest
 
-from support.programs import ENVIRONMENT, program
+from support.programs import environment, program
 
 pytestmark = pytest.mark.usefixtures("points_installed")
 
@@ -22,7 +22,7 @@ def files(folder):
 def test_killed_ten_times_it_makes_the_same_library_to_the_byte(tmp_path):
     """And the same work folder: plans carried out, episodes, judgements."""
     ran = subprocess.run(
-        [*program("killed_training"), tmp_path], env=ENVIRONMENT, capture_output=True, text=True
+        [*program("killed_training"), tmp_path], env=environment(), capture_output=True, text=True
     )
     assert ran.returncode == 0, ran.stderr
     kills = (tmp_path / "kills").read_text().splitlines()

@@ -10,7 +10,7 @@ import numpy as np
 
 from slap_ros.bags import bag_digest
 from slap_ros.messages.interfaces import STATE
-from support.programs import ENVIRONMENT, program
+from support.programs import environment, program
 from support.truthful_run import Script, record, without
 
 HERE = Path(__file__).parent
@@ -20,7 +20,7 @@ def record_in_a_process(path: Path, clock_ns: int) -> None:
     subprocess.run(
         [*program("truthful_run"), str(path), "7", str(clock_ns)],
         check=True,
-        env=ENVIRONMENT | {"PYTHONHASHSEED": str(clock_ns % 100)},
+        env=environment() | {"PYTHONHASHSEED": str(clock_ns % 100)},
     )
 
 

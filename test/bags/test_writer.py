@@ -19,7 +19,7 @@ from rosbags.interfaces import QosDurability
 from slap_ros.bags import BagWriter, bag_info, read_bag
 from slap_ros.errors import BagExistsError, ErrorCode, InvalidParameterError, StorageFullError
 from support.counting_writer import STATE, cdr
-from support.programs import ENVIRONMENT, program
+from support.programs import environment, program
 from support.truthful_run import METADATA, Script
 
 
@@ -118,7 +118,7 @@ def test_a_killed_recording_has_all_that_was_acknowledged(tmp_path: Path, seed: 
     process = subprocess.Popen(
         [*program("counting_writer"), str(tmp_path / "bag")],
         stdout=subprocess.PIPE,
-        env=ENVIRONMENT,
+        env=environment(),
     )
     assert process.stdout is not None
     first = process.stdout.readline()
@@ -138,7 +138,7 @@ def test_a_full_disk_is_named_and_leaves_a_readable_bag(tmp_path: Path, limit: i
         [*program("counting_writer"), str(tmp_path / "bag"), str(limit)],
         capture_output=True,
         text=True,
-        env=ENVIRONMENT,
+        env=environment(),
     )
     assert result.returncode == ErrorCode.STORAGE_FULL, result.stderr
     assert "no room left" in result.stderr

@@ -15,7 +15,7 @@ from slap_ros.worlds.contact.simulation_pool import close_idle
 from slap_ros.worlds.contact.world import ContactWorld
 from support.contact_transitions import Transitions, record
 from support.marks import slow
-from support.programs import ENVIRONMENT, program
+from support.programs import environment, program
 
 COUNT = 600
 
@@ -70,7 +70,7 @@ def test_the_same_in_another_process(recorded, tmp_path):
     recorded.save(tmp_path / "steps.npz")
     answer = subprocess.run(
         [*program("contact_transitions"), tmp_path / "steps.npz"],
-        env=ENVIRONMENT,
+        env=environment(),
         capture_output=True,
         text=True,
         check=True,

@@ -14,7 +14,7 @@ from slap_ros.domains.registry import OURS
 from slap_ros.worlds.contact.features import ROBOT
 from support.domain_transitions import differing, orders, record, save
 from support.marks import slow
-from support.programs import ENVIRONMENT, program
+from support.programs import environment, program
 
 DOMAINS = [name for name in OURS if get_domain(name).acquisition is not None]
 COUNT = 120  # steps; ``domain_transitions`` is a command for more
@@ -48,5 +48,5 @@ def test_the_same_in_another_process(recorded, tmp_path):
     name, steps = recorded
     save(steps, tmp_path / "steps.npz")
     command = [*program("domain_transitions"), name, "--file", tmp_path / "steps.npz"]
-    answer = subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True, check=True)
+    answer = subprocess.run(command, env=environment(), capture_output=True, text=True, check=True)
     assert answer.stdout == f"0 of {COUNT} differ\n"

@@ -30,7 +30,7 @@ from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract
 from slap_ros.planning.options import Option, OptionKind, given_option
 from slap_ros.planning.plan import Plan, PlanEdge
 from slap_ros.relational import AtomSpace, Target
-from support.programs import ENVIRONMENT, PATH
+from support.programs import PATH, environment
 
 SVG = "{http://www.w3.org/2000/svg}"
 PAPER = (0.8, 0.4)  # m, block positions
@@ -358,7 +358,7 @@ def test_deterministic_across_processes_and_hash_seeds() -> None:
     outputs = [
         subprocess.run(
             [sys.executable, "-c", program],
-            env=ENVIRONMENT
+            env=environment()
             | {
                 "PYTHONPATH": os.pathsep.join([PATH, str(Path(__file__).parent)]),
                 "PYTHONHASHSEED": seed,

@@ -19,7 +19,7 @@ from ensemble.interfaces import STATE
 from ensemble.network import is_embedded
 from ensemble.nodes import node_class
 from support import leftovers
-from support.programs import ENVIRONMENT
+from support.programs import environment
 
 ROOT = Path(__file__).parents[2]
 LIMIT_S = 120.0
@@ -87,12 +87,12 @@ def nested(tmp_path):
     ))  # fmt: skip
     (tmp_path / "test_nested.py").write_text(TESTS)
     # ROS 2 brings plug-ins for versions of pytest that are long past.
-    environment = {**ENVIRONMENT, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+    own = {**environment(), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
 
     def start(*options):
         return subprocess.Popen(
             [sys.executable, "-m", "pytest", "-s", "-q", "-p", "no:cacheprovider", *options],
-            cwd=tmp_path, text=True, stdout=subprocess.PIPE, env=environment,
+            cwd=tmp_path, text=True, stdout=subprocess.PIPE, env=own,
         )  # fmt: skip
 
     return start

@@ -35,7 +35,7 @@ from support.motion_scenes import (
     top_down,
     tower,
 )
-from support.programs import ENVIRONMENT, PATH
+from support.programs import PATH, environment
 
 OVER_TOWER = [TABLE, *tower(0.5, 0.0)]
 
@@ -150,7 +150,7 @@ def test_another_process_finds_the_same_path(request):
     path = plan_path(start, goal, free, seed=3)
     other = subprocess.run(
         [sys.executable, "-c", IN_ANOTHER_PROCESS],
-        env=ENVIRONMENT | {"PYTHONPATH": os.pathsep.join([PATH, str(request.path.parent)])},
+        env=environment() | {"PYTHONPATH": os.pathsep.join([PATH, str(request.path.parent)])},
         capture_output=True,
         text=True,
         check=True,

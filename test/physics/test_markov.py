@@ -17,7 +17,7 @@ from slap_ros.worlds.joint_space.scene import TABLE, Box, Scene
 from slap_ros.worlds.joint_space.simulation_pool import close_idle
 from slap_ros.worlds.joint_space.world import PandaWorld
 from support.marks import slow
-from support.programs import ENVIRONMENT, program
+from support.programs import environment, program
 from support.transitions import Transitions, record
 
 COUNTS = {"alike": 1000, "mixed": 1000, "toys": 400}  # toys have many pieces
@@ -70,7 +70,7 @@ def test_the_same_in_another_process(transitions, tmp_path):
     transitions.save(tmp_path / "transitions.npz")
     answer = subprocess.run(
         [*program("transitions"), tmp_path / "transitions.npz"],
-        env=ENVIRONMENT,
+        env=environment(),
         capture_output=True,
         text=True,
         check=True,

@@ -24,7 +24,7 @@ from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.training import CandidateGroup, Training, rank
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 from slap_ros.skills.domain_choice import DomainChoice
-from support.programs import ENVIRONMENT, PATH
+from support.programs import PATH, environment
 
 TASKS = TaskDistribution(DomainChoice("obstacle2d", "fair"), 5)
 OURS = training_settings("ours", get_domain("obstacle2d"))
@@ -161,7 +161,7 @@ def test_a_killed_training_resumes_from_its_checkpoint(tmp_path):
     path = os.pathsep.join([PATH, str(Path(__file__).parent)])
     killed = subprocess.run(
         [sys.executable, "-c", KILLED.format(work=str(work))],
-        env=ENVIRONMENT | {"PYTHONPATH": path},
+        env=environment() | {"PYTHONPATH": path},
         check=False,
     )
     assert killed.returncode == -9

@@ -8,9 +8,14 @@ from pathlib import Path
 
 TESTS = Path(__file__).parents[1]
 PATH = os.pathsep.join([str(TESTS.parent), str(TESTS)])  # of benchmarks, and of this package
-ENVIRONMENT = os.environ | {"PYTHONPATH": PATH}
+
+
+def environment() -> dict[str, str]:
+    """The environment of such a program: this process's, with the modules that it imports."""
+    before = filter(None, [os.environ.get("PYTHONPATH")])
+    return os.environ | {"PYTHONPATH": os.pathsep.join([PATH, *before])}
 
 
 def program(name: str) -> list[str]:
-    """The command that runs a module of this package; give it :data:`ENVIRONMENT`."""
+    """The command that runs a module of this package; give it :func:`environment`."""
     return [sys.executable, "-m", f"support.{name}"]
