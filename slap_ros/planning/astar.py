@@ -16,6 +16,7 @@ import heapq
 from collections.abc import Sequence
 
 from slap_ros.errors import PlanningLimitError, UnsolvableError
+from slap_ros.planning.arrivals import trace
 from slap_ros.planning.hmax import HMaxHeuristic
 from slap_ros.relational import GroundOperator
 
@@ -56,7 +57,7 @@ def find_shortest_sequence(
     while queue:
         *_, state = heapq.heappop(queue)
         if state & goal == goal:
-            return _trace(arrivals, state)
+            return trace(arrivals, start, state)
         if state in expanded:
             continue
         expanded.add(state)
@@ -81,12 +82,3 @@ def find_shortest_sequence(
     raise UnsolvableError(
         f"no sequence of operators leads to the goal: {len(expanded)} abstract states were expanded"
     )
-
-
-def _trace(arrivals: dict[int, tuple[int, int]], state: int) -> list[int]:
-    """The operators on the way to a state."""
-    sequence = []
-    while state in arrivals:
-        state, index = arrivals[state]
-        sequence.append(index)
-    return sequence[::-1]

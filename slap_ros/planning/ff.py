@@ -19,6 +19,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 from slap_ros.errors import PlanningLimitError, UnsolvableError
+from slap_ros.planning.arrivals import trace
 from slap_ros.relational import GroundOperator
 
 MAX_EXPANSIONS = 100_000  # abstract states; some ten seconds with two hundred operators
@@ -69,14 +70,14 @@ def _best_first(
     limits: tuple[int, int],
 ) -> list[int]:
     """Greedy best-first search with deferred evaluation; see :func:`find_operator_sequence`."""
-    arrivals: dict[int, tuple[int, int] | None] = {start: None}  # previous state, operator
+    arrivals = {start: (start, -1)}  # previous state, operator
     queue = [(False, 0, 0, start)]  # unhelpful, estimate, order of discovery, state
     max_expansions, max_tests = limits
     expansions = 0
     while queue:
         *_, state = heapq.heappop(queue)
         if state & goal == goal:
-            return _trace(arrivals, state)
+            return trace(arrivals, start, state)
         if expansions >= max_expansions:
             raise PlanningLimitError(
                 f"no plan within {max_expansions} expansions of abstract states; raise the limit "
@@ -108,15 +109,6 @@ def _successors(
     for index, operator in enumerate(operators):
         if operator.applicable(state) and (state, index) not in forbidden:
             yield index, operator, operator.apply(state)
-
-
-def _trace(arrivals: dict[int, tuple[int, int] | None], state: int) -> list[int]:
-    """The operators on the way to a state, by index."""
-    sequence = []
-    while (arrival := arrivals[state]) is not None:
-        state, index = arrival
-        sequence.append(index)
-    return sequence[::-1]
 
 
 @dataclass(frozen=True, slots=True)

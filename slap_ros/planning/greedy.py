@@ -17,6 +17,7 @@ import numpy as np
 
 from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.planning.additive import relaxed_plan
+from slap_ros.planning.arrivals import trace
 from slap_ros.planning.relaxation import Indices, RelaxedTask
 from slap_ros.relational.pddl.ground_task import GroundTask
 
@@ -113,7 +114,7 @@ class _Search:
                 continue
             self._arrivals[successor] = state, index
             if successor & self._task.goal == self._task.goal:
-                return self._trace(successor)
+                return trace(self._arrivals, start, successor)
             self._check_limits()
             self._expand(successor)
         raise UnsolvableError(
@@ -153,11 +154,3 @@ class _Search:
                 f"no plan after {max_tests} tests of operators, in {self._expansions} expansions "
                 "of abstract states; raise the limit or give a goal nearer by"
             )
-
-    def _trace(self, state: int) -> list[int]:
-        """The actions on the way to a state, by index."""
-        sequence = []
-        while state != self._task.start:
-            state, index = self._arrivals[state]
-            sequence.append(index)
-        return sequence[::-1]

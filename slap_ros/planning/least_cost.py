@@ -18,6 +18,7 @@ import numpy as np
 
 from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.planning.additive import relaxed_plan
+from slap_ros.planning.arrivals import trace
 from slap_ros.planning.relaxation import RelaxedTask, Truth
 from slap_ros.relational.pddl.ground_task import GroundTask
 
@@ -169,7 +170,7 @@ class _CostSearch:
         while queue:
             *_, cost, state = heapq.heappop(queue)
             if state & task.goal == task.goal:
-                return _trace(arrivals, start, state)
+                return trace(arrivals, start, state)
             if cost > costs[state]:
                 continue
             if self.evaluated >= self._max_states or self._relaxed.tests > self._max_tests:
@@ -188,12 +189,3 @@ class _CostSearch:
                 estimate = total + self._weight * remaining
                 heapq.heappush(queue, (estimate, remaining, order, total, successor))
         return None
-
-
-def _trace(arrivals: dict[int, tuple[int, int]], start: int, state: int) -> list[int]:
-    """The actions on the way to a state, by index."""
-    sequence = []
-    while state != start:
-        state, index = arrivals[state]
-        sequence.append(index)
-    return sequence[::-1]

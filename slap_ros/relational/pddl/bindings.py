@@ -11,7 +11,7 @@ So the work follows what can happen, not the product of all objects.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import prod
 
@@ -110,7 +110,6 @@ class _Choice:
 
 
 _Step = _Join | _Choice
-_Check = Callable[[Binding], bool]
 
 
 class ActionBindings:
