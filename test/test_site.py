@@ -119,7 +119,7 @@ def test_the_reference_has_every_field_of_every_interface(site):
     ("page", "name"),
     [
         ("core", "slap_ros.core.domain.Domain"),
-        ("planning", "slap_ros.planning.search.search_lazily"),
+        ("planning", "slap_ros.planning.lazy_search.search_lazily"),
         ("errors", "slap_ros.errors.UnsolvableError"),
     ],
 )

@@ -16,11 +16,12 @@ from slap_ros.planning.abstract_graph import (
     add_beyond,
     build_abstract_graph,
 )
+from slap_ros.planning.lazy_search import search_lazily
 from slap_ros.planning.model import Model
 from slap_ros.planning.plan import PlanningResult
 from slap_ros.planning.problem import Problem
 from slap_ros.planning.recovery import Recovery
-from slap_ros.planning.search import SearchOutcome, search_lazily
+from slap_ros.planning.search import SearchOutcome
 from slap_ros.relational import State
 
 Search = Callable[[AbstractGraph, State, Model], SearchOutcome]

@@ -64,6 +64,10 @@ class Model:
         """A model for the tasks over these objects."""
         return cls(domain.make_world(initial), domain.atom_space(initial), domain.action_space)
 
+    def knows(self, option: Option, state: State, target: Target) -> bool:
+        """Whether a roll-out was made before; see :meth:`roll_out`."""
+        return (option, target, state.key) in self._cache
+
     def roll_out(self, option: Option, state: State, target: Target) -> Rollout:
         """Execute an option until it reaches its target or ends otherwise.
 

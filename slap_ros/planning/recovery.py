@@ -18,9 +18,10 @@ from dataclasses import dataclass
 
 from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.planning.abstract_graph import AbstractGraph, build_unrolled_graph
+from slap_ros.planning.lazy_search import search_lazily
 from slap_ros.planning.plan import Plan, PlanEdge
 from slap_ros.planning.problem import Problem
-from slap_ros.planning.search import FailedPath, SearchOutcome, search_lazily
+from slap_ros.planning.search import FailedPath, SearchOutcome
 from slap_ros.planning.symbolic_planner import SymbolicPlanner
 from slap_ros.relational import State, Target
 

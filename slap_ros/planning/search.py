@@ -7,12 +7,11 @@ far. Vertices of the search are therefore (node, low-level state) pairs, and a n
 again for each low-level state in which it is reached.
 
 :func:`search_exhaustively` rolls out every forward edge from every such vertex first and runs
-Dijkstra's algorithm on the result, as the paper does. :func:`search_lazily` is A* with lazy edge
-evaluation, as in Lazy Weighted A* (Cohen, Phillips and Likhachev: Planning single-arm
-manipulations with n-arm robots, RSS 2014) with weight 1; see LazySP (Dellin and Srinivasa: A
-unifying formalism for shortest path problems with expensive edge evaluations via lazy best-first
-search over paths with edge selectors, ICAPS 2016) for the family: an edge is rolled out only
-when it comes to the front of the queue, and until then counts with a lower bound.
+Dijkstra's algorithm on the result, as the paper does. Lazy search
+(:mod:`slap_ros.planning.lazy_search`) is A* with lazy edge evaluation; see LazySP (Dellin and
+Srinivasa: A unifying formalism for shortest path problems with expensive edge evaluations via lazy
+best-first search over paths with edge selectors, ICAPS 2016) for the family: an edge is rolled out
+only when it comes to the front of the queue, and until then counts with a lower bound.
 
 Both find the same cost *if bounds are admissible* (no option takes fewer steps than
 ``Skill.least_steps`` and ``Skill.lower_bound`` say) and no shortcut is given up on the way, which
@@ -33,7 +32,7 @@ replaced.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import count
 
@@ -97,11 +96,16 @@ class SearchOutcome:
         failed: Without a plan: paths on which a given or acquired skill moved the robot and failed,
             in the order in which the search met them.
         reason: Without a plan: why there is none.
+        at_least: Environment steps that every plan through the graph takes, as far as is proven;
+            None where nothing is known.
+        stopped: Whether a limit ended the search.
     """
 
     plan: Plan | None
     failed: tuple[FailedPath, ...] = ()
     reason: str = ""
+    at_least: int | None = None
+    stopped: bool = False
 
     def require_plan(self) -> Plan:
         """The plan, where there has to be one.
@@ -195,7 +199,7 @@ def search_exhaustively(graph: AbstractGraph, state: State, model: Model) -> Sea
     while queue:
         g, _, vertex = heapq.heappop(queue)
         if vertex.node in goals:
-            return SearchOutcome(_plan(graph, vertex))
+            return SearchOutcome(plan_to(graph, vertex), at_least=g)
         if vertex.key in closed:
             continue
         closed[vertex.key] = vertex
@@ -203,7 +207,7 @@ def search_exhaustively(graph: AbstractGraph, state: State, model: Model) -> Sea
             reached = Vertex(successor.node, successor.state, g + steps, vertex, edge)
             heapq.heappush(queue, (reached.g, next(tie), reached))
     failed = _failed_edges(graph, closed.values(), model)
-    return _without_plan(graph, failed, model, bottom.failures)
+    return without_plan(graph, failed, model, bottom.failures)
 
 
 def _failed_edges(
@@ -219,161 +223,13 @@ def _failed_edges(
                 yield Vertex(edge.target, rollout.final, vertex.g + rollout.steps, vertex, edge)
 
 
-@dataclass(order=True)
-class _QueueEntry:
-    """A vertex to be expanded, or an edge out of it that was not rolled out yet."""
-
-    f: int  # lower bound of the environment steps of any plan through it
-    tie: int
-    vertex: Vertex = field(compare=False)
-    edge: Edge | None = field(compare=False)
-    least_steps: int = field(compare=False)  # environment steps that the edge takes
-
-    @property
-    def node(self) -> int:
-        """Index of the node that it leads to."""
-        return self.vertex.node if self.edge is None else self.edge.target
-
-
-class _Frontier:
-    """The queue of A*, smallest f = g + h first; h is a lower bound of the steps to go."""
-
-    def __init__(self, graph: AbstractGraph) -> None:
-        self._goals = graph.goal_nodes
-        self._look_ahead(graph.forward_edges())
-        self._queue: list[_QueueEntry] = []
-        self._tie = count()
-
-    def push(self, vertex: Vertex, edge: Edge | None = None, least_steps: int = 0) -> None:
-        """Put a vertex or an edge into the queue, if a goal can be reached through it.
-
-        Args:
-            vertex: To be expanded.
-            edge: To be rolled out from the vertex instead.
-            least_steps: Lower bound of the environment steps that the edge takes.
-        """
-        # Deeper first among equals: they are nearer to the goal.
-        self._put(_QueueEntry(0, -next(self._tie), vertex, edge, least_steps))
-
-    def _put(self, entry: _QueueEntry) -> None:
-        h = self._h[entry.node]
-        if h is not None:
-            entry.f = entry.vertex.g + entry.least_steps + h
-            heapq.heappush(self._queue, entry)
-
-    def pop(self) -> _QueueEntry | None:
-        """The best entry; None if the queue is empty."""
-        while self._queue:
-            best = heapq.heappop(self._queue)
-            h = self._h[best.node]
-            if h is not None and best.vertex.g + best.least_steps + h <= best.f:
-                return best
-            self._put(best)  # bounds rose since it was pushed
-        return None
-
-    def drop_given_up(self) -> None:
-        """Drop the options that were given up, with the bounds that counted on them."""
-        self._look_ahead([[e for e in out if not e.option.given_up()] for out in self.forward])
-
-    def _look_ahead(self, forward: list[list[Edge]]) -> None:
-        """Keep the edges through which a goal can be reached, and h of each node."""
-        self._h = _steps_to_go(forward, self._goals)
-        self.forward = [[e for e in out if self._h[e.target] is not None] for out in forward]
-
-
-def search_lazily(graph: AbstractGraph, state: State, model: Model) -> SearchOutcome:
-    """A* with lazy edge evaluation: an edge is rolled out at the front of the queue.
-
-    Until then it counts with the bound of its skill from the state at its source. As long as
-    bounds never exceed the true steps, the first goal vertex at the front is the cheapest; the
-    module's text says when they may.
+def plan_to(graph: AbstractGraph, goal: Vertex) -> Plan:
+    """The plan whose edges lead to a vertex.
 
     Args:
         graph: The top level.
-        state: The low-level state to start from, in the graph's first node.
-        model: Rolls options out.
-
-    Returns:
-        A plan, of least cost where bounds are admissible, if any path of the graph can be executed
-        from ``state``.
+        goal: Where the plan ends.
     """
-    return _LazySearch(graph, state, model).run()
-
-
-class _LazySearch:
-    """One run of :func:`search_lazily`."""
-
-    def __init__(self, graph: AbstractGraph, state: State, model: Model) -> None:
-        """See :func:`search_lazily`."""
-        self._graph, self._model = graph, model
-        self._goals = set(graph.goal_nodes)
-        self._frontier = _Frontier(graph)
-        start = Vertex(0, state, 0)
-        self._cheapest = {start.key: 0}
-        self._failures = Failures()
-        self._failed: list[Vertex] = []  # where operators that failed have left the robot
-        self._frontier.push(start)
-
-    def run(self) -> SearchOutcome:
-        """Until the best entry of the queue is a goal vertex."""
-        while (best := self._frontier.pop()) is not None:
-            vertex, edge = best.vertex, best.edge
-            if edge is not None:
-                self._evaluate(vertex, edge)
-            elif vertex.node in self._goals:
-                return SearchOutcome(_plan(self._graph, vertex))
-            elif vertex.g == self._cheapest[vertex.key]:
-                self._expand(vertex)
-        return _without_plan(self._graph, self._failed, self._model, self._failures)
-
-    def _expand(self, vertex: Vertex) -> None:
-        """Queue the edges out of a vertex, each with its bound."""
-        for edge in self._frontier.forward[vertex.node]:
-            skill = edge.option.skill
-            bound = skill.lower_bound(vertex.state, edge.option.objects)
-            self._frontier.push(vertex, edge, max(skill.least_steps, bound))
-
-    def _evaluate(self, vertex: Vertex, edge: Edge) -> None:
-        """Roll an edge out, and queue where it leads and its next attempt."""
-        if edge.option.given_up():
-            return
-        target = edge.option.target(self._graph.nodes[edge.target])
-        rollout = self._model.roll_out(edge.option, vertex.state, target)
-        if edge.option.attempt == 0:
-            self._failures.add(edge.option, target, rollout)
-        if rollout.reached:
-            g = vertex.g + rollout.steps
-            reached = Vertex(edge.target, rollout.final, g, vertex, edge)
-            if g < self._cheapest.get(reached.key, g + 1):
-                self._cheapest[reached.key] = g
-                self._frontier.push(reached)
-            following = edge.option.next_attempt()
-            if following is not None:  # it takes longer, but the next option may take less
-                self._frontier.push(vertex, replace(edge, option=following), rollout.steps)
-            return
-        if rollout.moved_and_failed and edge.option.kind is OptionKind.OPERATOR:
-            g = vertex.g + rollout.steps
-            self._failed.append(Vertex(edge.target, rollout.final, g, vertex, edge))
-        if edge.option.given_up():
-            self._frontier.drop_given_up()
-
-
-def _steps_to_go(forward: list[list[Edge]], goals: Sequence[int]) -> list[int | None]:
-    """Lower bound of the steps from each node to a goal; None where there is no way."""
-    h: list[int | None] = [None] * len(forward)
-    for goal in goals:
-        h[goal] = 0
-    for node in reversed(range(len(forward))):  # forward edges lead to later nodes
-        for edge in forward[node]:
-            beyond = h[edge.target]
-            if beyond is not None:
-                through = edge.option.skill.least_steps + beyond
-                known = h[node]
-                h[node] = through if known is None else min(known, through)
-    return h
-
-
-def _plan(graph: AbstractGraph, goal: Vertex) -> Plan:
     edges = [
         PlanEdge(
             edge.option,
@@ -391,14 +247,14 @@ def _path(vertex: Vertex) -> Iterator[tuple[Vertex, Vertex, Edge]]:
         vertex = vertex.parent
 
 
-def _without_plan(
+def without_plan(
     graph: AbstractGraph, failed: Iterable[Vertex], model: Model, failures: Failures
 ) -> SearchOutcome:
     """The outcome of a search that found no plan."""
     what = f"no path through the {len(graph.nodes)} abstract states can be executed from here"
     why = failures.in_words()
     paths = tuple(
-        FailedPath(_plan(graph, ended), ended.node, model.space.abstract(ended.state))
+        FailedPath(plan_to(graph, ended), ended.node, model.space.abstract(ended.state))
         for ended in failed
     )
     return SearchOutcome(None, paths, f"{what}: {why}" if why else what)

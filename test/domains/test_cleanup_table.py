@@ -27,8 +27,9 @@ from slap_ros.errors import ErrorCode, InvalidParameterError
 from slap_ros.geometry.pose import Pose, rotate
 from slap_ros.meshes.solid import Solid, cuboid
 from slap_ros.planning.graph_planner import GraphPlanner
+from slap_ros.planning.lazy_search import search_lazily
 from slap_ros.planning.problem import Problem
-from slap_ros.planning.search import search_exhaustively, search_lazily
+from slap_ros.planning.search import search_exhaustively
 from slap_ros.relational import Column, State, Target
 from slap_ros.worlds.joint_space.features import ROBOT
 from slap_ros.worlds.joint_space.world import PandaWorld

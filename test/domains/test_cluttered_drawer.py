@@ -26,10 +26,11 @@ from slap_ros.geometry.pose import multiply, rotate
 from slap_ros.motion import linear_motion, nearest_configurations, retime
 from slap_ros.planning.abstract_graph import build_abstract_graph
 from slap_ros.planning.graph_planner import GraphPlanner
+from slap_ros.planning.lazy_search import search_lazily
 from slap_ros.planning.model import Model
 from slap_ros.planning.options import given_option
 from slap_ros.planning.problem import Problem
-from slap_ros.planning.search import search_exhaustively, search_lazily
+from slap_ros.planning.search import search_exhaustively
 from slap_ros.relational import Column, State, Target
 from slap_ros.worlds.joint_space.scene import TABLE_TOP
 from slap_ros.worlds.panda import MAX_STEP, grasp_pose

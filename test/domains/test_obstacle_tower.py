@@ -18,10 +18,11 @@ from slap_ros.domains.obstacle_tower.tasks import (
 from slap_ros.domains.tabletop.state_access import pose_of
 from slap_ros.errors import ErrorCode, InvalidStateError, UnsolvableError
 from slap_ros.planning.graph_planner import GraphPlanner
+from slap_ros.planning.lazy_search import search_lazily
 from slap_ros.planning.model import Model
 from slap_ros.planning.planner import make_planner
 from slap_ros.planning.problem import Problem
-from slap_ros.planning.search import search_exhaustively, search_lazily
+from slap_ros.planning.search import search_exhaustively
 from slap_ros.relational import State
 from slap_ros.worlds.bodies import Material
 from slap_ros.worlds.joint_space.scene import CUBE_EDGE

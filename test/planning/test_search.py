@@ -13,11 +13,12 @@ from hypothesis import strategies as st
 from slap_ros.domains import get_domain
 from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
+from slap_ros.planning.lazy_search import search_lazily
 from slap_ros.planning.model import Rollout
 from slap_ros.planning.options import Option, OptionKind
 from slap_ros.planning.planner import make_planner
 from slap_ros.planning.problem import Problem
-from slap_ros.planning.search import search_exhaustively, search_lazily
+from slap_ros.planning.search import search_exhaustively
 from slap_ros.relational import Feature, Layout, State, Target, Type
 
 COUNTER = Type("counter", (Feature("value", "1"),))

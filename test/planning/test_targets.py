@@ -13,11 +13,12 @@ from hypothesis import strategies as st
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode, UnsolvableError
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge
+from slap_ros.planning.lazy_search import search_lazily
 from slap_ros.planning.model import Rollout
 from slap_ros.planning.options import Option, OptionExecution, OptionKind, OptionResult
 from slap_ros.planning.planner import make_planner
 from slap_ros.planning.problem import ground_options
-from slap_ros.planning.search import search_exhaustively, search_lazily
+from slap_ros.planning.search import search_exhaustively
 from slap_ros.relational import Feature, Layout, State, Target, Type
 
 MASKS = st.integers(0, 255)

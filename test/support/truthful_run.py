@@ -19,9 +19,9 @@ from slap_ros.messages import interfaces
 from slap_ros.messages.events import PlanEventKind, SkillEventKind
 from slap_ros.messages.interfaces import typestore
 from slap_ros.planning.abstract_graph import build_abstract_graph
+from slap_ros.planning.lazy_search import search_lazily
 from slap_ros.planning.model import Model
 from slap_ros.planning.options import OptionExecution, OptionResult, given_option
-from slap_ros.planning.search import search_lazily
 
 METADATA = {"seed": "7", "preset": "fair", "revision": "0123456789ab-dirty"}
 TICK = 1_000_003  # ns between any two messages

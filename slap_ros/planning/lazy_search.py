@@ -1,0 +1,248 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A* with lazy edge evaluation through the abstract graph, exact or weighted.
+
+What it finds, and under which bounds, is told in :mod:`slap_ros.planning.search`. With a weight
+above 1 it is Lazy Weighted A* (Cohen, Phillips and Likhachev: Planning single-arm manipulations
+with n-arm robots, RSS 2014): bounds of what is still to come count more than steps that were rolled
+out, so that a first plan is found soon, and is at most that many times as long as the shortest.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from itertools import count
+
+from slap_ros.planning.abstract_graph import AbstractGraph, Edge
+from slap_ros.planning.failures import Failures
+from slap_ros.planning.model import Model
+from slap_ros.planning.options import OptionKind
+from slap_ros.planning.search import SearchOutcome, Vertex, plan_to, without_plan
+from slap_ros.relational import State, Target
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a search may do, in counts; the defaults limit nothing.
+
+    Args:
+        weight: Factor by which bounds of steps to come count more than steps so far, at least 1.
+        rollouts: Number of the model's roll-outs, all of its life, at which the search stops; None
+            for no limit.
+        below: Environment steps that a plan must stay below; None for no limit.
+    """
+
+    weight: float = 1.0
+    rollouts: int | None = None
+    below: int | None = None
+
+
+UNLIMITED = Limits()
+
+
+def search_lazily(
+    graph: AbstractGraph, state: State, model: Model, limits: Limits = UNLIMITED
+) -> SearchOutcome:
+    """A* with lazy edge evaluation: an edge is rolled out at the front of the queue.
+
+    Until then it counts with the bound of its skill from the state at its source. As long as
+    bounds never exceed the true steps, the first goal vertex at the front is the cheapest; the
+    text of :mod:`slap_ros.planning.search` says when they may.
+
+    Args:
+        graph: The top level.
+        state: The low-level state to start from, in the graph's first node.
+        model: Rolls options out.
+        limits: Weight of the heuristic, and where to stop.
+
+    Returns:
+        A plan, of least cost where bounds are admissible and the weight is 1, if any path of the
+        graph can be executed from ``state`` within the limits.
+    """
+    return _LazySearch(graph, state, model, limits).run()
+
+
+@dataclass(order=True)
+class _QueueEntry:
+    """A vertex to be expanded, or an edge out of it that was not rolled out yet."""
+
+    priority: float  # g + weight * (steps to come, at least)
+    tie: int
+    vertex: Vertex = field(compare=False)
+    edge: Edge | None = field(compare=False)
+    least_steps: int = field(compare=False)  # environment steps that the edge takes
+    f: int = field(compare=False, default=0)  # lower bound of the steps of any plan through it
+
+    @property
+    def node(self) -> int:
+        """Index of the node that it leads to."""
+        return self.vertex.node if self.edge is None else self.edge.target
+
+
+class _Frontier:
+    """The queue of A*; h is a lower bound of the steps to go from a node."""
+
+    def __init__(self, graph: AbstractGraph, weight: float) -> None:
+        self._goals, self._weight = graph.goal_nodes, weight
+        self._look_ahead(graph.forward_edges())
+        self._queue: list[_QueueEntry] = []
+        self._tie = count()
+
+    def push(self, vertex: Vertex, edge: Edge | None = None, least_steps: int = 0) -> None:
+        """Put a vertex or an edge into the queue, if a goal can be reached through it.
+
+        Args:
+            vertex: To be expanded.
+            edge: To be rolled out from the vertex instead.
+            least_steps: Lower bound of the environment steps that the edge takes.
+        """
+        # Deeper first among equals: they are nearer to the goal.
+        self._put(_QueueEntry(0.0, -next(self._tie), vertex, edge, least_steps))
+
+    def _put(self, entry: _QueueEntry) -> None:
+        h = self._h[entry.node]
+        if h is not None:
+            to_come = entry.least_steps + h
+            entry.f = entry.vertex.g + to_come
+            entry.priority = entry.vertex.g + self._weight * to_come
+            heapq.heappush(self._queue, entry)
+
+    def pop(self) -> _QueueEntry | None:
+        """The best entry; None if the queue is empty."""
+        while self._queue:
+            best = heapq.heappop(self._queue)
+            h = self._h[best.node]
+            if h is not None and best.vertex.g + best.least_steps + h <= best.f:
+                return best
+            self._put(best)  # bounds rose since it was pushed
+        return None
+
+    def waiting(self) -> Sequence[_QueueEntry]:
+        """All entries, in no order."""
+        return self._queue
+
+    def drop_given_up(self) -> None:
+        """Drop the options that were given up, with the bounds that counted on them."""
+        self._look_ahead([[e for e in out if not e.option.given_up()] for out in self.forward])
+
+    def _look_ahead(self, forward: list[list[Edge]]) -> None:
+        """Keep the edges through which a goal can be reached, and h of each node."""
+        self._h = _steps_to_go(forward, self._goals)
+        self.forward = [[e for e in out if self._h[e.target] is not None] for out in forward]
+
+
+class _LazySearch:
+    """One run of :func:`search_lazily`."""
+
+    def __init__(self, graph: AbstractGraph, state: State, model: Model, limits: Limits) -> None:
+        """See :func:`search_lazily`."""
+        self._graph, self._model, self._limits = graph, model, limits
+        self._goals = set(graph.goal_nodes)
+        self._frontier = _Frontier(graph, limits.weight)
+        start = Vertex(0, state, 0)
+        self._cheapest = {start.key: 0}
+        self._failures = Failures()
+        self._failed: list[Vertex] = []  # where operators that failed have left the robot
+        self._frontier.push(start)
+
+    def run(self) -> SearchOutcome:
+        """Until the best entry of the queue is a goal vertex, or a limit is reached."""
+        limits = self._limits
+        while (best := self._frontier.pop()) is not None:
+            vertex, edge = best.vertex, best.edge
+            if limits.below is not None and best.f >= limits.below:
+                continue
+            if edge is not None:
+                if self._is_too_much(vertex, edge):
+                    return self._stopped(best)
+                self._evaluate(vertex, edge)
+            elif vertex.node in self._goals:
+                return SearchOutcome(plan_to(self._graph, vertex), at_least=self._at_least(best))
+            elif vertex.g == self._cheapest[vertex.key]:
+                self._expand(vertex)
+        found = without_plan(self._graph, self._failed, self._model, self._failures)
+        return replace(found, at_least=limits.below)
+
+    def _is_too_much(self, vertex: Vertex, edge: Edge) -> bool:
+        """Whether an edge takes a roll-out more than the limit."""
+        model, limit = self._model, self._limits.rollouts
+        if limit is None or model.executed < limit:
+            return False
+        return not model.knows(edge.option, vertex.state, self._target(edge))
+
+    def _stopped(self, best: _QueueEntry) -> SearchOutcome:
+        """The outcome at the limit of roll-outs: the best plan that waits in the queue."""
+        at_least = self._at_least(best)
+        goals = [one for one in self._frontier.waiting() if one.vertex.node in self._goals]
+        if goals:
+            nearest = min(goals, key=lambda one: one.vertex.g)
+            plan = plan_to(self._graph, nearest.vertex)
+            return SearchOutcome(plan, at_least=at_least, stopped=True)
+        reason = f"no plan after {self._limits.rollouts} roll-outs"
+        return SearchOutcome(None, reason=reason, at_least=at_least, stopped=True)
+
+    def _at_least(self, best: _QueueEntry) -> int:
+        """Steps that any plan takes that is through the best entry or what waits behind it."""
+        waiting = (entry.f for entry in self._frontier.waiting())
+        bound = min([best.f, *waiting])
+        return bound if self._limits.below is None else min(bound, self._limits.below)
+
+    def _target(self, edge: Edge) -> Target:
+        return edge.option.target(self._graph.nodes[edge.target])
+
+    def _expand(self, vertex: Vertex) -> None:
+        """Queue the edges out of a vertex, each with its bound."""
+        for edge in self._frontier.forward[vertex.node]:
+            skill = edge.option.skill
+            bound = skill.lower_bound(vertex.state, edge.option.objects)
+            self._frontier.push(vertex, edge, max(skill.least_steps, bound))
+
+    def _evaluate(self, vertex: Vertex, edge: Edge) -> None:
+        """Roll an edge out, and queue where it leads and its next attempt."""
+        if edge.option.given_up():
+            return
+        target = self._target(edge)
+        rollout = self._model.roll_out(edge.option, vertex.state, target)
+        if edge.option.attempt == 0:
+            self._failures.add(edge.option, target, rollout)
+        if rollout.reached:
+            g = vertex.g + rollout.steps
+            reached = Vertex(edge.target, rollout.final, g, vertex, edge)
+            if g < self._cheapest.get(reached.key, g + 1):
+                self._cheapest[reached.key] = g
+                self._frontier.push(reached)
+            following = edge.option.next_attempt()
+            if following is not None:  # it takes longer, but the next option may take less
+                self._frontier.push(vertex, replace(edge, option=following), rollout.steps)
+            return
+        if rollout.moved_and_failed and edge.option.kind is OptionKind.OPERATOR:
+            g = vertex.g + rollout.steps
+            self._failed.append(Vertex(edge.target, rollout.final, g, vertex, edge))
+        if edge.option.given_up():
+            self._frontier.drop_given_up()
+
+
+def _steps_to_go(edges: Sequence[Sequence[Edge]], goals: Sequence[int]) -> list[int | None]:
+    """Lower bound of the steps from each node to a goal, by Dijkstra; None without a way.
+
+    Args:
+        edges: Edges out of each node.
+        goals: Indices of the goal nodes.
+    """
+    into: list[list[tuple[int, int]]] = [[] for _ in edges]
+    for out in edges:
+        for edge in out:
+            into[edge.target].append((edge.source, edge.option.skill.least_steps))
+    h: list[int | None] = [None] * len(edges)
+    queue = [(0, goal) for goal in sorted(goals)]
+    while queue:
+        steps, node = heapq.heappop(queue)
+        if h[node] is not None:
+            continue
+        h[node] = steps
+        for source, least_steps in into[node]:
+            if h[source] is None:
+                heapq.heappush(queue, (steps + least_steps, source))
+    return h
