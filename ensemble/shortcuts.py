@@ -12,6 +12,7 @@ from ensemble.observation import Episode
 from ensemble.parameters import parameter
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError
+from slap_ros.planning.planner_choice import DEFAULT_PLANNER
 from slap_ros.relational import Layout, State
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
 from slap_ros.shortcuts.shipped import chosen_library, require_usable
@@ -30,7 +31,9 @@ class ShortcutParameters:
 class ShortcutProvider:
     """The library of whatever domain the simulator runs, and what it offers in each episode."""
 
-    def __init__(self, node: Node, settings: ShortcutParameters, planner: str = "lazy") -> None:
+    def __init__(
+        self, node: Node, settings: ShortcutParameters, planner: str = DEFAULT_PLANNER
+    ) -> None:
         """Refuse what is wrong whatever the domain.
 
         Args:

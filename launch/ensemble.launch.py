@@ -51,7 +51,7 @@ PARAMETERS = {
     "seed": (int, "seed that samples the task"),
     "index": (int, "which of the seed's tasks"),
     "goal": (str, "goal of the task, by name or as atoms"),
-    "planner": (str, "name of the planner: lazy, exhaustive, ff or astar"),
+    "planner": (str, "planner: anytime, lazy, exhaustive, ff or astar"),
     "shortcuts": (str, "folder of a shortcut library, or none"),
     "samples": (int, "attempts of a shortcut in the model; the shortest is used"),
     "scene": (str, "scene file of a robot"),

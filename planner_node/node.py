@@ -3,7 +3,8 @@
 """Solves tasks: plans over the abstract graph, has the skill server execute, watches, replans.
 
 ROS Parameters:
-    planner (string, "lazy"): lazy, exhaustive, ff or astar; see ``slap_ros.planning.planner``.
+    planner (string, "anytime"): anytime, lazy, exhaustive, ff or astar; anytime may have settings,
+        as in anytime:within=1.25,effort=4; see ``slap_ros.planning.planner_choice``.
     shortcuts (string, ""): folder of a shortcut library, or none; empty: the shipped one.
     samples (int, 16): attempts of a shortcut in the model; the shortest is used.
     observation_timeout (double, 10.0): seconds to wait for a perceived state.
@@ -61,13 +62,13 @@ from planner_node.skill_server_watch import SkillServerWatch
 from planner_node.task_execution import TaskExecution
 from slap_ros.errors import (
     BusyError,
-    InvalidParameterError,
     NoTaskError,
     TaskCanceledError,
 )
 from slap_ros.messages.decode import decode_goal
 from slap_ros.planning.partial import PartialPlanner
-from slap_ros.planning.planner import PLANNERS, Planner, make_planner
+from slap_ros.planning.planner import PLANNERS, Planner, make_planner, require_planner
+from slap_ros.planning.planner_choice import DEFAULT_PLANNER
 from slap_ros.relational import State
 
 
@@ -75,7 +76,7 @@ from slap_ros.relational import State
 class PlannerParameters(ShortcutParameters):
     """See the module's docstring."""
 
-    planner: str = parameter("lazy", f"name of the planner: {', '.join(PLANNERS)}")
+    planner: str = parameter(DEFAULT_PLANNER, f"planner: {', '.join(PLANNERS)}")
     observation_timeout: float = parameter(10.0, "s to wait for a perceived state")
     server_timeout: float = parameter(5.0, "s without a skill server until a run fails")
 
@@ -94,11 +95,7 @@ class PlannerNode(Node):
         """
         super().__init__("planner_node", **kwargs)
         self._settings = read_parameters(self, PlannerParameters)
-        if self._settings.planner not in PLANNERS:
-            raise InvalidParameterError(
-                f"parameter planner must be one of {', '.join(PLANNERS)}, "
-                f"not {self._settings.planner!r}"
-            )
+        require_planner(self._settings.planner)
         common = read_parameters(self, CommonParameters)
         self._patience = common.patience
         self._shortcuts = ShortcutProvider(self, self._settings, self._settings.planner)

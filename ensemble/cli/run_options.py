@@ -22,11 +22,13 @@ from slap_ros.cli.options import (
     MAX_INDEX,
     ChosenSeed,
     DomainName,
+    EffortFactor,
     Goal,
     Index,
     Json,
     Planner,
     Preset,
+    Within,
     at_most,
     seed_or_default,
 )
@@ -36,6 +38,8 @@ from slap_ros.cli.skill_choice import Skills
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import require_writable
 from slap_ros.planning.execution import MAX_REPLANS
+from slap_ros.planning.planner import require_planner
+from slap_ros.planning.planner_choice import DEFAULT_PLANNER, with_settings
 from slap_ros.robot.worlds import MOCK, ROBOT, SIM, WORLDS
 from slap_ros.skills.domain_choice import SHIPPED
 
@@ -57,7 +61,9 @@ class RunOptions:
     goal: Goal = None
     shortcuts: Shortcuts = None
     samples: Samples = SAMPLES
-    planner: Planner = "lazy"
+    planner: Planner = DEFAULT_PLANNER
+    within: Within = None
+    effort: EffortFactor = None
     skills: Skills = SHIPPED
     max_replans: Annotated[
         int,
@@ -156,8 +162,14 @@ class RunOptions:
     ] = ""
     json: Json = False
 
+    @property
+    def planner_choice(self) -> str:
+        """The planner with its settings."""
+        return with_settings(self.planner, self.within, self.effort)
+
     def __post_init__(self) -> None:
         """Refuse what can be refused without the domain; see the class."""
+        require_planner(self.planner_choice)
         self._check_world()
         self._check_acquisition()
         if not self.live and (self.watched or self.live_port is not None):

@@ -109,7 +109,7 @@ def _request(options: RunOptions, domain: Domain, task: Task, import_s: float) -
         DomainChoice(options.domain, domain.preset, options.skills),
         options.task_seed,
         options.index,
-        options.planner,
+        options.planner_choice,
         record=None,
         goal=options.goal or "",
         pace=options.pace,
@@ -148,8 +148,8 @@ def _check_planning(options: RunOptions, domain: Domain, task: Task) -> frozense
         SlapError: It is no goal of the task; or planner, library or pictures are not there.
     """
     with suppress(*(NoSkillsError,) if options.acquire else ()):
-        make_planner(options.planner, domain, task.initial_state)
-    chosen_library(options.shortcuts, domain, options.planner)
+        make_planner(options.planner_choice, domain, task.initial_state)
+    chosen_library(options.shortcuts, domain, options.planner_choice)
     if options.render is not None:
         require_renderable(domain, task.initial_state, options.render)
     return task.goal if options.goal else frozenset()

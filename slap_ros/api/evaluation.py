@@ -15,6 +15,7 @@ from slap_ros.errors import ErrorCode, InvalidParameterError
 from slap_ros.evaluation.approaches import Approach, approaches, shooting
 from slap_ros.evaluation.experiment import Experiment, Trial, run_with
 from slap_ros.planning.planner import make_planner
+from slap_ros.planning.planner_choice import DEFAULT_PLANNER
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 from slap_ros.skills.domain_choice import DomainChoice
 
@@ -89,7 +90,7 @@ def evaluate(
     seeds: int = 5,
     first_seed: int = 0,
     goal: str | None = None,
-    planner: str = "lazy",
+    planner: str = DEFAULT_PLANNER,
     samples: int = SAMPLES,
     compare_shooting: bool = False,
     jobs: int | None = None,

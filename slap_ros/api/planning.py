@@ -13,6 +13,7 @@ from slap_ros.core import Domain, Task
 from slap_ros.evaluation.approaches import approaches
 from slap_ros.planning.plan import PlanningResult, PlanOrigin
 from slap_ros.planning.planner import Planner
+from slap_ros.planning.planner_choice import DEFAULT_PLANNER
 from slap_ros.relational import State
 
 
@@ -21,7 +22,7 @@ def plan(
     task: Task,
     shortcuts: Shortcuts = "shipped",
     *,
-    planner: str = "lazy",
+    planner: str = DEFAULT_PLANNER,
     samples: int = SAMPLES,
 ) -> PlanningResult:
     """Plan one task without executing it.
@@ -31,7 +32,8 @@ def plan(
         task: Task to solve, as ``domain.task(seed=1)``.
         shortcuts: Learned shortcuts to plan with: ``shipped`` for the library that ships, if
             there is one; None for pure planning; a folder that :func:`train` made; or a library.
-        planner: Name of the planner: lazy, exhaustive, ff or astar.
+        planner: Planner: anytime, lazy, exhaustive, ff or astar; anytime may have settings, as in
+            ``anytime:within=1.25,effort=4``.
         samples: Attempts of a shortcut in the model; the shortest is used.
 
     Returns:
@@ -90,7 +92,7 @@ def planner_for(
     domain: Domain,
     task: Task,
     shortcuts: Shortcuts = "shipped",
-    planner: str = "lazy",
+    planner: str = DEFAULT_PLANNER,
     samples: int = SAMPLES,
     tell: Tell = warn_caller,
 ) -> NamedPlanner:

@@ -11,7 +11,8 @@ from slap_ros.api.left_out import Tell
 from slap_ros.api.opening import SHIPPED_WORD
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError
-from slap_ros.planning.planner import PLANNERS, WITH_SHORTCUTS
+from slap_ros.planning.planner import require_planner
+from slap_ros.planning.planner_choice import WITH_SHORTCUTS
 from slap_ros.shortcuts.shipped import NONE, chosen_library
 from slap_ros.shortcuts.shortcut import DEFAULT, Sampling
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
@@ -48,7 +49,7 @@ def _fitting(library: ShortcutLibrary, domain: Domain, planner: str) -> Shortcut
     """The library, which must be the domain's and of use to the planner."""
     if library.domain != domain.name:
         raise InvalidLibraryError(f"shortcuts of domain {library.domain!r}, not of {domain.name!r}")
-    if planner in PLANNERS and planner not in WITH_SHORTCUTS:
+    if require_planner(planner).name not in WITH_SHORTCUTS:
         raise InvalidParameterError(
             f"the planner {planner} plans without shortcuts: give shortcuts=None, or use "
             f"{' or '.join(WITH_SHORTCUTS)}"

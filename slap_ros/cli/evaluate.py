@@ -15,7 +15,17 @@ from slap_ros.api.command_line import command_line
 from slap_ros.api.evaluation import compared_approaches, run_approaches
 from slap_ros.cli.bars import counting_bars
 from slap_ros.cli.console import console, print_json
-from slap_ros.cli.options import DomainName, Goal, Jobs, Json, Planner, Preset, at_most
+from slap_ros.cli.options import (
+    DomainName,
+    EffortFactor,
+    Goal,
+    Jobs,
+    Json,
+    Planner,
+    Preset,
+    Within,
+    at_most,
+)
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose
 from slap_ros.cli.skill_choice import Skills, open_chosen
 from slap_ros.core import Domain
@@ -25,6 +35,7 @@ from slap_ros.evaluation.evaluation_file import require_replaceable, write_evalu
 from slap_ros.evaluation.experiment import Experiment, Trial
 from slap_ros.evaluation.summary import Spread, Summary
 from slap_ros.files import require_writable
+from slap_ros.planning.planner_choice import DEFAULT_PLANNER, with_settings
 from slap_ros.shortcuts.shipped import shipped_library
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 from slap_ros.skills.domain_choice import SHIPPED
@@ -59,7 +70,9 @@ def evaluate(
             "often as SLAP tries its policies.",
         ),
     ] = False,
-    planner: Planner = "lazy",
+    planner: Planner = DEFAULT_PLANNER,
+    within: Within = None,
+    effort: EffortFactor = None,
     jobs: Jobs = 1,
     output: Annotated[
         Path | None, typer.Option(help="JSON file for all trials, with settings and libraries.")
@@ -71,6 +84,7 @@ def evaluate(
     A shortcut library adds two rows for the same tasks: SLAP as the paper evaluates it (one
     sample), and SLAP with --samples. Spreads are mean ± sample standard deviation over all tasks.
     """
+    planner = with_settings(planner, within, effort)
     chosen = open_chosen(domain, preset, skills)
     settings = {
         "preset": chosen.preset,

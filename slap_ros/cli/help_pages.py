@@ -16,7 +16,8 @@ PANELS: Mapping[str, str] = {
         ("seed", "index", "preset", "goal", "tasks", "seeds", "first_seed", "presets"), TASK
     ),
     **dict.fromkeys(
-        ("shortcuts", "samples", "planner", "max_replans", "effort", "with_shooting"), PLANNING
+        ("shortcuts", "samples", "planner", "within", "effort", "max_replans", "with_shooting"),
+        PLANNING,
     ),
     **dict.fromkeys(
         ("skills", "acquire", "acquisition", "proposer", "rewarder", "demonstrations", "operators"),

@@ -72,8 +72,23 @@ Preset = Annotated[
 Planner = Annotated[
     str,
     typer.Option(
-        help="Planner: lazy, exhaustive (the paper's), ff (greedy best-first search, SLAP D.2) or "
-        "astar (fewest operators; tries none in the model)."
+        help="Planner: anytime (a plan soon, then better ones), lazy (the shortest), exhaustive "
+        "(the paper's), ff (greedy best-first search, SLAP D.2) or astar (fewest operators; tries "
+        "none in the model)."
+    ),
+]
+Within = Annotated[
+    float | None,
+    typer.Option(
+        help="With the planner anytime: how many times as long as the shortest a plan may be, as "
+        "far as is proven. Planning ends with the first such plan. Default: 1.",
+    ),
+]
+EffortFactor = Annotated[
+    int | None,
+    typer.Option(
+        help="With the planner anytime: factor of the usual effort of planning, which is counted "
+        "in roll-outs. With PDDL files: factor of all limits. Default: 1.",
     ),
 ]
 Seed = Annotated[

@@ -12,17 +12,21 @@ import typer
 from slap_ros.cli.options import (
     ChosenSeed,
     DomainOrFile,
+    EffortFactor,
     Goal,
     Index,
     Json,
     Planner,
     Preset,
+    Within,
     say_default_seed,
     seed_or_default,
 )
 from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts
 from slap_ros.cli.skill_choice import Skills, open_chosen
+from slap_ros.errors import InvalidParameterError
 from slap_ros.files import require_writable
+from slap_ros.planning.planner_choice import DEFAULT_PLANNER, with_settings
 from slap_ros.skills.domain_choice import SHIPPED
 
 
@@ -38,30 +42,29 @@ def plan(
     skills: Skills = SHIPPED,
     shortcuts: Shortcuts = None,
     samples: Samples = SAMPLES,
-    planner: Planner = "lazy",
+    planner: Planner = DEFAULT_PLANNER,
     output: Annotated[
         Path | None, typer.Option(help="Folder for domain.pddl, problem.pddl and graph.svg.")
     ] = None,
-    effort: Annotated[
-        int,
-        typer.Option(
-            min=1,
-            max=10**6,
-            help="With PDDL files: factor of all limits of planning, and so of its time.",
-        ),
-    ] = 1,
+    within: Within = None,
+    effort: EffortFactor = None,
     json: Json = False,
 ) -> None:
     """Plan one task without executing it; write its PDDL and draw its abstract graph.
 
     A domain without skills is planned with its hand-written operators alone. Two PDDL files, or one
-    that has domain and problem, are planned symbolically: with the FF heuristic (lazy, ff), for the
+    that has domain and problem, are planned symbolically: with the FF heuristic (anytime, ff), for
+    the
     least cost or the fewest operators (astar), or by an engine of unified-planning (up:NAME).
     """
     if problem is not None or domain.lower().endswith(".pddl"):
         from slap_ros.cli.plan_pddl import plan_pddl
 
-        plan_pddl(Path(domain), problem or Path(domain), planner, effort, json)
+        if within is not None:
+            raise InvalidParameterError(
+                "--within is not for PDDL files: --planner astar finds a plan of least cost"
+            )
+        plan_pddl(Path(domain), problem or Path(domain), planner, effort or 1, json)
         return
     # Not above: what plans symbolically needs none of it.
     from slap_ros.cli.plan_task import plan_task
@@ -69,6 +72,7 @@ def plan(
 
     if output is not None:
         require_writable(output)
+    planner = with_settings(planner, within, effort)
     chosen = open_chosen(domain, preset, skills)
     task = task_with_goal(chosen, seed_or_default(seed), index, goal)
     plan_task(chosen, task, planner, shortcuts, samples, output, json)

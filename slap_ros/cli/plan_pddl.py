@@ -16,7 +16,7 @@ from slap_ros.relational.pddl.grounder import MAX_BINDINGS, ground_task
 from slap_ros.relational.pddl.tokens import decode
 
 OTHER_PLANNERS = "up:"  # engines of unified-planning, by name
-PLANNERS = ("lazy", "ff", "astar")  # lazy, the default, is ff, and then cheaper where costs count
+PLANNERS = ("anytime", "lazy", "ff", "astar")  # anytime and lazy: ff, then cheaper plans
 
 
 @dataclass(frozen=True)
@@ -84,15 +84,16 @@ def plan_pddl(domain_file: Path, problem_file: Path, planner: str, effort: int, 
 
 
 def plan_symbolically(
-    domain: PddlDomain, problem: PddlProblem, planner: str = "lazy", effort: int = 1
+    domain: PddlDomain, problem: PddlProblem, planner: str = "anytime", effort: int = 1
 ) -> SymbolicPlan:
     """A plan for a PDDL problem.
 
     Args:
         domain: Types, predicates and operators.
         problem: Objects, start and goal.
-        planner: ``ff`` finds some plan fast. ``lazy`` makes it cheaper where the problem asks for
-            least cost. ``astar`` finds a plan of least cost, or of the fewest operators.
+        planner: ``ff`` finds some plan fast. ``anytime`` and ``lazy`` make it cheaper where the
+            problem asks for least cost. ``astar`` finds a plan of least cost, or of the fewest
+            operators.
         effort: Factor of the limits of planning.
 
     Raises:
@@ -100,6 +101,8 @@ def plan_symbolically(
         UnsolvableError: The goal cannot be reached.
         PlanningLimitError: A limit was reached first.
     """
+    if effort < 1:
+        raise InvalidParameterError(f"the effort of planning must be 1 at least, got {effort}")
     if planner not in PLANNERS:
         raise InvalidParameterError(
             f"unknown planner {planner!r} for PDDL files; there are {', '.join(PLANNERS)} and "

@@ -15,6 +15,7 @@ from slap_ros.drawing import draw_abstract_graph
 from slap_ros.errors import StorageFullError
 from slap_ros.files import write_whole
 from slap_ros.planning.abstract_graph import AbstractGraph, build_abstract_graph
+from slap_ros.planning.anytime import PlanningInterrupted
 from slap_ros.planning.plan import PlanningResult
 from slap_ros.planning.problem import Problem
 from slap_ros.planning.symbolic_planner import plan_symbolically
@@ -49,7 +50,12 @@ def plan_task(
     if not domain.operators and domain.acquisition and domain.acquisition.operators:
         _plan_by_hand(domain, domain.acquisition.operators, task, output, json)
         return
-    result = make_plan(domain, task, wanted(shortcuts), planner, samples, warn)
+    try:
+        result = make_plan(domain, task, wanted(shortcuts), planner, samples, warn)
+    except PlanningInterrupted as interrupted:
+        console.print("interrupted; the best plan so far:")
+        _show(interrupted.best, json)
+        raise interrupted.interrupt from None
     _show(result, json)
     if output is not None:
         space = domain.atom_space(task.initial_state)
@@ -109,6 +115,7 @@ def _show(result: PlanningResult, json: bool) -> None:
                 "graph_nodes": result.graph_nodes,
                 "graph_edges": result.graph_edges,
                 "edges_rolled_out": result.edges_rolled_out,
+                "bound": result.bound,
                 "versions": versions(),
             }
             | ({"fails": result.fails} if result.fails else {})
@@ -118,9 +125,10 @@ def _show(result: PlanningResult, json: bool) -> None:
         console.print(f"{steps:5d}  {option}")
     if result.fails:
         console.print(f"this plan fails in the model, near the goal: {result.fails}")
+    bound = "" if result.bound is None else f"; bound {result.bound:.2f}"
     console.print(
         f"{result.plan.predicted_steps:5d}  steps predicted; {result.graph_nodes} abstract states, "
-        f"{result.graph_edges} edges, {result.edges_rolled_out} rolled out",
+        f"{result.graph_edges} edges, {result.edges_rolled_out} rolled out{bound}",
     )
 
 

@@ -54,7 +54,7 @@ def find_operator_sequence(
         UnsolvableError: No sequence leads to the goal.
         PlanningLimitError: None was found within ``max_expansions`` and ``max_tests``.
     """
-    heuristic = _FFHeuristic(goal, operators)
+    heuristic = FFHeuristic(goal, operators)
     if heuristic.relaxed_plan(start) is None:
         raise UnsolvableError("the goal is out of reach, even if operators deleted nothing")
     limits = max_expansions, max_tests
@@ -65,7 +65,7 @@ def _best_first(
     start: int,
     goal: int,
     operators: Sequence[GroundOperator],
-    heuristic: _FFHeuristic,
+    heuristic: FFHeuristic,
     forbidden: frozenset[tuple[int, int]],
     limits: tuple[int, int],
 ) -> list[int]:
@@ -119,13 +119,18 @@ class _RelaxedPlan:
     subgoals: int  # mask: what it needs that one operator can add at once
 
 
-class _FFHeuristic:
+class FFHeuristic:
     """The FF heuristic, on bit masks."""
 
     def __init__(self, goal: int, operators: Sequence[GroundOperator]) -> None:
         self._goal = goal
         self._operators = [(op.preconditions, op.add_effects) for op in operators]
         self.tests = 0  # of operators so far
+
+    def helpful_atoms(self, state: int) -> int:
+        """What an operator adds that is helpful in a state, a mask; none where the goal is lost."""
+        plan = self.relaxed_plan(state)
+        return 0 if plan is None else plan.subgoals
 
     def relaxed_plan(self, state: int) -> _RelaxedPlan | None:
         """A plan for the relaxed task; None where there is none, hence none for the task either.

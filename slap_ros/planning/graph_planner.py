@@ -4,15 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 from slap_ros.errors import InvalidParameterError, UnsolvableError
 from slap_ros.planning.abstract_graph import (
+    MAX_NODES,
     AbstractGraph,
-    Edge,
-    EdgeBeyond,
     add_beyond,
     build_abstract_graph,
 )
@@ -22,26 +20,10 @@ from slap_ros.planning.plan import PlanningResult
 from slap_ros.planning.problem import Problem
 from slap_ros.planning.recovery import Recovery
 from slap_ros.planning.search import SearchOutcome
+from slap_ros.planning.shortcut_source import ShortcutSource
 from slap_ros.relational import State
 
 Search = Callable[[AbstractGraph, State, Model], SearchOutcome]
-
-
-class ShortcutSource(Protocol):
-    """Gives shortcut edges for an abstract graph."""
-
-    def edges(self, graph: AbstractGraph) -> Sequence[Edge]:
-        """Edges to be added to a graph."""
-        ...
-
-    def beyond(self, graph: AbstractGraph, within: Collection[str]) -> Sequence[EdgeBeyond]:
-        """Edges to abstract states that a graph may not have.
-
-        Args:
-            graph: Where they begin.
-            within: Names of the shortcuts that stay in it.
-        """
-        ...
 
 
 @dataclass(frozen=True)
@@ -92,7 +74,8 @@ class GraphPlanner:
                 raise UnsolvableError(outcome.reason)
         rolled_out = model.executed - before
         sizes = len(graph.nodes), len(graph.edges)
-        return PlanningResult(plan, *sizes, rolled_out, remark, graph)
+        at_least = outcome.at_least or 0
+        return PlanningResult(plan, *sizes, rolled_out, remark, graph, at_least=at_least)
 
     def search_to(self, state: State, goal: int) -> tuple[AbstractGraph, SearchOutcome]:
         """Search the shallowest graph in which there is a plan, else the deepest one.
@@ -109,16 +92,30 @@ class GraphPlanner:
         """
         start = self.problem.model.space.abstract(state)
         for extra_depth in range(self.max_extra_depth + 1):
-            graph = self._graph(start, goal, extra_depth)
+            graph = self.graph(start, goal, extra_depth)
             outcome = self.search(graph, state, self.problem.model)
             if outcome.plan is not None:
                 break
         return graph, outcome
 
-    def _graph(self, start: int, goal: int, extra_depth: int) -> AbstractGraph:
-        """The top level with shortcuts; an error says which atoms of the goal cannot be had."""
+    def graph(
+        self, start: int, goal: int, extra_depth: int = 0, max_nodes: int = MAX_NODES
+    ) -> AbstractGraph:
+        """The top level with shortcuts.
+
+        Args:
+            start: Abstract state to start from, a mask.
+            goal: Mask of atoms that must hold.
+            extra_depth: Layers after the first with a goal state.
+            max_nodes: Abstract states after which to give up.
+
+        Raises:
+            UnsolvableError: No operators lead to the goal; which atoms of it cannot be had.
+            PlanningLimitError: More than ``max_nodes`` abstract states.
+        """
+        operators = self.problem.operators
         try:
-            graph = build_abstract_graph(start, goal, self.problem.operators, extra_depth)
+            graph = build_abstract_graph(start, goal, operators, extra_depth, max_nodes)
         except UnsolvableError as error:
             raise UnsolvableError(f"{error}: {self.problem.why_not(start, goal)}") from error
         graph.space = self.problem.model.space

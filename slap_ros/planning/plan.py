@@ -80,6 +80,7 @@ class PlanningResult(ShownInNotebooks):
         origin: What made it.
         planner: Planner that made it, for a plan in its place where it diverges; None where that
             is not known.
+        at_least: Environment steps that any plan takes, as far as is proven; 0 where nothing is.
     """
 
     plan: Plan
@@ -91,6 +92,18 @@ class PlanningResult(ShownInNotebooks):
     seconds: float = field(default=0.0, repr=False, compare=False)
     origin: PlanOrigin = field(default=PlanOrigin(), repr=False, compare=False)
     planner: Planner | None = field(default=None, repr=False, compare=False)
+    at_least: int = field(default=0, compare=False)
+
+    @property
+    def bound(self) -> float | None:
+        """How many times as long as the shortest plan it is at most; None where that is not known.
+
+        1 means that it is proven to be the shortest, under the bounds of the skills; see
+        :mod:`slap_ros.planning.search`.
+        """
+        if self.steps <= self.at_least:
+            return 1.0
+        return self.steps / self.at_least if self.at_least else None
 
     @property
     def steps(self) -> int:

@@ -9,11 +9,15 @@ from typing import Protocol
 
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError
+from slap_ros.planning.anytime import AnytimePlanner
+from slap_ros.planning.effort import Effort
 from slap_ros.planning.ff_planner import FFPlanner
-from slap_ros.planning.graph_planner import GraphPlanner, ShortcutSource
+from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.plan import PlanningResult
+from slap_ros.planning.planner_choice import PlannerChoice
 from slap_ros.planning.problem import Problem
 from slap_ros.planning.search import search_exhaustively
+from slap_ros.planning.shortcut_source import ShortcutSource
 from slap_ros.planning.symbolic_planner import SymbolicPlanner
 from slap_ros.relational import State
 
@@ -31,42 +35,49 @@ class Planner(Protocol):
         ...
 
 
-def _lazy(problem: Problem, shortcuts: ShortcutSource | None) -> Planner:
+Make = Callable[[Problem, ShortcutSource | None, Effort], Planner]
+
+
+def _lazy(problem: Problem, shortcuts: ShortcutSource | None, _: Effort) -> Planner:
     return GraphPlanner(problem, shortcuts=shortcuts)
 
 
-def _exhaustive(problem: Problem, shortcuts: ShortcutSource | None) -> Planner:
+def _exhaustive(problem: Problem, shortcuts: ShortcutSource | None, _: Effort) -> Planner:
     return GraphPlanner(problem, search_exhaustively, shortcuts=shortcuts)
 
 
-def _ff(problem: Problem, shortcuts: ShortcutSource | None) -> Planner:
+def _anytime(problem: Problem, shortcuts: ShortcutSource | None, effort: Effort) -> Planner:
+    return AnytimePlanner(problem, shortcuts, effort)
+
+
+def _ff(problem: Problem, shortcuts: ShortcutSource | None, _: Effort) -> Planner:
     if shortcuts is not None:
-        raise InvalidParameterError("the planner ff plans without shortcuts; use lazy")
+        raise InvalidParameterError("the planner ff plans without shortcuts; use anytime")
     return FFPlanner(problem)
 
 
-def _astar(problem: Problem, shortcuts: ShortcutSource | None) -> Planner:
+def _astar(problem: Problem, shortcuts: ShortcutSource | None, _: Effort) -> Planner:
     if shortcuts is not None:
-        raise InvalidParameterError("the planner astar plans without shortcuts; use lazy")
+        raise InvalidParameterError("the planner astar plans without shortcuts; use anytime")
     return SymbolicPlanner(problem.model.space, problem.operators, problem.unskilled)
 
 
-PLANNERS: Mapping[str, Callable[[Problem, ShortcutSource | None], Planner]] = {
+PLANNERS: Mapping[str, Make] = {
+    "anytime": _anytime,
     "lazy": _lazy,
     "exhaustive": _exhaustive,
     "ff": _ff,
     "astar": _astar,
 }
-WITH_SHORTCUTS = ("lazy", "exhaustive")  # planners that can use them
 
 
 def make_planner(
-    name: str, domain: Domain, initial: State, shortcuts: ShortcutSource | None = None
+    planner: str, domain: Domain, initial: State, shortcuts: ShortcutSource | None = None
 ) -> Planner:
     """A planner by name.
 
     Args:
-        name: One of ``PLANNERS``.
+        planner: One of ``PLANNERS``; ``anytime`` with settings, as in ``anytime:within=1.25``.
         domain: For whose tasks.
         initial: A state with the objects of the tasks.
         shortcuts: Where shortcut edges come from; None for pure planning.
@@ -75,9 +86,23 @@ def make_planner(
         The planner, with a model of its own.
 
     Raises:
-        InvalidParameterError: No planner of that name, or none that can use shortcuts.
+        InvalidParameterError: No planner of that name, none that can use shortcuts, or no such
+            settings.
         NoSkillsError: The domain has no operators.
     """
-    if name not in PLANNERS:
-        raise InvalidParameterError(f"unknown planner {name!r}; there are {', '.join(PLANNERS)}")
-    return PLANNERS[name](Problem.of(domain, initial), shortcuts)
+    choice = require_planner(planner)
+    return PLANNERS[choice.name](Problem.of(domain, initial), shortcuts, choice.effort)
+
+
+def require_planner(planner: str) -> PlannerChoice:
+    """The choice of a planner that there is.
+
+    Raises:
+        InvalidParameterError: No planner of that name, or no such settings.
+    """
+    choice = PlannerChoice.parse(planner)
+    if choice.name not in PLANNERS:
+        raise InvalidParameterError(
+            f"unknown planner {choice.name!r}; there are {', '.join(PLANNERS)}"
+        )
+    return choice

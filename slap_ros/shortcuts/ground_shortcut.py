@@ -22,6 +22,14 @@ STATE_TOLERANCE = 1e-6  # in any feature's unit: up to here a state is as predic
 ROBOT_TOLERANCE = 0.02  # in any feature's unit: up to here a robot is where it was predicted
 
 
+def least_steps(shortcut: Shortcut) -> int:
+    """Half of a shortcut's shortest success in training, environment steps.
+
+    An assumption, not a bound: sampling may find a way that is shorter still.
+    """
+    return max(1, shortcut.shortest // 2)
+
+
 @dataclass(frozen=True)
 class GroundShortcut:
     """A shortcut for given objects: the skill behind a shortcut edge.
@@ -52,14 +60,11 @@ class GroundShortcut:
 
     @property
     def least_steps(self) -> int:
-        """Half of the shortest success in training, environment steps.
-
-        An assumption, not a bound: sampling may find a way that is shorter still.
-        """
-        return max(1, self.shortcut.shortest // 2)
+        """See :func:`least_steps`."""
+        return least_steps(self.shortcut)
 
     def lower_bound(self, state: State, objects: tuple[Object, ...]) -> int:
-        """A number of environment steps, the same from every state; see :attr:`least_steps`."""
+        """A number of environment steps, the same from every state; see :func:`least_steps`."""
         del state, objects
         return self.least_steps
 

@@ -9,10 +9,11 @@ from functools import partial
 
 from slap_ros.core import Domain
 from slap_ros.planning.abstract_graph import AbstractGraph, Edge, EdgeBeyond
+from slap_ros.planning.landmark_cut import RelaxedOperator
 from slap_ros.planning.options import Option, OptionKind
 from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.relational import State, Target
-from slap_ros.shortcuts.ground_shortcut import GroundShortcut
+from slap_ros.shortcuts.ground_shortcut import GroundShortcut, least_steps
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.shortcut import DEFAULT, Sampling, Shortcut
 from slap_ros.shortcuts.shortcut_rollouts import ShortcutRollout, ShortcutRollouts
@@ -67,6 +68,13 @@ class GroundedShortcuts:
             if shortcut.name not in within
             for i, node in enumerate(graph.nodes)
             for change in grounder.changes(node)
+        ]
+
+    def relaxed(self) -> list[RelaxedOperator]:
+        """Each shortcut with all instances of what it adds, which need nothing."""
+        return [
+            RelaxedOperator(0, matcher.may_be_added, least_steps(shortcut))
+            for shortcut, matcher in zip(self.shortcuts, self._matchers, strict=True)
         ]
 
     def option(self, name: str, source: int, target: Target, attempt: int = 0) -> Option | None:

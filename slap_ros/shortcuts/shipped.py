@@ -10,7 +10,11 @@ from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError
 from slap_ros.files import parse_json, read_text
-from slap_ros.planning.planner import WITH_SHORTCUTS
+from slap_ros.planning.planner_choice import (
+    DEFAULT_PLANNER,
+    WITH_SHORTCUTS,
+    can_use_shortcuts,
+)
 from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.policies.library_files import ABOUT
 from slap_ros.policies.shipped_models import shipped_folder, shipped_with_siblings
@@ -30,7 +34,7 @@ def shipped_libraries(domain: str) -> list[Path]:
 
 
 def chosen_library(
-    choice: str | None, domain: Domain, planner: str = "lazy"
+    choice: str | None, domain: Domain, planner: str = DEFAULT_PLANNER
 ) -> ShortcutLibrary | None:
     """Load the library that was chosen.
 
@@ -60,8 +64,8 @@ def _chosen_path(choice: str | None, domain: str, planner: str) -> Path | None:
     if choice == NONE:
         return None
     if not choice:
-        return shipped_library(domain) if planner in WITH_SHORTCUTS else None
-    if planner not in WITH_SHORTCUTS:
+        return shipped_library(domain) if can_use_shortcuts(planner) else None
+    if not can_use_shortcuts(planner):
         raise InvalidParameterError(
             f"the planner {planner} plans without shortcuts: leave out {choice}, or use "
             f"{' or '.join(WITH_SHORTCUTS)}"
@@ -69,7 +73,7 @@ def _chosen_path(choice: str | None, domain: str, planner: str) -> Path | None:
     return Path(choice)
 
 
-def require_usable(choice: str, planner: str = "lazy") -> None:
+def require_usable(choice: str, planner: str = DEFAULT_PLANNER) -> None:
     """Refuse a choice that can be seen to be wrong before the domain is known.
 
     Raises:

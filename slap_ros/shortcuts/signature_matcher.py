@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
+from functools import reduce
+from operator import or_
 
 from slap_ros.relational import AtomSpace, Predicate
 from slap_ros.shortcuts.signature import Change, Signature, context_of, instances, kinds
@@ -31,6 +33,11 @@ class SignatureMatcher:
         self._left_alone = ~space.mask(
             atom for atom in space.atoms if all(kind[o] in signature.slots for o in atom.objects)
         )
+
+    @property
+    def may_be_added(self) -> int:
+        """All atoms that the shortcut might add, for any objects; a mask."""
+        return reduce(or_, self._adds, 0)
 
     def pairs(self, nodes: Sequence[int]) -> Iterator[tuple[int, int]]:
         """Yield the pairs of nodes that a shortcut may join, as indices, the later one second."""

@@ -1,0 +1,212 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A first plan soon, then better ones, and how far from the best they can be.
+
+Where the abstract graph is small, it is searched with falling weights (as in Richter, Thayer and
+Ruml: The Joy of Forgetting: Faster Anytime Search via Restarting, ICAPS 2010): every search begins
+anew, but roll-outs are kept, so that it pays for what is new alone. The last one, without a weight,
+is the search of ``lazy``, and finds the same plan.
+
+Where there are too many abstract states, the first plan is the one that the FF heuristic finds.
+Then the graph near the best plan is searched (:mod:`slap_ros.planning.corridor`), shortcuts
+included, until that finds nothing shorter. Such a graph is another one for each plan, so that less
+effort goes into it.
+
+The effort is limited in roll-outs and abstract states, never in seconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+from slap_ros.errors import PlanningLimitError, UnsolvableError
+from slap_ros.planning.abstract_graph import AbstractGraph
+from slap_ros.planning.corridor import CorridorBuilder
+from slap_ros.planning.effort import Effort
+from slap_ros.planning.ff_planner import FFPlanner
+from slap_ros.planning.graph_planner import GraphPlanner
+from slap_ros.planning.landmark_cut import LandmarkCut, RelaxedOperator
+from slap_ros.planning.lazy_search import Limits, search_lazily
+from slap_ros.planning.plan import Plan, PlanningResult
+from slap_ros.planning.problem import Problem
+from slap_ros.planning.search import SearchOutcome
+from slap_ros.planning.shortcut_source import ShortcutSource
+from slap_ros.relational import State
+
+NEAR_PLANS = 3  # roll-outs of a whole graph to one of graphs near plans
+WEIGHTS = (30.0, 3.0, 1.0)  # of bounds of what is to come, one search after the other
+
+
+class PlanningInterrupted(KeyboardInterrupt):
+    """Planning was interrupted when it had a plan.
+
+    Args:
+        best: Best plan so far.
+        interrupt: Interrupt that came.
+    """
+
+    def __init__(self, best: PlanningResult, interrupt: KeyboardInterrupt) -> None:
+        super().__init__()
+        self.best, self.interrupt = best, interrupt
+
+
+@dataclass(frozen=True)
+class AnytimePlanner:
+    """Plans of any length soon, and of least cost where the effort suffices; see the module.
+
+    Args:
+        problem: The model, and the ground operators with their options.
+        shortcuts: Where shortcut edges come from; None for pure planning.
+        effort: How much planning may cost.
+    """
+
+    problem: Problem
+    shortcuts: ShortcutSource | None = None
+    effort: Effort = field(default_factory=Effort)
+
+    def plan(self, state: State, goal: int) -> PlanningResult:
+        """See :class:`~slap_ros.planning.planner.Planner`.
+
+        Raises:
+            PlanningInterrupted: An interrupt came when there was a plan.
+        """
+        best = None
+        try:
+            for best in self.improve(state, goal):
+                if best.bound is not None and best.bound <= self.effort.within:
+                    break
+        except KeyboardInterrupt as interrupt:
+            if best is None:
+                raise
+            raise PlanningInterrupted(best, interrupt) from interrupt
+        if best is None:
+            return GraphPlanner(self.problem, shortcuts=self.shortcuts).plan(state, goal)
+        return best
+
+    def improve(self, state: State, goal: int) -> Iterator[PlanningResult]:
+        """Each plan that is better than those before, or of which more is proven.
+
+        Args:
+            state: Low-level state to start from.
+            goal: Mask of atoms that must hold.
+
+        Returns:
+            The plans, as they are found; none where no plan through the abstract graph can be
+            executed.
+
+        Raises:
+            UnsolvableError: No operators lead to the goal.
+            PlanningLimitError: No plan was found within the limits.
+        """
+        abstract = self.problem.model.space.abstract(state)
+        planner = GraphPlanner(self.problem, shortcuts=self.shortcuts)
+        run = _Run(self, state, goal)
+        try:
+            graph = planner.graph(abstract, goal, max_nodes=self.effort.abstract_states)
+        except PlanningLimitError:
+            yield from run.near_plans(abstract)
+        else:
+            yield from run.through(graph)
+
+
+class _Run:
+    """One run of :meth:`AnytimePlanner.improve`."""
+
+    def __init__(self, planner: AnytimePlanner, state: State, goal: int) -> None:
+        self._planner, self._state, self._goal = planner, state, goal
+        self._model = planner.problem.model
+        self._before = self._model.executed
+        self._limit = self._before + planner.effort.rollouts
+        self._best: Plan | None = None
+        self._at_least = 0  # environment steps of any plan
+
+    def through(self, graph: AbstractGraph) -> Iterator[PlanningResult]:
+        """Search a graph as a whole, with falling weights."""
+        for weight in WEIGHTS:
+            outcome = self._search(graph, weight)
+            self._at_least = max(self._at_least, outcome.at_least or 0)
+            if outcome.plan is None and not outcome.stopped and self._best is None:
+                return  # nothing can be executed
+            if self._take(outcome.plan) or self._is_proven():
+                yield self._result(graph)
+            if self._is_proven():
+                return
+        if self._best is None:
+            yield from self.near_plans(graph.nodes[0])
+        yield self._result(graph)
+
+    def near_plans(self, abstract: int) -> Iterator[PlanningResult]:
+        """A first plan by the FF heuristic, then plans near the best one.
+
+        Args:
+            abstract: Abstract state to start from, a mask.
+        """
+        self._at_least = max(self._at_least, self._least_steps(abstract))
+        first = self._first_plan()
+        yield self._result(None, first.graph_nodes, first.graph_edges)
+        self._limit = self._model.executed + self._planner.effort.rollouts // NEAR_PLANS
+        problem = self._planner.problem
+        builder = CorridorBuilder(self._goal, problem.operators, self._planner.shortcuts)
+        route: Sequence[int] = [abstract]  # where shortcuts pay most, as a rule
+        while True:
+            graph, before = builder.around(route), self._best
+            for weight in WEIGHTS:
+                if self._take(self._search(graph, weight).plan):
+                    yield self._result(graph)
+            if self._model.executed >= self._limit or (self._best is before and len(route) > 1):
+                return
+            route = [abstract, *self._on_the_way()]
+
+    def _first_plan(self) -> PlanningResult:
+        """The plan that the FF heuristic finds.
+
+        Raises:
+            PlanningLimitError: It finds none that can be executed.
+        """
+        try:
+            first = FFPlanner(self._planner.problem).plan(self._state, self._goal)
+        except UnsolvableError as error:
+            raise PlanningLimitError(f"no plan within the effort of planning: {error}") from error
+        self._take(first.plan)
+        return first
+
+    def _search(self, graph: AbstractGraph, weight: float) -> SearchOutcome:
+        below = None if self._best is None else self._best.predicted_steps
+        limits = Limits(weight, self._limit, below)
+        return search_lazily(graph, self._state, self._model, limits)
+
+    def _take(self, plan: Plan | None) -> bool:
+        """Keep a plan that is shorter than the best; whether it was."""
+        if plan is None:
+            return False
+        if self._best is not None and plan.predicted_steps >= self._best.predicted_steps:
+            return False
+        self._best = plan
+        return True
+
+    def _on_the_way(self) -> list[int]:
+        """The abstract states after each edge of the best plan but the last."""
+        assert self._best is not None
+        return [edge.target.required for edge in self._best.edges[:-1]]
+
+    def _is_proven(self) -> bool:
+        return self._best is not None and self._at_least >= self._best.predicted_steps
+
+    def _least_steps(self, abstract: int) -> int:
+        """Steps of any plan, by landmarks of operators and shortcuts."""
+        operators = [
+            RelaxedOperator(ground.preconditions, ground.add_effects, option.skill.least_steps)
+            for ground, option in self._planner.problem.operators
+        ]
+        if self._planner.shortcuts is not None:
+            operators += self._planner.shortcuts.relaxed()
+        return LandmarkCut(self._goal, operators)(abstract) or 0
+
+    def _result(
+        self, graph: AbstractGraph | None, nodes: int = 0, edges: int = 0
+    ) -> PlanningResult:
+        assert self._best is not None
+        sizes = (nodes, edges) if graph is None else (len(graph.nodes), len(graph.edges))
+        rolled_out = self._model.executed - self._before
+        return PlanningResult(self._best, *sizes, rolled_out, graph=graph, at_least=self._at_least)

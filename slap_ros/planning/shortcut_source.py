@@ -1,0 +1,32 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where planners get shortcuts from."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from typing import Protocol
+
+from slap_ros.planning.abstract_graph import AbstractGraph, Edge, EdgeBeyond
+from slap_ros.planning.landmark_cut import RelaxedOperator
+
+
+class ShortcutSource(Protocol):
+    """Gives shortcut edges for an abstract graph."""
+
+    def edges(self, graph: AbstractGraph) -> Sequence[Edge]:
+        """Edges to be added to a graph."""
+        ...
+
+    def beyond(self, graph: AbstractGraph, within: Collection[str]) -> Sequence[EdgeBeyond]:
+        """Edges to abstract states that a graph may not have.
+
+        Args:
+            graph: Where they begin.
+            within: Names of the shortcuts that stay in it.
+        """
+        ...
+
+    def relaxed(self) -> Sequence[RelaxedOperator]:
+        """Each shortcut with all that it might add for any objects, as if it needed nothing."""
+        ...
