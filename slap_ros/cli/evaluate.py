@@ -81,21 +81,15 @@ def evaluate(
 ) -> int:
     """Plan and execute many tasks; print success, plan length and planning time.
 
-    A shortcut library adds two rows for the same tasks: SLAP as the paper evaluates it (one
-    sample), and SLAP with --samples. Spreads are mean ± sample standard deviation over all tasks.
+    A library adds two rows for the same tasks: SLAP with one sample, as the paper evaluates it, and
+    with --samples. Spreads are mean ± sample standard deviation over all tasks.
     """
     planner = with_settings(planner, within, effort)
     chosen = open_chosen(domain, preset, skills)
-    settings = {
-        "preset": chosen.preset,
-        "tasks": tasks,
-        "seeds": seeds,
-        "first_seed": first_seed,
-        "samples": samples,
-        "planner": planner,
-    }
-    besides = {"goal": goal, "skills": skills, "shooting": with_shooting}
-    settings |= {name: value for name, value in besides.items() if value}
+    settings = {"preset": chosen.preset, "tasks": tasks, "seeds": seeds, "first_seed": first_seed}
+    settings |= {"samples": samples, "planner": planner}
+    besides = ("goal", goal), ("skills", skills), ("shooting", with_shooting)
+    settings |= {name: value for name, value in besides if value}
     command = command_line("evaluate", domain, shortcuts=shortcuts, **settings)
     if output is not None:
         require_writable(output)
@@ -105,7 +99,7 @@ def evaluate(
     experiment = Experiment(chosen, tasks, seeds, first_seed, planner, goal=goal, skills=skills)
     results = _run(experiment, compared, jobs)
     if output is not None:
-        origin = {"command": command, "domain": domain, **settings}
+        origin = {"command": command, "domain": domain} | settings
         write_evaluation(output, origin | _libraries(chosen, shortcuts, library), results)
     return _show(experiment, [summary for summary, _ in results], json)
 

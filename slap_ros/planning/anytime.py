@@ -27,7 +27,7 @@ from slap_ros.planning.effort import Effort
 from slap_ros.planning.ff_planner import FFPlanner
 from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.landmark_cut import LandmarkCut, RelaxedOperator
-from slap_ros.planning.lazy_search import Limits, search_lazily
+from slap_ros.planning.lazy_search import SearchLimits, search_lazily
 from slap_ros.planning.plan import Plan, PlanningResult
 from slap_ros.planning.problem import Problem
 from slap_ros.planning.search import SearchOutcome
@@ -101,7 +101,7 @@ class AnytimePlanner:
         """
         abstract = self.problem.model.space.abstract(state)
         planner = GraphPlanner(self.problem, shortcuts=self.shortcuts)
-        run = _Run(self, state, goal)
+        run = _Improvement(self, state, goal)
         try:
             graph = planner.graph(abstract, goal, max_nodes=self.effort.abstract_states)
         except PlanningLimitError:
@@ -110,7 +110,7 @@ class AnytimePlanner:
             yield from run.through(graph)
 
 
-class _Run:
+class _Improvement:
     """One run of :meth:`AnytimePlanner.improve`."""
 
     def __init__(self, planner: AnytimePlanner, state: State, goal: int) -> None:
@@ -173,7 +173,7 @@ class _Run:
 
     def _search(self, graph: AbstractGraph, weight: float) -> SearchOutcome:
         below = None if self._best is None else self._best.predicted_steps
-        limits = Limits(weight, self._limit, below)
+        limits = SearchLimits(weight, self._limit, below)
         return search_lazily(graph, self._state, self._model, limits)
 
     def _take(self, plan: Plan | None) -> bool:

@@ -24,7 +24,7 @@ from slap_ros.relational import State, Target
 
 
 @dataclass(frozen=True)
-class Limits:
+class SearchLimits:
     """What a search may do, in counts; the defaults limit nothing.
 
     Args:
@@ -39,11 +39,11 @@ class Limits:
     below: int | None = None
 
 
-UNLIMITED = Limits()
+UNLIMITED = SearchLimits()
 
 
 def search_lazily(
-    graph: AbstractGraph, state: State, model: Model, limits: Limits = UNLIMITED
+    graph: AbstractGraph, state: State, model: Model, limits: SearchLimits = UNLIMITED
 ) -> SearchOutcome:
     """A* with lazy edge evaluation: an edge is rolled out at the front of the queue.
 
@@ -136,7 +136,9 @@ class _Frontier:
 class _LazySearch:
     """One run of :func:`search_lazily`."""
 
-    def __init__(self, graph: AbstractGraph, state: State, model: Model, limits: Limits) -> None:
+    def __init__(
+        self, graph: AbstractGraph, state: State, model: Model, limits: SearchLimits
+    ) -> None:
         """See :func:`search_lazily`."""
         self._graph, self._model, self._limits = graph, model, limits
         self._goals = set(graph.goal_nodes)

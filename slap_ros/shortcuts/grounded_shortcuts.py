@@ -91,7 +91,7 @@ class GroundedShortcuts:
         """
         change = Change(target.required & ~source, target.forbidden & source)
         for shortcut in self.shortcuts:
-            if shortcut.name == name and shortcut.signature.matches(change, self._space):
+            if shortcut.name == name and shortcut.signature.matches(change, source, self._space):
                 return self._option(shortcut, change, attempt)
         return None
 

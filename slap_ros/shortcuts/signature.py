@@ -221,14 +221,23 @@ class Signature:
         words = "_".join(sorted({predicate for predicate, _ in self.add})) or "nothing"
         return f"{words}-{sha256(text.encode()).hexdigest()[:8]}"
 
-    def matches(self, change: Change, space: AtomSpace) -> bool:
-        """Whether a change has all patterns of the signature, with any number of objects.
+    def matches(self, change: Change, source: int, space: AtomSpace) -> bool:
+        """Whether a change has the patterns of the signature, with any number of objects.
+
+        What is already so need not change: a tower of one block has none on another, and of none
+        the top becomes free. Objects of each kind must change, and one pattern at least must be
+        added, and one deleted, of those that the signature has.
 
         As in Alg. 3 the change may delete more atoms, but about these objects only, and, unlike
         there, it adds no others: nothing that was not to be achieved in training. Beyond it, the
         number of objects is free: Alg. 3 asks for each atom of the training's change, so that
         what was learned on a tower of three is of no use for a tower of two. A shortcut is tried
         in the model anyway, before it is used.
+
+        Args:
+            change: Change from the source to another abstract state.
+            source: Abstract state in which the shortcut would begin, a mask.
+            space: Atoms of the task.
         """
         kind = kinds(space)
         found: set[Pattern] = set()
@@ -243,4 +252,27 @@ class Signature:
                 return False
             else:
                 others.update(atom.objects)
-        return found == self.patterns and others <= mine
+        missing = self.patterns - found
+        return (
+            others <= mine
+            and {kind[obj] for obj in mine} == set(self.roles)
+            and _signs(found) == _signs(self.patterns)
+            and all(_is_already_so(pattern, source, mine, space) for pattern in missing)
+        )
+
+
+def _signs(patterns: Collection[Pattern]) -> set[str]:
+    return {sign for sign, _, _ in patterns}
+
+
+def _is_already_so(
+    pattern: Pattern, source: int, objects: Collection[Object], space: AtomSpace
+) -> bool:
+    """Whether all atoms of a pattern about these objects hold that are added, or none do."""
+    about = [
+        atom
+        for atom in space.decode(instances(pattern, space))
+        if set(atom.objects) <= set(objects)
+    ]
+    mask = space.mask(about)
+    return source & mask == (mask if pattern[0] == "+" else 0)

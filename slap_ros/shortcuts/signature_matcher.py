@@ -29,15 +29,12 @@ class SignatureMatcher:
         ordered = sorted(signature.patterns)
         self._adds = [instances(p, space) for p in ordered if p[0] == "+"]
         self._deletes = [instances(p, space) for p in ordered if p[0] == "-"]
+        self.may_be_added = reduce(or_, self._adds, 0)  # for any objects, a mask
+        self._may_be_deleted = reduce(or_, self._deletes, 0)
         kind = kinds(space)
         self._left_alone = ~space.mask(
             atom for atom in space.atoms if all(kind[o] in signature.slots for o in atom.objects)
         )
-
-    @property
-    def may_be_added(self) -> int:
-        """All atoms that the shortcut might add, for any objects; a mask."""
-        return reduce(or_, self._adds, 0)
 
     def pairs(self, nodes: Sequence[int]) -> Iterator[tuple[int, int]]:
         """Yield the pairs of nodes that a shortcut may join, as indices, the later one second."""
@@ -82,9 +79,9 @@ class SignatureMatcher:
         change = Change.between(source, target)
         return (
             not (change.add | change.delete) & self._left_alone
-            and all(change.add & mask for mask in self._adds)
-            and all(change.delete & mask for mask in self._deletes)
-            and self._signature.matches(change, self._space)
+            and bool(change.add & self.may_be_added) == bool(self._adds)
+            and bool(change.delete & self._may_be_deleted) == bool(self._deletes)
+            and self._signature.matches(change, source, self._space)
         )
 
 

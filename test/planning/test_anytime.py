@@ -12,7 +12,7 @@ from slap_ros.errors import InvalidParameterError, UnsolvableError
 from slap_ros.planning.anytime import AnytimePlanner, PlanningInterrupted
 from slap_ros.planning.effort import Effort
 from slap_ros.planning.landmark_cut import LandmarkCut, RelaxedOperator
-from slap_ros.planning.lazy_search import Limits, search_lazily
+from slap_ros.planning.lazy_search import SearchLimits, search_lazily
 from slap_ros.planning.planner import make_planner
 from slap_ros.planning.problem import Problem
 from slap_ros.planning.search import search_exhaustively
@@ -46,7 +46,7 @@ START = State(LAYOUT, [0.0])
 @given(made_up_graphs(), st.sampled_from([1.0, 1.5, 3.0, 30.0]))
 def test_a_weighted_search_is_too_long_by_its_weight_at_most(graph, weight):
     best = search_exhaustively(graph, START, MadeUpModel()).plan
-    outcome = search_lazily(graph, START, MadeUpModel(), Limits(weight))
+    outcome = search_lazily(graph, START, MadeUpModel(), SearchLimits(weight))
     if best is None:
         assert outcome.plan is None
         return
@@ -61,7 +61,7 @@ def test_a_weighted_search_is_too_long_by_its_weight_at_most(graph, weight):
 def test_a_search_that_stops_says_no_more_than_is_true(graph, rollouts, below):
     best = search_exhaustively(graph, START, MadeUpModel()).plan
     model = RememberingModel()
-    outcome = search_lazily(graph, START, model, Limits(1.0, rollouts, below))
+    outcome = search_lazily(graph, START, model, SearchLimits(1.0, rollouts, below))
     assert model.executed <= rollouts
     if best is not None:
         assert outcome.at_least <= best.predicted_steps or outcome.at_least == below
