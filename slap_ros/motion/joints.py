@@ -22,7 +22,7 @@ LOW, HIGH, STEP = np.array(JOINT_LOW), np.array(JOINT_HIGH), np.array(MAX_STEP)
 RESOLUTION = 0.125  # control steps between checked configurations: the hand moves about 1 cm
 
 _ROUNDING = 1e-9  # rad
-_STRIDE = 8  # rows from one that is checked first to the next
+STRIDE = 8  # rows from one that is checked first to the next
 
 
 def configuration(q: Joints) -> Joints:
@@ -76,7 +76,7 @@ def free_count(line: Joints, free: Free) -> int:
     A few rows spread over the line are checked first: most blocked lines are found out by them.
     """
     rows = np.arange(len(line))
-    first = rows % _STRIDE == (len(line) - 1) % _STRIDE  # the last row among them
+    first = rows % STRIDE == (len(line) - 1) % STRIDE  # the last row among them
     coarse = rows[first]
     allowed = free(line[coarse])
     blocked = len(line) if allowed.all() else int(coarse[np.argmin(allowed)])
