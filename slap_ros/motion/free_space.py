@@ -10,7 +10,16 @@ from typing import Protocol
 import numpy as np
 
 from slap_ros.motion.collision import CollisionChecker
-from slap_ros.motion.joints import Free, Joints, Path, free_count, interpolate, path_configurations
+from slap_ros.motion.joints import (
+    Array,
+    Free,
+    Joints,
+    Path,
+    free_count,
+    interpolate,
+    path_configurations,
+)
+from slap_ros.motion.numpy_inverse_kinematics import nearest_configurations
 from slap_ros.motion.rrt import rrt_connect
 from slap_ros.motion.shortcutting import shorten, straighten
 from slap_ros.motion.via_point import via_point_path
@@ -36,6 +45,10 @@ class FreeSpace(Protocol):
 
     def path_is_free(self, path: Path, resolution: float) -> bool:
         """Whether a path is, all along; ``resolution``: control steps between what is checked."""
+        ...
+
+    def nearest_configurations(self, targets: Array, near: Joints) -> Joints:
+        """See :func:`slap_ros.motion.numpy_inverse_kinematics.nearest_configurations`."""
         ...
 
     def via_point_path(
@@ -83,6 +96,10 @@ class NumpyFreeSpace:
     def path_is_free(self, path: Path, resolution: float) -> bool:
         """See :meth:`slap_ros.motion.free_space.FreeSpace.path_is_free`."""
         return bool(self.free(path_configurations(path, resolution)).all())
+
+    def nearest_configurations(self, targets: Array, near: Joints) -> Joints:
+        """See :meth:`slap_ros.motion.free_space.FreeSpace.nearest_configurations`."""
+        return nearest_configurations(targets, near, self.free)
 
     def via_point_path(
         self, start: Joints, goal: Joints, rng: np.random.Generator, resolution: float

@@ -21,7 +21,7 @@ Free = Callable[[Joints], NDArray[np.bool_]]  # (n, 7) to (n,): True where nothi
 LOW, HIGH, STEP = np.array(JOINT_LOW), np.array(JOINT_HIGH), np.array(MAX_STEP)
 RESOLUTION = 0.125  # control steps between checked configurations: the hand moves about 1 cm
 
-_ROUNDING = 1e-9  # rad
+ROUNDING = 1e-9  # rad
 STRIDE = 8  # rows from one that is checked first to the next
 
 
@@ -49,7 +49,7 @@ def control_steps(start: Joints, goal: Joints) -> Array:
 
 def within_limits(q: Joints) -> NDArray[np.bool_]:
     """Whether every joint is within its limits; never for NaN. Shape (..., 7) to (...)."""
-    return cast(NDArray[np.bool_], ((q >= LOW - _ROUNDING) & (q <= HIGH + _ROUNDING)).all(-1))
+    return cast(NDArray[np.bool_], ((q >= LOW - ROUNDING) & (q <= HIGH + ROUNDING)).all(-1))
 
 
 def interpolate(start: Joints, goal: Joints, resolution: float = RESOLUTION) -> Joints:

@@ -15,12 +15,20 @@ from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.motion import CollisionChecker, MotionPlanningError, plan_path
 from slap_ros.motion.free_space import NumpyFreeSpace
 from slap_ros.motion.joints import RESOLUTION, interpolate
-from slap_ros.motion.kinematics import arm_frames
+from slap_ros.motion.kinematics import arm_frames, matrix
 from slap_ros.motion.numpy_collision import free_flags
 from slap_ros.motion.numpy_kinematics import arm_frames as numpy_arm_frames
 from slap_ros.portable_math import arccos, arctan2, sin_cos
 from slap_ros.worlds.panda import Pose, grasp_pose
-from support.motion_scenes import HELD, STRAIGHT, TABLE, random_box, random_configurations, tower
+from support.motion_scenes import (
+    HELD,
+    STRAIGHT,
+    TABLE,
+    random_box,
+    random_configurations,
+    top_down,
+    tower,
+)
 from support.programs import environment
 from tools.processors import PROCESSORS
 
@@ -64,6 +72,19 @@ def test_frames_and_collisions(seed):
     assert isinstance(free.space, CompiledFreeSpace)
     np.testing.assert_array_equal(arm_frames(q), numpy_arm_frames(q))
     np.testing.assert_array_equal(free(q), by_numpy(free).free(q))
+
+
+@settings(max_examples=20, deadline=None)
+@given(SEEDS)
+def test_inverse_kinematics(seed):
+    rng = np.random.default_rng(seed)
+    free, near = scene(rng), random_configurations(rng, 1)[0]
+    poses = [grasp_pose(q) for q in random_configurations(rng, 3)]
+    poses += [top_down(*rng.uniform(-0.7, 0.7, 3), rng.uniform(-3.0, 3.0)) for _ in range(3)]
+    targets = np.array([matrix(pose) for pose in [*poses, top_down(2.0, 0.0, 0.0)]])
+    found = free.space.nearest_configurations(targets, near)
+    np.testing.assert_array_equal(found, by_numpy(free).nearest_configurations(targets, near))
+    assert np.isnan(found[-1]).all()
 
 
 @settings(max_examples=30, deadline=None)

@@ -40,6 +40,7 @@ class CompiledBackend:
         scene = make_scene(moving_shapes(None, FINGER_OPEN, 0.0, 0.0), [box], True)
         space = self.free_space(scene)
         space.free(start[None])
+        space.nearest_configurations(np.eye(4)[None], start)
         space.line_is_free(start, goal, RESOLUTION)
         path = np.stack([start, goal])
         space.path_is_free(path, RESOLUTION)

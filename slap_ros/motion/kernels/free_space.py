@@ -13,9 +13,11 @@ from slap_ros.motion.collision_scene import CollisionScene
 from slap_ros.motion.joints import Array, Joints, Path
 from slap_ros.motion.kernels import lines, shortcutting
 from slap_ros.motion.kernels.collision import free_flags
+from slap_ros.motion.kernels.inverse_kinematics import nearest
 from slap_ros.motion.kernels.random_draws import with_draws
 from slap_ros.motion.kernels.rrt import connect
 from slap_ros.motion.kernels.via_point import first_free_via_point
+from slap_ros.motion.numpy_inverse_kinematics import sweep
 from slap_ros.motion.via_point import draw_via_points
 
 
@@ -36,6 +38,10 @@ class CompiledFreeSpace:
     def path_is_free(self, path: Path, resolution: float) -> bool:
         """See :meth:`slap_ros.motion.free_space.FreeSpace.path_is_free`."""
         return lines.path_is_free(_plain(path), self.scene, resolution)
+
+    def nearest_configurations(self, targets: Array, near: Joints) -> Joints:
+        """See :meth:`slap_ros.motion.free_space.FreeSpace.nearest_configurations`."""
+        return nearest(_plain(targets), sweep(near), _plain(near), self.scene)
 
     def via_point_path(
         self, start: Joints, goal: Joints, rng: np.random.Generator, resolution: float
