@@ -19,10 +19,11 @@ install: $(VENV)/.installed  ## Make .venv with everything that running needs
 $(VENV)/.installed: $(METADATA)
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13))' || \
 	  { echo "slap_ros needs Python 3.11 or 3.12; try: make $(MAKECMDGOALS) PYTHON=python3.12" >&2; exit 1; }
-	@echo "== setting up $(VENV), which takes about a minute"
+	@echo "== setting up $(VENV), which takes about two minutes"
 	$(PYTHON) -m venv $(VENV) || \
 	  { echo "no venv module; on Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
 	$(BIN)/pip install --quiet --disable-pip-version-check -e ./embedded_ros -e '.[physics]'
+	$(BIN)/python -m slap_ros.motion.kernels
 	@touch $@
 
 $(VENV)/.tested: $(VENV)/.installed

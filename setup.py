@@ -27,6 +27,7 @@ NODES = [package for package in PACKAGES if package not in ("slap_ros", "ensembl
 
 RUNTIME = [
     "numpy>=1.26,<3",
+    "numba>=0.60",  # compiles motion planning; each version has an upper bound of numpy
     "rosbags>=0.11,<0.12",
     "typer>=0.15",
     "rich>=13",

@@ -41,6 +41,12 @@ KINDS = {
 }
 
 
+def user_cache(name: str) -> Path:
+    """``slap_ros/NAME`` in the user's cache folder; it may not exist yet."""
+    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(home) / "slap_ros" / name
+
+
 def open_regular(path: Path) -> BinaryIO:
     """Open a regular file for reading, without waiting.
 

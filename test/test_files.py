@@ -157,6 +157,7 @@ OWN = {
     "domains/cleanup_table/shapes/__init__.py",
     "files.py",
     "messages/interfaces.py",
+    "motion/kernels/compilation.py",
     "report/page.py",
 }
 

@@ -39,6 +39,8 @@ def _numpy_features() -> str:
     return ",".join(found)
 
 
+# numba compiles for a processor without extensions; both variables are needed.
+NUMBA_BASELINE = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
 GLIBC_BASELINE = "glibc.cpu.hwcaps=-AVX2,-FMA,-AVX"
 PROCESSORS: Mapping[str, Mapping[str, str]] = {
     "prescott": {"OPENBLAS_CORETYPE": "Prescott"},
@@ -46,10 +48,12 @@ PROCESSORS: Mapping[str, Mapping[str, str]] = {
     "haswell": {"OPENBLAS_CORETYPE": "Haswell"},
     "numpy": {"NPY_DISABLE_CPU_FEATURES": _numpy_features()},
     "glibc": {"GLIBC_TUNABLES": GLIBC_BASELINE},
+    "numba": NUMBA_BASELINE,
     "baseline": {
         "OPENBLAS_CORETYPE": "Prescott",
         "NPY_DISABLE_CPU_FEATURES": _numpy_features(),
         "GLIBC_TUNABLES": GLIBC_BASELINE,
+        **NUMBA_BASELINE,
     },
 }
 AS_IT_IS: Mapping[str, str] = {}

@@ -1,6 +1,10 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whether many pairs of oriented boxes keep a distance from each other."""
+"""Whether many pairs of oriented boxes keep a distance from each other.
+
+Sums are written out: libraries sum in another order, or without rounding in between, as the
+processor does it best, and the last bit differs.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +17,9 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 _NEXT, _AFTER = [1, 2, 0], [2, 0, 1]  # the other two axes of each axis
-_NEARLY_PARALLEL = 1e-3  # least sine of the angle between two edges that is told from 0
-_TOUCHING = 1e-9  # m, below which two points are one
-_PROJECTIONS = 3  # from box to box, in search of their nearest points
+NEARLY_PARALLEL = 1e-3  # least sine of the angle between two edges that is told from 0
+TOUCHING = 1e-9  # m, below which two points are one
+PROJECTIONS = 3  # from box to box, in search of their nearest points
 
 
 def separated(turn: Array, offset: Array, half_a: Array, half_b: Array, distance: Array) -> Flags:
@@ -67,7 +71,7 @@ def _gaps_across_edges(turn: Array, offset: Array, half_a: Array, half_b: Array)
     wide, deep = half_b[:, None, _NEXT], half_b[:, None, _AFTER]
     reach_b = wide * size[:, :, _AFTER] + deep * size[:, :, _NEXT]
     sine2 = 1.0 - size * size
-    parallel = sine2 < _NEARLY_PARALLEL**2  # then there is no such line
+    parallel = sine2 < NEARLY_PARALLEL**2  # then there is no such line
     gap = (np.abs(shift) - reach_a - reach_b) / np.sqrt(np.where(parallel, 1.0, sine2))
     return cast(Array, np.where(parallel, -np.inf, gap).max((1, 2)))
 
@@ -81,19 +85,25 @@ def _gaps_between_nearest_points(
     """
     back = turn.swapaxes(1, 2)
     in_b = offset  # the centre of A
-    for _ in range(_PROJECTIONS):
+    for _ in range(PROJECTIONS):
         point_b = np.maximum(np.minimum(in_b, half_b), -half_b) - offset
         point_b = _apply(turn, point_b)  # seen from A
         point_a = np.maximum(np.minimum(point_b, half_a), -half_a)
         in_b = _apply(back, point_a) + offset
     line = point_b - point_a
-    reach = (np.abs(line) * half_a).sum(-1) + (np.abs(_apply(back, line)) * half_b).sum(-1)
-    shadow = np.abs((line * _apply(turn, offset)).sum(-1))
-    length = np.linalg.norm(line, axis=-1)
-    touching = length < _TOUCHING
+    reach = dot(np.abs(line), half_a) + dot(np.abs(_apply(back, line)), half_b)
+    shadow = np.abs(dot(line, _apply(turn, offset)))
+    length = np.sqrt(dot(line, line))
+    touching = length < TOUCHING
     gap = np.where(touching, -np.inf, (shadow - reach) / np.where(touching, 1.0, length))
     return gap, length
 
 
+def dot(a: Array, b: Array) -> Array:
+    """The inner products of vectors: shapes (..., 3) to (...)."""
+    product: Array = a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
+    return product
+
+
 def _apply(matrices: Array, vectors: Array) -> Array:
-    return cast(Array, np.matmul(matrices, vectors[..., None])[..., 0])
+    return dot(matrices, vectors[..., None, :])

@@ -7,11 +7,12 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from slap_ros.files import user_cache
+
 
 def cache_folder() -> Path:
     """``slap_ros/meshes`` in the user's cache folder; it may not exist yet."""
-    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(home) / "slap_ros" / "meshes"
+    return user_cache("meshes")
 
 
 def store(file: Path, content: bytes) -> None:

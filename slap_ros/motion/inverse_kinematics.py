@@ -1,49 +1,24 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Inverse kinematics of the Panda in closed form, for all branches and redundancy values at once.
+"""Inverse kinematics of the Panda: free configurations at a pose, over all of its redundancy.
 
-Seven joints leave one degree of freedom at a pose of the hand. Once joint 7 is chosen, the wrist
-is known, the triangle from shoulder over elbow to wrist gives joint 4, and the rest follows, with
-two choices each at the elbow, the wrist and the shoulder. The geometry is that of
-
-Y. He, S. Liu: Analytical Inverse Kinematics for Franka Emika Panda, ICCMA 2021,
-https://doi.org/10.1109/ICCMA54375.2021.9646185
+The closed form is in :mod:`slap_ros.motion.numpy_inverse_kinematics`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import cast
+from functools import cache
 
 import numpy as np
 
 from slap_ros.geometry.pose import Pose
-from slap_ros.motion.joints import (
-    HIGH,
-    LOW,
-    Array,
-    Free,
-    Joints,
-    configuration,
-    control_steps,
-    within_limits,
-)
-from slap_ros.motion.kinematics import GRASP_IN_LAST_LINK, matrix
+from slap_ros.motion.collision import CollisionChecker
+from slap_ros.motion.free_space import FreeSpace, free_space
+from slap_ros.motion.joints import Array, Free, Joints, configuration, within_limits
+from slap_ros.motion.kinematics import matrix
+from slap_ros.motion.numpy_inverse_kinematics import ik_branches, solutions, sweep
 from slap_ros.worlds.panda import JOINTS
-
-SHOULDER = np.array([0.0, 0.0, 0.333])  # m, where the axes of joints 1, 2 and 3 meet
-UPPER_ARM, FOREARM = 0.316, 0.384  # m, along the axes of joints 3 and 5
-ELBOW = 0.0825  # m, from both of these axes to that of joint 4
-WRIST = 0.088  # m, from the axes of joints 5 and 6 to that of joint 7
-BRANCHES = 8  # elbow, wrist, shoulder
-
-SWEEP = 64  # values of joint 7 over its range
-REFINEMENT = 33  # values around the best of the sweep
-_FREE_BATCH = 16  # candidates that are checked for collisions together
-_UPRIGHT = 1e-9  # sine of joint 2, below which joints 1 and 3 turn about the same axis
-
-_TO_LAST_LINK = np.linalg.inv(matrix(GRASP_IN_LAST_LINK))
-_SIGNS = np.array([1.0, -1.0])
 
 
 def inverse_kinematics(target: Pose, near: Joints, *, free: Free | None = None) -> Joints | None:
@@ -76,16 +51,10 @@ def nearest_configurations(
     Returns:
         For each pose rad, shape (7,); None if it is out of reach or no configuration there is free.
     """
-    near = configuration(near)
-    swept = _solutions(targets, [_sweep(near)] * len(targets), near)
-    best = _first_free(swept, free)
-    refined = _solutions(targets, [_around(q) for q in best], near)
-    nearer = [
-        q if known is None else q[control_steps(near, q) < control_steps(near, known)]
-        for q, known in zip(refined, best, strict=True)
-    ]
-    better = _first_free(nearer, free)
-    return [known if q is None else q for q, known in zip(better, best, strict=True)]
+    space = _everywhere() if free is None else free_space(free)
+    frames = np.array([matrix(target) for target in targets]).reshape(-1, 4, 4)
+    found = space.nearest_configurations(frames, configuration(near))
+    return [q if np.isfinite(q).all() else None for q in found]
 
 
 def ik_candidates(target: Pose, near: Joints) -> Joints:
@@ -98,57 +67,7 @@ def ik_candidates(target: Pose, near: Joints) -> Joints:
     Returns:
         rad, shape (k, 7); k is 0 if the pose is out of reach.
     """
-    return _solutions([target], [_sweep(near)], near)[0]
-
-
-def _sweep(near: Joints) -> Array:
-    """Values of joint 7 over its range, and its present one: shape (SWEEP + 1,)."""
-    return np.append(np.linspace(LOW[6], HIGH[6], SWEEP), near[6])
-
-
-def _around(best: Joints | None) -> Array:
-    """Values of joint 7 between the neighbours of the best in the sweep; none without a best."""
-    if best is None:
-        return np.empty(0)
-    spacing = (HIGH[6] - LOW[6]) / (SWEEP - 1)
-    around = best[6] + np.linspace(-spacing, spacing, REFINEMENT)
-    return cast(Array, np.clip(around, LOW[6], HIGH[6]))
-
-
-def _solutions(targets: Sequence[Pose], joint7: Sequence[Array], near: Joints) -> list[Joints]:
-    """The configurations at each pose with its values of joint 7, shape (k, 7), nearest first."""
-    counts = [len(values) for values in joint7]
-    frames = np.repeat([matrix(target) for target in targets], counts, axis=0)
-    branches = ik_branches(frames, np.concatenate(joint7), near[0])
-    found = np.split(branches, np.cumsum(counts)[:-1])
-    return [_nearest_first(q[within_limits(q)], near) for q in found]
-
-
-def _nearest_first(q: Joints, near: Joints) -> Joints:
-    return q[np.argsort(control_steps(near, q), kind="stable")]
-
-
-def _first_free(candidates: Sequence[Joints], free: Free | None) -> list[Joints | None]:
-    """The first that is free in each of some arrays of the shape (k, 7), k from 0 on."""
-    firsts = [q[:1] for q in candidates]
-    if free is not None:
-        # These alone first, and together: mostly they are free.
-        allowed = iter(free(np.concatenate(firsts)).tolist())
-        firsts = [
-            first if len(first) == 0 or next(allowed) else _next_free(q[1:], free)
-            for first, q in zip(firsts, candidates, strict=True)
-        ]
-    return [first[0] if len(first) else None for first in firsts]
-
-
-def _next_free(candidates: Joints, free: Free) -> Joints:
-    """The first that is free, shape (1, 7), or none, shape (0, 7)."""
-    for i in range(0, len(candidates), _FREE_BATCH):
-        batch = candidates[i : i + _FREE_BATCH]
-        found = batch[free(batch)]
-        if len(found):
-            return found[:1]
-    return candidates[:0]
+    return solutions(matrix(target)[None], [sweep(near)], near)[0]
 
 
 def ik_solutions(target: Pose, joint7: Array, joint1: float = 0.0) -> Joints:
@@ -166,70 +85,7 @@ def ik_solutions(target: Pose, joint7: Array, joint1: float = 0.0) -> Joints:
     return q[within_limits(q)]
 
 
-def ik_branches(targets: Array, joint7: Array, joint1: float = 0.0) -> Joints:
-    """The configuration of every branch at each of many poses, joint 7 given.
-
-    Args:
-        targets: Poses of the grasp point in the base's frame, as homogeneous transforms, lengths
-            in m, shape (m, 4, 4), or (1, 4, 4) for the same pose throughout.
-        joint7: Values of joint 7, rad, shape (m,).
-        joint1: Value of joint 1 where the upper arm is upright and joint 1 is free, rad.
-
-    Returns:
-        rad, shape (m, BRANCHES, 7), NaN where a branch does not reach; joint limits are not heeded.
-    """
-    # Axes are unit vectors of the base's frame; the frame of link i is named by i. Arrays have
-    # the shape (m, elbow, wrist, shoulder) of the choices made so far, vectors 3 before it.
-    last = targets @ _TO_LAST_LINK
-    last_x, last_y, last_z, origin = last[:, :3].transpose(2, 1, 0)[..., None, None, None]
-    q7 = joint7[:, None, None, None]
-    cos7, sin7 = np.cos(q7), np.sin(q7)
-    x6, y6, z6 = cos7 * last_x - sin7 * last_y, -last_z, sin7 * last_x + cos7 * last_y
-    wrist = origin - WRIST * x6
-    to_shoulder = SHOULDER[:, None, None, None, None] - wrist
-
-    with np.errstate(invalid="ignore"):  # NaN: out of reach
-        q4 = _elbow(_dot(to_shoulder, to_shoulder))
-        cos4, sin4 = np.cos(q4), np.sin(q4)
-        # The same vector in the frame of link 4, where y is along the forearm.
-        along_x = ELBOW * (1.0 - cos4) - UPPER_ARM * sin4
-        along_y = ELBOW * sin4 - UPPER_ARM * cos4 - FOREARM
-
-        shoulder_x, shoulder_y = _dot(to_shoulder, x6), _dot(to_shoulder, y6)
-        slant = np.arccos(along_y / np.hypot(shoulder_x, shoulder_y))
-        q6 = np.arctan2(shoulder_x, shoulder_y) + slant * _SIGNS[:, None]
-        cos6, sin6 = np.cos(q6), np.sin(q6)
-        q5 = np.arctan2(_dot(to_shoulder, z6), cos6 * shoulder_x - sin6 * shoulder_y)
-
-        y4 = sin6 * x6 + cos6 * y6
-        x4 = (to_shoulder - along_y * y4) / along_x
-        x3, z3 = cos4 * x4 - sin4 * y4, sin4 * x4 + cos4 * y4
-        y3_up = x4[1] * y4[0] - x4[0] * y4[1]
-        q2 = np.arccos(np.clip(z3[2], -1.0, 1.0)) * _SIGNS
-        q1 = np.arctan2(_SIGNS * z3[1], _SIGNS * z3[0])
-        q3 = np.arctan2(_SIGNS * y3_up, -_SIGNS * x3[2])
-        upright = np.hypot(z3[0], z3[1]) < _UPRIGHT
-        q1 = np.where(upright, joint1, q1)
-        q3 = np.where(upright, _wrap(np.arctan2(x3[1], x3[0]) - joint1, -np.pi), q3)
-
-        parts = (q1, q2, q3, _wrap(q4, -2.0 * np.pi), q5, _wrap(q6, LOW[5]), q7)
-    q: Joints = np.stack(np.broadcast_arrays(*parts), axis=-1).reshape(-1, BRANCHES, JOINTS)
-    return q
-
-
-def _elbow(distance2: Array) -> Array:
-    """Joint 4 for a squared distance from shoulder to wrist: elbow out, elbow in."""
-    sine = ELBOW * (UPPER_ARM + FOREARM)
-    cosine = ELBOW**2 - UPPER_ARM * FOREARM
-    sides2 = UPPER_ARM**2 + FOREARM**2 + 2.0 * ELBOW**2
-    swing = np.arccos((sides2 - distance2) / (2.0 * np.hypot(sine, cosine)))
-    return cast(Array, np.arctan2(sine, cosine) + swing * _SIGNS[:, None, None])
-
-
-def _dot(a: Array, b: Array) -> Array:
-    return cast(Array, a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
-
-
-def _wrap(angle: Array, low: float) -> Array:
-    """The same angle in [low, low + 2 pi)."""
-    return np.mod(angle - low, 2.0 * np.pi) + low
+@cache
+def _everywhere() -> FreeSpace:
+    """The free space without obstacles."""
+    return CollisionChecker([], base=False).space

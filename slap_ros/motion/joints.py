@@ -21,8 +21,8 @@ Free = Callable[[Joints], NDArray[np.bool_]]  # (n, 7) to (n,): True where nothi
 LOW, HIGH, STEP = np.array(JOINT_LOW), np.array(JOINT_HIGH), np.array(MAX_STEP)
 RESOLUTION = 0.125  # control steps between checked configurations: the hand moves about 1 cm
 
-_ROUNDING = 1e-9  # rad
-_STRIDE = 8  # rows from one that is checked first to the next
+ROUNDING = 1e-9  # rad
+STRIDE = 8  # rows from one that is checked first to the next
 
 
 def configuration(q: Joints) -> Joints:
@@ -49,7 +49,7 @@ def control_steps(start: Joints, goal: Joints) -> Array:
 
 def within_limits(q: Joints) -> NDArray[np.bool_]:
     """Whether every joint is within its limits; never for NaN. Shape (..., 7) to (...)."""
-    return cast(NDArray[np.bool_], ((q >= LOW - _ROUNDING) & (q <= HIGH + _ROUNDING)).all(-1))
+    return cast(NDArray[np.bool_], ((q >= LOW - ROUNDING) & (q <= HIGH + ROUNDING)).all(-1))
 
 
 def interpolate(start: Joints, goal: Joints, resolution: float = RESOLUTION) -> Joints:
@@ -76,7 +76,7 @@ def free_count(line: Joints, free: Free) -> int:
     A few rows spread over the line are checked first: most blocked lines are found out by them.
     """
     rows = np.arange(len(line))
-    first = rows % _STRIDE == (len(line) - 1) % _STRIDE  # the last row among them
+    first = rows % STRIDE == (len(line) - 1) % STRIDE  # the last row among them
     coarse = rows[first]
     allowed = free(line[coarse])
     blocked = len(line) if allowed.all() else int(coarse[np.argmin(allowed)])

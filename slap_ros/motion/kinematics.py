@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from slap_ros.geometry.pose import Pose, rotation_matrix
+from slap_ros.motion.backend import backend
 from slap_ros.motion.joints import Array, Joints
 from slap_ros.worlds.panda import JOINTS, grasp_pose, link_poses
 
@@ -25,13 +26,8 @@ def matrix(pose: Pose) -> Array:
 
 _ZERO = link_poses((0.0,) * JOINTS, 0.0)
 GRASP_IN_LAST_LINK = _ZERO[LAST_LINK].inverse().compose(grasp_pose((0.0,) * JOINTS))
-
-# A joint's frame at zero, times a rotation by the joint about z, is C cos + S sin + FIXED.
-_AT_ZERO = np.stack([matrix(a.inverse().compose(b)) for a, b in pairwise(_ZERO[: JOINTS + 1])])
-_COS, _SIN, _FIXED = np.zeros((3, JOINTS, 4, 4))
-_COS[..., 0], _COS[..., 1] = _AT_ZERO[..., 0], _AT_ZERO[..., 1]
-_SIN[..., 0], _SIN[..., 1] = _AT_ZERO[..., 1], -_AT_ZERO[..., 0]
-_FIXED[..., 2:] = _AT_ZERO[..., 2:]
+# Frames of the joints at zero, each in the link before it: shape (7, 4, 4).
+AT_ZERO = np.stack([matrix(a.inverse().compose(b)) for a, b in pairwise(_ZERO[: JOINTS + 1])])
 
 
 def arm_frames(q: Joints) -> Array:
@@ -43,8 +39,4 @@ def arm_frames(q: Joints) -> Array:
     Returns:
         Homogeneous transforms, shape (n, 7, 4, 4), lengths in m.
     """
-    angles = q[..., None, None]
-    frames: Array = np.cos(angles) * _COS + np.sin(angles) * _SIN + _FIXED
-    for joint in range(1, JOINTS):
-        np.matmul(frames[:, joint - 1], frames[:, joint], out=frames[:, joint])
-    return frames
+    return backend().arm_frames(np.ascontiguousarray(q, dtype=np.float64))

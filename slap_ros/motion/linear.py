@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 from slap_ros.geometry.pose import ORIGIN, Pose, Vector, conjugate, multiply
+from slap_ros.motion.free_space import free_space
 from slap_ros.motion.joints import (
     RESOLUTION,
     STEP,
@@ -17,7 +18,6 @@ from slap_ros.motion.joints import (
     Path,
     configuration,
     control_steps,
-    path_configurations,
     within_limits,
 )
 from slap_ros.worlds.panda import GraspKinematics, grasp_pose
@@ -73,7 +73,7 @@ def linear_motion(
             return None
         path += following
     rows = np.stack(path)
-    if free is not None and not free(path_configurations(rows, resolution)).all():
+    if free is not None and not free_space(free).path_is_free(rows, resolution):
         return None
     return rows
 

@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from slap_ros.motion.errors import MotionPlanningError
+from slap_ros.motion.free_space import FreeSpace, free_space
 from slap_ros.motion.joints import (
     RESOLUTION,
     Free,
@@ -17,14 +18,9 @@ from slap_ros.motion.joints import (
     Path,
     configuration,
     control_steps,
-    interpolate,
-    path_configurations,
     path_steps,
     within_limits,
 )
-from slap_ros.motion.rrt import rrt_connect
-from slap_ros.motion.shortcutting import shorten, straighten
-from slap_ros.motion.via_point import via_point_path
 
 ATTEMPTS = 4  # paths, of which the one of fewest control steps is kept
 MAX_SAMPLES = 500  # of the joint space, an attempt
@@ -70,38 +66,43 @@ def plan_path(
     _check_end("goal", goal, free)
     if np.array_equal(start, goal):
         return start[None]
-    if free(interpolate(start, goal, resolution)).all():
+    space = free_space(free)
+    if space.line_is_free(start, goal, resolution):
         return np.stack([start, goal])
 
     rng = np.random.default_rng(seed)
 
     def random_path() -> Path | None:
-        found = rrt_connect(start, goal, free, rng, max_samples=max_samples, resolution=resolution)
-        return found if found is None else shortened(straighten(found, free, resolution=resolution))
+        found = space.rrt_connect(start, goal, rng, max_samples, resolution)
+        return None if found is None else shortened(space.straighten(found, resolution))
 
     shortened = partial(
-        _shortened, free=free, rng=rng, tries=shortening_tries, resolution=resolution
+        _shortened, space=space, rng=rng, tries=shortening_tries, resolution=resolution
     )
-    bent = via_point_path(start, goal, free, rng, resolution=resolution)
+    bent = space.via_point_path(start, goal, rng, resolution)
     if bent is not None:
         return shortened(bent)
     best = _shortest(random_path, attempts, GOOD_ENOUGH * float(control_steps(start, goal)))
     if best is None:
-        raise MotionPlanningError(
-            f"no collision-free path after {max_samples} samples; the goal may be out of reach "
-            "behind obstacles, or takes more samples"
-        )
+        raise _no_path(max_samples)
     return best
 
 
+def _no_path(max_samples: int) -> MotionPlanningError:
+    return MotionPlanningError(
+        f"no collision-free path after {max_samples} samples; the goal may be out of reach behind "
+        "obstacles, or takes more samples"
+    )
+
+
 def _shortened(
-    path: Path, free: Free, rng: np.random.Generator, tries: int, resolution: float
+    path: Path, space: FreeSpace, rng: np.random.Generator, tries: int, resolution: float
 ) -> Path:
     """The path shortened, if what comes out is free; see :mod:`slap_ros.motion.shortcutting`."""
-    shorter = shorten(path, free, rng, tries=tries, resolution=resolution)
-    shorter = straighten(shorter, free, resolution=resolution)
+    shorter = space.shorten(path, rng, tries, resolution)
+    shorter = space.straighten(shorter, resolution)
     # A piece of a piece is checked at other configurations than the whole of it was.
-    return shorter if free(path_configurations(shorter, resolution)).all() else path
+    return shorter if space.path_is_free(shorter, resolution) else path
 
 
 def _shortest(make_path: Callable[[], Path | None], attempts: int, enough: float) -> Path | None:

@@ -14,6 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from slap_ros.motion.free_space import free_space
 from slap_ros.motion.joints import (
     RESOLUTION,
     STEP,
@@ -21,8 +22,6 @@ from slap_ros.motion.joints import (
     Free,
     Joints,
     Path,
-    interpolate,
-    path_configurations,
 )
 from slap_ros.motion.shortcutting import points_at, without_repeats
 from slap_ros.worlds.panda import MAX_STEP
@@ -104,12 +103,13 @@ def _pieces(path: Path, limits: Array, free: Free, resolution: float) -> list[Pa
     """The path, cut at the corners where a step must end."""
     times = _arrivals(path, limits)
     motion = np.vstack([path[:1], _evenly(path, _count(path, limits), limits)])
-    if free(path_configurations(motion, resolution)).all():
+    space = free_space(free)
+    if space.path_is_free(motion, resolution):
         return [path]
     step = times[-1] / max(len(motion) - 1, 1)
     for i, (begin, end) in enumerate(pairwise(motion)):
         corners = ((times > i * step) & (times < (i + 1) * step)).nonzero()[0]
-        if len(corners) and not free(interpolate(begin, end, resolution)).all():
+        if len(corners) and not space.line_is_free(begin, end, resolution):
             corner = int(corners[0])
             first = _pieces(path[: corner + 1], limits, free, resolution)
             return first + _pieces(path[corner:], limits, free, resolution)

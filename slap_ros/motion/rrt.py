@@ -27,7 +27,7 @@ from slap_ros.motion.joints import (
 
 MAX_GROWTH = 15.0  # control steps that a tree grows at most towards a sample
 WIDENING = 50  # samples until the sampled box has reached the joint limits
-_LEAST_GROWTH = 0.5  # control steps; less is no progress
+LEAST_GROWTH = 0.5  # control steps; less is no progress
 
 
 class _Tree:
@@ -70,7 +70,7 @@ class _Tree:
         line = interpolate(self[parent], target, resolution)
         count = free_count(line, free)
         if count == 0 or (
-            count < len(line) and control_steps(self[parent], line[count - 1]) < _LEAST_GROWTH
+            count < len(line) and control_steps(self[parent], line[count - 1]) < LEAST_GROWTH
         ):
             return False
         self.add(line[count - 1], parent)

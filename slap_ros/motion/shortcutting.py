@@ -12,7 +12,7 @@ import numpy as np
 
 from slap_ros.motion.joints import Array, Free, Joints, Path, control_steps, free_count, interpolate
 
-_GAIN = 1e-6  # control steps; less is not shorter
+GAIN = 1e-6  # control steps; less is not shorter
 
 
 def shorten(
@@ -39,7 +39,7 @@ def shorten(
         if first == last:  # on the same straight piece
             continue
         a, b = points_at(path, times, np.array((begin, end)))
-        if control_steps(a, b) >= end - begin - _GAIN:
+        if control_steps(a, b) >= end - begin - GAIN:
             continue
         line = interpolate(a, b, resolution)
         if free_count(line, free) == len(line):

@@ -29,7 +29,7 @@ VIA_POINTS = 512  # to choose from
 SPREAD = 10.0  # control steps, the largest standard deviation from the straight way
 _MIDDLE = 0.2, 0.8  # where on the straight way
 _BATCH = 32  # via points that are checked together
-_COARSE_CHECKS = 1, 3, 6  # configurations each way: a few reveal most blocked paths
+COARSE_CHECKS = 1, 3, 6  # configurations each way: a few reveal most blocked paths
 
 
 def via_point_path(
@@ -47,10 +47,10 @@ def via_point_path(
     Returns:
         rad, shape (3, 7); None if none of them is free.
     """
-    via_points = _via_points(start, goal, rng)
+    via_points = draw_via_points(start, goal, rng)
     for i in range(0, len(via_points), _BATCH):
         batch = via_points[i : i + _BATCH]
-        for count in _COARSE_CHECKS:
+        for count in COARSE_CHECKS:
             checked = _spread_along(start, batch, goal, count)
             batch = batch[free(checked.reshape(-1, JOINTS)).reshape(checked.shape[:2]).all(0)]
         for via_point in batch:
@@ -60,8 +60,17 @@ def via_point_path(
     return None
 
 
-def _via_points(start: Joints, goal: Joints, rng: np.random.Generator) -> Joints:
-    """Configurations around the straight way, those of the shortest paths first: shape (k, 7)."""
+def draw_via_points(start: Joints, goal: Joints, rng: np.random.Generator) -> Joints:
+    """Configurations around the straight way, those of the shortest paths first.
+
+    Args:
+        start: Configuration to start from, rad, shape (7,).
+        goal: Configuration to reach, rad, shape (7,).
+        rng: Source of random numbers.
+
+    Returns:
+        rad, shape (k, 7), within the limits.
+    """
     along = rng.uniform(*_MIDDLE, (VIA_POINTS, 1))
     aside = rng.uniform(0.0, SPREAD, (VIA_POINTS, 1)) * rng.normal(size=(VIA_POINTS, JOINTS))
     q = start + along * (goal - start) + aside * STEP

@@ -15,8 +15,9 @@ from ensemble.cli import application
 LEARNING = {"torch", "stable_baselines3", "tensorboard", "gymnasium", "ray"}
 PHYSICS = {"pybullet", "slap_ros.worlds.joint_space", "slap_ros.worlds.contact", "slap_ros.motion"}
 PICTURES = {"PIL", "cv2", "matplotlib", "slap_ros.drawing"}
+COMPILER = {"numba", "llvmlite"}
 OTHERS = {"scipy", "openai", "transformers", "pandas", "jinja2", "slap_ros.language"}
-HEAVY = LEARNING | PHYSICS | PICTURES | OTHERS
+HEAVY = LEARNING | PHYSICS | PICTURES | OTHERS | COMPILER
 ROS = {"rclpy", "rosbags", "cyclonedds", "slap_ros.bags"}
 PLANNING = {"yaml", "safetensors", "slap_ros.core", "slap_ros.domains", "slap_ros.evaluation"}
 LG_SAIL = {"slap_ros.skills.skill_library", "slap_ros.acquisition.proposals.proposal"}

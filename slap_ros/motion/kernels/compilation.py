@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How Python becomes machine code: the only module that imports numba.
+
+Neither fast-math nor fused products and sums: every operation is rounded as IEEE 754 says, so that
+the results are the same on every processor.
+
+Machine code is kept in the user's cache, in a folder of its own for these sources, this numba and
+this processor. numba alone looks at one file only, so that it would call what another file had
+before a change, and processors that share a home would overwrite each other's code.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import logging
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from hashlib import blake2b
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+from llvmlite import binding
+
+from slap_ros import portable_math
+from slap_ros.files import user_cache
+from slap_ros.geometry import box_separation
+from slap_ros.worlds import panda
+
+Function = TypeVar("Function", bound=Callable[..., object])
+
+COMPLETE = "complete"  # a file that is written once everything is compiled
+_config: Any = numba.config
+logger = logging.getLogger(__name__)
+
+
+def inner(function: Function) -> Function:
+    """A function that other compiled ones call; it becomes a part of them."""
+    return cast(Function, numba.njit(fastmath=False, error_model="numpy")(function))
+
+
+def compiled(function: Function) -> Function:
+    """A function that Python calls: compiled once, then loaded from the user's cache."""
+    made: Any = inner(function)
+    folder = cache_folder()
+    if folder is not None:
+        before, _config.CACHE_DIR = _config.CACHE_DIR, str(folder)
+        made.enable_caching()
+        _config.CACHE_DIR = before
+    return cast(Function, made)
+
+
+def compile_once(use: Callable[[], None]) -> None:
+    """Compile everything unless it is in the cache; one process does, and others wait for it.
+
+    Args:
+        use: Function that calls every compiled function.
+    """
+    folder = cache_folder()
+    if folder is None or (folder / COMPLETE).exists():
+        return
+    with _lock(folder):
+        if not (folder / COMPLETE).exists():
+            logger.warning("compiling motion planning for this processor, once: half a minute")
+            use()
+            (folder / COMPLETE).touch()
+
+
+@cache
+def cache_folder() -> Path | None:
+    """The folder of the machine code; None where none can be written."""
+    base = Path(_config.CACHE_DIR) if _config.CACHE_DIR else user_cache("kernels")
+    folder = base / _digest()
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)  # it is executed
+    except OSError:
+        return None
+    return folder if os.access(folder, os.W_OK) else None
+
+
+def _digest() -> str:
+    """Of all that machine code is made from."""
+    digest = blake2b(digest_size=8)
+    for source in _sources():
+        # numba compares times, too.
+        digest.update(f"{source} {source.stat().st_mtime_ns}\n".encode() + source.read_bytes())
+    processor = binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+    chosen = _config.CPU_NAME, _config.CPU_FEATURES
+    digest.update(repr((numba.__version__, processor, chosen)).encode())
+    return digest.hexdigest()
+
+
+def _sources() -> list[Path]:
+    """The compiled functions' files, and those with constants that are compiled in."""
+    motion = Path(__file__).parent.parent
+    others = [Path(str(module.__file__)) for module in (portable_math, box_separation, panda)]
+    return [*sorted(motion.rglob("*.py")), *others]
+
+
+@contextmanager
+def _lock(folder: Path) -> Iterator[None]:
+    """Be the only process within; it is released when this one ends, however it ends."""
+    with (folder / "lock").open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield

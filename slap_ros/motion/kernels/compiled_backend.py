@@ -1,0 +1,49 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Motion by compiled code."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from slap_ros.geometry.oriented_box import OrientedBox
+from slap_ros.geometry.pose import Pose
+from slap_ros.motion.collision_scene import CollisionScene, make_scene, moving_shapes
+from slap_ros.motion.joints import RESOLUTION, Array, Joints
+from slap_ros.motion.kernels.compilation import compile_once
+from slap_ros.motion.kernels.free_space import CompiledFreeSpace
+from slap_ros.motion.kernels.kinematics import arm_frames
+from slap_ros.worlds.panda import FINGER_OPEN, HOME
+
+
+class CompiledBackend:
+    """See :class:`slap_ros.motion.backend.Backend`."""
+
+    def __init__(self) -> None:
+        """Compile everything where that was not done yet."""
+        compile_once(self._use)
+
+    def arm_frames(self, q: Joints) -> Array:
+        """See :meth:`slap_ros.motion.backend.Backend.arm_frames`."""
+        return arm_frames(np.array(q, dtype=np.float64, order="C"))
+
+    def free_space(self, scene: CollisionScene) -> CompiledFreeSpace:
+        """See :meth:`slap_ros.motion.backend.Backend.free_space`."""
+        return CompiledFreeSpace(scene)
+
+    def _use(self) -> None:
+        """Call every compiled function."""
+        start, rng = np.array(HOME), np.random.default_rng(0)
+        goal = start + 0.1
+        self.arm_frames(start[None])
+        box = OrientedBox(Pose((0.5, 0.5, 0.5)), (0.1, 0.1, 0.1))
+        scene = make_scene(moving_shapes(None, FINGER_OPEN, 0.0, 0.0), [box], True)
+        space = self.free_space(scene)
+        space.free(start[None])
+        space.nearest_configurations(np.eye(4)[None], start)
+        space.line_is_free(start, goal, RESOLUTION)
+        path = np.stack([start, goal])
+        space.path_is_free(path, RESOLUTION)
+        space.via_point_path(start, goal, rng, RESOLUTION)
+        space.rrt_connect(start, goal, rng, 1, RESOLUTION)
+        space.straighten(space.shorten(path, rng, 1, RESOLUTION), RESOLUTION)

@@ -1,0 +1,25 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Motion in numpy alone: where numba is missing, and to compare compiled code with."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from slap_ros.motion.collision_scene import CollisionScene
+from slap_ros.motion.free_space import NumpyFreeSpace
+from slap_ros.motion.joints import Array, Joints
+from slap_ros.motion.numpy_collision import free_flags
+from slap_ros.motion.numpy_kinematics import arm_frames
+
+
+class NumpyBackend:
+    """See :class:`slap_ros.motion.backend.Backend`."""
+
+    def arm_frames(self, q: Joints) -> Array:
+        """See :meth:`slap_ros.motion.backend.Backend.arm_frames`."""
+        return arm_frames(q)
+
+    def free_space(self, scene: CollisionScene) -> NumpyFreeSpace:
+        """See :meth:`slap_ros.motion.backend.Backend.free_space`."""
+        return NumpyFreeSpace(partial(free_flags, scene))
