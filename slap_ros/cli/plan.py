@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from slap_ros.api.command_options import Preset, Samples, ShortcutFolder
 from slap_ros.cli.options import (
     ChosenSeed,
     DomainOrFile,
@@ -16,11 +17,10 @@ from slap_ros.cli.options import (
     Index,
     Json,
     Planner,
-    Preset,
     say_default_seed,
     seed_or_default,
 )
-from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts
+from slap_ros.cli.shortcuts import SAMPLES
 from slap_ros.cli.skill_choice import Skills, open_chosen
 from slap_ros.files import require_writable
 from slap_ros.skills.domain_choice import SHIPPED
@@ -36,7 +36,7 @@ def plan(
     preset: Preset = None,
     goal: Goal = None,
     skills: Skills = SHIPPED,
-    shortcuts: Shortcuts = None,
+    shortcuts: ShortcutFolder = None,
     samples: Samples = SAMPLES,
     planner: Planner = "lazy",
     output: Annotated[
