@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 from benchmarks.printing import show
 from ensemble.nodes import RunSettings
 from ensemble.run import RunRequest, run
+from slap_ros.api.library_descriptions import describe_library
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode, SlapError
 from slap_ros.evaluation.statistics import wilson_interval
@@ -35,7 +36,6 @@ from slap_ros.studies.results import (
     MarkdownTable,
     Provenance,
     StudyReport,
-    describe_library,
     require_replaceable,
     write,
 )

@@ -30,6 +30,7 @@ from ensemble.interfaces import RESET_TASK
 from ensemble.launcher import ProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.spinner import Spinner, temporary_node
+from slap_ros.api.library_descriptions import describe_library
 from slap_ros.cli.bars import counting_bars
 from slap_ros.domains import get_domain
 from slap_ros.evaluation.run_log import RunLog
@@ -38,7 +39,7 @@ from slap_ros.shortcuts.shipped import shipped_library
 from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.figures import LINES, picture, require_matplotlib
-from slap_ros.studies.results import MarkdownTable, describe_library
+from slap_ros.studies.results import MarkdownTable
 from slap_ros.versions import versions
 
 if TYPE_CHECKING:

@@ -58,6 +58,7 @@ NOT_ALONE = re.compile(
     r"|(From|To) where)\b"
 )
 PROTOCOL = re.compile(r"See :(class|meth|func):`~?[\w.]+`")
+OPTION = re.compile(r"help=|Command(Option|Argument)\(")
 SECTION = re.compile(r"^(Args|Attributes|Returns|Yields|Raises):$", re.MULTILINE)
 ERRORS = {
     node.name
@@ -113,12 +114,13 @@ def functions(documented):
 
 @pytest.fixture(scope="module")
 def option_aliases():
-    """Names such as ``Seed``, each an annotation with the ``help=`` of an option."""
+    """Names such as ``Seed``, each an annotation with the help of an option."""
+    rooms = [*ROOT.glob("slap_ros/cli/*.py"), *ROOT.glob("ensemble/cli/*.py")]
     return {
         target.id
-        for path in [*ROOT.glob("slap_ros/cli/*.py"), *ROOT.glob("ensemble/cli/*.py")]
+        for path in [*rooms, ROOT / "slap_ros" / "api" / "command_options.py"]
         for node in ast.parse(path.read_text(encoding="utf-8")).body
-        if isinstance(node, ast.Assign) and "help=" in ast.unparse(node.value)
+        if isinstance(node, ast.Assign) and OPTION.search(ast.unparse(node.value))
         for target in node.targets
     }
 

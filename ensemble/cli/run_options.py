@@ -17,23 +17,21 @@ from slap_ros.acquisition.proposals.proposer_names import (
     REWARDERS,
     require_known,
 )
+from slap_ros.api.command_options import MAX_INDEX, DomainName, Preset, Samples, ShortcutFolder
 from slap_ros.bags.writer import require_new
 from slap_ros.cli.options import (
-    MAX_INDEX,
     ChosenSeed,
-    DomainName,
     EffortFactor,
     Goal,
     Index,
     Json,
     Planner,
-    Preset,
     Within,
     at_most,
     seed_or_default,
 )
 from slap_ros.cli.render import Size, picture_size
-from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts
+from slap_ros.cli.shortcuts import SAMPLES
 from slap_ros.cli.skill_choice import Skills
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import require_writable
@@ -59,7 +57,7 @@ class RunOptions:
     index: Index = 0
     preset: Preset = None
     goal: Goal = None
-    shortcuts: Shortcuts = None
+    shortcuts: ShortcutFolder = None
     samples: Samples = SAMPLES
     planner: Planner = DEFAULT_PLANNER
     within: Within = None

@@ -62,6 +62,9 @@ def plan_task(
         planner: Name of the planner.
         samples: Attempts of a shortcut in the model.
         tell: Function that receives warnings about shortcuts that are left out.
+
+    Returns:
+        The plan and its measurements.
     """
     maker = planner_for(domain, task, shortcuts, planner, samples, tell)
     goal = domain.atom_space(task.initial_state).mask(task.goal)

@@ -45,6 +45,15 @@ def choose_library(
     return library
 
 
+def shortcuts_of_option(option: str | None) -> str | None:
+    """The value of ``--shortcuts`` as :func:`choose_library` has it.
+
+    Args:
+        option: Folder of a library, or the word ``none``; None for the shipped library.
+    """
+    return None if option == NONE else option or SHIPPED_WORD
+
+
 def _fitting(library: ShortcutLibrary, domain: Domain, planner: str) -> ShortcutLibrary:
     """The library, which must be the domain's and of use to the planner."""
     if library.domain != domain.name:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from slap_ros.api.jobs import require_torch, some_workers
+from slap_ros.api.library_descriptions import describe_skills
 from slap_ros.api.setting_texts import Changes, change_texts
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError
@@ -23,7 +24,6 @@ from slap_ros.shortcuts.settings import TrainingSettings, training_settings
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary, save_library
 from slap_ros.shortcuts.training import CandidateGroup, Training, TrainingCallback
 from slap_ros.skills.domain_choice import WORDS, DomainChoice
-from slap_ros.studies.results import describe_skills
 
 
 class Unwatched:

@@ -17,11 +17,12 @@ from slap_ros.acquisition.proposals.proposer_names import MANUAL, REWARDERS, req
 from slap_ros.acquisition.training.settings import ACQUISITION_SETTINGS
 from slap_ros.api.acquisition import AcquisitionWatch, acquirable, carry_out
 from slap_ros.api.acquisition_request import AcquisitionRequest
+from slap_ros.api.command_options import DomainName, Jobs, Preset
 from slap_ros.api.training import training_folder
 from slap_ros.cli.acquisition_bars import AcquisitionBars
 from slap_ros.cli.acquisition_events import AcquisitionEvents
 from slap_ros.cli.console import console, print_json, warn
-from slap_ros.cli.options import DomainName, Goal, Jobs, Json, Preset, Ray, TrainingSeed
+from slap_ros.cli.options import Goal, Json, Ray, TrainingSeed
 from slap_ros.cli.propose import show_entry
 from slap_ros.cli.proposer_options import ProposerOptions
 from slap_ros.errors import InvalidParameterError

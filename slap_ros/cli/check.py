@@ -9,9 +9,10 @@ from typing import Annotated
 
 import typer
 
+from slap_ros.api.command_options import DomainName, Preset
 from slap_ros.cli.console import console, print_json, styled
 from slap_ros.cli.doctor import STYLE
-from slap_ros.cli.options import DomainName, Json, Preset, Seed, at_most
+from slap_ros.cli.options import Json, Seed, at_most
 from slap_ros.domain_check import check_domain
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode

@@ -10,8 +10,9 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
+from slap_ros.api.command_options import Preset, matching_domains
 from slap_ros.cli.console import console, print_json
-from slap_ros.cli.options import Json, Preset, matching_domains
+from slap_ros.cli.options import Json
 from slap_ros.core import Domain
 from slap_ros.domains import domain_names, preset_names
 from slap_ros.errors import InvalidDomainError, InvalidParameterError, UnknownObjectError

@@ -12,21 +12,13 @@ import typer
 from rich.table import Table
 
 from slap_ros.api.command_line import command_line
+from slap_ros.api.command_options import DomainName, Jobs, Preset, Samples, ShortcutFolder
 from slap_ros.api.evaluation import compared_approaches, run_approaches
+from slap_ros.api.library_descriptions import describe_library, describe_skills
 from slap_ros.cli.bars import counting_bars
 from slap_ros.cli.console import console, print_json
-from slap_ros.cli.options import (
-    DomainName,
-    EffortFactor,
-    Goal,
-    Jobs,
-    Json,
-    Planner,
-    Preset,
-    Within,
-    at_most,
-)
-from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts, choose
+from slap_ros.cli.options import EffortFactor, Goal, Json, Planner, Within, at_most
+from slap_ros.cli.shortcuts import SAMPLES, choose
 from slap_ros.cli.skill_choice import Skills, open_chosen
 from slap_ros.core import Domain
 from slap_ros.errors import ErrorCode
@@ -39,7 +31,6 @@ from slap_ros.planning.planner_choice import DEFAULT_PLANNER, with_settings
 from slap_ros.shortcuts.shipped import shipped_library
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 from slap_ros.skills.domain_choice import SHIPPED
-from slap_ros.studies.results import describe_library, describe_skills
 from slap_ros.versions import versions
 
 Tasks = Annotated[int, typer.Option(min=1, callback=at_most(10**6), help="Tasks per seed.")]
@@ -60,7 +51,7 @@ def evaluate(
     preset: Preset = None,
     goal: Goal = None,
     skills: Skills = SHIPPED,
-    shortcuts: Shortcuts = None,
+    shortcuts: ShortcutFolder = None,
     samples: Samples = SAMPLES,
     with_shooting: Annotated[
         bool,

@@ -39,7 +39,7 @@ PANELS: Mapping[str, str] = {
     ),
     "events": OUTPUT,
 }
-EXAMPLES: Mapping[str, str] = {
+EXAMPLES: Mapping[str, str] = {  # those of studies are in their files
     "run": "slap run obstacle_tower --seed 1 --record runs/tower --report runs/tower.html",
     "plan": "slap plan obstacle_tower --seed 1 --shortcuts none",
     "propose": "slap propose stow_hammer --proposer induced --demonstrations 3",
@@ -57,22 +57,6 @@ EXAMPLES: Mapping[str, str] = {
     "bag render": "slap bag render runs/tower --output runs/tower.gif",
     "bag replay": "slap bag replay runs/tower",
     "bag export": "slap bag export runs/tower --output runs/tower.npz",
-    "study dynamics": "slap study dynamics obstacle2d --work runs/models/obstacle2d-training",
-    "study generalisation": "slap study generalisation obstacle_tower --vary obstacles=1,3,5",
-    "study goals": "slap study goals obstacle_tower",
-    "study pruning": "slap study pruning obstacle_tower --settings ours",
-    "study perception": "slap study perception cluttered_drawer",
-    "study planning_time": "slap study planning_time obstacle_tower",
-    "study table1": "slap study table1 obstacle_tower --preset fair",
-    "study ablation": "slap study ablation obstacle2d --trainings 1",
-    "study demonstrations": "slap study demonstrations stow_hammer",
-    "study vacuity": "slap study vacuity stow_hammer",
-    "study acquisition": "slap study acquisition stow_hammer",
-    "study replanning": "slap study replanning stow_hammer",
-    "study induction": "slap study induction stow_hammer --demonstrations 3",
-    "study planning_ablation": "slap study planning_ablation stow_hammer --model NAME",
-    "study models": "slap study models stow_hammer --model NAME",
-    "study reward_ablation": "slap study reward_ablation stow_hammer --model NAME",
     "study readme": "slap study readme",
 }
 

@@ -6,20 +6,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import wraps
 from inspect import Parameter, signature
-from pathlib import Path
-from typing import Annotated, Any, TypeVar, get_type_hints
+from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import typer
 
 from slap_ros.api.command_line import option_of
+from slap_ros.api.command_options import (
+    MAX_INDEX,
+    MAX_SEED,
+    CommandArgument,
+    CommandOption,
+    matching_domains,
+)
 from slap_ros.cli.console import console
 from slap_ros.errors import InvalidParameterError
 
 R = TypeVar("R")
-MAX_SEED, MAX_INDEX = 2**63 - 1, 2**32 - 1  # as messages and bags have room for them
 DEFAULT_SEED = 0
 
 
@@ -41,19 +46,6 @@ def at_most(limit: float) -> Callable[[Any], Any]:
     return check
 
 
-def matching_domains(incomplete: str) -> list[str]:
-    """The domains that a shell may complete a name to."""
-    from slap_ros.domains import domain_names
-
-    return [name for name in domain_names() if name.startswith(incomplete)]
-
-
-DomainName = Annotated[
-    str,
-    typer.Argument(
-        help="Name of a domain; `slap domains` lists them.", autocompletion=matching_domains
-    ),
-]
 DomainOrFile = Annotated[
     str,
     typer.Argument(
@@ -62,13 +54,6 @@ DomainOrFile = Annotated[
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
-Preset = Annotated[
-    str | None,
-    typer.Option(
-        help="Preset of the domain; `slap domains` lists them. Default: the first. In our "
-        "domains, fair has random tasks, and paper the start states of the paper's code."
-    ),
-]
 Planner = Annotated[
     str,
     typer.Option(
@@ -126,14 +111,6 @@ Ray = Annotated[
     str | None,
     typer.Option(help="Run on Ray instead of in processes: a cluster's address, or local."),
 ]
-Jobs = Annotated[
-    int, typer.Option(min=1, help="Number of processes. It does not change the results.")
-]
-
-LanguageFile = Annotated[
-    Path | None,
-    typer.Option(help="JSON file of settings for the language model; see docs/language.md."),
-]
 
 
 def seed_or_default(seed: int | None) -> int:
@@ -169,7 +146,7 @@ def flat_options(command: Callable[..., R]) -> Callable[..., R]:
             parameters += _parameters_of(hints[name])
         else:
             parameters.append(
-                parameter.replace(annotation=hints[name], kind=Parameter.KEYWORD_ONLY)
+                parameter.replace(annotation=_for_typer(hints[name]), kind=Parameter.KEYWORD_ONLY)
             )
 
     @wraps(command)
@@ -210,7 +187,39 @@ def _parameters_of(kind: Any) -> list[Parameter]:
             field.name,
             Parameter.KEYWORD_ONLY,
             default=Parameter.empty if field.default is MISSING else field.default,
-            annotation=hints[field.name],
+            annotation=_for_typer(hints[field.name]),
         )
-        for field in fields(kind)
+        for field in _own_first(kind)
     ]
+
+
+def _own_first(kind: Any) -> list[Field[Any]]:
+    """Fields of a dataclass, those of a class before those of the classes that it extends."""
+    bases = [base for base in kind.__bases__ if is_dataclass(base)]
+    inherited = [field.name for base in bases for field in _own_first(base)]
+    by_name = {field.name: field for field in fields(kind)}
+    own = [name for name in by_name if name not in inherited]
+    return [by_name[name] for name in (*own, *inherited)]
+
+
+def _for_typer(hint: Any) -> Any:
+    """The type of a parameter with its option as Typer has it."""
+    if get_origin(hint) is not Annotated:
+        return hint
+    kind, *notes = get_args(hint)
+    return Annotated[(kind, *map(_typer_note, notes))]
+
+
+def _typer_note(note: Any) -> Any:
+    if isinstance(note, CommandArgument):
+        return typer.Argument(help=note.help, autocompletion=note.complete)
+    if isinstance(note, CommandOption):
+        return typer.Option(
+            *([note.name] if note.name else []),
+            help=note.help,
+            min=note.least,
+            max=note.most,
+            metavar=note.metavar,
+            callback=None if note.limit is None else at_most(note.limit),
+        )
+    return note

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from slap_ros.api.command_options import Preset, Samples, ShortcutFolder
 from slap_ros.cli.options import (
     ChosenSeed,
     DomainOrFile,
@@ -17,12 +18,11 @@ from slap_ros.cli.options import (
     Index,
     Json,
     Planner,
-    Preset,
     Within,
     say_default_seed,
     seed_or_default,
 )
-from slap_ros.cli.shortcuts import SAMPLES, Samples, Shortcuts
+from slap_ros.cli.shortcuts import SAMPLES
 from slap_ros.cli.skill_choice import Skills, open_chosen
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import require_writable
@@ -40,22 +40,21 @@ def plan(
     preset: Preset = None,
     goal: Goal = None,
     skills: Skills = SHIPPED,
-    shortcuts: Shortcuts = None,
+    shortcuts: ShortcutFolder = None,
     samples: Samples = SAMPLES,
     planner: Planner = DEFAULT_PLANNER,
+    within: Within = None,
+    effort: EffortFactor = None,
     output: Annotated[
         Path | None, typer.Option(help="Folder for domain.pddl, problem.pddl and graph.svg.")
     ] = None,
-    within: Within = None,
-    effort: EffortFactor = None,
     json: Json = False,
 ) -> None:
     """Plan one task without executing it; write its PDDL and draw its abstract graph.
 
     A domain without skills is planned with its hand-written operators alone. Two PDDL files, or one
     that has domain and problem, are planned symbolically: with the FF heuristic (anytime, ff), for
-    the
-    least cost or the fewest operators (astar), or by an engine of unified-planning (up:NAME).
+    the least cost or the fewest operators (astar), or by an engine of unified-planning (up:NAME).
     """
     if problem is not None or domain.lower().endswith(".pddl"):
         from slap_ros.cli.plan_pddl import plan_pddl

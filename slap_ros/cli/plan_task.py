@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from slap_ros.api.planning import plan_task as make_plan
+from slap_ros.api.shortcut_choice import shortcuts_of_option
 from slap_ros.cli.console import console, print_json, warn
-from slap_ros.cli.shortcuts import wanted
 from slap_ros.core import Domain, Task
 from slap_ros.drawing import draw_abstract_graph
 from slap_ros.errors import StorageFullError
@@ -51,7 +51,7 @@ def plan_task(
         _plan_by_hand(domain, domain.acquisition.operators, task, output, json)
         return
     try:
-        result = make_plan(domain, task, wanted(shortcuts), planner, samples, warn)
+        result = make_plan(domain, task, shortcuts_of_option(shortcuts), planner, samples, warn)
     except PlanningInterrupted as interrupted:
         console.print("interrupted; the best plan so far:")
         _show(interrupted.best, json)

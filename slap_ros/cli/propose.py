@@ -23,10 +23,11 @@ from slap_ros.acquisition.proposals.proposer_names import (
     REWARDERS,
     require_known,
 )
+from slap_ros.api.command_options import Preset
 from slap_ros.api.proposing import answer, request_for
 from slap_ros.cli.console import console, print_json
 from slap_ros.cli.operators import print_operator
-from slap_ros.cli.options import DomainOrFile, Goal, Index, Json, Preset, Seed
+from slap_ros.cli.options import DomainOrFile, Goal, Index, Json, Seed
 from slap_ros.cli.plan_pddl import read_pddl
 from slap_ros.cli.proposer_options import ProposerOptions
 from slap_ros.core import task_with_goal

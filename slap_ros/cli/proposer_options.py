@@ -11,10 +11,10 @@ import typer
 
 from slap_ros.acquisition.proposals.proposal_request import Demonstrations
 from slap_ros.acquisition.proposals.proposer_names import MANUAL
+from slap_ros.api.command_options import LanguageFile
 from slap_ros.api.left_out import Tell
 from slap_ros.api.proposers import DEMONSTRATIONS, Proposers, Status
 from slap_ros.cli.console import console
-from slap_ros.cli.options import LanguageFile
 from slap_ros.core import Domain
 from slap_ros.language.budget import BudgetLimits
 

@@ -1,12 +1,10 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The options ``--shortcuts`` and ``--samples`` of several commands."""
+"""Which shortcuts the options of several commands choose."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from slap_ros.cli.console import warn
 from slap_ros.shortcuts.shortcut import DEFAULT
@@ -16,22 +14,6 @@ if TYPE_CHECKING:
     from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 
 SAMPLES = DEFAULT.samples
-
-Shortcuts = Annotated[
-    str | None,
-    typer.Option(
-        help="Folder of a shortcut library, or none. Default: the library that ships, if "
-        "there is one."
-    ),
-]
-Samples = Annotated[
-    int,
-    typer.Option(
-        min=1,
-        max=10**6,
-        help="Times that a shortcut is tried in the model; the shortest try is used.",
-    ),
-]
 
 
 def choose(choice: str | None, domain: Domain, planner: str) -> ShortcutLibrary | None:
@@ -46,14 +28,7 @@ def choose(choice: str | None, domain: Domain, planner: str) -> ShortcutLibrary 
         InvalidLibraryError: It cannot be used as a whole.
         InvalidParameterError: The planner cannot use it.
     """
-    from slap_ros.api.shortcut_choice import choose_library  # only where there is a domain
+    # Only where there is a domain.
+    from slap_ros.api.shortcut_choice import choose_library, shortcuts_of_option
 
-    return choose_library(wanted(choice), domain, planner, warn)
-
-
-def wanted(choice: str | None) -> str | None:
-    """The option's value as the Python API has it: ``shipped``, a folder, or None for none."""
-    from slap_ros.api.opening import SHIPPED_WORD
-    from slap_ros.shortcuts.shipped import NONE
-
-    return None if choice == NONE else choice or SHIPPED_WORD
+    return choose_library(shortcuts_of_option(choice), domain, planner, warn)

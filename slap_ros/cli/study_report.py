@@ -1,33 +1,21 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the commands of ``slap study`` share: how a report is begun, made and written."""
+"""How ``slap study`` makes a report: begun, followed by bars, and written."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
 
-import typer
 from rich.progress import TaskID
 
-from slap_ros.api.command_line import command_line
 from slap_ros.cli.bars import counting_bars
-from slap_ros.cli.console import console
-from slap_ros.cli.options import MAX_SEED, at_most
+from slap_ros.cli.console import console, warn
 from slap_ros.files import require_writable
 from slap_ros.studies.figures import require_matplotlib
 from slap_ros.studies.job_runner import JobRunner
-from slap_ros.studies.results import Data, Provenance, StudyReport, require_replaceable, write
+from slap_ros.studies.results import Provenance, require_replaceable, write
+from slap_ros.studies.study import Options, Study
 from slap_ros.studies.study_log import StudyLog
-
-RESULTS = Path("docs/results")
-FRESH_SEED = 500  # development looks at no task seed from here on
-
-FreshSeed = Annotated[
-    int, typer.Option(min=0, callback=at_most(MAX_SEED), help="Seed of the tasks.")
-]
-Output = Annotated[Path, typer.Option(help="Folder for the files STUDY_DOMAIN.json, .svg and .md.")]
 
 
 def require_report(output: Path) -> None:
@@ -41,49 +29,26 @@ def require_report(output: Path) -> None:
     require_writable(output)
 
 
-def provenance(study: str, domain: str, settings: Data, **given: Any) -> Provenance:
-    """From what a report is made.
+def make_report(study: Study[Options], options: Options) -> None:
+    """Make the report of a study and write it. After an interruption, the same command goes on.
 
     Args:
-        study: Name of the study, as in ``slap study``.
-        domain: Name of the domain.
-        settings: What the report names, and the command repeats.
-        given: What the command has besides, or says otherwise than the report.
-
-    Returns:
-        The settings, and the command that makes the report again.
-    """
-    return Provenance(
-        domain, command_line("study", study, domain, **{**given, **settings, **given}), settings
-    )
-
-
-def make_report(
-    study: str,
-    origin: Provenance,
-    output: Path,
-    jobs: int,
-    make: Callable[[JobRunner], StudyReport],
-) -> None:
-    """Make a report and write it. Whoever stops it goes on with the same command.
-
-    Args:
-        study: Name of the study, as in ``slap study``.
-        origin: From what it is made.
-        output: Folder for its files, and until they are written for what is done so far.
-        jobs: Number of processes.
-        make: Makes the report.
+        study: Study to make.
+        options: Options of its command.
 
     Raises:
         BusyError: Another process makes it.
         InvalidParameterError: What is done so far is of another study, or the data there is.
         OSError: Nothing can be written there.
     """
-    require_replaceable(output, study, origin)
-    with StudyLog(output / f".{study}_{origin.domain}.jsonl", origin) as log:
+    require_report(options.output)
+    prepared = study.prepare(options, warn)
+    origin = Provenance.of_command(study.name, options.domain, prepared.settings, prepared.given)
+    require_replaceable(options.output, study.name, origin)
+    with StudyLog(options.output / f".{study.name}_{origin.domain}.jsonl", origin) as log:
         with StudyBars() as bars:
-            report = make(JobRunner(log, jobs, bars))
-        paths = write(output, report, origin, log.cpu_seconds)
+            report = prepared.make(JobRunner(log, options.jobs, bars))
+        paths = write(options.output, report, origin, log.cpu_seconds)
         console.print(f"{report.title}: {', '.join(map(str, paths))}")
         log.remove()
 

@@ -14,11 +14,12 @@ from typing import Annotated
 import typer
 from rich.progress import BarColumn, TaskID, TimeRemainingColumn
 
+from slap_ros.api.command_options import DomainName, Preset
 from slap_ros.api.training import skills_option
 from slap_ros.api.training import train as train_library
 from slap_ros.cli.console import console, print_json
 from slap_ros.cli.learning_bars import LearningBars
-from slap_ros.cli.options import DomainName, Json, Preset, Ray, TrainingSeed
+from slap_ros.cli.options import Json, Ray, TrainingSeed
 from slap_ros.cli.skill_choice import Skills, open_chosen
 from slap_ros.shortcuts.progress import latest
 from slap_ros.shortcuts.training import CandidateGroup

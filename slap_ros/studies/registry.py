@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 from slap_ros.studies.lg_sail import (
     acquisition,
@@ -26,27 +27,27 @@ from slap_ros.studies.slap import (
     pruning,
     table1,
 )
-from slap_ros.studies.study import PaperFigure, not_made
+from slap_ros.studies.study import PaperFigure, Study, not_made
 
-STUDIES = {
+STUDIES: Mapping[str, Study[Any]] = {
     study.name: study
-    for study in (
-        table1.STUDY,
-        pruning.STUDY,
-        planning_time.STUDY,
-        perception.STUDY,
+    for study in (  # in the order in which help lists them
         dynamics.STUDY,
         generalisation.STUDY,
         goals.STUDY,
-        ablation.STUDY,
+        pruning.STUDY,
+        perception.STUDY,
+        planning_time.STUDY,
+        demonstrations.STUDY,
+        vacuity.STUDY,
         acquisition.STUDY,
+        replanning.STUDY,
+        induction.STUDY,
         planning_ablation.STUDY,
         planning_ablation.MODELS_STUDY,
         reward_ablation.STUDY,
-        demonstrations.STUDY,
-        induction.STUDY,
-        replanning.STUDY,
-        vacuity.STUDY,
+        table1.STUDY,
+        ablation.STUDY,
     )
 }
 WITHOUT_STUDY = (

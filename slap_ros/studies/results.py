@@ -9,11 +9,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from slap_ros.core import Domain
+from slap_ros.api.command_line import command_line
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import parse_json, pretty_json, read_text, write_whole
-from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
-from slap_ros.skills.domain_choice import DIGEST_KEY, SKILLS_KEY
 from slap_ros.studies.figures import Size, picture
 from slap_ros.versions import versions
 
@@ -77,6 +75,19 @@ class Provenance:
     domain: str
     command: str
     settings: Data
+
+    @classmethod
+    def of_command(cls, study: str, domain: str, settings: Data, given: Data) -> Provenance:
+        """What ``slap study`` makes a report from.
+
+        Args:
+            study: Name of the study, as in ``slap study``.
+            domain: Name of the domain.
+            settings: Settings that the report names, and the command repeats.
+            given: Options that the command has besides, or states otherwise than the report.
+        """
+        options = {**given, **settings, **given}  # in the order in which commands have them
+        return cls(domain, command_line("study", study, domain, **options), settings)
 
     def as_json(self) -> dict[str, Any]:
         """Domain, settings, command and versions, for the report's JSON."""
@@ -147,27 +158,6 @@ def write(folder: Path, report: StudyReport, origin: Provenance, cpu_seconds: fl
         paths.append(folder / f"{name}.{ending}")
         write_whole(paths[-1], content)
     return paths
-
-
-def describe_library(name: str, library: ShortcutLibrary) -> dict[str, Any]:
-    """Which library it is: its name, the digest that bags have too, what it offers."""
-    return {
-        "name": name,
-        "digest": library.digest,
-        "shortcuts": [shortcut.name for shortcut in library.shortcuts],
-    }
-
-
-def describe_skills(domain: Domain) -> dict[str, Any]:
-    """Which library of acquired skills a domain has; empty where it has none.
-
-    It is told as libraries of shortcuts are, and never by the path of its folder.
-    """
-    digest = domain.configuration.get(DIGEST_KEY)
-    if digest is None:
-        return {}
-    name, skills = domain.configuration[SKILLS_KEY], list(domain.skills)
-    return {"name": name, "digest": digest, "skills": skills}
 
 
 def _page(name: str, report: StudyReport, origin: Provenance) -> str:

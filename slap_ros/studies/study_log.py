@@ -34,6 +34,7 @@ class StudyLog:
             OSError: It cannot be read or written.
         """
         self.path = path
+        self.origin = origin
         self.results: dict[str, Any] = {}  # by the job's name
         self.cpu_seconds = 0.0  # of all jobs so far
         self._header = {"command": origin.command, "settings": origin.settings}

@@ -13,11 +13,11 @@ import pytest
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
-from slap_ros.cli.language_study import ModelOptions
 from slap_ros.errors import ErrorCode, InvalidCassetteError
 from slap_ros.language.cassette import open_client, read_cassette
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.lg_sail.model_attempts import LanguageModel, ModelsOnly
+from slap_ros.studies.lg_sail.model_options import ModelOptions
 from slap_ros.studies.lg_sail.planning_ablation import (
     ALONE,
     ONE_SHOT,
@@ -215,14 +215,14 @@ def test_a_page_names_the_day_and_the_recording(tmp_path: Path) -> None:
     report = StudyReport(
         "models", "", "title", "", MarkdownTable(("a",), ()), {}, lambda figure: None, (2.0, 2.0)
     )
-    dated = ModelOptions(cassette=f"replay:{cassette}").dated(report)
+    dated = ModelOptions(domain="pegs", cassette=f"replay:{cassette}").dated(report)
     digest = sha256(cassette.read_bytes()).hexdigest()
     assert dated.circumstances["recording_sha256"] == digest
     assert dated.circumstances["answered_on"] == read_cassette(cassette).recorded[:10]
     write(tmp_path, dated, Provenance("pegs", "", {}), 1.0)
     assert digest in (tmp_path / "models_pegs.md").read_text()
     assert json.loads((tmp_path / "models_pegs.json").read_text())["recording_sha256"] == digest
-    assert set(ModelOptions().dated(report).circumstances) == {"answered_on"}
+    assert set(ModelOptions(domain="pegs").dated(report).circumstances) == {"answered_on"}
 
 
 def test_the_command_refuses_what_cannot_be() -> None:

@@ -13,13 +13,13 @@ import pytest
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
-from slap_ros.cli.study_report import FRESH_SEED
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode
 from slap_ros.policies.shipped_models import shipped_with_siblings
 from slap_ros.shortcuts.shipped import shipped_libraries, shipped_library
 from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.skills.skill_library import load_skill_library
+from slap_ros.studies.options import FRESH_SEED
 from slap_ros.studies.readme import PLACE, with_tables
 
 ROOT = Path(__file__).parent.parent.parent

@@ -7,11 +7,15 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from statistics import fmean
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from slap_ros.acquisition.curriculum.rollouts import PlanRollout, Stage, roll_out
+from slap_ros.api.command_options import CommandOption, DomainName, Jobs, Preset
+from slap_ros.api.left_out import Tell
 from slap_ros.core.goals import task_with_goal
+from slap_ros.domains import get_domain
 from slap_ros.drawing.palette import MUTED
 from slap_ros.evaluation.statistics import Interval, wilson_interval
 from slap_ros.evaluation.summary import Spread
@@ -20,8 +24,10 @@ from slap_ros.skills.skill import LearnedSkill
 from slap_ros.studies.comparison import format_spread
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
+from slap_ros.studies.lg_sail.domain_choices import GoalNames, all_goals, shipped_skills
+from slap_ros.studies.options import FRESH_SEED, RESULTS, FreshSeed, Output
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
-from slap_ros.studies.study import PaperFigure, Study
+from slap_ros.studies.study import PaperFigure, PreparedStudy, Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -278,8 +284,45 @@ def _made_by(goal: Data) -> str:
     return "" if origin == {"manual"} else f" ({goal['proposer']}, {goal['rewarder']})"
 
 
+@dataclass(frozen=True, kw_only=True)
+class AcquisitionOptions:
+    """Options of this study."""
+
+    domain: DomainName
+    library: Annotated[
+        list[Path] | None,
+        CommandOption(
+            "Folder that `slap acquire` made. May be repeated. Default: all that ship.",
+            metavar="FOLDER",
+        ),
+    ] = None
+    goal: GoalNames = None
+    tasks: Annotated[int, CommandOption("Number of tasks per goal and library.", least=1)] = 100
+    seed: FreshSeed = FRESH_SEED
+    preset: Preset = None
+    jobs: Jobs = 1
+    output: Output = RESULTS
+
+
+def prepare(options: AcquisitionOptions, _: Tell) -> PreparedStudy:
+    """Open the domain, and choose libraries and goals."""
+    folders = options.library or shipped_skills(options.domain)
+    chosen = get_domain(options.domain, options.preset)
+    choices = [DomainChoice(options.domain, chosen.preset, str(folder)) for folder in folders]
+    counts = dict.fromkeys(options.goal or all_goals(chosen), options.tasks)
+    return PreparedStudy(
+        {"preset": chosen.preset, "tasks": options.tasks, "seed": options.seed},
+        lambda runner: study(choices, counts, options.seed, runner),
+        {"library": options.library, "goal": options.goal},
+    )
+
+
 STUDY = Study(
     "acquisition",
+    help="Task progress with acquired skills, per goal, without planning again.",
+    example="slap study acquisition stow_hammer",
+    options=AcquisitionOptions,
+    prepare=prepare,
     summary=_summary,
     figures=(
         PaperFigure(

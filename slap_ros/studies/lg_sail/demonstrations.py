@@ -7,8 +7,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+from slap_ros.api.command_options import CommandOption, DomainName, Jobs, Preset
+from slap_ros.api.left_out import Tell
 from slap_ros.drawing.palette import MUTED
 from slap_ros.evaluation.statistics import Interval, wilson_interval
 from slap_ros.evaluation.summary import Spread
@@ -17,8 +19,10 @@ from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.studies.comparison import format_spread, not_solved, spread_of
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
+from slap_ros.studies.lg_sail.domain_choices import GoalNames, all_goals, with_demonstrator
+from slap_ros.studies.options import FRESH_SEED, RESULTS, FreshSeed, Output
 from slap_ros.studies.results import MarkdownTable, StudyReport
-from slap_ros.studies.study import Study
+from slap_ros.studies.study import PreparedStudy, Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -236,4 +240,37 @@ def draw(figure: Figure, goals: Sequence[GoalDemonstrations]) -> None:
     steps.set_xlabel("environment steps of solved tasks")
 
 
-STUDY = Study("demonstrations")
+@dataclass(frozen=True, kw_only=True)
+class DemonstrationOptions:
+    """Options of this study."""
+
+    domain: DomainName
+    goal: GoalNames = None
+    tasks: Annotated[int, CommandOption("Number of tasks of the first goal.", least=1)] = 100
+    others: Annotated[int, CommandOption("Number of tasks of every other goal.", least=1)] = 50
+    seed: FreshSeed = FRESH_SEED
+    preset: Preset = None
+    jobs: Jobs = 1
+    output: Output = RESULTS
+
+
+def prepare(options: DemonstrationOptions, _: Tell) -> PreparedStudy:
+    """Open the domain with its demonstrator."""
+    choice = with_demonstrator(options.domain, options.preset)
+    tasks, others, seed = options.tasks, options.others, options.seed
+    names = options.goal or all_goals(open_domain(choice))
+    counts = {name: others if i else tasks for i, name in enumerate(names)}
+    return PreparedStudy(
+        {"preset": choice.preset, "tasks": tasks, "others": others, "seed": seed},
+        lambda runner: study(choice, counts, seed, runner),
+        {"goal": options.goal},
+    )
+
+
+STUDY = Study(
+    "demonstrations",
+    help="Whether tasks can be solved: success of the domain's demonstrator, per goal.",
+    example="slap study demonstrations stow_hammer",
+    options=DemonstrationOptions,
+    prepare=prepare,
+)

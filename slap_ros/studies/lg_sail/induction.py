@@ -11,13 +11,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import permutations
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from slap_ros.acquisition.proposals.induction import (
     InducedOperator,
     hold_steps_of,
     induce_operators,
 )
+from slap_ros.api.command_options import CommandOption, DomainName, Jobs, Preset
+from slap_ros.api.left_out import Tell
 from slap_ros.core import Domain, Task
 from slap_ros.drawing.palette import MUTED
 from slap_ros.errors import InvalidParameterError, PlanningLimitError, UnsolvableError
@@ -27,8 +29,10 @@ from slap_ros.skills.demonstrator import record_traces
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
+from slap_ros.studies.lg_sail.domain_choices import with_demonstrator
+from slap_ros.studies.options import FRESH_SEED, RESULTS, FreshSeed, Output
 from slap_ros.studies.results import MarkdownTable, StudyReport
-from slap_ros.studies.study import Study
+from slap_ros.studies.study import PreparedStudy, Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -297,4 +301,43 @@ def draw(figure: Figure, found: Sequence[Induction]) -> None:
     figure.legend(loc="outside upper center", ncols=len(found))
 
 
-STUDY = Study("induction")
+@dataclass(frozen=True, kw_only=True)
+class InductionOptions:
+    """Options of this study."""
+
+    domain: DomainName
+    demonstrations: Annotated[
+        list[int] | None,
+        CommandOption("Number of demonstrations. May be repeated. Default: 1, 3 and 10."),
+    ] = None
+    tasks: Annotated[int, CommandOption("Number of tasks to plan per goal.", least=1)] = 20
+    seed: FreshSeed = FRESH_SEED
+    preset: Preset = None
+    jobs: Jobs = 1
+    output: Output = RESULTS
+
+
+def prepare(options: InductionOptions, _: Tell) -> PreparedStudy:
+    """Open the domain with its demonstrator."""
+    choice = with_demonstrator(options.domain, options.preset)
+    counts = options.demonstrations or [1, 3, 10]
+    settings = {
+        "preset": choice.preset,
+        "tasks": options.tasks,
+        "seed": options.seed,
+        "demonstrations": counts,
+    }
+    return PreparedStudy(
+        settings,
+        lambda runner: study(choice, counts, options.tasks, options.seed, runner),
+        {"demonstrations": counts},
+    )
+
+
+STUDY = Study(
+    "induction",
+    help="Operators from demonstrations: whether A* finds equally short plans for every goal.",
+    example="slap study induction stow_hammer --demonstrations 3",
+    options=InductionOptions,
+    prepare=prepare,
+)

@@ -11,11 +11,15 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import process_time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from slap_ros.acquisition.proposals.problem import AcquisitionProblem
+from slap_ros.api.command_options import CommandOption
+from slap_ros.api.left_out import Tell
+from slap_ros.domains import get_domain
+from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.statistics import wilson_interval
 from slap_ros.language.budget import BudgetLimits
 from slap_ros.studies.figures import LINES
@@ -26,8 +30,9 @@ from slap_ros.studies.lg_sail.model_attempts import (
     attempt_operators,
     attempt_plan,
 )
+from slap_ros.studies.lg_sail.model_options import ModelOptions, answered_by
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
-from slap_ros.studies.study import Study, not_made
+from slap_ros.studies.study import PreparedStudy, Study, not_made
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -341,8 +346,81 @@ def _percent(counts: Sequence[int]) -> str:
     return f"{good / every:.0%}"
 
 
+Plans = Annotated[int, CommandOption("Number of tasks to plan.", least=1)]
+Attempts = Annotated[
+    int, CommandOption("Maximum number of attempts at operators, per plan.", least=1)
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlanningOptions(ModelOptions):
+    """How much a model is asked."""
+
+    plans: Plans = PLANS
+    attempts: Attempts = 10
+
+
+@dataclass(frozen=True, kw_only=True)
+class VariantOptions(PlanningOptions):
+    """Options of the study of what plans with a model's operators."""
+
+    variants: Annotated[
+        str,
+        CommandOption("Ways to plan, separated by commas: language+search, language, one_shot."),
+    ] = ",".join(VARIANTS)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeveralModelsOptions(PlanningOptions):
+    """Options of the study of several models."""
+
+    plans: Plans = 100
+
+
+def prepare(options: VariantOptions, _: Tell) -> PreparedStudy:
+    """Choose who plans, and open the models.
+
+    Raises:
+        InvalidParameterError: There is no such variant, or a model is named twice.
+        InvalidCassetteError: The cassette was not recorded from a model.
+    """
+    chosen = options.variants.split(",")
+    if unknown := sorted(set(chosen) - set(VARIANTS)):
+        raise InvalidParameterError(
+            f"--variants {', '.join(unknown)}: there are {', '.join(VARIANTS)}"
+        )
+    return _asked(options, chosen)
+
+
+def prepare_models(options: SeveralModelsOptions, _: Tell) -> PreparedStudy:
+    """Open several models, all of which plan with search."""
+    asked = _asked(options, [SEARCH])
+    return replace(asked, make=lambda runner: replace(asked.make(runner), study="models"))
+
+
+def _asked(options: PlanningOptions, variants: Sequence[str]) -> PreparedStudy:
+    models = options.models()
+    opened = get_domain(options.domain, options.preset)
+    problems = [options.problem(opened, index) for index in range(options.plans)]
+    settings = {
+        "variants": ",".join(variants),
+        "plans": options.plans,
+        "attempts": options.attempts,
+        "model": [*models],
+        "answered_by": answered_by(models),
+    }
+    return PreparedStudy(
+        settings | options.as_settings(),
+        lambda runner: options.dated(study(models, problems, variants, options.attempts, runner)),
+    )
+
+
 STUDY = Study(
     "planning_ablation",
+    help="LG-SAIL Table 2: operators of a language model; A* or the model plans with them.",
+    example="slap study planning_ablation stow_hammer --model NAME",
+    options=VariantOptions,
+    prepare=prepare,
     summary=_summary,
     figures=(
         not_made(
@@ -356,6 +434,10 @@ STUDY = Study(
 )
 MODELS_STUDY = Study(
     "models",
+    help="LG-SAIL Tables 5 and 6: operators of several language models; A* plans with them.",
+    example="slap study models stow_hammer --model NAME",
+    options=SeveralModelsOptions,
+    prepare=prepare_models,
     figures=(
         not_made(
             "LG-SAIL Tables 5 and 6",

@@ -7,8 +7,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
+from slap_ros.api.command_options import CommandOption, DomainName, Jobs, Preset
+from slap_ros.api.left_out import Tell
+from slap_ros.api.opening import open_chosen
+from slap_ros.domains import get_domain
 from slap_ros.drawing.palette import MUTED
 from slap_ros.errors import ErrorCode
 from slap_ros.evaluation.approaches import PURE_PLANNING
@@ -20,8 +25,15 @@ from slap_ros.skills.domain_choice import DomainChoice, chosen_skills
 from slap_ros.studies.comparison import format_spread, named_tasks, not_solved, spread_of
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
+from slap_ros.studies.lg_sail.domain_choices import (
+    GoalNames,
+    all_goals,
+    hand_written,
+    shipped_skills,
+)
+from slap_ros.studies.options import FRESH_SEED, RESULTS, FreshSeed, Output
 from slap_ros.studies.results import MarkdownTable, StudyReport
-from slap_ros.studies.study import Study
+from slap_ros.studies.study import PreparedStudy, Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -231,4 +243,60 @@ def draw(figure: Figure, goals: Sequence[ReplanningRow]) -> None:
     axes.set_xlabel("success [%]: each library, all of a row (dot) with 95 % interval")
 
 
-STUDY = Study("replanning")
+@dataclass(frozen=True, kw_only=True)
+class ReplanningOptions:
+    """Options of this study."""
+
+    domain: DomainName
+    library: Annotated[
+        list[Path] | None,
+        CommandOption(
+            "Folder that `slap acquire` made. May be repeated. Default: all that ship with "
+            "hand-written operators and rewards.",
+            metavar="FOLDER",
+        ),
+    ] = None
+    goal: GoalNames = None
+    tasks: Annotated[int, CommandOption("Number of tasks per seed and goal.", least=1)] = 20
+    seeds: Annotated[int, CommandOption("Number of seeds for the first library.", least=1)] = 5
+    others: Annotated[int, CommandOption("Number of seeds for every other library.", least=1)] = 1
+    first_seed: FreshSeed = FRESH_SEED
+    preset: Preset = None
+    jobs: Jobs = 1
+    output: Output = RESULTS
+
+
+def prepare(options: ReplanningOptions, tell: Tell) -> PreparedStudy:
+    """Open the domain with each library, and choose goals."""
+    folders = options.library or hand_written(shipped_skills(options.domain))
+    choices = [
+        DomainChoice(options.domain, options.preset or "", str(folder)) for folder in folders
+    ]
+    opened = [open_chosen(choice, tell) for choice in choices]
+    counts = [options.seeds, *[options.others] * (len(opened) - 1)]
+    experiments = [
+        Experiment(one, options.tasks, count, options.first_seed, skills=choice.skills)
+        for one, count, choice in zip(opened, counts, choices, strict=True)
+    ]
+    preset = opened[0].preset
+    names = options.goal or all_goals(get_domain(options.domain, preset))
+    return PreparedStudy(
+        {
+            "preset": preset,
+            "tasks": options.tasks,
+            "seeds": options.seeds,
+            "others": options.others,
+            "first_seed": options.first_seed,
+        },
+        lambda runner: study(experiments, names, runner),
+        {"library": options.library, "goal": options.goal},
+    )
+
+
+STUDY = Study(
+    "replanning",
+    help="Success with acquired skills, per goal, with a new plan after each failure.",
+    example="slap study replanning stow_hammer",
+    options=ReplanningOptions,
+    prepare=prepare,
+)

@@ -10,10 +10,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from slap_ros.acquisition.proposals.complaints import REWARD_ERROR_GROUPS, ComplaintClass
 from slap_ros.acquisition.proposals.problem import AcquisitionProblem
+from slap_ros.api.command_options import CommandOption
+from slap_ros.api.left_out import Tell
+from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.statistics import wilson_interval
 from slap_ros.language.budget import BudgetLimits
@@ -21,8 +24,9 @@ from slap_ros.relational import LiftedOperator
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.lg_sail.model_attempts import Attempt, LanguageModel, attempt_rewards
+from slap_ros.studies.lg_sail.model_options import ModelOptions, answered_by
 from slap_ros.studies.results import MarkdownTable, StudyReport
-from slap_ros.studies.study import Study, not_made
+from slap_ros.studies.study import PreparedStudy, Study, not_made
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -200,8 +204,54 @@ def draw(figure: Figure, measured: Sequence[RewardTrials], names: Sequence[str])
     axes.grid(visible=False, axis="x")
 
 
+@dataclass(frozen=True, kw_only=True)
+class RewardOptions(ModelOptions):
+    """Options of this study."""
+
+    metrics: Annotated[
+        str,
+        CommandOption("What the model sees of the metrics, separated by commas: full, headers."),
+    ] = ",".join(METRICS)
+    trials: Annotated[int, CommandOption("Number of trials per choice of --metrics.", least=1)] = 25
+
+
+def prepare(options: RewardOptions, _: Tell) -> PreparedStudy:
+    """Choose what is shown, and open the model.
+
+    Raises:
+        InvalidParameterError: There is no such choice of what is shown, or more than one model.
+        InvalidCassetteError: The cassette was not recorded from a model.
+    """
+    shown = options.metrics.split(",")
+    if unknown := sorted(set(shown) - set(METRICS)):
+        raise InvalidParameterError(
+            f"--metrics {', '.join(unknown)}: there are {', '.join(METRICS)}"
+        )
+    models = options.models()
+    if len(models) > 1:
+        raise InvalidParameterError("rewards are asked of one model: give --model once")
+    opened = get_domain(options.domain, options.preset)
+    written = opened.acquisition.operators if opened.acquisition else opened.operators
+    ((name, model),) = models.items()
+    problem = options.problem(opened, 0)
+    settings = {
+        "metrics": options.metrics,
+        "trials": options.trials,
+        "model": [name],
+        "answered_by": answered_by(models),
+    }
+    return PreparedStudy(
+        settings | options.as_settings(),
+        lambda runner: options.dated(study(model, problem, written, shown, options.trials, runner)),
+    )
+
+
 STUDY = Study(
     "reward_ablation",
+    help="LG-SAIL Table 3, Fig. 7: rewards of a language model, and their errors.",
+    example="slap study reward_ablation stow_hammer --model NAME",
+    options=RewardOptions,
+    prepare=prepare,
     figures=(
         not_made(
             "LG-SAIL Table 3, Fig. 7",

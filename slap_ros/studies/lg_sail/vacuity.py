@@ -10,10 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
+from slap_ros.api.command_options import CommandOption, DomainName, Jobs, Preset
+from slap_ros.api.left_out import Tell
+from slap_ros.api.library_descriptions import describe_skills
+from slap_ros.api.opening import open_chosen
 from slap_ros.core import Action, ActionSpace, Domain
 from slap_ros.drawing.palette import MUTED
 from slap_ros.errors import InvalidParameterError, SlapError
@@ -24,8 +29,10 @@ from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.skills.skill import LearnedSkill
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
+from slap_ros.studies.lg_sail.domain_choices import with_demonstrator
+from slap_ros.studies.options import FRESH_SEED, RESULTS, FreshSeed, Output
 from slap_ros.studies.results import MarkdownTable, StudyReport
-from slap_ros.studies.study import Study
+from slap_ros.studies.study import PreparedStudy, Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -467,4 +474,42 @@ def draw(figure: Figure, found: Sequence[OperatorVacuity]) -> None:
     figure.legend(loc="outside upper center", ncols=len(names) + bool(judged))
 
 
-STUDY = Study("vacuity")
+@dataclass(frozen=True, kw_only=True)
+class VacuityOptions:
+    """Options of this study."""
+
+    domain: DomainName
+    starts: Annotated[int, CommandOption("Number of start states per operator.", least=1)] = 200
+    seed: FreshSeed = FRESH_SEED
+    preset: Preset = None
+    skills: Annotated[
+        Path | None,
+        CommandOption("Folder that `slap acquire` made. Its skills are judged as well."),
+    ] = None
+    jobs: Jobs = 1
+    output: Output = RESULTS
+
+
+def prepare(options: VacuityOptions, tell: Tell) -> PreparedStudy:
+    """Open the domain with its demonstrator, and with the skills to be judged."""
+    choice = with_demonstrator(options.domain, options.preset)
+    starts, seed, skills = options.starts, options.seed, options.skills
+    settings: dict[str, Any] = {"preset": choice.preset, "starts": starts, "seed": seed}
+    given, learned = {}, None
+    if skills is not None:
+        acquired = open_chosen(DomainChoice(options.domain, choice.preset, str(skills)), tell)
+        learned = DomainChoice.of(acquired, str(skills))
+        settings["skills"] = describe_skills(acquired)
+        given["skills"] = skills
+    return PreparedStudy(
+        settings, lambda runner: study(choice, starts, seed, runner, learned), given
+    )
+
+
+STUDY = Study(
+    "vacuity",
+    help="Whether there is anything to learn: success of blind policies from where skills begin.",
+    example="slap study vacuity stow_hammer",
+    options=VacuityOptions,
+    prepare=prepare,
+)

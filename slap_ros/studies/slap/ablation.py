@@ -7,12 +7,18 @@ The same shortcut is learned from the same starts with all terms, without each, 
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 from statistics import fmean
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+from slap_ros.api.command_options import CommandOption, DomainName, Jobs, Preset, Samples
+from slap_ros.api.jobs import require_torch
+from slap_ros.api.left_out import Tell
+from slap_ros.api.shortcut_choice import SAMPLES, sampling
 from slap_ros.core import Domain
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError, UnsolvableError
@@ -33,8 +39,9 @@ from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.comparison import format_spread
 from slap_ros.studies.figures import APPROACH_STYLES, LINES, label
 from slap_ros.studies.job_runner import JobRunner
+from slap_ros.studies.options import FRESH_SEED, RESULTS, FreshSeed, Output
 from slap_ros.studies.results import MarkdownTable, StudyReport
-from slap_ros.studies.study import Study
+from slap_ros.studies.study import PreparedStudy, Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -358,4 +365,66 @@ def draw(figure: Figure, results: Sequence[TermResult]) -> None:
     figure.legend(loc="outside upper center", ncols=len(SHOWN))
 
 
-STUDY = Study("ablation", costs="learning")
+@dataclass(frozen=True, kw_only=True)
+class AblationOptions:
+    """Options of this study."""
+
+    domain: DomainName
+    term: Annotated[
+        list[str] | None,
+        CommandOption("Term to leave out. May be repeated. Default: each term, and all together."),
+    ] = None
+    trainings: Annotated[
+        int, CommandOption("Number of trainings per term, with seeds from 0 on.", least=1)
+    ] = 3
+    steps: Annotated[
+        int | None,
+        CommandOption(
+            "Environment steps of a training. Default: as in the domain's settings.", least=1
+        ),
+    ] = None
+    tasks: Annotated[
+        int, CommandOption("Number of tasks to plan with what was learned.", least=1)
+    ] = 20
+    seed: FreshSeed = FRESH_SEED
+    samples: Samples = SAMPLES
+    preset: Preset = None
+    jobs: Jobs = 1
+    output: Output = RESULTS
+
+
+def prepare(options: AblationOptions, _: Tell) -> PreparedStudy:
+    """Open the domain. Checkpoints are kept beside the report until the study is done."""
+    require_torch()
+    domain, trainings = options.domain, options.trainings
+    preset = get_domain(domain, options.preset).preset
+    tried = sampling(options.samples)
+    setup = AblationSetup(domain, preset, options.steps, options.tasks, options.seed, tried)
+    settings = {
+        "preset": preset,
+        "trainings": trainings,
+        "steps": options.steps,
+        "tasks": options.tasks,
+        "seed": options.seed,
+        "samples": options.samples,
+    }
+
+    def make(runner: JobRunner) -> StudyReport:
+        # Checkpoints of another command would be of other trainings.
+        digest = sha256(runner.log.origin.command.encode()).hexdigest()[:8]
+        folder = options.output / f".ablation_{domain}-{digest}"
+        report = study(setup, options.term or setup.terms(), trainings, runner, folder)
+        shutil.rmtree(folder, ignore_errors=True)  # the log has every result
+        return report
+
+    return PreparedStudy(settings, make, {"term": options.term})
+
+
+STUDY = Study(
+    "ablation",
+    help="What a domain's hand-made terms are worth: learn without each, and without all.",
+    example="slap study ablation obstacle2d --trainings 1",
+    options=AblationOptions,
+    prepare=prepare,
+    costs="learning",
+)

@@ -6,18 +6,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
+from slap_ros.api.command_options import CommandOption
+from slap_ros.api.left_out import Tell
 from slap_ros.drawing.palette import PLAN
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.summary import Spread
 from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.studies.comparison import Comparison, format_spread, spread_of
+from slap_ros.studies.comparison_options import ChosenComparison, ComparisonOptions
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.slap.library_plans import LibraryPlans, plan_with
-from slap_ros.studies.slap.trainings import LearningCurve, TrainingFolder
-from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, Study, format_steps
+from slap_ros.studies.slap.trainings import LearningCurve, TrainingFolder, described
+from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, PreparedStudy, Study, format_steps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -285,8 +289,32 @@ def _summary(found: Data) -> str:
     return f"{each}; plans of {first} → {last} steps"
 
 
+@dataclass(frozen=True, kw_only=True)
+class DynamicsOptions(ComparisonOptions):
+    """Options of this study."""
+
+    work: Annotated[
+        list[Path],
+        CommandOption(
+            "Work folder of a `slap train`. May be repeated, one folder per seed.",
+            metavar="FOLDER",
+        ),
+    ]
+
+
+def prepare(options: DynamicsOptions, tell: Tell) -> PreparedStudy:
+    """Open the trainings; a library is not needed for their curves."""
+    folders = [TrainingFolder(folder) for folder in options.work]
+    compared = ChosenComparison.of(options, tell, described(folders), needs_library=False)
+    return compared.prepare(lambda it: study(folders, it), work=options.work)
+
+
 STUDY = Study(
     "dynamics",
+    help="SLAP Fig. 4: learning curves from work folders, and plans with what was learned so far.",
+    example="slap study dynamics obstacle2d --work runs/models/obstacle2d-training",
+    options=DynamicsOptions,
+    prepare=prepare,
     summary=_summary,
     figures=(
         PaperFigure(

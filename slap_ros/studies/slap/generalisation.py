@@ -9,13 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+from slap_ros.api.command_options import CommandOption
+from slap_ros.api.left_out import Tell
 from slap_ros.studies.comparison import ApproachResult, Comparison, format_spread
+from slap_ros.studies.comparison_options import ChosenComparison, ComparisonOptions
 from slap_ros.studies.figures import dodged, label, legend_above, plot_spreads, plot_values
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
-from slap_ros.studies.slap.variations import Variation
-from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, Study
+from slap_ros.studies.slap.variations import Variation, offered, parse_variation
+from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, PreparedStudy, Study
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -157,8 +160,33 @@ def _summary(found: Data) -> str:
     )
 
 
+@dataclass(frozen=True, kw_only=True)
+class GeneralisationOptions(ComparisonOptions):
+    """Options of this study."""
+
+    vary: Annotated[
+        list[str] | None,
+        CommandOption(
+            "Setting to vary and its values, as setting=value,value,... May be "
+            "repeated. Default: the usual settings."
+        ),
+    ] = None
+
+
+def prepare(options: GeneralisationOptions, tell: Tell) -> PreparedStudy:
+    """Open domain and library, and choose what varies."""
+    compared = ChosenComparison.of(options, tell)
+    given = [parse_variation(text) for text in options.vary or ()]
+    variations = given or offered(compared.domain)
+    return compared.ends().prepare(lambda it: study(it, variations), vary=options.vary)
+
+
 STUDY = Study(
     "generalisation",
+    help="SLAP Fig. 5: pure planning and SLAP as obstacles, distractors, mass or friction vary.",
+    example="slap study generalisation obstacle_tower --vary obstacles=1,3,5",
+    options=GeneralisationOptions,
+    prepare=prepare,
     summary=_summary,
     figures=(
         PaperFigure(

@@ -7,10 +7,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
+from slap_ros.api.command_options import CommandOption
+from slap_ros.api.left_out import Tell
 from slap_ros.drawing.palette import MUTED
 from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.evaluation.experiment import Trial, solve
@@ -22,9 +24,11 @@ from slap_ros.studies.comparison import (
     format_spread,
     named_tasks,
 )
+from slap_ros.studies.comparison_options import ChosenComparison, ComparisonOptions
 from slap_ros.studies.figures import APPROACH_STYLES, label
+from slap_ros.studies.options import Tasks
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
-from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, Study, format_steps
+from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, PreparedStudy, Study, format_steps
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -217,8 +221,29 @@ def _summary(found: Data) -> str:
     return f"{slap['success_rate']:.0%}; {steps}, {len(found['goals'])} goals in all"
 
 
+@dataclass(frozen=True, kw_only=True)
+class GoalOptions(ComparisonOptions):
+    """Options of this study; one task per seed, as each task has many goals."""
+
+    goals: Annotated[
+        int, CommandOption("Goals per task, or all if the task has fewer.", least=1)
+    ] = 15
+    tasks: Tasks = 1
+
+
+def prepare(options: GoalOptions, tell: Tell) -> PreparedStudy:
+    """Open domain and library."""
+    count = options.goals
+    compared = ChosenComparison.of(options, tell, {"goals": count}).ends()
+    return compared.prepare(lambda it: study(it, count))
+
+
 STUDY = Study(
     "goals",
+    help="SLAP Fig. 9: pure planning and SLAP for goals that the library was not trained for.",
+    example="slap study goals obstacle_tower",
+    options=GoalOptions,
+    prepare=prepare,
     summary=_summary,
     figures=(PaperFigure("SLAP Fig. 9", "15 other goals", SLAP_DOMAINS, {"": "bars"}),),
 )

@@ -12,10 +12,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from statistics import fmean
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
+from slap_ros.api.command_options import CommandOption
+from slap_ros.api.left_out import Tell
 from slap_ros.evaluation.summary import Spread
 from slap_ros.perception import NoisyPerceiver, Quality
 from slap_ros.planning.execution import EpisodeResult, Executor
@@ -27,9 +29,10 @@ from slap_ros.studies.comparison import (
     named_tasks,
     spread_of,
 )
+from slap_ros.studies.comparison_options import ChosenComparison, ComparisonOptions
 from slap_ros.studies.figures import dodged, label, legend_above, plot_spreads, plot_values
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
-from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, Study
+from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, PreparedStudy, Study
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -286,8 +289,28 @@ def _summary(found: Data) -> str:
     return f"success at worst {least['pure_planning']} → {least['slap']}"
 
 
+@dataclass(frozen=True, kw_only=True)
+class PerceptionOptions(ComparisonOptions):
+    """Options of this study."""
+
+    max_replans: Annotated[
+        int, CommandOption("Maximum number of plans after the first.", least=0)
+    ] = 10
+
+
+def prepare(options: PerceptionOptions, tell: Tell) -> PreparedStudy:
+    """Open domain and library."""
+    limit = options.max_replans
+    compared = ChosenComparison.of(options, tell, {"max_replans": limit}).ends()
+    return compared.prepare(lambda it: study(it, limit))
+
+
 STUDY = Study(
     "perception",
+    help="SLAP D.3, D.4: success, length and replans under several errors of perception.",
+    example="slap study perception cluttered_drawer",
+    options=PerceptionOptions,
+    prepare=prepare,
     summary=_summary,
     figures=(
         PaperFigure(

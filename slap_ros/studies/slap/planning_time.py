@@ -11,8 +11,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from statistics import fmean
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+from slap_ros.api.command_options import CommandOption
+from slap_ros.api.left_out import Tell
 from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.evaluation.summary import Spread
 from slap_ros.studies.comparison import (
@@ -22,10 +24,11 @@ from slap_ros.studies.comparison import (
     named_tasks,
     spread_of,
 )
+from slap_ros.studies.comparison_options import ChosenComparison, ComparisonOptions
 from slap_ros.studies.figures import dodged, label, legend_above, plot_spreads
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
-from slap_ros.studies.slap.variations import Variation
-from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, Study
+from slap_ros.studies.slap.variations import Variation, offered_number, parse_variation
+from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, PreparedStudy, Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -227,8 +230,33 @@ def _summary(found: Data) -> str:
     return f"{pure:.2f} → {slap:.2f} s with {most['slap']['value']} {found['setting']}"
 
 
+@dataclass(frozen=True, kw_only=True)
+class PlanningTimeOptions(ComparisonOptions):
+    """Options of this study."""
+
+    vary: Annotated[
+        str | None,
+        CommandOption(
+            "Setting to vary and its values, as setting=value,value,... Default: "
+            "the number of obstacles."
+        ),
+    ] = None
+
+
+def prepare(options: PlanningTimeOptions, tell: Tell) -> PreparedStudy:
+    """Open domain and library, and choose what varies."""
+    compared = ChosenComparison.of(options, tell)
+    given = options.vary
+    variation = parse_variation(given) if given else offered_number(compared.domain)
+    return compared.prepare(lambda it: study(it, variation), vary=given)
+
+
 STUDY = Study(
     "planning_time",
+    help="SLAP Table 4: seconds of planning, edges rolled out, size of the graph.",
+    example="slap study planning_time obstacle_tower",
+    options=PlanningTimeOptions,
+    prepare=prepare,
     summary=_summary,
     figures=(
         PaperFigure(

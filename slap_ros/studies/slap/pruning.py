@@ -7,8 +7,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
+from slap_ros.api.command_options import CommandOption
+from slap_ros.api.left_out import Tell
 from slap_ros.drawing.palette import MUTED, PLAN
 from slap_ros.errors import InvalidParameterError, UnsolvableError
 from slap_ros.evaluation.experiment import Trial
@@ -16,16 +19,18 @@ from slap_ros.evaluation.summary import Spread
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.shortcuts import jobs as training_jobs
 from slap_ros.shortcuts.explore import ExplorationResult
-from slap_ros.shortcuts.settings import ExplorationSettings
+from slap_ros.shortcuts.settings import ExplorationSettings, training_settings
 from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.training import problem_key
+from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.comparison import Comparison, format_spread
+from slap_ros.studies.comparison_options import ChosenComparison, ComparisonOptions
 from slap_ros.studies.figures import legend_above
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.slap.library_plans import LibraryPlans, plan_with
-from slap_ros.studies.slap.trainings import TrainingFolder
-from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, Study, format_steps
+from slap_ros.studies.slap.trainings import TrainingFolder, described
+from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, PreparedStudy, Study, format_steps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -409,8 +414,53 @@ def _summary(found: Data) -> str:
     return f"{kept}; {', '.join(steps)}"
 
 
+@dataclass(frozen=True, kw_only=True)
+class PruningOptions(ComparisonOptions):
+    """Options of this study."""
+
+    work: Annotated[
+        list[Path] | None,
+        CommandOption(
+            "Work folder of a `slap train` that has explored. May be repeated.", metavar="FOLDER"
+        ),
+    ] = None
+    settings: Annotated[
+        str, CommandOption("Settings of exploration where --work is not given: ours or paper.")
+    ] = "ours"
+
+
+def prepare(options: PruningOptions, tell: Tell) -> PreparedStudy:
+    """Open domain, library and trainings; without trainings, the study explores itself."""
+    folders = [TrainingFolder(folder) for folder in options.work or ()]
+    sampled_from = described(folders) if folders else {"settings": options.settings}
+    compared = ChosenComparison.of(options, tell, sampled_from, needs_library=False)
+
+    def make(comparison: Comparison) -> StudyReport:
+        if folders:
+            explored, how = explored_in(folders, options.domain)
+        else:
+            how = training_settings(options.settings, compared.domain).exploration
+            explored = _explore_as_trainings(comparison, how)
+        return study(explored, how, comparison)
+
+    return compared.prepare(make, work=options.work)
+
+
+def _explore_as_trainings(
+    comparison: Comparison, how: ExplorationSettings
+) -> tuple[PrunedCandidates, ...]:
+    """Explore as many tasks as are planned for, each seed's as a training with that seed does."""
+    choice = DomainChoice.of(comparison.domain)
+    trainings = [TaskDistribution(choice, seed) for seed in range(comparison.seeds)]
+    return explore(trainings, comparison.tasks, how, comparison.runner)
+
+
 STUDY = Study(
     "pruning",
+    help="SLAP Table 2: candidates that random rollouts keep, and plan length without the others.",
+    example="slap study pruning obstacle_tower --settings ours",
+    options=PruningOptions,
+    prepare=prepare,
     summary=_summary,
     figures=(
         PaperFigure(

@@ -10,14 +10,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from statistics import fmean
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+from slap_ros.api.command_options import CommandOption, DomainName, Jobs, Samples
+from slap_ros.api.left_out import Tell
+from slap_ros.api.library_descriptions import describe_library
+from slap_ros.api.shortcut_choice import SAMPLES, choose_library, sampling
 from slap_ros.core import Domain
+from slap_ros.domains import get_domain, preset_names
 from slap_ros.evaluation.approaches import PURE_PLANNING, Approach, approaches, shooting
 from slap_ros.evaluation.experiment import Experiment, Trial
 from slap_ros.evaluation.statistics import Interval, ratio_interval, wilson_interval
 from slap_ros.evaluation.summary import Spread, lengths_of_both
+from slap_ros.shortcuts.shipped import shipped_libraries
 from slap_ros.shortcuts.shortcut import Sampling
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 from slap_ros.skills.domain_choice import DomainChoice
@@ -31,8 +38,9 @@ from slap_ros.studies.comparison import (
 )
 from slap_ros.studies.figures import APPROACH_STYLES, label
 from slap_ros.studies.job_runner import Job, JobRunner
+from slap_ros.studies.options import FRESH_SEED, RESULTS, FirstSeed, Output, Seeds, Tasks
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
-from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, Study, format_steps
+from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, PreparedStudy, Study, format_steps
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -344,8 +352,62 @@ def _summary(found: Data) -> str:
     return "; ".join(parts)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Table1Options:
+    """Options of this study."""
+
+    domain: DomainName
+    libraries: Annotated[
+        list[Path] | None,
+        CommandOption(
+            "Folder of a library, one per training seed. May be repeated. Default: all that ship.",
+            metavar="FOLDER",
+            name="--library",
+        ),
+    ] = None
+    tasks: Tasks = 10
+    seeds: Seeds = 5
+    first_seed: FirstSeed = FRESH_SEED
+    presets: Annotated[
+        list[str] | None,
+        CommandOption("Preset of the domain. May be repeated. Default: all.", name="--preset"),
+    ] = None
+    samples: Samples = SAMPLES
+    jobs: Jobs = 1
+    output: Output = RESULTS
+
+
+def prepare(options: Table1Options, tell: Tell) -> PreparedStudy:
+    """Open every preset and every library."""
+    domain = options.domain
+    chosen = [get_domain(domain, preset) for preset in options.presets or preset_names(domain)]
+    trained = [
+        TrainedLibrary(_library_name(folder), loaded)
+        for folder in options.libraries or shipped_libraries(domain)
+        if (loaded := choose_library(str(folder), chosen[0], "lazy", tell)) is not None
+    ]
+    tasks, seeds, first_seed = options.tasks, options.seeds, options.first_seed
+    own = {"tasks": tasks, "seeds": seeds, "first_seed": first_seed, "samples": options.samples}
+    described = [describe_library(one.name, one.library) for one in trained]
+    experiments = [Experiment(one, tasks, seeds, first_seed) for one in chosen]
+    return PreparedStudy(
+        {**own, "libraries": described},
+        lambda runner: study(experiments, trained, sampling(options.samples), runner),
+        {"library": options.libraries, "preset": options.presets, **own},
+    )
+
+
+def _library_name(folder: Path) -> str:
+    """As people tell libraries of a domain apart: by the folder, and the training's seed."""
+    return "/".join(folder.resolve().parts[-2:])
+
+
 STUDY = Study(
     "table1",
+    help="SLAP Table 1: success and plan length on fresh tasks, over several trained libraries.",
+    example="slap study table1 obstacle_tower --preset fair",
+    options=Table1Options,
+    prepare=prepare,
     summary=_summary,
     figures=(
         PaperFigure(

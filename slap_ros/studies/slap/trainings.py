@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -140,6 +140,11 @@ class TrainingFolder:
         if not isinstance(settings, dict) or not isinstance(settings.get(name), dict):
             raise _damaged(path, f"no {name} in it")
         return dict(settings[name])
+
+
+def described(folders: Sequence[TrainingFolder]) -> dict[str, Any]:
+    """What reports say of trainings: domain, preset and seed of each."""
+    return {"trainings": [folder.distribution() for folder in folders]}
 
 
 def _digest(shortcut: Shortcut) -> str:
