@@ -34,7 +34,7 @@ from slap_ros.planning.search import SearchOutcome
 from slap_ros.planning.shortcut_source import ShortcutSource
 from slap_ros.relational import State
 
-NEAR_PLANS = 3  # roll-outs of a whole graph to one of graphs near plans
+NEAR_PLANS = 4  # roll-outs of a whole graph to one of graphs near plans
 WEIGHTS = (30.0, 3.0, 1.0)  # of bounds of what is to come, one search after the other
 
 

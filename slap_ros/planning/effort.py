@@ -23,7 +23,7 @@ class Effort:
         InvalidParameterError: No plan comes of so little, or none is so good.
     """
 
-    rollouts: int = 250
+    rollouts: int = 400
     abstract_states: int = 3_000
     within: float = 1.0
 

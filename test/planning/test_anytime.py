@@ -137,7 +137,7 @@ def test_a_tall_tower_is_planned_for_within_the_effort_and_each_plan_is_better()
     assert steps == sorted(steps, reverse=True)
     assert proven == sorted(proven)
     assert steps[-1] < 0.4 * steps[0]  # the slap clears towers that are taller than in training
-    assert found[-1].edges_rolled_out <= found[0].edges_rolled_out + 12 // 3
+    assert found[-1].edges_rolled_out <= found[0].edges_rolled_out + 12 // 4
     run = slap_ros.execute(domain, task, found[-1])
     assert run.success
     assert run.steps == steps[-1]
