@@ -29,6 +29,8 @@ EXCLUDED_FIELDS = {
     "std_msgs/msg/Header": ("stamp",),
     DOMAIN_INFO: ("versions",),
 }
+# Settings of domains that earlier bags do not have, at the values that change nothing.
+ADDED_SETTINGS = (("towers", "(1, 1)"),)
 
 
 def bag_digest(path: Path | str) -> str:
@@ -36,7 +38,8 @@ def bag_digest(path: Path | str) -> str:
 
     When messages were sent and received does not count, nor do software versions, diagnostics,
     logs, transforms and markers, nor types that cannot be deserialised. A field that older bags do
-    not have counts where it is not empty, so that the same run has the digest that it always had.
+    not have counts where it is not empty, and a setting where it changes something, so that the
+    same run has the digest that it always had.
 
     Returns:
         64 hexadecimal digits.
@@ -83,6 +86,8 @@ def _canonical(value: object) -> Iterator[bytes]:
         excluded, added = EXCLUDED_FIELDS.get(type_name, ()), ADDED.get(type_name, ())
         for field in fields(value):
             part = getattr(value, field.name)
+            if (type_name, field.name) == (DOMAIN_INFO, "configuration"):
+                part = [pair for pair in part if (pair.key, pair.value) not in ADDED_SETTINGS]
             if field.name not in excluded and (field.name not in added or part):
                 yield from _canonical(part)
     else:

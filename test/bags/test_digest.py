@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from slap_ros.bags import bag_digest
-from slap_ros.messages.interfaces import STATE
+from slap_ros.messages.interfaces import DOMAIN_INFO, STATE
 from support.programs import environment, program
-from support.truthful_run import Script, record, without
+from support.truthful_run import Script, make, record, without
 
 HERE = Path(__file__).parent
 
@@ -48,6 +48,20 @@ def test_order_within_a_topic_counts_and_between_topics_does_not(
     assert bag_digest(tmp_path / "sorted") == bag_digest(honest_bag)
     record(tmp_path / "reversed", reversed(by_topic))
     assert bag_digest(tmp_path / "reversed") != bag_digest(honest_bag)
+
+
+def test_a_setting_that_came_later_counts_where_it_changes_something(
+    script: Script, honest_bag: Path, tmp_path: Path
+) -> None:
+    digests = []
+    for value in ("(1, 1)", "(3, 3)"):
+        messages = copy.deepcopy(script.messages)
+        info = next(m.message for m in messages if m.type_name == DOMAIN_INFO)
+        info.configuration = [make("diagnostic_msgs/msg/KeyValue", key="towers", value=value)]
+        record(tmp_path / value, messages)
+        digests.append(bag_digest(tmp_path / value))
+    assert digests[0] == bag_digest(honest_bag)
+    assert digests[1] != bag_digest(honest_bag)
 
 
 def test_diagnostics_do_not_count(script: Script, honest_bag: Path, tmp_path: Path) -> None:

@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -32,7 +32,13 @@ from slap_ros.worlds.panda import HOME
 STEP_LIMIT = 600  # environment steps
 TRIES = 1_000  # places drawn for a toy before all are drawn again
 ROUNDS = 100  # before there is said to be no room
-
+# In place of the usual settings where so many toys have no room.
+ROOMIER: Mapping[str, Any] = {
+    "toy_x": (0.4, 0.64),
+    "toy_y": (-0.04, 0.26),
+    "gap": 0.105,
+    "wiper_y": (-0.21, -0.17),
+}
 
 PlanarPose = tuple[float, float, float]  # x, y, yaw
 Range = tuple[float, float]
@@ -112,23 +118,48 @@ class RandomCleanupTasks(ArmSettings):
             InvalidParameterError: There is no room for so many.
         """
         count = int(rng.integers(self.toys[0], self.toys[1] + 1))
-        places = dict(zip(_names(shapes, count), self._apart(rng, count), strict=True))
+        for settings in (self, self._roomier()):
+            toys = settings._apart(rng, count)
+            if toys is not None:
+                return settings._laid(rng, toys, shapes)
+        raise InvalidParameterError(f"the table has no room for {count} toys {self.gap} m apart")
+
+    def _laid(
+        self, rng: np.random.Generator, toys: Sequence[PlanarPose], shapes: Mapping[str, Solid]
+    ) -> Task:
+        """The task with toys at these places, and the wiper."""
+        places = dict(zip(_names(shapes, len(toys)), toys, strict=True))
         wiper = (self.wiper_x, self.wiper_y, self.wiper_yaw)
         x, y, yaw = (rng.uniform(*r) for r in wiper)
         material = Material(rng.uniform(*self.mass), rng.uniform(*self.friction))
         return make_task({**places, WIPER: (x, y, yaw)}, shapes, material)
 
-    def _apart(self, rng: np.random.Generator, count: int) -> list[PlanarPose]:
-        """Places that keep their distance, drawn again where the last toys find none."""
+    def _roomier(self) -> RandomCleanupTasks:
+        """The settings for more toys than have room; a range that was set stays as it is."""
+        usual = RandomCleanupTasks
+        changed = {
+            name: value for name, value in ROOMIER.items() if vars(self)[name] == vars(usual)[name]
+        }
+        return replace(self, **changed)
+
+    def _apart(self, rng: np.random.Generator, count: int) -> list[PlanarPose] | None:
+        """Places that keep their distance, drawn again where the last toys find none.
+
+        Returns:
+            The places; None where there is no room for so many.
+        """
         for _ in range(ROUNDS):
             placed: list[PlanarPose] = []
             for _ in range(TRIES):
                 if len(placed) == count:
                     return placed
-                x, y = rng.uniform(*self.toy_x), rng.uniform(*self.toy_y)
-                if all(math.hypot(x - px, y - py) >= self.gap for px, py, _ in placed):
+                x, y = _uniform(rng, self.toy_x), _uniform(rng, self.toy_y)
+                for px, py, _ in placed:
+                    if math.hypot(x - px, y - py) < self.gap:
+                        break
+                else:
                     placed.append((x, y, rng.uniform(*self.toy_yaw)))
-        raise InvalidParameterError(f"the table has no room for {count} toys {self.gap} m apart")
+        return None
 
 
 # Toys anywhere in the reference's ranges, the wiper where the reference has it.
@@ -139,6 +170,12 @@ PAPER = RandomCleanupTasks(
     wiper_y=(-0.12, -0.12),
     wiper_yaw=(0.0, 0.0),
 )
+
+
+def _uniform(rng: np.random.Generator, between: Range) -> float:
+    """The number that ``rng.uniform`` draws, in a tenth of the time: a full table takes many."""
+    low, high = between
+    return low + (high - low) * rng.random()
 
 
 def _names(shapes: Mapping[str, Solid], count: int) -> Sequence[str]:

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from slap_ros.core import Skill
 from slap_ros.domains.cluttered_drawer.blocking import SIDES
 from slap_ros.domains.cluttered_drawer.features import BLOCK, DRAWER, TABLE, TARGET, WALL
-from slap_ros.domains.cluttered_drawer.tasks import APART
+from slap_ros.domains.cluttered_drawer.tasks import APART, PLACE_MARGIN, PLACE_SPACING
 from slap_ros.domains.tabletop.grasps import from_above, grasps_to_stand, quarter_turns
 from slap_ros.domains.tabletop.placements import GAP, free_placements
 from slap_ros.domains.tabletop.planning_scene import PlanningScene
@@ -25,8 +25,6 @@ from slap_ros.relational import Object, State
 
 LIFT = 0.02  # m, of a block that counts as picked; it still blocks what it blocked
 TABLE_MARGIN = 0.05  # m, of places on the table from its edges
-SPACING = 0.025  # m, of the grid of places: the drawer is narrow
-WALL_MARGIN = 0.07  # m, of places in the drawer from its walls, so that fingers can open there
 
 # Turns of the hand against the target block: its fingers move along the hand's y.
 LEFT_RIGHT, FRONT_BACK = (0.0, math.pi), (math.pi / 2, -math.pi / 2)
@@ -95,13 +93,13 @@ def _onto_surface(state: State, block: Object, surface: Object, margin: float) -
     ]
     half_x, half_y, _ = board.half
     halves = (half_x - margin, half_y - margin)
-    for place in free_placements(near, board.pose.position[:2], halves, taken, SPACING):
+    for place in free_placements(near, board.pose.position[:2], halves, taken, PLACE_SPACING):
         yield _transit_to_placement(state, place, surface)
 
 
 def _into_drawer(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:
     _, block, _, drawer = objects
-    return _onto_surface(state, block, drawer, WALL_MARGIN)
+    return _onto_surface(state, block, drawer, PLACE_MARGIN)
 
 
 def _onto_table(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import combinations, product
 from typing import ClassVar
 
 import numpy as np
@@ -17,7 +18,7 @@ from slap_ros.domains.cluttered_drawer.blocking import SIDES, FingerClearance, b
 from slap_ros.domains.cluttered_drawer.features import BLOCK, TABLE, TARGET
 from slap_ros.domains.cluttered_drawer.predicates import ON
 from slap_ros.domains.cluttered_drawer.scene import BOTTOM, FIXED, HALF_WIDTH, MIDDLE, OPENING
-from slap_ros.domains.tabletop.placements import GAP
+from slap_ros.domains.tabletop.placements import GAP, free_placements
 from slap_ros.domains.tabletop.presets import ARM_LIMITS, ArmSettings
 from slap_ros.domains.tabletop.variation_limits import MATERIAL_LIMITS, REACH, TURN
 from slap_ros.errors import InvalidParameterError, InvalidStateError
@@ -35,6 +36,11 @@ NEIGHBOUR = 0.0675  # between the middles of the target block and of a blocker (
 APART = 0.15  # from the target block to a block that blocks no side of it
 WALL_GAP = 0.04  # between a wall and a block's middle
 ENDS = 0.06  # along y: of the drawer's two ends, where the blocks stand that block no side
+SCATTERED = 4  # of those blocks at most stand anywhere there; more have no room but in rows
+OFF_SPOT = 0.01  # from a block's spot in a row, along x and y, at most
+SPOTS = tuple(product((-0.07, 0.07), (-0.31, -0.2, 0.2, 0.31)))  # x from the drawer's middle, y
+PLACE_MARGIN = 0.07  # from walls to places for blockers, so that fingers can open there
+PLACE_SPACING = 0.025  # of the grid of these places: the drawer is narrow
 BLOCKING_LIMITS = {"reach": (0.0, OPENING), "half_width": (0.0, OPENING)}
 
 Range = tuple[float, float]
@@ -148,8 +154,21 @@ class RandomDrawerTasks(ArmSettings):
             )
             for side in sides
         )
+        count = obstacles - blocking_count
+        others = self._scattered(rng, count) if count <= SCATTERED else self._in_rows(rng, count)
+        if others is None:
+            return None
+        # Last, so that where things stand does not depend on it.
+        material = Material(float(rng.uniform(*self.mass)), float(rng.uniform(*self.friction)))
+        arrangement = DrawerArrangement(target, blockers, others, material)
+        stands = _blocked_sides(arrangement) == [[side] for side in sides]
+        fits = count <= SCATTERED or _has_room_for_two(arrangement)
+        return arrangement if stands and fits else None
+
+    def _scattered(self, rng: np.random.Generator, count: int) -> tuple[PlanarPose, ...] | None:
+        """Blocks anywhere at the drawer's ends; None where two stand too close together."""
         others: list[PlanarPose] = []
-        for _ in range(obstacles - blocking_count):
+        for _ in range(count):
             other = (
                 MIDDLE + float(rng.uniform(-1, 1)) * (OPENING / 2 - WALL_GAP),
                 float(rng.choice([-1, 1]) * (HALF_WIDTH - WALL_GAP - rng.uniform(0, ENDS))),
@@ -158,11 +177,23 @@ class RandomDrawerTasks(ArmSettings):
             if any(_between(other, thing) < GAP for thing in others):
                 return None
             others.append(other)
-        # Last, so that where things stand does not depend on it.
-        material = Material(float(rng.uniform(*self.mass)), float(rng.uniform(*self.friction)))
-        arrangement = DrawerArrangement(target, blockers, tuple(others), material)
-        stands = _blocked_sides(arrangement) == [[side] for side in sides]
-        return arrangement if stands else None
+        return tuple(others)
+
+    def _in_rows(self, rng: np.random.Generator, count: int) -> tuple[PlanarPose, ...] | None:
+        """Blocks in rows across the drawer's ends; None where two stand too close together."""
+        if count > len(SPOTS):
+            return None
+        spots = rng.permutation(len(SPOTS))[:count].tolist()
+        others = tuple(
+            (
+                MIDDLE + SPOTS[spot][0] + float(rng.uniform(-1, 1)) * OFF_SPOT,
+                SPOTS[spot][1] + float(rng.uniform(-1, 1)) * OFF_SPOT,
+                float(rng.uniform(*self.yaw)),
+            )
+            for spot in spots
+        )
+        crowded = any(_between(one, other) < GAP for one, other in combinations(others, 2))
+        return None if crowded else others
 
 
 @dataclass(frozen=True)
@@ -188,6 +219,20 @@ class PaperDrawerTasks(ArmSettings):
     def sample(self, _: np.random.Generator) -> Task:
         """The task of the single start state."""
         return self.scenery.task()
+
+
+def _has_room_for_two(arrangement: DrawerArrangement) -> bool:
+    """Whether two blockers can be put elsewhere in the drawer, as its skills do."""
+    taken = [((x, y), GAP) for x, y, _ in (*arrangement.blockers, *arrangement.others)]
+    x, y, _ = arrangement.target
+    places = free_placements(
+        (x, y),
+        (MIDDLE, 0.0),
+        (OPENING / 2 - PLACE_MARGIN, HALF_WIDTH - PLACE_MARGIN),
+        [*taken, ((x, y), APART)],
+        PLACE_SPACING,
+    )
+    return any(math.dist(one, other) >= GAP for one, other in combinations(places, 2))
 
 
 def _between(one: PlanarPose, other: PlanarPose) -> float:

@@ -10,6 +10,7 @@ A Panda at the origin, a table before it; x to the front, z up, m and rad. Read 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from types import MappingProxyType
 
 from slap_ros.core import Domain, Learning, presets
@@ -36,7 +37,7 @@ MODEL = TabletopModel(
     operators=operators.OPERATORS,
     skills=skills.skills,
     scene_of=scene_of,
-    goal=tasks.target_block_on_target,
+    goal=tasks.target_blocks_on_targets,
     step_limit=tasks.STEP_LIMIT,
     robot_types=frozenset({ROBOT}),
     learning=Learning(interface=LEARNER_INTERFACE, settings=TRAINING_SETTINGS, ablations=ABLATIONS),
@@ -47,4 +48,5 @@ MODEL = TabletopModel(
 def make(preset: str, changes: Mapping[str, str] = MappingProxyType({})) -> Domain:
     """The domain: preset ``fair`` samples different tasks, ``paper`` has the reference's one."""
     settings = varied(SETTINGS[preset], changes)
-    return tabletop_domain("obstacle_tower", preset, MODEL, settings, settings.sample)
+    model = replace(MODEL, step_limit=settings.step_limit)
+    return tabletop_domain("obstacle_tower", preset, model, settings, settings.sample)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from slap_ros.domains.obstacle_tower.predicates import (
 )
 from slap_ros.domains.tabletop import observation
 from slap_ros.domains.tabletop.observation import Features, joined
-from slap_ros.relational import Column, GroundAtom, State
+from slap_ros.relational import Column, GroundAtom, Object, State
 from slap_ros.relational.state import Array
 from slap_ros.worlds.joint_space.features import ROBOT
 from slap_ros.worlds.joint_space.scene import CUBE_EDGE, TABLE_TOP
@@ -44,7 +45,7 @@ def _object_features(blocks: Features, fixed: Features) -> Features:
 
 
 def _place_over_target(state: State, _: Array, column: Column) -> Array:
-    return _over_target(state, _off_target(state, column)) / NEAR
+    return _over_target(state, column) / NEAR
 
 
 def _joints_above(height: float) -> Features:
@@ -58,32 +59,55 @@ def _joints_above(height: float) -> Features:
 
 
 def _joints_off_target(state: State, hand: Array, column: Column) -> Array:
-    """Which joints push blocks away from the target."""
+    """Which joints push blocks away from the nearest target."""
     off = _off_target(state, column)
     level = np.concatenate([off, np.zeros((*off.shape[:2], 1))], axis=-1)
     return observation.joint_contributions(hand, level)
 
 
 def _off_target(state: State, column: Column) -> Array:
-    """Positions in the plane from the middle of the target, m, shape (n, objects, 2)."""
-    off: Array = state.gather(column, ("x", "y")) - state.gather(_target(state), ("x", "y"))
-    return off
+    """Positions in the plane from the middle of the nearest target, m, shape (n, objects, 2)."""
+    off = _off_targets(state, column)
+    return _of_nearest(off, off)
 
 
-def _over_target(state: State, off: Array) -> Array:
-    """The same along the axes of the target."""
-    z, w = np.moveaxis(state.gather(_target(state), ("qz", "qw")), -1, 0)
+def _over_target(state: State, column: Column) -> Array:
+    """The same along the axes of that target."""
+    off = _off_targets(state, column)
+    turns = state.gather(_targets(state), ("qz", "qw"))[..., None, :, :]
+    dx, dy = np.moveaxis(_of_nearest(off, off), -1, 0)
+    z, w = np.moveaxis(_of_nearest(off, np.broadcast_to(turns, off.shape)), -1, 0)
     sin, cos = 2.0 * z * w, w * w - z * z
-    dx, dy = off[..., 0], off[..., 1]
     return np.stack([cos * dx + sin * dy, cos * dy - sin * dx], axis=-1)
 
 
-def _target(state: State) -> Column:
-    """The target, alone; targets stay targets, so that one state of a batch tells."""
+def _off_targets(state: State, column: Column) -> Array:
+    """Positions in the plane from the middles of targets, m, shape (n, objects, targets, 2)."""
+    places = state.gather(column, ("x", "y"))[..., :, None, :]
+    off: Array = places - state.gather(_targets(state), ("x", "y"))[..., None, :, :]
+    return off
+
+
+def _of_nearest(off: Array, values: Array) -> Array:
+    """The values for the nearest target: (n, objects, targets, 2) to (n, objects, 2)."""
+    nearest = np.argmin(np.square(off).sum(axis=-1), axis=-1)[..., None, None]
+    chosen: Array = np.take_along_axis(values, nearest, axis=-2)[..., 0, :]
+    return chosen
+
+
+def _targets(state: State) -> Column:
+    """The targets, or any surface where there is none; they stay so: one state of a batch tells."""
     surfaces = state.layout.column_of(SURFACE)
     first = state.data.reshape(-1, state.data.shape[-1])[0]
-    labels = first[state.layout.grid(surfaces, ("is_target",))[:, 0]]
-    return observation.single(surfaces.objects[int(np.argmax(labels))])
+    labels = first[state.layout.grid(surfaces, ("is_target",))[:, 0]] > 0.5
+    targets = tuple(obj for obj, label in zip(surfaces.objects, labels, strict=True) if label)
+    return _column(targets or surfaces.objects[:1])
+
+
+@lru_cache(maxsize=256)
+def _column(objects: tuple[Object, ...]) -> Column:
+    """The same column for the same objects, as columns keep their indices."""
+    return Column(objects)
 
 
 def _distances(beside: float, over: float) -> Features:

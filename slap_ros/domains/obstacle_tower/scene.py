@@ -15,12 +15,13 @@ GREEN: Colour = (0.3, 0.7, 0.35, 1.0)
 
 
 def scene_of(state: State) -> Scene:
-    """The bodies of a state: the table, plates for the targets, cubes; the target block is red."""
+    """The bodies of a state: the table, plates for the targets, cubes; target blocks are red."""
+    surfaces = state.layout.of_type(SURFACE)
+    targets = [surface for surface in surfaces if state.get(surface, "is_target") > 0.5]
     bodies = [TABLE]
-    for surface in state.layout.of_type(SURFACE):
-        if state.get(surface, "is_target") > 0.5:
-            x, y, z = (float(state.get(surface, f"half_{axis}")) for axis in ("x", "y", "z"))
-            bodies.append(Box(surface.name, (x, y, z), colour=GREEN, solid=False))
+    for target in targets:
+        x, y, z = (float(state.get(target, f"half_{axis}")) for axis in ("x", "y", "z"))
+        bodies.append(Box(target.name, (x, y, z), colour=GREEN, solid=False))
     for number, block in enumerate(state.layout.of_type(BLOCK)):
-        bodies.append(cube(block.name, BLUE if number else RED))
+        bodies.append(cube(block.name, RED if number < len(targets) else BLUE))
     return Scene(tuple(bodies))

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import ClassVar
 
@@ -26,50 +26,93 @@ from slap_ros.worlds.joint_space.features import ROBOT, material_features, robot
 from slap_ros.worlds.joint_space.scene import CUBE_EDGE, CUBE_MATERIAL, TABLE, TABLE_TOP
 from slap_ros.worlds.panda import HOME
 
-STEP_LIMIT = 500  # environment steps (SLAP, appendix)
+STEP_LIMIT = 500  # environment steps for each tower (SLAP, appendix)
+APART = 1.4 * GAP  # between a block that stands about and a tower or another block, at least
+NEARER = 1.1 * GAP  # between such blocks on a table with several towers
+BETWEEN_TOWERS = 0.2  # between the middles of targets at least
 TRIES = 10_000  # places drawn before there is said to be no room
 PLATE_HALF = (0.026, 0.026, 0.0005)  # the target: a plate for one block, flush with the table
 
 Range = tuple[float, float]
+PlanarPose = tuple[float, float, float]  # x, y, yaw in rad
+
+
+@dataclass(frozen=True)
+class Tower:
+    """A target, the tower that stands on it, and the block that is to stand there instead."""
+
+    target: PlanarPose
+    target_block: PlanarPose
+    obstacles: tuple[PlanarPose, ...]  # from the bottom; the first is on the target
 
 
 @dataclass(frozen=True)
 class TowerArrangement:
-    """Where everything stands, yaws in rad; and what all blocks are made of."""
+    """Where everything stands with one tower; and what all blocks are made of."""
 
-    target: tuple[float, float, float]  # x, y, yaw
-    target_block: tuple[float, float, float]
-    tower: tuple[tuple[float, float, float], ...]  # from the bottom; the first is on the target
-    distractors: tuple[tuple[float, float, float], ...] = ()
+    target: PlanarPose
+    target_block: PlanarPose
+    tower: tuple[PlanarPose, ...]  # from the bottom; the first is on the target
+    distractors: tuple[PlanarPose, ...] = ()
     material: Material = CUBE_MATERIAL
 
     def task(self) -> Task:
         """The task to put the target block on the target."""
-        features: dict[Object, Mapping[str, float]] = {ROBOT("robot"): robot_features(HOME)}
-        features[BLOCK("block1")] = _block(self.material, *self.target_block)
-        others = [(*place, level) for level, place in enumerate(self.tower)]
-        others += [(*place, 0) for place in self.distractors]
-        for number, place in enumerate(others, start=2):
-            features[BLOCK(f"block{number}")] = _block(self.material, *place)
-        x, y, yaw = self.target
+        tower = Tower(self.target, self.target_block, self.tower)
+        return make_task((tower,), self.distractors, self.material)
+
+
+def make_task(
+    towers: Sequence[Tower], distractors: Sequence[PlanarPose], material: Material
+) -> Task:
+    """The task to put each target block on its target.
+
+    Args:
+        towers: Towers with their targets and target blocks.
+        distractors: Places of the blocks that stand about besides.
+        material: Material of all blocks.
+
+    Returns:
+        A task with blocks in this order: target blocks, towers from the bottom, distractors.
+    """
+    blocks = [(*tower.target_block, 0) for tower in towers]
+    for tower in towers:
+        blocks += [(*place, level) for level, place in enumerate(tower.obstacles)]
+    blocks += [(*place, 0) for place in distractors]
+    features: dict[Object, Mapping[str, float]] = {ROBOT("robot"): robot_features(HOME)}
+    for number, place in enumerate(blocks, start=1):
+        features[BLOCK(f"block{number}")] = _block(material, *place)
+    for number, tower in enumerate(towers, start=1):
+        x, y, yaw = tower.target
         plate = Pose((x, y, TABLE_TOP - PLATE_HALF[2]), from_yaw(yaw))
-        features[SURFACE("target")] = _surface(plate, PLATE_HALF, is_target=1.0)
-        features[SURFACE("table")] = _surface(TABLE.pose, TABLE.half_extents_m, is_target=0.0)
-        state = State.build(features)
-        return Task(state, target_block_on_target(state), STEP_LIMIT)
+        name = "target" if number == 1 else f"target{number}"
+        features[SURFACE(name)] = _surface(plate, PLATE_HALF, is_target=1.0)
+    features[SURFACE("table")] = _surface(TABLE.pose, TABLE.half_extents_m, is_target=0.0)
+    state = State.build(features)
+    return Task(state, target_blocks_on_targets(state), len(towers) * STEP_LIMIT)
 
 
-def target_block_on_target(state: State) -> frozenset[GroundAtom]:
-    """The goal: the first block, which is the target block, stands on the target.
+def targets_of(state: State) -> tuple[Object, ...]:
+    """The targets of a state; as many blocks, the first ones, are target blocks."""
+    surfaces = state.layout.of_type(SURFACE)
+    return tuple(surface for surface in surfaces if not NOT_IS_TARGET(surface).holds(state))
+
+
+def target_blocks_on_targets(state: State) -> frozenset[GroundAtom]:
+    """The goal: the first block stands on the first target, the second on the second, and so on.
 
     Raises:
-        InvalidStateError: The state has no block or no target.
+        InvalidStateError: The state has no target, or fewer blocks than targets.
     """
-    blocks = state.layout.of_type(BLOCK)
-    targets = [s for s in state.layout.of_type(SURFACE) if not NOT_IS_TARGET(s).holds(state)]
+    blocks, targets = state.layout.of_type(BLOCK), targets_of(state)
     if not blocks or not targets:
         raise InvalidStateError("a state of obstacle_tower needs a block and a target")
-    return frozenset({ON(blocks[0], targets[0])})
+    if len(blocks) < len(targets):
+        raise InvalidStateError(
+            f"a state of obstacle_tower needs a block for each target: it has {len(blocks)} "
+            f"blocks and {len(targets)} targets"
+        )
+    return frozenset(ON(block, target) for block, target in zip(blocks, targets, strict=False))
 
 
 @dataclass(frozen=True)
@@ -89,10 +132,11 @@ class RandomTowerTasks(ArmSettings):
             "block_y": REACH,
             "stacking_offset": (0.0, CUBE_EDGE),
             "stacking_turn": TURN,
+            "towers": (1, 3),
         }
     )
 
-    obstacles: tuple[int, int] = (3, 3)  # blocks of the tower, inclusive
+    obstacles: tuple[int, int] = (3, 3)  # blocks of each tower, inclusive
     distractors: tuple[int, int] = (0, 2)  # blocks that stand about besides, inclusive
     target_x: Range = (0.45, 0.55)
     target_y: Range = (-0.05, 0.05)
@@ -104,18 +148,46 @@ class RandomTowerTasks(ArmSettings):
     # Of all blocks of a task alike.
     mass: Range = (CUBE_MATERIAL.mass_kg, CUBE_MATERIAL.mass_kg)
     friction: Range = (CUBE_MATERIAL.friction, CUBE_MATERIAL.friction)
+    # Inclusive; each on a target of its own, for which there is a target block.
+    towers: tuple[int, int] = (1, 1)
+
+    @property
+    def step_limit(self) -> int:
+        """Environment steps of a task with as many towers as there may be."""
+        return self.towers[1] * STEP_LIMIT
 
     def sample(self, rng: np.random.Generator) -> Task:
-        """A task with a tower on the target.
+        """A task with a tower on each target.
 
         Raises:
-            InvalidParameterError: There is no room for so many distractors.
+            InvalidParameterError: There is no room for so many towers or distractors.
         """
+        further = int(rng.integers(self.towers[0], self.towers[1] + 1)) - 1
         obstacles = int(rng.integers(self.obstacles[0], self.obstacles[1] + 1))
         distractors = int(rng.integers(self.distractors[0], self.distractors[1] + 1))
-        target = tuple(rng.uniform(*r) for r in (self.target_x, self.target_y, self.yaw))
+        x, y, yaw = (float(rng.uniform(*r)) for r in (self.target_x, self.target_y, self.yaw))
+        targets, towers = [(x, y, yaw)], [self._tower(rng, (x, y, yaw), obstacles)]
+        for _ in range(further):
+            targets.append(self._further_target(rng, targets))
+            obstacles = int(rng.integers(self.obstacles[0], self.obstacles[1] + 1))
+            towers.append(self._tower(rng, targets[-1], obstacles))
+        taken = [(x, y, APART) for x, y, _ in targets]
+        apart = NEARER if further else APART
+        standing = [self._stand_apart(rng, taken, apart) for _ in range(len(towers) + distractors)]
+        # Last, so that where things stand does not depend on it.
+        material = Material(rng.uniform(*self.mass), rng.uniform(*self.friction))
+        return make_task(
+            [Tower(*parts) for parts in zip(targets, standing, towers, strict=False)],
+            standing[len(towers) :],
+            material,
+        )
+
+    def _tower(
+        self, rng: np.random.Generator, target: PlanarPose, obstacles: int
+    ) -> tuple[PlanarPose, ...]:
+        """Blocks one on the other, from the bottom, none exactly over the middle of the target."""
         x, y, yaw = target
-        tower = tuple(
+        return tuple(
             (
                 x + rng.uniform(-1, 1) * self.stacking_offset,
                 y + rng.uniform(-1, 1) * self.stacking_offset,
@@ -123,27 +195,46 @@ class RandomTowerTasks(ArmSettings):
             )
             for _ in range(obstacles)
         )
-        placed: list[tuple[float, float]] = [(x, y)]
-        standing = tuple(self._stand_apart(rng, placed) for _ in range(1 + distractors))
-        # Last, so that where things stand does not depend on it.
-        material = Material(rng.uniform(*self.mass), rng.uniform(*self.friction))
-        return TowerArrangement((x, y, yaw), standing[0], tower, standing[1:], material).task()
+
+    def _further_target(
+        self, rng: np.random.Generator, targets: Sequence[PlanarPose]
+    ) -> PlanarPose:
+        """A target beside those that there are.
+
+        Raises:
+            InvalidParameterError: There is no room for another target.
+        """
+        for _ in range(TRIES):
+            x, y = rng.uniform(*self.target_x), rng.uniform(*self.block_y)
+            if all(math.hypot(x - tx, y - ty) > BETWEEN_TOWERS for tx, ty, _ in targets):
+                return x, y, rng.uniform(*self.yaw)
+        raise InvalidParameterError(
+            f"the table has no room for {len(targets) + 1} towers {BETWEEN_TOWERS} m apart"
+        )
 
     def _stand_apart(
-        self, rng: np.random.Generator, placed: list[tuple[float, float]]
-    ) -> tuple[float, float, float]:
+        self, rng: np.random.Generator, taken: list[tuple[float, float, float]], apart: float
+    ) -> PlanarPose:
         """A place away from those already taken, which it joins.
+
+        Args:
+            rng: Source of random numbers.
+            taken: Places taken: x and y, and how far others are from there at least.
+            apart: Distance from the new place that is kept then.
+
+        Returns:
+            The place.
 
         Raises:
             InvalidParameterError: There is no room for another block.
         """
         for _ in range(TRIES):
             x, y = rng.uniform(*self.block_x), rng.uniform(*self.block_y)
-            if all(math.hypot(x - px, y - py) > 1.4 * GAP for px, py in placed):
-                placed.append((x, y))
+            if all(math.hypot(x - tx, y - ty) > least for tx, ty, least in taken):
+                taken.append((x, y, apart))
                 return x, y, rng.uniform(*self.yaw)
         raise InvalidParameterError(
-            f"the table has no room for {len(placed)} blocks that stand apart from the tower"
+            f"the table has no room for {len(taken)} blocks that stand apart from the tower"
         )
 
 
@@ -157,6 +248,7 @@ class PaperTowerTasks(ArmSettings):
         tower=((0.5, 0.0, 0.0),) * 3,
     )
     timing: str = "tens"
+    step_limit: ClassVar = STEP_LIMIT
 
     def sample(self, _: np.random.Generator) -> Task:
         """The task of the single start state."""

@@ -35,7 +35,7 @@ class Variation:
 
 # What SLAP Fig. 5 varies, by whatever name a domain has for it: fewer and more of each thing.
 OBSTACLES = Variation("obstacles", ("1", "2", "3", "4", "5"))
-TOYS = Variation("toys", ("1", "2", "3", "4"))  # a fifth has hardly any room
+TOYS = Variation("toys", ("1", "2", "3", "4"))
 DISTRACTORS = Variation("distractors", ("0", "1", "2", "3", "4"))
 BYSTANDERS = Variation("bystanders", ("0", "1", "2"))  # a fourth block has hardly any room
 NUMBERS = (OBSTACLES, TOYS, BYSTANDERS, DISTRACTORS)  # what makes tasks harder first
