@@ -53,12 +53,16 @@ demo: install  ## Run the whole ensemble with and without a shortcut, record, re
 	echo "more: \`slap evaluate obstacle2d --preset paper\`: from the paper's start states"
 
 PYTEST := $(abspath $(BIN))/pytest -q -n $(TESTS_AT_ONCE) --dist worksteal
+# No test should wait until motion planning is compiled. Half a second where it is.
+COMPILED := $(BIN)/python -m slap_ros.motion.kernels
 
 test: $(VENV)/.tested lint  ## Check style and types, and run all tests but the slow ones
+	$(COMPILED)
 	$(PYTEST) -m "not slow"
 	cd embedded_ros && $(PYTEST)
 
 test-all: $(VENV)/.tested lint  ## The same with the slow tests, as CI does
+	$(COMPILED)
 	$(PYTEST)
 	cd embedded_ros && $(PYTEST)
 

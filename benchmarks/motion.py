@@ -3,7 +3,8 @@
 """Motion around a tower of three blocks: ``python -m benchmarks.motion [--queries N] [--json]``.
 
 Lengths are control steps; ``straight`` is the bound that the joint limits set, obstacles or not,
-and ``ten a piece`` the timing of the preset ``paper`` on the same paths.
+and ``ten a piece`` the timing of the preset ``paper`` on the same paths. Then each compiled kernel
+beside numpy on the same input, called from Python: microseconds of both, and the ratio.
 """
 
 from __future__ import annotations
@@ -30,6 +31,11 @@ from slap_ros.motion import (
     retime_fixed_steps,
     shifted,
 )
+from slap_ros.motion.backend import Backend, backend
+from slap_ros.motion.joints import RESOLUTION
+from slap_ros.motion.kinematics import matrix
+from slap_ros.motion.numpy_backend import NumpyBackend
+from slap_ros.motion.planning import MAX_SAMPLES, SHORTENING_TRIES
 from slap_ros.worlds.panda import HOME, JOINT_HIGH, JOINT_LOW, Pose, grasp_pose
 
 HALF = (0.025, 0.025, 0.025)  # m, of a block
@@ -84,6 +90,68 @@ def scenes(count: int) -> Iterator[Scene]:
         blocks = [block(foot_x, foot_y, ON_TABLE + 0.05 * i) for i in range(3)]
         yield Scene(blocks, block(x, y), (px, py))
         count -= 1
+
+
+def scenes_of_kernels() -> tuple[CollisionChecker, Joints, Joints]:
+    """A held block between two towers: the checker, and both ends of a motion that needs a tree."""
+    towers = [block(0.45, y, ON_TABLE + 0.05 * i) for y in (0.0, 0.1) for i in range(3)]
+    free = CollisionChecker([TABLE, *towers], held=OrientedBox(Pose(), HALF))
+    middle = np.array((0.0, -0.2, 0.0, -1.9, 0.0, 1.6, 0.8))
+    turn = np.eye(len(middle))[0]
+    return free, middle - 0.5 * turn, middle + 0.6 * turn
+
+
+def measure_kernels(backend: Backend) -> dict[str, float]:
+    """Microseconds of each of a backend's answers, called from Python.
+
+    Args:
+        backend: Compiled code or numpy.
+    """
+    checker, start, goal = scenes_of_kernels()
+    space = backend.free_space(checker.scene)
+    poses = [top_down(0.5, 0.2, 0.2, yaw) for yaw in np.linspace(-1.5, 1.5, 4).tolist()]
+    targets = np.array([matrix(pose) for pose in poses])
+    lift = shifted(grasp_pose(start), (0.0, 0.0, APPROACH))
+    tree = space.rrt_connect(start, goal, np.random.default_rng(0), MAX_SAMPLES, RESOLUTION)
+    assert tree is not None
+
+    def rng() -> np.random.Generator:
+        return np.random.default_rng(0)
+
+    calls: dict[str, Callable[[], object]] = {
+        "frames": lambda: backend.arm_frames(start[None]),
+        "collision": lambda: space.free(start[None]),
+        "collisions of 256": lambda: space.free(np.tile(start, (256, 1))),
+        "line": lambda: space.line_is_free(start, start + 0.1, RESOLUTION),
+        "via point": lambda: space.via_point_path(start, goal, rng(), RESOLUTION),
+        "tree": lambda: space.rrt_connect(start, goal, rng(), MAX_SAMPLES, RESOLUTION),
+        "shortening": lambda: space.shorten(tree, rng(), SHORTENING_TRIES, RESOLUTION),
+        "pruning": lambda: space.straighten(tree, RESOLUTION),
+        "four grasps": lambda: space.nearest_configurations(targets, start),
+        "straight up": lambda: backend.linear_rows(start, lift, 4),
+    }
+    for call in calls.values():
+        call()  # loads it
+    return {name: median_microseconds(call) for name, call in calls.items()}
+
+
+def compare_kernels() -> Figures:
+    """Each kernel: microseconds of compiled code and of numpy, and the ratio."""
+    compiled, plain = measure_kernels(backend()), measure_kernels(NumpyBackend())
+    return {
+        name: {"us": compiled[name], "numpy_us": plain[name], "ratio": plain[name] / compiled[name]}
+        for name in compiled
+    }
+
+
+def median_microseconds(call: Callable[[], object], repetitions: int = 31) -> float:
+    """Median time of a call: other work on the machine matters less than to the mean."""
+    times = []
+    for _ in range(repetitions):
+        start = perf_counter()
+        call()
+        times.append(perf_counter() - start)
+    return float(np.median(times)) * 1e6
 
 
 def microseconds(call: Callable[[], object], repetitions: int = 300) -> float:
@@ -215,6 +283,7 @@ def main() -> None:
         "inverse kinematics": measure_inverse_kinematics(arguments.queries),
         "collisions": measure_collisions(),
         **measure_plans(arguments.queries),
+        **compare_kernels(),
     }
     show(figures, arguments.json)
 

@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 from slap_ros.geometry.pose import ORIGIN, Pose, Vector, conjugate, multiply
+from slap_ros.motion.backend import backend
 from slap_ros.motion.free_space import free_space
 from slap_ros.motion.joints import (
     RESOLUTION,
@@ -24,12 +25,12 @@ from slap_ros.worlds.panda import GraspKinematics, grasp_pose
 
 INCREMENT = 0.0125  # m, between rows of the path: coming down, less than 1 mm off the line
 TURN_INCREMENT = 0.05  # rad
-_HALVINGS = 2  # of an increment
-_ITERATIONS = 8  # of Newton's method, an increment; 3 or 4 are usual
-_CLOSE = 1e-7  # m and rad
-_DAMPING = 1e-4  # m and rad a control step, against singularities
-_DAMPED = _DAMPING**2 * np.eye(6)
-_LARGEST_JUMP = 2.0  # control steps an increment; more is another branch
+HALVINGS = 2  # of an increment
+ITERATIONS = 8  # of Newton's method, an increment; 3 or 4 are usual
+CLOSE = 1e-7  # m and rad
+DAMPING = 1e-4  # m and rad a control step, against singularities
+_DAMPED = DAMPING**2 * np.eye(6)
+LARGEST_JUMP = 2.0  # control steps an increment; more is another branch
 
 
 def shifted(pose: Pose, displacement: tuple[float, float, float]) -> Pose:
@@ -66,16 +67,27 @@ def linear_motion(
     start = grasp_pose(q)
     parts = (math.dist(start.position, target.position) / increment, _angle(start, target))
     count = max(1, math.ceil(max(parts) - 1e-9))
-    path = [q]
+    rows = backend().linear_rows(q, target, count)
+    if rows is None or (free is not None and not free_space(free).path_is_free(rows, resolution)):
+        return None
+    return rows
+
+
+def linear_rows(q: Joints, target: Pose, count: int) -> Path | None:
+    """The path of :func:`linear_motion`, whatever is in its way, by Python.
+
+    Args:
+        q: Configuration to start from, rad, shape (7,).
+        target: Pose of the grasp point in the base's frame.
+        count: Number of increments.
+    """
+    start, path = grasp_pose(q), [q]
     for i in range(1, count + 1):
-        following = _rows(path[-1], start, target, ((i - 1) / count, i / count), _HALVINGS)
+        following = _rows(path[-1], start, target, ((i - 1) / count, i / count), HALVINGS)
         if following is None:
             return None
         path += following
-    rows = np.stack(path)
-    if free is not None and not free_space(free).path_is_free(rows, resolution):
-        return None
-    return rows
+    return np.stack(path)
 
 
 def _angle(start: Pose, target: Pose) -> float:
@@ -85,14 +97,14 @@ def _angle(start: Pose, target: Pose) -> float:
 
 def _on_the_way(start: Pose, target: Pose, fraction: float) -> Pose:
     x, y, z = (a + fraction * (b - a) for a, b in zip(start.position, target.position, strict=True))
-    turn = [fraction * part for part in _rotation_vector(start, target)]
+    turn = [fraction * part for part in rotation_vector(start, target)]
     angle = math.sqrt(sum(part * part for part in turn))
     ax, ay, az = (part * (math.sin(0.5 * angle) / angle if angle else 0.5) for part in turn)
     turned = Pose((0.0, 0.0, 0.0), (ax, ay, az, math.cos(0.5 * angle)))
     return Pose((x, y, z), turned.compose(Pose((0.0, 0.0, 0.0), start.quaternion)).quaternion)
 
 
-def _rotation_vector(start: Pose, target: Pose) -> Vector:
+def rotation_vector(start: Pose, target: Pose) -> Vector:
     """The turn from one orientation to another, rad, along the axes of the base."""
     x, y, z, w = multiply(target.quaternion, conjugate(start.quaternion))
     sine = math.hypot(x, y, z)
@@ -132,12 +144,12 @@ def _rows(
 def _follow(q: Joints, target: Pose) -> Joints | None:
     """The configuration at a nearby pose, by Newton's method in units of control steps."""
     before = q
-    for _ in range(_ITERATIONS):
+    for _ in range(ITERATIONS):
         reach = GraspKinematics(q.tolist())
         offset = (a - b for a, b in zip(target.position, reach.grasp.position, strict=True))
-        error = (*offset, *_rotation_vector(reach.grasp, target))
-        if max(map(abs, error)) < _CLOSE:
-            close = control_steps(before, q) <= _LARGEST_JUMP
+        error = (*offset, *rotation_vector(reach.grasp, target))
+        if max(map(abs, error)) < CLOSE:
+            close = control_steps(before, q) <= LARGEST_JUMP
             return q if close and within_limits(q) else None
         scaled = reach.jacobian() * STEP
         damped = scaled @ scaled.T + _DAMPED

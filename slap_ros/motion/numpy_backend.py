@@ -6,9 +6,11 @@ from __future__ import annotations
 
 from functools import partial
 
+from slap_ros.geometry.pose import Pose
 from slap_ros.motion.collision_scene import CollisionScene
 from slap_ros.motion.free_space import NumpyFreeSpace
-from slap_ros.motion.joints import Array, Joints
+from slap_ros.motion.joints import Array, Joints, Path
+from slap_ros.motion.linear import linear_rows
 from slap_ros.motion.numpy_collision import free_flags
 from slap_ros.motion.numpy_kinematics import arm_frames
 
@@ -23,3 +25,7 @@ class NumpyBackend:
     def free_space(self, scene: CollisionScene) -> NumpyFreeSpace:
         """See :meth:`slap_ros.motion.backend.Backend.free_space`."""
         return NumpyFreeSpace(partial(free_flags, scene))
+
+    def linear_rows(self, q: Joints, target: Pose, count: int) -> Path | None:
+        """See :meth:`slap_ros.motion.backend.Backend.linear_rows`."""
+        return linear_rows(q, target, count)

@@ -1,3 +1,7 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Lets the tests of motion import the scenes that they share."""
+"""Tests of motion begin once it is compiled, which may take longer than a test may."""
+
+from slap_ros.motion.backend import backend
+
+backend()

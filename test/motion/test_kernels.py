@@ -12,10 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slap_ros.geometry.oriented_box import OrientedBox
-from slap_ros.motion import CollisionChecker, MotionPlanningError, plan_path
+from slap_ros.geometry.pose import from_yaw
+from slap_ros.motion import CollisionChecker, MotionPlanningError, plan_path, shifted
+from slap_ros.motion.backend import backend
 from slap_ros.motion.free_space import NumpyFreeSpace
 from slap_ros.motion.joints import RESOLUTION, interpolate
 from slap_ros.motion.kinematics import arm_frames, matrix
+from slap_ros.motion.numpy_backend import NumpyBackend
 from slap_ros.motion.numpy_collision import free_flags
 from slap_ros.motion.numpy_kinematics import arm_frames as numpy_arm_frames
 from slap_ros.portable_math import arccos, arctan2, sin_cos
@@ -85,6 +88,23 @@ def test_inverse_kinematics(seed):
     found = free.space.nearest_configurations(targets, near)
     np.testing.assert_array_equal(found, by_numpy(free).nearest_configurations(targets, near))
     assert np.isnan(found[-1]).all()
+
+
+@settings(max_examples=30, deadline=None)
+@given(SEEDS)
+def test_straight_motions_of_the_hand(seed):
+    """Python has turns as quaternions, so that rounding differs; also near singularities."""
+    rng = np.random.default_rng(seed)
+    for _ in range(5):
+        q = random_configurations(rng, 1)[0]
+        pose = grasp_pose(q)
+        goal = shifted(pose, tuple(rng.uniform(-0.15, 0.15, 3).tolist()))
+        if rng.random() < 0.5:
+            goal = goal.compose(Pose((0.0, 0.0, 0.0), from_yaw(rng.uniform(-2.0, 2.0))))
+        found, expected = (one.linear_rows(q, goal, 7) for one in (backend(), NumpyBackend()))
+        assert (found is None) == (expected is None)
+        if found is not None:
+            np.testing.assert_allclose(found, expected, atol=1e-7)
 
 
 @settings(max_examples=30, deadline=None)

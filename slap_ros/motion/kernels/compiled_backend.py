@@ -9,11 +9,14 @@ import numpy as np
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose
 from slap_ros.motion.collision_scene import CollisionScene, make_scene, moving_shapes
-from slap_ros.motion.joints import RESOLUTION, Array, Joints
+from slap_ros.motion.joints import RESOLUTION, Array, Joints, Path
 from slap_ros.motion.kernels.compilation import compile_once
 from slap_ros.motion.kernels.free_space import CompiledFreeSpace
 from slap_ros.motion.kernels.kinematics import arm_frames
-from slap_ros.worlds.panda import FINGER_OPEN, HOME
+from slap_ros.motion.kernels.linear import rows_to
+from slap_ros.motion.kinematics import matrix
+from slap_ros.motion.linear import rotation_vector
+from slap_ros.worlds.panda import FINGER_OPEN, HOME, grasp_pose
 
 
 class CompiledBackend:
@@ -31,11 +34,20 @@ class CompiledBackend:
         """See :meth:`slap_ros.motion.backend.Backend.free_space`."""
         return CompiledFreeSpace(scene)
 
+    def linear_rows(self, q: Joints, target: Pose, count: int) -> Path | None:
+        """See :meth:`slap_ros.motion.backend.Backend.linear_rows`."""
+        start = grasp_pose(q)
+        shift = np.subtract(target.position, start.position)
+        turn = np.array(rotation_vector(start, target))
+        path = rows_to(np.array(q), matrix(start), shift, turn, count)
+        return path if len(path) else None
+
     def _use(self) -> None:
         """Call every compiled function."""
         start, rng = np.array(HOME), np.random.default_rng(0)
         goal = start + 0.1
         self.arm_frames(start[None])
+        self.linear_rows(start, grasp_pose(goal), 1)
         box = OrientedBox(Pose((0.5, 0.5, 0.5)), (0.1, 0.1, 0.1))
         scene = make_scene(moving_shapes(None, FINGER_OPEN, 0.0, 0.0), [box], True)
         space = self.free_space(scene)

@@ -79,7 +79,7 @@ def _place_nearest(
     for i in range(len(joint7)):
         _place_branches(last, joint7[i], near[0], candidates[i * BRANCHES : (i + 1) * BRANCHES])
     for i in range(len(candidates)):
-        within = _is_within_limits(candidates[i])
+        within = is_within_limits(candidates[i])
         steps[i] = control_steps(near, candidates[i]) if within else np.inf
     while True:
         best = np.argmin(steps)
@@ -92,7 +92,8 @@ def _place_nearest(
 
 
 @inner
-def _is_within_limits(q: Joints) -> bool:
+def is_within_limits(q: Joints) -> bool:
+    """Whether every joint is within its limits; never for NaN."""
     for joint in range(JOINTS):
         if not (q[joint] >= LOW[joint] - ROUNDING and q[joint] <= HIGH[joint] + ROUNDING):
             return False
