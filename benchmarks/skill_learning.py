@@ -68,7 +68,7 @@ def main() -> None:
     arguments = parser.parse_args()
     torch.set_num_threads(1)
     source = source_of(get_domain(arguments.domain))
-    rollouts, fresh = rollouts_from(source, 0), rollouts_from(source, VALIDATION)
+    rollouts, fresh = rollouts_from(source, 0), rollouts_from(source, VALIDATION.first)
     operator = rollouts[0].stages[0].operator
     settings = changed(AcquisitionSettings(), parse_changes(arguments.set, AcquisitionSettings))
     settings = replace(settings, skill_steps=arguments.steps, enough=NEVER)

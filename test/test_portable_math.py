@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from slap_ros.portable_math import RESOLUTION, exp, on_grid, tanh
-from tools.processors import PLAN, RECORDED_RUN, differences
+from tools.processors import PLAN, PROCESSORS, RECORDED_RUN, differences, main
 
 VALUES = np.concatenate([np.linspace(-30.0, 30.0, 20001), [-1e-9, 0.0, 1e-9, -800.0, 800.0]])
 
@@ -26,6 +26,13 @@ def test_values_that_differ_in_their_last_bits_become_equal():
     assert on_grid(values).tobytes() == on_grid(near).tobytes() != values.tobytes()
     assert np.abs(on_grid(values) - values).max() <= RESOLUTION / 2
     assert on_grid(np.array([-1e-17])).tobytes() == np.zeros(1).tobytes()
+
+
+def test_processors_that_are_not_known_are_refused(capsys):
+    with pytest.raises(SystemExit):
+        main(["nehalem", "abacus"])
+    said = " ".join(capsys.readouterr().err.split())
+    assert f"no processor 'abacus'; there are {', '.join(PROCESSORS)}" in said
 
 
 @pytest.mark.slow

@@ -151,13 +151,26 @@ def differences(processors: Sequence[str], figures: Sequence[Figure]) -> Iterato
                 yield Difference(figure.name, name)
 
 
+def _known(processor: str) -> str:
+    """A processor by its name; argparse's own choices refuse the default of many."""
+    if processor not in PROCESSORS:
+        raise argparse.ArgumentTypeError(
+            f"no processor {processor!r}; there are {', '.join(PROCESSORS)}"
+        )
+    return processor
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Compare, and say what differs; 1 if anything does."""
     parser = argparse.ArgumentParser(prog="python -m tools.processors", description=__doc__)
     parser.add_argument(
-        "processor", nargs="*", choices=[*PROCESSORS, []], help="Processors to emulate; all."
+        "processor",
+        nargs="*",
+        type=_known,
+        default=list(PROCESSORS),
+        help=f"Processors to emulate, of {', '.join(PROCESSORS)}. Default: all.",
     )
-    names = parser.parse_args(arguments).processor or list(PROCESSORS)
+    names = parser.parse_args(arguments).processor
     console, found = Console(stderr=True), []
     for figure in track(FIGURES, "figures", console=console):
         found += list(differences(names, [figure]))

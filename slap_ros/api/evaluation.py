@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from slap_ros.api.jobs import some_workers
 from slap_ros.api.left_out import warn_caller
@@ -65,20 +65,14 @@ class TrialRow:
             approach: Name of the way to plan.
             trial: Figures of the task.
         """
+        row = {field.name for field in fields(cls)}
+        figures = {field.name for field in fields(trial)}
         return cls(
-            domain.name,
-            domain.preset,
-            approach,
-            trial.seed,
-            trial.index,
-            trial.success,
-            trial.plan_length,
-            trial.shortcut_steps,
-            trial.planning_seconds,
-            trial.edges_rolled_out,
-            trial.replans,
-            ErrorCode(trial.error_code).name,
-            trial.reason,
+            domain=domain.name,
+            preset=domain.preset,
+            approach=approach,
+            error=ErrorCode(trial.error_code).name,
+            **{name: getattr(trial, name) for name in row & figures},
         )
 
 

@@ -22,11 +22,20 @@ from slap_ros.api.training import training_folder
 from slap_ros.cli.acquisition_bars import AcquisitionBars
 from slap_ros.cli.acquisition_events import AcquisitionEvents
 from slap_ros.cli.console import console, print_json, warn
-from slap_ros.cli.options import Goal, Json, Ray, TrainingSeed
+from slap_ros.cli.options import Goal, Json
 from slap_ros.cli.propose import show_entry
 from slap_ros.cli.proposer_options import ProposerOptions
+from slap_ros.cli.training_options import (
+    Ray,
+    TrainingSeed,
+    WorkFolder,
+    new_library,
+    setting_changes,
+)
 from slap_ros.errors import InvalidParameterError
 from slap_ros.skills.skill_library import SkillLibrary
+
+LIBRARIES = Path("runs/skills")
 
 
 @dataclass(frozen=True)
@@ -34,9 +43,7 @@ class AcquireOptions:
     """What to acquire, how, and where to keep it."""
 
     domain: DomainName
-    output: Annotated[
-        Path | None, typer.Option(help="Folder of the new library. Default: runs/skills/DOMAIN.")
-    ] = None
+    output: Annotated[Path | None, new_library(LIBRARIES)] = None
     preset: Preset = None
     goal: Goal = None
     seed: TrainingSeed = 0
@@ -70,26 +77,14 @@ class AcquireOptions:
     settings: Annotated[
         str, typer.Option(help=f"Networks and SAC: {', '.join(ACQUISITION_SETTINGS)}.")
     ] = "small"
-    set: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=VALUE",
-            help="Change one of the settings, such as sac.gamma=0.99. May be repeated. A wrong "
-            "name lists all names.",
-        ),
-    ] = None
+    set: Annotated[list[str] | None, setting_changes("sac.gamma=0.99")] = None
     steps: Annotated[
         int | None,
         typer.Option(min=1, help="Environment steps of training, all skills together."),
     ] = None
     jobs: Jobs = 2
     ray: Ray = None
-    work: Annotated[
-        Path | None,
-        typer.Option(
-            help="Folder for checkpoints and results. With the same folder again, training goes on."
-        ),
-    ] = None
+    work: WorkFolder = None
     events: Annotated[
         bool,
         typer.Option("--events", help="Print every event on stdout, as one line of JSON."),
@@ -104,7 +99,7 @@ class AcquireOptions:
     @property
     def library_folder(self) -> Path:
         """Where the library is saved."""
-        return self.output or Path("runs/skills") / self.domain
+        return self.output or LIBRARIES / self.domain
 
     def request(self, proposers: ProposerOptions) -> AcquisitionRequest:
         """What is to be acquired.

@@ -104,13 +104,6 @@ Goal = Annotated[
         "such as '(and (On block2 target) (GripperEmpty robot))'."
     ),
 ]
-TrainingSeed = Annotated[
-    int, typer.Option(min=0, callback=at_most(MAX_SEED), help="Seed of all random numbers.")
-]
-Ray = Annotated[
-    str | None,
-    typer.Option(help="Run on Ray instead of in processes: a cluster's address, or local."),
-]
 
 
 def seed_or_default(seed: int | None) -> int:

@@ -14,17 +14,26 @@ from typing import Annotated
 import typer
 from rich.progress import BarColumn, TaskID, TimeRemainingColumn
 
-from slap_ros.api.command_options import DomainName, Preset
+from slap_ros.api.command_options import DomainName, Jobs, Preset
 from slap_ros.api.training import skills_option
 from slap_ros.api.training import train as train_library
 from slap_ros.cli.console import console, print_json
 from slap_ros.cli.learning_bars import LearningBars
-from slap_ros.cli.options import Json, Ray, TrainingSeed
+from slap_ros.cli.options import Json
 from slap_ros.cli.skill_choice import Skills, open_chosen
+from slap_ros.cli.training_options import (
+    Ray,
+    TrainingSeed,
+    WorkFolder,
+    new_library,
+    setting_changes,
+)
 from slap_ros.shortcuts.progress import latest
 from slap_ros.shortcuts.training import CandidateGroup
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 from slap_ros.skills.domain_choice import SHIPPED
+
+LIBRARIES = Path("runs/models")
 
 
 @dataclass(frozen=True)
@@ -32,9 +41,7 @@ class TrainOptions:
     """What to train, how, and where to keep it."""
 
     domain: DomainName
-    output: Annotated[
-        Path | None, typer.Option(help="Folder of the new library. Default: runs/models/DOMAIN.")
-    ] = None
+    output: Annotated[Path | None, new_library(LIBRARIES)] = None
     preset: Preset = None
     skills: Skills = SHIPPED
     seed: TrainingSeed = 0
@@ -45,14 +52,7 @@ class TrainOptions:
             "paper (the paper's), or the name of the domain's own."
         ),
     ] = "ours"
-    set: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=VALUE",
-            help="Change one of the settings, such as exploration.rollouts=16. May be repeated. A "
-            "wrong name lists all names.",
-        ),
-    ] = None
+    set: Annotated[list[str] | None, setting_changes("exploration.rollouts=16")] = None
     steps: Annotated[
         int | None,
         typer.Option(
@@ -61,20 +61,15 @@ class TrainOptions:
             "settings.",
         ),
     ] = None
-    jobs: Annotated[int, typer.Option(min=1, help="Number of processes.")] = 2
+    jobs: Jobs = 2
     ray: Ray = None
-    work: Annotated[
-        Path | None,
-        typer.Option(
-            help="Folder for checkpoints and logs. With the same folder again, training goes on."
-        ),
-    ] = None
+    work: WorkFolder = None
     json: Json = False
 
     @property
     def library_folder(self) -> Path:
         """Where the library is saved."""
-        return self.output or Path("runs/models") / self.domain
+        return self.output or LIBRARIES / self.domain
 
     @property
     def skills_given(self) -> str:

@@ -23,6 +23,32 @@ class Interval:
     high: float
 
 
+@dataclass(frozen=True)
+class SuccessRate:
+    """How many of some trials succeeded.
+
+    Args:
+        successes: Number of trials that succeeded.
+        trials: Number of trials, at least 1.
+    """
+
+    successes: int
+    trials: int
+
+    @property
+    def share(self) -> float:
+        """Share of trials that succeeded, between 0 and 1."""
+        return self.successes / self.trials
+
+    @property
+    def interval(self) -> Interval:
+        """Wilson's 95 % interval of the share."""
+        return wilson_interval(self.successes, self.trials)
+
+    def __str__(self) -> str:
+        return f"{self.share:.0%} [{self.interval.low:.0%}, {self.interval.high:.0%}]"
+
+
 def wilson_interval(successes: int, trials: int) -> Interval:
     """Wilson's 95 % score interval of a success rate.
 

@@ -15,6 +15,7 @@ from time import sleep
 from typing import Any, Protocol, TypeVar
 
 from slap_ros.errors import InvalidParameterError
+from slap_ros.learning.progress_callback import ProgressCallback
 from slap_ros.signals import signals_held_back
 
 Result = TypeVar("Result")
@@ -155,7 +156,8 @@ def run_in_order(
     workers: Workers,
     function: Callable[..., Result],
     jobs: Sequence[tuple[Any, ...]],
-    on_progress: Callable[[int, int], None],
+    what: str,
+    callback: ProgressCallback,
 ) -> list[Result]:
     """Run a function once per job, wherever and in whichever order they end.
 
@@ -163,15 +165,15 @@ def run_in_order(
         workers: Workers that run the jobs.
         function: Function to run; importable by its name, for other processes.
         jobs: Arguments of the function, one tuple per job.
-        on_progress: Function that is called with the number of jobs done and of all: before the
-            first, after each.
+        what: Name of the step that the jobs are, in words.
+        callback: Callback that is told before the first job and after each.
 
     Returns:
         The results in the order of the jobs.
     """
     results: dict[int, Result] = {}
-    on_progress(0, len(jobs))
+    callback.on_progress(what, 0, len(jobs))
     for number, result in workers.run(function, jobs):
         results[number] = result
-        on_progress(len(results), len(jobs))
+        callback.on_progress(what, len(results), len(jobs))
     return [results[number] for number in sorted(results)]

@@ -15,6 +15,7 @@ import numpy as np
 from slap_ros.errors import PlanningLimitError, SlapError, UnsolvableError
 from slap_ros.learning.subproc_vec_env import make_vec_env
 from slap_ros.learning.task_distribution import TaskDistribution
+from slap_ros.learning.task_range import TaskRange
 from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.problem import Problem
 from slap_ros.shortcuts.explore import Explorer, OperatorPath
@@ -32,7 +33,9 @@ if TYPE_CHECKING:
     from slap_ros.shortcuts.ppo import Learner
 
 WARM_UP = 64  # random steps in each environment, from which observations are normalised
-EXPLORATION, STARTS, VALIDATION = 0, 10_000, 90_000  # first task index of each use
+EXPLORATION = TaskRange("exploration", 0, 10_000)
+STARTS = TaskRange("starts", 10_000, 90_000)
+VALIDATION = TaskRange("validation", 90_000)
 
 
 def explore(
@@ -42,7 +45,7 @@ def explore(
 
     Args:
         distribution: Distribution from which the task is drawn.
-        index: Index of the task.
+        index: Index of the task among those that are explored, from 0.
         settings: Settings of exploration.
 
     Returns:
@@ -53,9 +56,9 @@ def explore(
         PlanningLimitError: A limit was reached before a plan was found.
     """
     began = process_time()
-    rng = np.random.default_rng([distribution.seed, EXPLORATION, index])
+    rng = np.random.default_rng([distribution.seed, EXPLORATION.first, index])
     explorer = Explorer.of_task(
-        distribution.make_domain(), distribution.task_seed, index, settings, rng
+        distribution.make_domain(), distribution.task_seed, EXPLORATION.index(index), settings, rng
     )
     return {**explorer.explore().as_json(), "cpu_s": process_time() - began}
 
@@ -98,7 +101,7 @@ def start(
     found = find_start(
         distribution.make_domain(),
         distribution.task_seed,
-        STARTS + index,
+        STARTS.index(index),
         signature,
         operator_path,
         operator_steps,
@@ -121,7 +124,7 @@ def plan_length(
         Environment steps of the plan in the model; or why there is none, in words.
     """
     domain = distribution.make_domain()
-    task = domain.task(distribution.task_seed, VALIDATION + index)
+    task = domain.task(distribution.task_seed, VALIDATION.index(index))
     problem, initial = Problem.of(domain, task.initial_state), task.initial_state
     grounded = GroundedShortcuts(domain, shortcuts, initial, sampling) if shortcuts else None
     planner = GraphPlanner(problem, shortcuts=grounded)

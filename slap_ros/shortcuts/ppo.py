@@ -60,7 +60,7 @@ class _NormalisedVecEnv(StableBaselinesVecEnv):
         )
 
 
-class _ProgressCallback(BaseCallback):
+class _RolloutCallback(BaseCallback):
     """Reports after each rollout, and stops when the answer is no."""
 
     def __init__(self, env: _NormalisedVecEnv, report: Callable[[Progress], bool]) -> None:
@@ -143,7 +143,7 @@ class Learner:
         """
         if logs is not None:
             self._ppo.set_logger(configure(str(logs), ["tensorboard"]))
-        callback = _ProgressCallback(self._env, report)
+        callback = _RolloutCallback(self._env, report)
         steps = self.settings.total_steps - self._ppo.num_timesteps
         if steps > 0:
             self._ppo.learn(steps, callback=callback, reset_num_timesteps=False)

@@ -11,14 +11,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from statistics import fmean
 from typing import Any, Protocol, TypeVar
 
 from slap_ros.errors import UnsolvableError
+from slap_ros.learning.progress_callback import ProgressCallback
 from slap_ros.learning.random_goals import RandomGoalsChoice
 from slap_ros.learning.task_distribution import TaskDistribution
+from slap_ros.learning.task_range import TaskRange
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.learning.workers import Workers, run_in_order
 from slap_ros.shortcuts import jobs
@@ -36,18 +37,8 @@ Result = TypeVar("Result")
 UNRECORDED = "why was not recorded"  # in work folders of version 0.1.0
 
 
-class TrainingCallback(Protocol):
+class TrainingCallback(ProgressCallback, Protocol):
     """Receives the events of a training."""
-
-    def on_progress(self, what: str, done: int, total: int) -> None:
-        """Some of a step's jobs are done.
-
-        Args:
-            what: Name of the step, in words.
-            done: Number of jobs done so far; 0 as the step begins.
-            total: Number of jobs of the step.
-        """
-        ...
 
     def on_left_out(self, use: str, index: int, reason: str) -> None:
         """A task has no plan, and training goes on without it.
@@ -194,9 +185,11 @@ class Training:
 
         Raises:
             ChildProcessError: A process that stepped environments has ended.
-            InvalidParameterError: The folder has a training with other settings, or is damaged.
+            InvalidParameterError: The folder has a training with other settings, or is damaged; or
+                the settings want more tasks than there are for a use.
             UnsolvableError: No validation task has a plan, or no task to be explored has one.
         """
+        self._require_tasks()
         self._require_same_settings()
         length = baseline = self._validate_without()
         explored = self._explore()
@@ -279,19 +272,24 @@ class Training:
             lambda data: [ExplorationResult.from_json(result) for result in data],
         )
 
+    def _require_tasks(self) -> None:
+        """Refuse settings with so many tasks that some would have two uses."""
+        jobs.EXPLORATION.batch(0, self.settings.exploration.tasks)
+        jobs.STARTS.batch(0, self.settings.starts)
+        jobs.VALIDATION.batch(0, self.settings.validation)
+
     def _explore_what_can_be(self) -> list[Any]:
         tasks = self.settings.exploration.tasks
         work = [(self._any_goal, i, self.settings.exploration) for i in range(tasks)]
         found = self._run("exploring tasks", jobs.try_to_explore, work)
-        self._leave_out("exploration", jobs.EXPLORATION, found)
+        self._leave_out(jobs.EXPLORATION, found)
         return [result for result in found if not isinstance(result, str)]
 
-    def _leave_out(self, use: str, first: int, found: Sequence[Any]) -> None:
+    def _leave_out(self, tasks: TaskRange, found: Sequence[Any]) -> None:
         """Report the tasks that have no plan, and why.
 
         Args:
-            use: Purpose of the tasks: validation or exploration.
-            first: Index of the first of these tasks.
+            tasks: Range of the tasks: for validation, or for exploration.
             found: Result of each task, or why there is none, in words.
 
         Raises:
@@ -299,20 +297,20 @@ class Training:
         """
         reasons = {i: reason for i, reason in enumerate(found) if isinstance(reason, str)}
         for i, reason in reasons.items():
-            self.callback.on_left_out(use, first + i, reason)
+            self.callback.on_left_out(tasks.use, tasks.index(i), reason)
         if len(reasons) == len(found):
             domain = self.distribution.domain
             raise UnsolvableError(
-                f"none of {len(found)} tasks for {use} has a plan, so there is nothing to shorten. "
-                f"The first: {reasons[0]}. `slap plan {domain.name} --preset "
-                f"{domain.preset} --seed {self.distribution.task_seed} --index {first}` "
+                f"none of {len(found)} tasks for {tasks.use} has a plan, so there is nothing to "
+                f"shorten. The first: {reasons[0]}. `slap plan {domain.name} --preset "
+                f"{domain.preset} --seed {self.distribution.task_seed} --index {tasks.first}` "
                 "plans for it"
             )
 
     def _validate_without(self) -> float:
         """Mean plan length without shortcuts; validation tasks without a plan are left out."""
         lengths = self._plan(range(self.settings.validation), ())
-        self._leave_out("validation", jobs.VALIDATION, lengths)
+        self._leave_out(jobs.VALIDATION, lengths)
         solved = {i: length for i, length in enumerate(lengths) if isinstance(length, int)}
         self._validation = list(solved)
         return fmean(solved.values())
@@ -390,8 +388,7 @@ class Training:
 
     def _run(self, what: str, function: Any, work: Sequence[tuple[Any, ...]]) -> list[Any]:
         """The results of a step's jobs, in their order."""
-        report = partial(self.callback.on_progress, what)
-        return run_in_order(self.workers, function, work, report)
+        return run_in_order(self.workers, function, work, what, self.callback)
 
     def _record(
         self, explored: Sequence[ExplorationResult], baseline: float, length: float

@@ -98,20 +98,16 @@ def front_table(results: Path) -> MarkdownTable:
     """
     return MarkdownTable(
         ("", "pure planning [steps]", "SLAP [steps]", "relative [95 %]", "the paper's [steps]"),
-        [[name, *_compared(results / f"table1_{key}.json", key)] for key, name in DOMAINS.items()],
+        [[name, *_compared(key, results)] for key, name in DOMAINS.items()],
     )
 
 
-def _compared(path: Path, domain: str) -> list[str]:
-    if not path.exists():
+def _compared(domain: str, results: Path) -> list[str]:
+    fair = _under("fair", domain, results)
+    if not {"pure_planning", "slap"} <= fair.keys():
         raise InvalidParameterError(
-            f"no data in {path.parent}; make it with `slap study table1 {domain}`"
+            f"no data in {results}; make it with `slap study table1 {domain}`"
         )
-    fair = {
-        row["approach"]: row
-        for row in parse_json(read_text(path))["found"]["rows"]
-        if row["preset"] == "fair"
-    }
     pure, slap = fair["pure_planning"], fair["slap"]
     papers = THE_PAPERS[domain]
     mean = {approach: length.split(" ")[0] for approach, length in papers.items()}
@@ -136,17 +132,28 @@ def preset_table(results: Path) -> MarkdownTable:
     """How plans with all samples compare with pure planning under the preset ``paper``."""
     return MarkdownTable(
         ("", "relative length, all samples", "libraries", "tasks"),
-        [[name, *_under_paper(results / f"table1_{key}.json")] for key, name in DOMAINS.items()],
+        [[name, *_under_paper(key, results)] for key, name in DOMAINS.items()],
     )
 
 
-def _under_paper(path: Path) -> list[str]:
-    rows = parse_json(read_text(path))["found"]["rows"] if path.exists() else []
-    for row in rows:
-        if (row["preset"], row["approach"]) == ("paper", "slap"):
-            length = _with_interval(row["relative_length"], None)
-            return [length, f"{len(row['libraries'])}", f"{row['tasks']}"]
-    return [NOT_MEASURED, "", ""]
+def _under_paper(domain: str, results: Path) -> list[str]:
+    row = _under("paper", domain, results).get("slap")
+    if row is None:
+        return [NOT_MEASURED, "", ""]
+    length = _with_interval(row["relative_length"], None)
+    return [length, f"{len(row['libraries'])}", f"{row['tasks']}"]
+
+
+def _under(preset: str, domain: str, results: Path) -> dict[str, dict[str, Any]]:
+    """Rows of ``slap study table1`` under a preset, by approach."""
+    rows = _table1(domain, results)
+    return {row["approach"]: row for row in rows if row["preset"] == preset}
+
+
+def _table1(domain: str, results: Path) -> list[dict[str, Any]]:
+    """All rows of ``slap study table1`` for a domain; none where there is no data."""
+    path = results / f"table1_{domain}.json"
+    return list(parse_json(read_text(path))["found"]["rows"]) if path.exists() else []
 
 
 def skill_table(results: Path) -> MarkdownTable:
@@ -238,11 +245,8 @@ def _trainings(domain: str) -> list[dict[str, Any]]:
 
 
 def _rows(domain: str, results: Path) -> Iterator[list[str]]:
-    path = results / f"table1_{domain}.json"
-    if not path.exists():
-        return
     shown_domain, shown_preset = "", ""
-    for row in parse_json(read_text(path))["found"]["rows"]:
+    for row in _table1(domain, results):
         name = DOMAINS[domain]
         preset = f"`{row['preset']}`"
         yield [

@@ -31,7 +31,9 @@ def starts(first):
 
 
 def job(folder, settings=SETTINGS):
-    return jobs.LearningJob(SOURCE, "Pick", 0, starts(0), starts(VALIDATION), settings, folder)
+    return jobs.LearningJob(
+        SOURCE, "Pick", 0, starts(0), starts(VALIDATION.first), settings, folder
+    )
 
 
 def files(folder):

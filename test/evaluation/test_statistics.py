@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 
-from slap_ros.evaluation.statistics import ratio_interval, wilson_interval
+from slap_ros.evaluation.statistics import SuccessRate, ratio_interval, wilson_interval
 
 
 @pytest.mark.parametrize(
@@ -20,6 +20,9 @@ from slap_ros.evaluation.statistics import ratio_interval, wilson_interval
 def test_success_rates_as_published(successes, trials, low, high):
     interval = wilson_interval(successes, trials)
     assert (round(interval.low, 4), round(interval.high, 4)) == (low, high)
+    rate = SuccessRate(successes, trials)
+    assert (rate.share, rate.interval) == (successes / trials, interval)
+    assert str(rate) == f"{successes / trials:.0%} [{interval.low:.0%}, {interval.high:.0%}]"
 
 
 def test_all_and_none_are_each_others_mirror():

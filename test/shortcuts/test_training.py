@@ -88,6 +88,20 @@ def snapshots_in(folder):
     return {steps: one.policy.layers[0][0].tobytes() for steps, one in taken.items()}
 
 
+@pytest.mark.parametrize(
+    "settings",
+    [
+        replace(SMALL, exploration=replace(SMALL.exploration, tasks=10_001)),
+        replace(SMALL, starts=80_001),
+        replace(SMALL, validation=2**32),
+    ],
+)
+def test_tasks_with_two_uses_are_refused_at_once(tmp_path, settings):
+    with pytest.raises(InvalidParameterError, match="choose settings with fewer"):
+        train(tmp_path / "work", settings)
+    assert not (tmp_path / "work").exists()
+
+
 def test_pushing_is_discovered_learned_and_worth_it_and_twice_the_same(tmp_path):
     library, callback = train(tmp_path / "work")
     ((name, before, after, kept),) = callback.verdicts

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from ensemble.cli.application import app
 from slap_ros.domains import get_domain
-from slap_ros.errors import ErrorCode
+from slap_ros.errors import ErrorCode, InvalidParameterError
 from slap_ros.policies.shipped_models import shipped_with_siblings
 from slap_ros.shortcuts.shipped import shipped_libraries, shipped_library
 from slap_ros.shortcuts.shortcut_library import load_library
@@ -200,3 +200,19 @@ def test_a_page_is_left_as_it_is_where_a_table_cannot_be_made(tmp_path, page, sa
     assert result.exit_code == ErrorCode.INVALID_PARAMETER
     assert said in " ".join(result.stderr.split())
     assert path.read_text() == page
+
+
+def test_the_table_of_the_front_page_wants_data_of_its_preset(tmp_path):
+    """A study of other presets, or of pure planning alone, is not enough, and is no crash."""
+    name = "table1_obstacle2d.json"
+    data = json.loads((PUBLISHED / name).read_text(encoding="utf-8"))
+    rows = data["found"]["rows"]
+    page = "<!-- slap: slap study readme -->\n<!-- end -->\n"
+    for some in (
+        [row for row in rows if row["preset"] != "fair"],
+        [row for row in rows if row["approach"] == "pure_planning"],
+    ):
+        assert some
+        (tmp_path / name).write_text(json.dumps({"found": {"rows": some}}), encoding="utf-8")
+        with pytest.raises(InvalidParameterError, match="slap study table1 obstacle2d"):
+            with_tables(page, tmp_path)

@@ -22,7 +22,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from statistics import fmean
 from typing import Any
@@ -41,7 +40,7 @@ from slap_ros.acquisition.curriculum.skill_selection import (
     SkillSelection,
     select_skills,
 )
-from slap_ros.acquisition.curriculum.task_source import TaskSource, fresh_tasks, training_tasks
+from slap_ros.acquisition.curriculum.task_source import ROLLOUTS, VALIDATION, TaskSource
 from slap_ros.acquisition.training.retrieval import METRICS, MetricSignatureEncoder, SkillEncoder
 from slap_ros.acquisition.training.settings import AcquisitionSettings
 from slap_ros.acquisition.training.warm_start import WarmStarts
@@ -115,14 +114,14 @@ class Curriculum:
         Returns:
             Why the curriculum is over; empty where it is not.
         """
-        tasks = training_tasks(iteration, self.settings.rollouts)
+        tasks = ROLLOUTS.batch(iteration, self.settings.rollouts)
         rollouts = self._roll_out(iteration, "rollouts", tasks, state)
         require_plans(rollouts, self.source)
         state.task_progress.append(fmean(rollout.progress for rollout in rollouts))
         self.callback.on_rollouts(iteration, rollouts)
         if over := self._why_over(rollouts, state):
             return over
-        unseen = fresh_tasks(iteration, self.settings.validation)
+        unseen = VALIDATION.batch(iteration, self.settings.validation)
         fresh = self._roll_out(iteration, "fresh", unseen, state)
         selection = select_skills(rollouts, state, self.settings)
         state.not_trained = dict(selection.not_trained)
@@ -222,7 +221,7 @@ class Curriculum:
 
     def _library(self, ended: str, iteration: int, state: CurriculumState) -> SkillLibrary:
         """The library of the skills that were learned, and of those that were kept."""
-        unseen = fresh_tasks(iteration, self.settings.validation)
+        unseen = VALIDATION.batch(iteration, self.settings.validation)
         fresh = self._roll_out(iteration, "final", unseen, state)
         vacuity = self._vacuity(state.learned, fresh)
         skills = [skill for name, skill in self._kept.items() if name not in state.learned]
@@ -262,8 +261,7 @@ class Curriculum:
     def _run(
         self, what: str, function: Callable[..., dict[str, Any]], work: Sequence[tuple[Any, ...]]
     ) -> list[dict[str, Any]]:
-        report = partial(self.callback.on_progress, what)
-        return run_in_order(self.workers, function, work, report)
+        return run_in_order(self.workers, function, work, what, self.callback)
 
 
 def require_plans(rollouts: Sequence[PlanRollout], source: TaskSource) -> None:

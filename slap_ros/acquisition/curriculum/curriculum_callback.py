@@ -13,6 +13,7 @@ from slap_ros.acquisition.curriculum.dead_ends import DeadEnd
 from slap_ros.acquisition.curriculum.jobs import LearningJob
 from slap_ros.acquisition.curriculum.rollouts import PlanRollout
 from slap_ros.acquisition.training.skill_training import Round, rounds_in
+from slap_ros.learning.progress_callback import ProgressCallback
 
 
 @dataclass(frozen=True)
@@ -49,18 +50,8 @@ class OngoingRound:
         return rounds[self.number] if self.number < len(rounds) else None
 
 
-class CurriculumCallback(Protocol):
+class CurriculumCallback(ProgressCallback, Protocol):
     """Receives the events of a curriculum."""
-
-    def on_progress(self, what: str, done: int, total: int) -> None:
-        """Some of a step's jobs are done.
-
-        Args:
-            what: Name of the step, in words.
-            done: Number of jobs done so far; 0 as the step begins.
-            total: Number of jobs of the step.
-        """
-        ...
 
     def on_rollouts(self, iteration: int, rollouts: Sequence[PlanRollout]) -> None:
         """Plans were carried out.

@@ -13,11 +13,16 @@ from typing import Any
 from slap_ros.core import Domain, Task
 from slap_ros.core.goals import task_with_goal
 from slap_ros.learning.task_distribution import TRAINING_SEED
+from slap_ros.learning.task_range import TaskRange
 from slap_ros.relational import LiftedOperator, RewardTemplate
 from slap_ros.skills.domain_choice import NO_SKILLS, DomainChoice
 from slap_ros.skills.operator_json import operator_data, read_operator, read_template, template_data
 
-ROLLOUTS, VALIDATION = 0, 900_000  # first task index of each use
+# Tasks that plans are carried out in, other ones in each iteration.
+ROLLOUTS = TaskRange("rollouts", 0, 900_000)
+# Tasks that skills are judged on, none of which is trained on. They are other ones in each
+# iteration, too: else a checkpoint that was lucky with them would stay for good.
+VALIDATION = TaskRange("validation", 900_000)
 
 
 @dataclass(frozen=True)
@@ -83,25 +88,6 @@ class TaskSource:
             "seed": self.seed,
             "proposal": json.loads(self.proposal),
         }
-
-
-def training_tasks(iteration: int, count: int) -> range:
-    """Indices of the tasks that an iteration carries out plans in: others in each."""
-    return _tasks_of(iteration, count, ROLLOUTS)
-
-
-def fresh_tasks(iteration: int, count: int) -> range:
-    """Indices of the tasks that an iteration judges skills on: others in each, none trained on.
-
-    Were they the same in each, a checkpoint that was lucky with them would stay for good.
-    """
-    return _tasks_of(iteration, count, VALIDATION)
-
-
-def _tasks_of(iteration: int, count: int, use: int) -> range:
-    """An iteration's indices, from those of a use."""
-    first = use + iteration * count
-    return range(first, first + count)
 
 
 @lru_cache(maxsize=64)

@@ -17,16 +17,16 @@ from slap_ros.api.left_out import Tell
 from slap_ros.core.goals import task_with_goal
 from slap_ros.domains import get_domain
 from slap_ros.drawing.palette import MUTED
-from slap_ros.evaluation.statistics import Interval, wilson_interval
+from slap_ros.evaluation.statistics import SuccessRate
 from slap_ros.evaluation.summary import Spread
 from slap_ros.skills.domain_choice import DomainChoice, chosen_skills, open_domain
 from slap_ros.skills.skill import LearnedSkill
 from slap_ros.studies.comparison import format_spread
-from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.lg_sail.domain_choices import GoalNames, all_goals, shipped_skills
 from slap_ros.studies.options import FRESH_SEED, RESULTS, FreshSeed, Output
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
+from slap_ros.studies.row_figures import name_rows, plot_each, plot_whole
 from slap_ros.studies.study import PaperFigure, PreparedStudy, Study
 
 if TYPE_CHECKING:
@@ -133,10 +133,10 @@ class GoalProgress:
         return Spread.of([library.progress for library in self.libraries])
 
     @property
-    def solved(self) -> Interval:
-        """Wilson's interval of the share of tasks whose stages were all done."""
+    def solved(self) -> SuccessRate:
+        """Share of the tasks whose stages were all done."""
         done = sum(rollout.progress == 1.0 for rollout in self.rollouts)
-        return wilson_interval(done, len(self.rollouts))
+        return SuccessRate(done, len(self.rollouts))
 
     @property
     def paper(self) -> float | None:
@@ -149,21 +149,20 @@ class GoalProgress:
             "goal": self.goal,
             **self.origin._asdict(),
             "progress": asdict(self.progress),
-            "solved_interval": asdict(self.solved),
+            "solved_interval": asdict(self.solved.interval),
             "paper": self.paper,
             "libraries": [library.as_json() for library in self.libraries],
         }
 
     def as_row(self) -> list[str]:
         """Row of a table."""
-        done = sum(rollout.progress == 1.0 for rollout in self.rollouts)
         failures = sum((library.failures for library in self.libraries), Counter[str]())
         return [
             self.goal or "(the task's own)",
             ", ".join(self.origin),
             f"{len(self.libraries)} × {len(self.libraries[0].rollouts)}",
             format_spread(self.progress, 2),
-            f"{done / len(self.rollouts):.0%} [{self.solved.low:.0%}, {self.solved.high:.0%}]",
+            str(self.solved),
             ", ".join(f"{name} {count}" for name, count in failures.most_common()) or "none",
             "" if self.paper is None else f"{self.paper:.2f}",
         ]
@@ -261,14 +260,11 @@ def draw(figure: Figure, goals: Sequence[GoalProgress]) -> None:
     """Draw every library's task progress, their mean, and the paper's."""
     axes = figure.subplots()
     for place, goal in enumerate(goals):
-        each = [library.progress for library in goal.libraries]
-        axes.plot(each, [place] * len(each), "|", color=LINES[0], markersize=9)
-        axes.plot([goal.progress.mean], [place], "o", color=LINES[0], markersize=5)
+        plot_each(axes, place, [library.progress for library in goal.libraries])
+        plot_whole(axes, place, goal.progress.mean)
         if goal.paper is not None:
             axes.plot([goal.paper], [place], "D", color=MUTED, markersize=5, fillstyle="none")
-    names = [f"{goal.goal or 'own goal'}: {', '.join(goal.origin)}" for goal in goals]
-    axes.set_yticks(range(len(goals)), names)
-    axes.set_ylim(len(goals) - 0.5, -0.5)
+    name_rows(axes, [f"{goal.goal or 'own goal'}: {', '.join(goal.origin)}" for goal in goals])
     axes.set_xlim(-0.03, 1.03)
     axes.set_xlabel("task progress: each library, their mean (dot), the paper's (diamond)")
 

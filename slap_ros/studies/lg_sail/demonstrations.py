@@ -11,17 +11,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from slap_ros.api.command_options import CommandOption, DomainName, Jobs, Preset
 from slap_ros.api.left_out import Tell
-from slap_ros.drawing.palette import MUTED
-from slap_ros.evaluation.statistics import Interval, wilson_interval
+from slap_ros.evaluation.statistics import SuccessRate
 from slap_ros.evaluation.summary import Spread
 from slap_ros.skills.demonstrator import demonstrate
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.studies.comparison import format_spread, not_solved, spread_of
-from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.lg_sail.domain_choices import GoalNames, all_goals, with_demonstrator
 from slap_ros.studies.options import FRESH_SEED, RESULTS, FreshSeed, Output
 from slap_ros.studies.results import MarkdownTable, StudyReport
+from slap_ros.studies.row_figures import name_rows, plot_each, plot_interval, plot_whole
 from slap_ros.studies.study import PreparedStudy, Study
 
 if TYPE_CHECKING:
@@ -70,19 +69,9 @@ class GoalDemonstrations:
     tasks: tuple[DemonstratedTask, ...]
 
     @property
-    def solved(self) -> int:
-        """Tasks whose goal was reached."""
-        return sum(task.success for task in self.tasks)
-
-    @property
-    def rate(self) -> float:
-        """The share of solved tasks."""
-        return self.solved / len(self.tasks)
-
-    @property
-    def interval(self) -> Interval:
-        """Wilson's interval of the rate."""
-        return wilson_interval(self.solved, len(self.tasks))
+    def solved(self) -> SuccessRate:
+        """Share of the tasks whose goal was reached."""
+        return SuccessRate(sum(task.success for task in self.tasks), len(self.tasks))
 
     @property
     def steps(self) -> Spread | None:
@@ -108,8 +97,8 @@ class GoalDemonstrations:
         """The summary and every task."""
         return {
             "goal": self.goal,
-            "success_rate": self.rate,
-            "success_interval": asdict(self.interval),
+            "success_rate": self.solved.share,
+            "success_interval": asdict(self.solved.interval),
             "steps": asdict(self.steps) if self.steps else None,
             "replans": asdict(self.replans),
             "options": {
@@ -129,8 +118,8 @@ class GoalDemonstrations:
         return [
             self.goal or "(the task's own)",
             str(len(self.tasks)),
-            f"{self.rate:.0%}",
-            f"{self.interval.low:.0%} to {self.interval.high:.0%}",
+            f"{self.solved.share:.0%}",
+            f"{self.solved.interval.low:.0%} to {self.solved.interval.high:.0%}",
             format_spread(self.steps, 0),
             format_spread(self.replans, 2),
             ", ".join(failures) or "none",
@@ -225,15 +214,11 @@ def demonstrate_task(choice: DomainChoice, goal: str, seed: int, index: int) -> 
 def draw(figure: Figure, goals: Sequence[GoalDemonstrations]) -> None:
     """Draw success with its interval, and the steps of every solved task."""
     success, steps = figure.subplots(1, 2, sharey=True)
-    places = range(len(goals))
-    for place, goal in zip(places, goals, strict=True):
-        low, high = goal.interval.low, goal.interval.high
-        success.plot([100 * low, 100 * high], [place, place], color=MUTED, linewidth=1)
-        success.plot([100 * goal.rate], [place], "o", color=LINES[0], markersize=5)
-        solved = [task.steps for task in goal.tasks if task.success]
-        steps.plot(solved, [place] * len(solved), "|", color=LINES[0], markersize=9)
-    success.set_yticks(places, [goal.goal or "task's own" for goal in goals])
-    success.set_ylim(len(goals) - 0.5, -0.5)
+    for place, goal in enumerate(goals):
+        plot_interval(success, place, goal.solved.interval)
+        plot_whole(success, place, 100 * goal.solved.share)
+        plot_each(steps, place, [task.steps for task in goal.tasks if task.success])
+    name_rows(success, [goal.goal or "task's own" for goal in goals])
     success.set_xlim(-3, 103)
     success.set_xlabel("success [%], with 95 % interval")
     steps.set_xlim(left=0)

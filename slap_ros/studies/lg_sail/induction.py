@@ -32,6 +32,7 @@ from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.lg_sail.domain_choices import with_demonstrator
 from slap_ros.studies.options import FRESH_SEED, RESULTS, FreshSeed, Output
 from slap_ros.studies.results import MarkdownTable, StudyReport
+from slap_ros.studies.row_figures import name_rows
 from slap_ros.studies.study import PreparedStudy, Study
 
 if TYPE_CHECKING:
@@ -294,8 +295,7 @@ def draw(figure: Figure, found: Sequence[Induction]) -> None:
         name = f"{one.demonstrations} demonstration{'s' * (one.demonstrations > 1)}"
         axes.plot(shares, places, "o", color=LINES[number % len(LINES)], label=name)
     axes.axvline(100, color=MUTED, linewidth=1)
-    axes.set_yticks(range(len(goals)), goals)
-    axes.set_ylim(len(goals) - 0.5, -0.5)
+    name_rows(axes, goals)
     axes.set_xlim(-3, 103)
     axes.set_xlabel("tasks with a plan as short as with hand-written operators [%]")
     figure.legend(loc="outside upper center", ncols=len(found))

@@ -14,16 +14,14 @@ from slap_ros.api.command_options import CommandOption, DomainName, Jobs, Preset
 from slap_ros.api.left_out import Tell
 from slap_ros.api.opening import open_chosen
 from slap_ros.domains import get_domain
-from slap_ros.drawing.palette import MUTED
 from slap_ros.errors import ErrorCode
 from slap_ros.evaluation.approaches import PURE_PLANNING
 from slap_ros.evaluation.experiment import Experiment, Trial, task_job, try_task
-from slap_ros.evaluation.statistics import Interval, wilson_interval
+from slap_ros.evaluation.statistics import SuccessRate
 from slap_ros.evaluation.summary import Spread
 from slap_ros.planning.execution import MAX_REPLANS
 from slap_ros.skills.domain_choice import DomainChoice, chosen_skills
 from slap_ros.studies.comparison import format_spread, named_tasks, not_solved, spread_of
-from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.lg_sail.domain_choices import (
     GoalNames,
@@ -33,6 +31,7 @@ from slap_ros.studies.lg_sail.domain_choices import (
 )
 from slap_ros.studies.options import FRESH_SEED, RESULTS, FreshSeed, Output
 from slap_ros.studies.results import MarkdownTable, StudyReport
+from slap_ros.studies.row_figures import name_rows, plot_each, plot_interval, plot_whole
 from slap_ros.studies.study import PreparedStudy, Study
 
 if TYPE_CHECKING:
@@ -117,19 +116,9 @@ class ReplanningRow:
         return f"seed{plural} {', '.join(str(library.seed) for library in self.libraries)}"
 
     @property
-    def solved(self) -> int:
-        """Tasks whose goal was reached."""
-        return sum(trial.success for trial in self.trials)
-
-    @property
-    def rate(self) -> float:
-        """The share of solved tasks."""
-        return self.solved / len(self.trials)
-
-    @property
-    def interval(self) -> Interval:
-        """Wilson's interval of the rate."""
-        return wilson_interval(self.solved, len(self.trials))
+    def solved(self) -> SuccessRate:
+        """Share of the tasks whose goal was reached."""
+        return SuccessRate(sum(trial.success for trial in self.trials), len(self.trials))
 
     @property
     def replans(self) -> Spread:
@@ -152,8 +141,8 @@ class ReplanningRow:
         return {
             "goal": self.goal,
             "tasks": len(self.trials),
-            "success_rate": self.rate,
-            "success_interval": asdict(self.interval),
+            "success_rate": self.solved.share,
+            "success_interval": asdict(self.solved.interval),
             "replans": asdict(self.replans),
             "replanned": sum(trial.replans > 0 for trial in self.trials),
             "steps": asdict(self.steps) if self.steps else None,
@@ -169,7 +158,7 @@ class ReplanningRow:
             self.goal or "(the task's own)",
             self.seeds,
             f"{len(self.libraries)} × {tasks}",
-            f"{self.rate:.0%} [{self.interval.low:.0%}, {self.interval.high:.0%}]",
+            str(self.solved),
             format_spread(self.replans, 2),
             format_spread(self.steps, 0),
             ", ".join(failures) or "none",
@@ -232,13 +221,10 @@ def draw(figure: Figure, goals: Sequence[ReplanningRow]) -> None:
     """Draw success with its interval, and that of each library."""
     axes = figure.subplots()
     for place, goal in enumerate(goals):
-        each = [100 * library.rate for library in goal.libraries]
-        low, high = 100 * goal.interval.low, 100 * goal.interval.high
-        axes.plot([low, high], [place, place], color=MUTED, linewidth=1)
-        axes.plot(each, [place] * len(each), "|", color=LINES[0], markersize=9)
-        axes.plot([100 * goal.rate], [place], "o", color=LINES[0], markersize=5)
-    axes.set_yticks(range(len(goals)), [f"{one.goal or 'own goal'}: {one.seeds}" for one in goals])
-    axes.set_ylim(len(goals) - 0.5, -0.5)
+        plot_interval(axes, place, goal.solved.interval)
+        plot_each(axes, place, [100 * library.rate for library in goal.libraries])
+        plot_whole(axes, place, 100 * goal.solved.share)
+    name_rows(axes, [f"{one.goal or 'own goal'}: {one.seeds}" for one in goals])
     axes.set_xlim(-3, 103)
     axes.set_xlabel("success [%]: each library, all of a row (dot) with 95 % interval")
 

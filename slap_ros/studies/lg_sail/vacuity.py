@@ -22,7 +22,7 @@ from slap_ros.api.opening import open_chosen
 from slap_ros.core import Action, ActionSpace, Domain
 from slap_ros.drawing.palette import MUTED
 from slap_ros.errors import InvalidParameterError, SlapError
-from slap_ros.evaluation.statistics import Interval, wilson_interval
+from slap_ros.evaluation.statistics import SuccessRate
 from slap_ros.relational import GroundOperator, State, ground_operators
 from slap_ros.skills.demonstrator import Demonstration, demonstrate
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
@@ -32,6 +32,7 @@ from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.lg_sail.domain_choices import with_demonstrator
 from slap_ros.studies.options import FRESH_SEED, RESULTS, FreshSeed, Output
 from slap_ros.studies.results import MarkdownTable, StudyReport
+from slap_ros.studies.row_figures import name_rows, plot_interval
 from slap_ros.studies.study import PreparedStudy, Study
 
 if TYPE_CHECKING:
@@ -72,18 +73,17 @@ class PolicySuccess:
     starts: int
 
     @property
-    def rate(self) -> float:
-        """The share of starts."""
-        return self.successes / self.starts
-
-    @property
-    def interval(self) -> Interval:
-        """Wilson's interval of the rate."""
-        return wilson_interval(self.successes, self.starts)
+    def succeeded(self) -> SuccessRate:
+        """Share of the starts."""
+        return SuccessRate(self.successes, self.starts)
 
     def as_json(self) -> dict[str, Any]:
         """The counts with their interval."""
-        return {**asdict(self), "rate": self.rate, "interval": asdict(self.interval)}
+        return {
+            **asdict(self),
+            "rate": self.succeeded.share,
+            "interval": asdict(self.succeeded.interval),
+        }
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ class OperatorVacuity:
     @property
     def vacuous(self) -> bool:
         """Whether a policy that sees nothing succeeds too often."""
-        return any(policy.rate > ALLOWED for policy in self.policies)
+        return any(policy.succeeded.share > ALLOWED for policy in self.policies)
 
     def as_json(self) -> dict[str, Any]:
         """Counts and rates of every policy."""
@@ -122,7 +122,7 @@ class OperatorVacuity:
 
     def as_row(self) -> list[str]:
         """Row of a table, without what was learned."""
-        rates = [f"{policy.rate:.1%}" for policy in self.policies]
+        rates = [f"{policy.succeeded.share:.1%}" for policy in self.policies]
         verdict = "**vacuous**" if self.vacuous else "no"
         return [self.operator, str(self.starts), str(self.lost), *rates, verdict]
 
@@ -229,7 +229,7 @@ def _report(
         measured += JUDGED.format(digest=learned.digest)
         columns.append(LEARNED)
         for row, one in zip(rows, found, strict=True):
-            row.append(f"{one.learned.rate:.1%}" if one.learned else "none")
+            row.append(f"{one.learned.succeeded.share:.1%}" if one.learned else "none")
     if never:
         measured += f"\n\nNo demonstration of this preset had a start of {', '.join(never)}."
     return StudyReport(
@@ -448,7 +448,7 @@ def draw(figure: Figure, found: Sequence[OperatorVacuity]) -> None:
         places = [i + 0.14 * (number - (len(names) - 1) / 2) for i in range(len(found))]
         policies = [one.policies[number] for one in found]
         axes.plot(
-            [100 * policy.rate for policy in policies],
+            [100 * policy.succeeded.share for policy in policies],
             places,
             "o",
             color=LINES[number],
@@ -456,18 +456,15 @@ def draw(figure: Figure, found: Sequence[OperatorVacuity]) -> None:
             label=name,
         )
         for place, policy in zip(places, policies, strict=True):
-            ends = [100 * policy.interval.low, 100 * policy.interval.high]
-            axes.plot(ends, [place, place], color=LINES[number], linewidth=1)
+            plot_interval(axes, place, policy.succeeded.interval, LINES[number])
     judged = [(i, one.learned) for i, one in enumerate(found) if one.learned is not None]
     for number, (place, skill) in enumerate(judged):
         label = LEARNED if number == 0 else None
-        axes.plot(100 * skill.rate, place, "*", color=MUTED, markersize=9, label=label)
-        ends = [100 * skill.interval.low, 100 * skill.interval.high]
-        axes.plot(ends, [place, place], color=MUTED, linewidth=1)
+        axes.plot(100 * skill.succeeded.share, place, "*", color=MUTED, markersize=9, label=label)
+        plot_interval(axes, place, skill.succeeded.interval)
     axes.axvline(100 * ALLOWED, color=MUTED, linestyle="--", linewidth=1)
-    axes.set_yticks(range(len(found)), [one.operator for one in found])
-    axes.set_ylim(len(found) - 0.5, -0.5)
-    widest = max(20.0, *(105 * p.interval.high for one in found for p in one.policies))
+    name_rows(axes, [one.operator for one in found])
+    widest = max(20.0, *(105 * p.succeeded.interval.high for one in found for p in one.policies))
     axes.set_xlim(-1, 105.0 if judged else widest)
     which = "policy" if judged else "blind policy"
     axes.set_xlabel(f"starts from which a {which} succeeds [%], with 95 % interval")

@@ -41,6 +41,7 @@ from slap_ros.studies.figures import APPROACH_STYLES, LINES, label
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.options import FRESH_SEED, RESULTS, FreshSeed, Output
 from slap_ros.studies.results import MarkdownTable, StudyReport
+from slap_ros.studies.row_figures import name_rows
 from slap_ros.studies.study import PreparedStudy, Study
 
 if TYPE_CHECKING:
@@ -359,8 +360,7 @@ def draw(figure: Figure, results: Sequence[TermResult]) -> None:
                 markersize=5,
                 label=style.label if place == 0 else None,
             )
-    axes.set_yticks(range(len(results)), [result.term for result in results])
-    axes.set_ylim(len(results) - 0.5, -0.5)
+    name_rows(axes, [result.term for result in results])
     axes.set_xlabel("plan length relative to pure planning; a mark for each training")
     figure.legend(loc="outside upper center", ncols=len(SHOWN))
 
