@@ -2,15 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """A first plan soon, then better ones, and how far from the best they can be.
 
-Where the abstract graph is small, it is searched with falling weights (as in Richter, Thayer and
+A small abstract graph is searched as ``lazy`` does. In a larger one, the first plan is the one that
+the FF heuristic finds. Then the graph is searched with falling weights (as in Richter, Thayer and
 Ruml: The Joy of Forgetting: Faster Anytime Search via Restarting, ICAPS 2010): every search begins
 anew, but roll-outs are kept, so that it pays for what is new alone. The last one, without a weight,
-is the search of ``lazy``, and finds the same plan.
+is the search of ``lazy``, and finds a plan of the same cost.
 
-Where there are too many abstract states, the first plan is the one that the FF heuristic finds.
-Then the graph near the best plan is searched (:mod:`slap_ros.planning.corridor`), shortcuts
-included, until that finds nothing shorter. Such a graph is another one for each plan, so that less
-effort goes into it.
+Where there are too many abstract states, the graph near the best plan is searched
+(:mod:`slap_ros.planning.corridor`), shortcuts included, until that finds nothing shorter. Such a
+graph is another one for each plan, so that less effort goes into it.
 
 The effort is limited in roll-outs and abstract states, never in seconds.
 """
@@ -18,6 +18,7 @@ The effort is limited in roll-outs and abstract states, never in seconds.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 from slap_ros.errors import PlanningLimitError, UnsolvableError
@@ -34,6 +35,7 @@ from slap_ros.planning.search import SearchOutcome
 from slap_ros.planning.shortcut_source import ShortcutSource
 from slap_ros.relational import State
 
+SMALL = 150  # abstract states of a graph in which nothing is gained by a first plan
 NEAR_PLANS = 4  # roll-outs of a whole graph to one of graphs near plans
 WEIGHTS = (30.0, 3.0, 1.0)  # of bounds of what is to come, one search after the other
 
@@ -122,8 +124,14 @@ class _Improvement:
         self._at_least = 0  # environment steps of any plan
 
     def through(self, graph: AbstractGraph) -> Iterator[PlanningResult]:
-        """Search a graph as a whole, with falling weights."""
-        for weight in WEIGHTS:
+        """Search a graph as a whole, with falling weights where it is not small."""
+        is_small = len(graph.nodes) <= SMALL
+        if not is_small:
+            self._at_least = self._least_steps(graph.nodes[0])
+            with suppress(PlanningLimitError):
+                self._find_first()
+                yield self._result(graph)
+        for weight in WEIGHTS[-1:] if is_small else WEIGHTS:
             outcome = self._search(graph, weight)
             self._at_least = max(self._at_least, outcome.at_least or 0)
             if outcome.plan is None and not outcome.stopped and self._best is None:
@@ -132,8 +140,8 @@ class _Improvement:
                 yield self._result(graph)
             if self._is_proven():
                 return
-        if self._best is None:
-            yield from self.near_plans(graph.nodes[0])
+        if self._best is None:  # of a small graph: others were tried
+            self._find_first()
         yield self._result(graph)
 
     def near_plans(self, abstract: int) -> Iterator[PlanningResult]:
@@ -142,8 +150,8 @@ class _Improvement:
         Args:
             abstract: Abstract state to start from, a mask.
         """
-        self._at_least = max(self._at_least, self._least_steps(abstract))
-        first = self._first_plan()
+        self._at_least = self._least_steps(abstract)
+        first = self._find_first()
         yield self._result(None, first.graph_nodes, first.graph_edges)
         self._limit = self._model.executed + self._planner.effort.rollouts // NEAR_PLANS
         problem = self._planner.problem
@@ -158,8 +166,8 @@ class _Improvement:
                 return
             route = [abstract, *self._on_the_way()]
 
-    def _first_plan(self) -> PlanningResult:
-        """The plan that the FF heuristic finds.
+    def _find_first(self) -> PlanningResult:
+        """Take the plan that the FF heuristic finds.
 
         Raises:
             PlanningLimitError: It finds none that can be executed.
