@@ -19,6 +19,12 @@ from support import leftovers
 DOMAIN_IDS = range(2, 60)
 _next_ids = itertools.cycle(DOMAIN_IDS)
 _numbers = itertools.count()
+# Marks of tests by their fixtures. No test opens a network without one: see `no_network`.
+MARKED_BY = {
+    "ensemble": {"network", "other_network", "module_network"},
+    "browser": {"browser"},
+    "training": {"trained"},
+}
 PORTS = 250  # UDP ports of a DDS domain, domain 0 from 7400 on
 
 
@@ -37,6 +43,14 @@ def pytest_configure(config):
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if sys.platform == "linux":
         config.guard = leftovers.start_guard()
+
+
+@pytest.hookimpl(tryfirst=True)  # before tests are chosen by their marks
+def pytest_collection_modifyitems(items):
+    for item in items:
+        for mark, fixtures in MARKED_BY.items():
+            if fixtures & set(getattr(item, "fixturenames", ())):
+                item.add_marker(mark)
 
 
 @pytest.fixture(autouse=True)

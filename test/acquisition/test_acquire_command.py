@@ -31,6 +31,7 @@ def slap(*arguments):
     return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
+@pytest.mark.training
 def test_a_library_is_acquired_shown_and_begun_with(tmp_path):
     made = slap("acquire", "points", "--output", tmp_path / "one", "--json", *BUDGET)
     assert made.exit_code == 0, made.stderr
@@ -51,6 +52,7 @@ def test_a_library_is_acquired_shown_and_begun_with(tmp_path):
     assert "(similarity 1.00, success" in slap("skills", tmp_path / "two").stderr
 
 
+@pytest.mark.training
 def test_operators_and_rewards_come_from_whoever_is_named(tmp_path, in_this_process):
     """From demonstrations and metrics; and the same training is not mistaken for another."""
     asked = ("acquire", "points", "--output", tmp_path / "library", "--json", *BUDGET)
@@ -70,6 +72,7 @@ def test_operators_and_rewards_come_from_whoever_is_named(tmp_path, in_this_proc
     assert "proposer and rewarder: induced and composed" in shown
 
 
+@pytest.mark.training
 def test_what_a_script_said_is_never_taken_for_a_models(tmp_path, in_this_process):
     """Recorded, and replayed: both libraries say that no model answered, or not now."""
     problem = AcquisitionProblem.of_task(POINTS, POINTS.task(0))
@@ -119,6 +122,7 @@ def test_bad_input_is_refused(tmp_path, arguments, reason):
     assert not (tmp_path / "library").exists()
 
 
+@pytest.mark.training
 def test_a_command_that_was_corrected_finds_no_other_training_in_its_folder(
     tmp_path, in_this_process
 ):

@@ -49,6 +49,7 @@ def children_of(launcher, name):
     return [int(word) for word in found.stdout.split()]
 
 
+@pytest.mark.training
 @pytest.mark.timeout(180)  # learns both skills
 def test_skills_are_acquired_announced_and_recorded(network, tmp_path):
     bag, output = tmp_path / "bag", tmp_path / "skills"
@@ -83,6 +84,7 @@ def slap(*arguments):
     return subprocess.run(command, capture_output=True, text=True, timeout=300)
 
 
+@pytest.mark.training
 @pytest.mark.timeout(300)  # starts an ensemble, learns with it, and starts it again
 @pytest.mark.parametrize("begun", [*slow(False), True])
 def test_a_run_acquires_what_it_lacks_and_one_bag_tells_it_all(network, tmp_path, begun):
@@ -122,6 +124,7 @@ def begin(asker, spinner):
     return handle
 
 
+@pytest.mark.training
 @pytest.mark.timeout(180)  # a node and three trainings, each of which imports torch
 def test_a_training_that_was_killed_and_canceled_goes_on_with_the_same_goal(network, tmp_path):
     """Killed, it is reported; canceled, its process ends; what was learned before is read."""
@@ -166,6 +169,7 @@ def small_files(pid, limit=40_000):
         resource.prlimit(pid, resource.RLIMIT_FSIZE, before)
 
 
+@pytest.mark.training
 @pytest.mark.slow
 @pytest.mark.timeout(180)  # a node and two trainings, each of which imports torch
 def test_a_full_disk_is_reported_and_the_same_goal_goes_on(network, tmp_path):
@@ -177,6 +181,7 @@ def test_a_full_disk_is_reported_and_the_same_goal_goes_on(network, tmp_path):
         assert acquire(asker, spinner).success
 
 
+@pytest.mark.training
 @pytest.mark.slow
 @pytest.mark.timeout(180)  # learns both skills
 def test_a_planner_that_goes_away_meanwhile_takes_the_skills_on_when_it_is_back(network, tmp_path):
@@ -197,6 +202,7 @@ def test_a_planner_that_goes_away_meanwhile_takes_the_skills_on_when_it_is_back(
             assert solved.success, solved.error_msg
 
 
+@pytest.mark.training
 @pytest.mark.slow
 @pytest.mark.timeout(180)  # a node and two trainings, each of which imports torch
 def test_what_cannot_be_acquired_is_said(network, tmp_path):

@@ -31,6 +31,7 @@ def begin(index):
     return index, (hammer.name,), tuple(map(float, world.state.data))
 
 
+@pytest.mark.training
 @pytest.mark.slow
 @pytest.mark.timeout(600)  # a minute of learning, on a machine that nobody else uses
 def test_a_hammer_is_grasped_after_a_minute_of_learning(tmp_path):
@@ -54,6 +55,7 @@ def out_of_reach(start):
     return index, names, tuple(map(float, state.data))
 
 
+@pytest.mark.training
 def test_starts_that_the_world_refuses_are_left_out_and_counted(tmp_path):
     settings = AcquisitionSettings(segment_episodes=1, skill_steps=1)
     settings = replace(settings, sac=replace(settings.sac, n_envs=2))

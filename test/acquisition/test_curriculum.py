@@ -115,6 +115,7 @@ def whole(finished):
     return library, events
 
 
+@pytest.mark.training
 def test_both_skills_are_acquired(whole):
     library, events = whole
     assert library.record["ended"] == "nothing fails"
@@ -130,6 +131,7 @@ def test_both_skills_are_acquired(whole):
     assert library.record["steps"] <= WHOLE.total_steps
 
 
+@pytest.mark.training
 def test_no_task_is_used_twice(whole, finished):
     """Neither to train on and to judge, nor in two iterations, nor for the progress in the end."""
     folders = sorted((finished / "work").glob("iteration*"))
@@ -149,6 +151,7 @@ def test_no_task_is_used_twice(whole, finished):
     assert len(used) == 2 * WHOLE.rollouts * len(folders)  # as many to judge on
 
 
+@pytest.mark.training
 @pytest.mark.slow
 def test_skills_are_acquired_without_anything_written_by_hand(tmp_path):
     """Operators from demonstrations, rewards from metrics."""
@@ -162,6 +165,7 @@ def test_skills_are_acquired_without_anything_written_by_hand(tmp_path):
     assert library.record["progress_on_fresh_tasks"] >= 0.95
 
 
+@pytest.mark.training
 @pytest.mark.slow
 @pytest.mark.timeout(300)  # learns two skills, several times each
 def test_a_skill_that_never_succeeds_is_learned_from_scratch_and_so_is_what_comes_before(tmp_path):
@@ -205,6 +209,7 @@ def test_dead_ends_are_behind_skills_that_were_learned_and_not_too_often():
     assert not find_dead_ends(["Pick"], [rolled_out("Pick")], state)  # nothing comes before
 
 
+@pytest.mark.training
 def test_a_finished_curriculum_is_read(whole, finished):
     again, events = acquire(finished / "work", WHOLE)
     assert not events.computed
@@ -213,6 +218,7 @@ def test_a_finished_curriculum_is_read(whole, finished):
         acquire(finished / "work", WHOLE, seed=2)
 
 
+@pytest.mark.training
 def test_acquired_skills_solve_what_training_never_saw(whole, finished):
     """Other tasks, another goal and more objects, planned and executed like any domain."""
     domain = acquired_domain(POINTS, load_skill_library(finished / "library", POINTS))
@@ -234,6 +240,7 @@ def test_acquired_skills_solve_what_training_never_saw(whole, finished):
     assert np.mean(done) >= 0.9
 
 
+@pytest.mark.training
 def test_the_library_is_the_same_after_interruptions(tmp_path, monkeypatch):
     """At every write of a training in turn, before and after it."""
     uninterrupted = saved(acquire(tmp_path / "once", SHORT)[0], tmp_path / "library")
@@ -263,6 +270,7 @@ def test_the_library_is_the_same_after_interruptions(tmp_path, monkeypatch):
     assert saved(library, tmp_path / "again") == uninterrupted
 
 
+@pytest.mark.training
 @pytest.mark.slow
 def test_the_library_is_the_same_with_two_processes(tmp_path):
     one = saved(acquire(tmp_path / "one", SHORT)[0], tmp_path / "first")
@@ -281,6 +289,7 @@ def test_a_curriculum_without_budget_or_need_says_so(tmp_path):
     assert not events.judged
 
 
+@pytest.mark.training
 def test_a_skill_that_is_not_learned_is_given_up_and_the_record_says_how_it_failed(tmp_path):
     """Weights that hardly change make no progress, and there is no other skill to go on with."""
     stuck = replace(SHORT, patience=2, total_steps=30_000, sac=replace(SAC, learning_rate=1e-12))
@@ -294,6 +303,7 @@ def test_a_skill_that_is_not_learned_is_given_up_and_the_record_says_how_it_fail
     assert any(atom.startswith("Holding(") for atom in left["atoms"])
 
 
+@pytest.mark.training
 def test_a_skill_that_was_left_once_is_not_said_to_be_left_in_the_end(tmp_path, monkeypatch):
     """Put is left besides in the first iteration; in the last one Pick alone is."""
     iterations = []
@@ -343,6 +353,7 @@ def random_policy(seed=0):
     return MlpPolicy(AS_OBSERVED, layers, np.zeros(3, dtype=np.float32), "relu", squashed=True)
 
 
+@pytest.mark.training
 def test_a_skill_begins_with_the_nearest_known_one(tmp_path):
     known = AcquiredSkill(PICK, REWARDS["Pick"], random_policy(), 12)
     folder = tmp_path / known.folder_name
@@ -362,6 +373,7 @@ def files(path):
     return {str(p.relative_to(path)): p.read_bytes() for p in path.rglob("*") if p.is_file()}
 
 
+@pytest.mark.training
 def test_skills_that_are_there_are_kept_and_what_is_missing_is_learned(tmp_path):
     there = kept(tmp_path / "some", PICKING)
     library, events = acquire(tmp_path / "work", SHORT, kept=there)
@@ -389,6 +401,7 @@ def test_where_all_skills_are_there_nothing_is_learned(tmp_path):
     assert library.digest == load_skill_library(tmp_path / "both", POINTS).digest
 
 
+@pytest.mark.training
 def test_a_skill_that_fails_again_is_learned_further(tmp_path):
     """From its own weights; what it was worth stays a candidate."""
     weak = replace(PICKING, policy=towards(0, False))

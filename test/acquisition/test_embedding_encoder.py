@@ -146,6 +146,7 @@ def slap(*arguments):
     return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
+@pytest.mark.training
 @pytest.mark.usefixtures("points_installed")
 def test_new_skills_begin_with_those_that_the_server_finds_alike(
     tmp_path, monkeypatch, in_this_process

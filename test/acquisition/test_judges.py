@@ -40,6 +40,7 @@ def files(folder):
     return {p.relative_to(folder): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
 
+@pytest.mark.training
 @pytest.mark.parametrize(("enough", "segments"), [(0.0, 1), (2.0, SEGMENTS)])
 def test_a_round_is_the_same_whoever_judges_it(tmp_path, enough, segments):
     """Also where two good judgements in a row end it."""
@@ -52,6 +53,7 @@ def test_a_round_is_the_same_whoever_judges_it(tmp_path, enough, segments):
     assert not active_children()
 
 
+@pytest.mark.training
 def test_the_next_segment_is_learned_before_the_verdict(tmp_path, monkeypatch):
     """But for the last one, whose verdict ends the round."""
     order = []
@@ -72,6 +74,7 @@ def test_the_next_segment_is_learned_before_the_verdict(tmp_path, monkeypatch):
     assert order == [*["begin", "learn", "verdict"] * SEGMENTS, "begin", "verdict"]
 
 
+@pytest.mark.training
 def test_a_judge_that_is_killed_is_noticed_and_the_same_job_goes_on(tmp_path, monkeypatch):
     undisturbed = jobs.learn(job(tmp_path / "undisturbed"))
     begin, left = JudgeElsewhere.begin, [2]

@@ -17,6 +17,7 @@ def files(folder):
     return {str(p.relative_to(folder)): p.read_bytes() for p in paths if p.suffix != ".pt"}
 
 
+@pytest.mark.training
 @pytest.mark.slow
 @pytest.mark.timeout(300)  # six trainings' worth of processor time
 def test_killed_ten_times_it_makes_the_same_library_to_the_byte(tmp_path):

@@ -49,6 +49,7 @@ def success(policy):
     return env.succeeded.mean()
 
 
+@pytest.mark.training
 @pytest.mark.parametrize("task", ["Pendulum-v1", "MountainCarContinuous-v0"])
 def test_an_update_is_stable_baselines3s_up_to_rounding(task):
     kwargs = {
@@ -91,6 +92,7 @@ def test_gradients_of_critics_are_those_of_automatic_differentiation_to_the_bit(
         assert torch.equal(gradient, other)
 
 
+@pytest.mark.training
 def test_a_second_core_changes_nothing_that_is_learned():
     """Whether it is there all the time or now and then; the layers are those it is used for."""
     settings = replace(QUICK, critic_net_arch=(256, 256), batch_size=128)
@@ -126,6 +128,7 @@ def test_values_of_what_is_far_from_everything_tried_are_bounded_by_normalised_l
     assert spread(1e3, QUICK) < 3.0 * spread(1.0, QUICK)
 
 
+@pytest.mark.training
 @pytest.mark.parametrize("settings", [QUICK, replace(QUICK, critic_net_arch=(24, 16))])
 def test_what_is_resumed_ends_with_the_same_weights(tmp_path, settings):
     whole = learner(settings=settings)
@@ -147,6 +150,7 @@ def test_what_is_resumed_ends_with_the_same_weights(tmp_path, settings):
     assert not torch.equal(weights(other)["actor.mu.weight"], weights(whole)["actor.mu.weight"])
 
 
+@pytest.mark.training
 @pytest.mark.parametrize(("tau", "same"), [(1.0, True), (0.005, False)])
 def test_the_policy_is_the_actors_average(tau, same):
     one = SkillLearner(SkillVecEnv(MDP, STARTS, 8, HORIZON, (1,)), replace(QUICK, tau=tau), 1)
@@ -168,6 +172,7 @@ def test_a_damaged_checkpoint_is_refused(tmp_path):
         load_episodes(tmp_path / "0", POINTS.types_by_name)
 
 
+@pytest.mark.training
 def test_rewards_are_computed_again_when_the_template_changes():
     first = learner()
     episodes = first.learn(2)
@@ -188,6 +193,7 @@ def test_rewards_are_computed_again_when_the_template_changes():
     )
 
 
+@pytest.mark.training
 def test_a_full_buffer_forgets_the_oldest():
     small = replace(QUICK, buffer_size=5 * HORIZON * 8)
     env = SkillVecEnv(MDP, STARTS, 8, HORIZON, (1,))
@@ -200,6 +206,7 @@ def test_a_full_buffer_forgets_the_oldest():
     assert np.array_equal(newest, episodes.actions.reshape(count, -1))
 
 
+@pytest.mark.training
 def test_nothing_is_terminal_for_the_critic():
     one = learner()
     one.learn(1)
@@ -217,6 +224,7 @@ def test_a_skill_can_begin_with_another_ones_weights():
         large.begin_with(policy)
 
 
+@pytest.mark.training
 def test_larger_critics_leave_the_policy_as_small_as_it_is():
     small, one = learner(), learner(settings=replace(QUICK, critic_net_arch=(24, 16)))
     one.begin_with(small.policy())  # has the same layers
@@ -228,6 +236,7 @@ def test_larger_critics_leave_the_policy_as_small_as_it_is():
     assert shapes[0] == shapes[1]
 
 
+@pytest.mark.training
 def test_random_actions_are_held_longer_in_each_environment():
     one = learner()
     one.learn(1)  # whole episodes of random actions, then of the policy's with noise
@@ -243,6 +252,7 @@ def test_random_actions_are_held_longer_in_each_environment():
 FRESH_SEEN = SkillVecEnv(MDP, FRESH, 8, HORIZON, (9,)).observations
 
 
+@pytest.mark.training
 def test_torch_and_numpy_say_the_same():
     one = learner()
     one.learn(2)
@@ -251,6 +261,7 @@ def test_torch_and_numpy_say_the_same():
     assert np.allclose(ours, theirs, atol=1e-5)
 
 
+@pytest.mark.training
 def test_pick_is_learned():
     one = learner()
     assert success(one.policy()) < 0.2

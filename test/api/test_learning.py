@@ -88,6 +88,7 @@ def test_changes_of_settings_are_texts_and_back():
     assert parse_changes(change_texts(changes), TrainingSettings) == changes
 
 
+@pytest.mark.training
 @pytest.mark.slow
 def test_a_library_is_that_of_the_command(domain, tmp_path, monkeypatch):
     """Of a toy training, in this process from both; torch is imported once."""

@@ -90,6 +90,7 @@ def test_a_finished_training_is_read_with_nothing_computed_again(work, tmp_path)
     assert now | machine == then | machine
 
 
+@pytest.mark.training
 @pytest.mark.parametrize("work", ["interrupted"], indirect=True)
 def test_a_killed_training_continues_from_its_checkpoint(work):
     kept = {path: path.read_bytes() for path in work.rglob("*.json")}

@@ -102,6 +102,7 @@ def test_tasks_with_two_uses_are_refused_at_once(tmp_path, settings):
     assert not (tmp_path / "work").exists()
 
 
+@pytest.mark.training
 def test_pushing_is_discovered_learned_and_worth_it_and_twice_the_same(tmp_path):
     library, callback = train(tmp_path / "work")
     ((name, before, after, kept),) = callback.verdicts
@@ -125,6 +126,7 @@ def test_pushing_is_discovered_learned_and_worth_it_and_twice_the_same(tmp_path)
     assert not loaded.refused
 
 
+@pytest.mark.training
 def test_a_ray_cluster_learns_the_same(tmp_path):
     """Where Ray is installed: ``pip install -e '.[ray]'``."""
     pytest.importorskip("ray")
@@ -135,6 +137,7 @@ def test_a_ray_cluster_learns_the_same(tmp_path):
     assert there.digest == here.digest
 
 
+@pytest.mark.training
 def test_it_goes_on_where_it_was_interrupted(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         train(tmp_path / "work", BRIEF, Recorder(interrupt_at=("collecting starts", 24)))
@@ -169,6 +172,7 @@ t.train(Path({work!r}))
 """
 
 
+@pytest.mark.training
 @pytest.mark.slow
 def test_a_killed_training_resumes_from_its_checkpoint(tmp_path):
     work = tmp_path / "work"
@@ -189,6 +193,7 @@ def test_a_killed_training_resumes_from_its_checkpoint(tmp_path):
     assert len(library.shortcuts) == 1
 
 
+@pytest.mark.training
 @pytest.mark.slow
 @pytest.mark.timeout(180)  # three trainings
 def test_what_hardly_succeeds_is_learned_again_and_the_best_attempt_counts(tmp_path, monkeypatch):
@@ -210,6 +215,7 @@ def test_what_hardly_succeeds_is_learned_again_and_the_best_attempt_counts(tmp_p
     assert [folder.finished.exists() for folder in folders] == [i == best for i in range(2)]
 
 
+@pytest.mark.training
 @pytest.mark.slow
 def test_steps_of_attempts_in_vain_are_counted(tmp_path, monkeypatch):
     monkeypatch.setattr(training, "ENOUGH_SUCCESS", 1.1)

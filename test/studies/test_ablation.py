@@ -70,6 +70,7 @@ def test_what_cannot_be_studied_is_refused_before_anything_is_learned(tmp_path, 
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.training
 @pytest.mark.slow
 @pytest.mark.timeout(180)  # explores, and trains twice
 def test_a_study_that_was_killed_goes_on(tmp_path, monkeypatch):
