@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -50,7 +51,11 @@ class CollisionChecker:
         """
         self.scene = make_scene(moving_shapes(held, finger, margin, held_margin), obstacles, base)
         self.space = backend().free_space(self.scene)
-        self.key = self.scene.digest()
+
+    @cached_property
+    def key(self) -> bytes:
+        """Equal for checkers of equal scenes."""
+        return self.scene.digest()
 
     def __call__(self, q: Joints) -> Flags:
         """Whether the configurations are free: shape (..., 7) to (...)."""

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from slap_ros.geometry.box_separation import dot
 from slap_ros.geometry.oriented_box import OrientedBox
+from slap_ros.geometry.pose import Pose
 from slap_ros.motion.arm_shapes import ARM_SHAPES, BASE, BEHIND_ELBOW
 from slap_ros.motion.joints import Array
 from slap_ros.motion.kinematics import GRASP_IN_LAST_LINK, LAST_LINK, matrix
@@ -60,7 +61,7 @@ def make_scene(
         base: Whether the arm's base is in the way of forearm, hand and held box.
     """
     boxes = [*obstacles, BASE] if base else list(obstacles)
-    poses = np.array([matrix(box.pose) for box in boxes]).reshape(-1, 4, 4)
+    poses = np.array([_frame(box.pose) for box in boxes]).reshape(-1, 4, 4)
     turns = np.ascontiguousarray(poses[:, :3, :3])
     sizes = np.array([box.half for box in boxes]).reshape(-1, 3)
     origins = dot(turns.swapaxes(1, 2), poses[:, None, :3, 3])
@@ -71,6 +72,7 @@ def make_scene(
     return CollisionScene(*shapes, turns, sizes, origins, reaches2)
 
 
+@lru_cache(maxsize=256)  # of many states; nobody changes the arrays
 def moving_shapes(
     held: OrientedBox | None, finger: float, margin: float, held_margin: float
 ) -> MovingShapes:
@@ -96,6 +98,12 @@ def moving_shapes(
         np.array(halves),
         np.array(clearances),
     )
+
+
+@lru_cache(maxsize=1024)
+def _frame(pose: Pose) -> Array:
+    """The matrix of a pose: most things stand where they stood before."""
+    return matrix(pose)
 
 
 @lru_cache(maxsize=64)
