@@ -10,7 +10,7 @@ seconds of one core in one process, after a first plan that loads and compiles w
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from math import log
 from statistics import fmean
@@ -152,6 +152,20 @@ def growth(tasks: int) -> dict[str, float]:
     return {f"{n} blocks": s for n, s in seconds.items()} | {"log-log slope": float(slope)}
 
 
+def markdown(rows: Mapping[str, Mapping[str, float]]) -> Iterator[str]:
+    """The lines of the table of a page."""
+    yield "| table | shortcuts | solved | first plan | steps | last | steps | bound | roll-outs |"
+    yield "|---|---|---|---|---|---|---|---|---|"
+    for name, row in rows.items():
+        domain, preset, word = name.split()
+        yield (
+            f"| `{domain}` `{preset}` | {'shipped' if word == 'shortcuts' else 'none'} "
+            f"| {row['solved']:.0f} of {row['tasks']:.0f} | {row['first_seconds']:.2f} s "
+            f"| {row['first_steps']:.0f} | {row['last_seconds']:.2f} s | {row['last_steps']:.0f} "
+            f"| {row['bound']:.2f} | {row['rollouts']:.0f} |"
+        )
+
+
 def _warm_up() -> None:
     domain = get_domain("obstacle_tower", "fair")
     plan(domain, domain.task(0), "")
@@ -162,6 +176,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--tasks", type=int, default=5)
     parser.add_argument("--table", action="append", default=[], help="as 'cleanup_table fair'")
+    parser.add_argument("--markdown", action="store_true", help="end with the table of a page")
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
     figures = {}
@@ -170,6 +185,8 @@ def main() -> None:
         if not arguments.json:
             numbers = ", ".join(f"{name} {value:.2f}" for name, value in its.items())
             print(f"{row}: {numbers}", flush=True)
+    if arguments.markdown:
+        print("\n".join(markdown(figures)))
     if not arguments.table:
         figures["growth"] = growth(arguments.tasks)
     show(figures, arguments.json)

@@ -107,6 +107,7 @@ class AnytimePlanner:
         try:
             graph = planner.graph(abstract, goal, max_nodes=self.effort.abstract_states)
         except PlanningLimitError:
+            self.problem.require_reachable(abstract, goal)
             yield from run.near_plans(abstract)
         else:
             yield from run.through(graph)

@@ -13,6 +13,7 @@ from slap_ros.errors import NoSkillsError, PlanningLimitError, UnsolvableError
 from slap_ros.planning.astar import find_shortest_sequence
 from slap_ros.planning.failures import unreachable_atoms
 from slap_ros.planning.model import Model
+from slap_ros.planning.mutexes import never_together
 from slap_ros.planning.options import Option, given_option
 from slap_ros.relational import AtomSpace, GroundOperator, State, ground_operators, list_atoms
 
@@ -81,6 +82,23 @@ class Problem:
         options = ground_options(domain, space)
         return cls(Model.of(domain, initial), options, unskilled, domain.exact)
 
+    def require_reachable(self, start: int, goal: int) -> None:
+        """Refuse a goal that is easily seen to be out of reach.
+
+        Args:
+            start: Abstract state to start from, a mask.
+            goal: Mask of atoms that must hold.
+
+        Raises:
+            UnsolvableError: Atoms of it never hold, or never hold together.
+        """
+        grounds = [ground for ground, _ in self.operators]
+        space = self.model.space
+        if never := unreachable_atoms(start, goal, grounds):
+            raise UnsolvableError(f"no operator leads to {list_atoms(space, never)}")
+        if pair := never_together(goal, start, grounds):
+            raise UnsolvableError(f"{list_atoms(space, pair)} never hold together")
+
     def why_not(self, start: int, goal: int) -> str:
         """Why operators alone do not lead from an abstract state to a goal, both masks."""
         grounds = [ground for ground, _ in self.operators]
@@ -112,4 +130,6 @@ def why_unreachable(
     never = unreachable_atoms(start, goal, operators)
     if never:
         return f"no operator leads to {list_atoms(space, never)}"
+    if pair := never_together(goal, start, operators):
+        return f"{list_atoms(space, pair)} never hold together"
     return f"{list_atoms(space, goal)} never hold all together"

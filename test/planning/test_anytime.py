@@ -13,8 +13,10 @@ from slap_ros.planning.anytime import AnytimePlanner, PlanningInterrupted
 from slap_ros.planning.effort import Effort
 from slap_ros.planning.landmark_cut import LandmarkCut, RelaxedOperator
 from slap_ros.planning.lazy_search import SearchLimits, search_lazily
+from slap_ros.planning.mutexes import may_hold_together
 from slap_ros.planning.planner import make_planner
 from slap_ros.planning.problem import Problem
+from slap_ros.planning.relaxation import bits
 from slap_ros.planning.search import search_exhaustively
 from slap_ros.relational import State
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
@@ -194,14 +196,41 @@ def test_an_interrupt_leaves_the_best_plan_so_far():
     assert not isinstance(early.value, PlanningInterrupted)
 
 
-def test_an_effort_that_is_too_small_is_no_proof_that_there_is_no_plan():
-    domain = slap_ros.make("obstacle_tower", obstacles=2)
+@pytest.mark.parametrize("obstacles", [2, 8])
+def test_what_never_holds_together_is_named(obstacles):
+    domain = slap_ros.make("obstacle_tower", obstacles=obstacles)
     task = domain.task(seed=1)
     problem = Problem.of(domain, task.initial_state)
     space = problem.model.space
-    never = space.mask([space.atom("Holding", ["robot", f"block{i}"]) for i in (1, 2)])
-    with pytest.raises(UnsolvableError, match="never hold all together"):
-        AnytimePlanner(problem).plan(task.initial_state, never)
+    both = space.mask([space.atom("Holding", ["robot", f"block{i}"]) for i in (1, 2)])
+    words = "Holding.robot, block1., Holding.robot, block2. never hold together"
+    with pytest.raises(UnsolvableError, match=words):
+        AnytimePlanner(problem).plan(task.initial_state, both)
+    assert problem.model.executed == 0
+
+
+def reachable(start, operators):
+    states, todo = {start}, [start]
+    while todo:
+        state = todo.pop()
+        fresh = {one.apply(state) for one in operators if one.applicable(state)} - states
+        states |= fresh
+        todo += fresh
+    return states
+
+
+def test_two_atoms_that_hold_together_are_never_said_not_to():
+    domain = get_domain("obstacle2d")
+    for seed in range(3):
+        problem = Problem.of(domain, domain.task(seed).initial_state)
+        start = problem.model.space.abstract(domain.task(seed).initial_state)
+        operators = [ground for ground, _ in problem.operators]
+        together = may_hold_together(start, operators)
+        for state in reachable(start, operators):
+            for atom in bits(state):
+                assert state & ~together[atom] == 0
+        pairs = sum(mask.bit_count() for mask in together.values())
+        assert pairs < len(together) ** 2  # something is excluded
 
 
 @pytest.mark.parametrize(
