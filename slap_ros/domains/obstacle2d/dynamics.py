@@ -233,7 +233,7 @@ class Obstacle2DVectorWorld:
             InvalidStateError: A scene that cannot be.
         """
         self._tolerance = tolerance
-        for state in states:
+        for state in {state.key: state for state in states}.values():  # many begin alike
             require_valid(state)
         self._layout = states[0].layout
         self._data = np.stack([state.data for state in states])

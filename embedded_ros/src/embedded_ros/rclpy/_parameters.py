@@ -56,8 +56,8 @@ class Parameters:
         """Declare a parameter.
 
         Args:
-            name: Its name.
-            value: Its default, or its type where it has none, or None.
+            name: Name of the parameter.
+            value: Default of the parameter, or its type where it has none, or None.
             descriptor: An rcl_interfaces/msg/ParameterDescriptor; filled in.
             ignore_override: Whether the command line counts.
 

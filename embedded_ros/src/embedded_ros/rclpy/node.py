@@ -55,10 +55,10 @@ class Node:
     """A node.
 
     Args:
-        node_name: Its name, without namespace.
+        node_name: Name of the node, without namespace.
         context: The context; the default one where not given.
         cli_args: Arguments for this node alone, before the global ones in precedence.
-        namespace: Its namespace.
+        namespace: Namespace of the node.
         use_global_arguments: Whether the arguments given to init count.
         enable_rosout: Whether its log goes to ``/rosout`` as well.
         start_parameter_services: Whether ``ros2 param`` can reach it.
@@ -322,7 +322,7 @@ class Node:
 
         Args:
             srv_type: The service's class.
-            srv_name: Its name: absolute, relative or private.
+            srv_name: Name of the service: absolute, relative or private.
             callback: Called with request and response, returns the response; may be a
                 coroutine function.
             qos_profile: QoS of both directions.
@@ -484,8 +484,8 @@ class Node:
         """Declare a parameter.
 
         Args:
-            name: Its name.
-            value: Its default; or, where it has none, its :class:`Parameter.Type`.
+            name: Name of the parameter.
+            value: Default of the parameter; or, where it has none, its :class:`Parameter.Type`.
             descriptor: An rcl_interfaces/msg/ParameterDescriptor.
             ignore_override: Whether to ignore the command line.
 

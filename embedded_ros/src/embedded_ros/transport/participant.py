@@ -106,7 +106,7 @@ class Participant:
         Args:
             topic: The DDS topic's name.
             full_name: The ROS type.
-            policies: Its QoS.
+            policies: QoS of the endpoint.
             service_id: For a service's end: what ties it to its other end.
         """
         with self._lock:

@@ -107,7 +107,7 @@ class ActionClient(Generic[ActT]):
     Args:
         node: The node it belongs to.
         action_type: The action's class.
-        action_name: Its name: absolute, relative or private.
+        action_name: Name of the action: absolute, relative or private.
         callback_group: The callbacks' group; the node's default one where not given.
         goal_service_qos_profile: QoS of the goal service.
         result_service_qos_profile: QoS of the result service.

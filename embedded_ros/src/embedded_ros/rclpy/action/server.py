@@ -163,7 +163,7 @@ class ActionServer(Generic[ActT]):
     Args:
         node: The node it belongs to.
         action_type: The action's class.
-        action_name: Its name: absolute, relative or private.
+        action_name: Name of the action: absolute, relative or private.
         execute_callback: Called with the goal handle; returns the result. A coroutine function
             lets a single-threaded executor go on meanwhile.
         callback_group: The group of the goal, cancel and result services' callbacks; the
