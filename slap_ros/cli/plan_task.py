@@ -16,7 +16,7 @@ from slap_ros.errors import StorageFullError
 from slap_ros.files import write_whole
 from slap_ros.planning.abstract_graph import AbstractGraph, build_abstract_graph
 from slap_ros.planning.anytime import PlanningInterrupted
-from slap_ros.planning.plan import PlanningResult
+from slap_ros.planning.plan import PlanningResult, bound_as_text
 from slap_ros.planning.problem import Problem
 from slap_ros.planning.symbolic_planner import plan_symbolically
 from slap_ros.relational import AtomSpace, LiftedOperator, ground_operators
@@ -125,7 +125,7 @@ def _show(result: PlanningResult, json: bool) -> None:
         console.print(f"{steps:5d}  {option}")
     if result.fails:
         console.print(f"this plan fails in the model, near the goal: {result.fails}")
-    bound = "" if result.bound is None else f"; bound {result.bound:.2f}"
+    bound = "" if result.bound is None else f"; bound {bound_as_text(result.bound)}"
     console.print(
         f"{result.plan.predicted_steps:5d}  steps predicted; {result.graph_nodes} abstract states, "
         f"{result.graph_edges} edges, {result.edges_rolled_out} rolled out{bound}",

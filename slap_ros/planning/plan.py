@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import ceil
 from typing import TYPE_CHECKING
 
 from slap_ros.core.notebook import ShownInNotebooks
@@ -47,6 +48,16 @@ class Plan:
 
 def _learned(edge: PlanEdge) -> str:
     return "  (shortcut)" if edge.option.kind is OptionKind.SHORTCUT else ""
+
+
+def bound_as_text(bound: float) -> str:
+    """A bound with two decimals, rounded up: ``1.00`` is what is proven to be the shortest alone.
+
+    Args:
+        bound: Bound of a plan, as :attr:`PlanningResult.bound` has it.
+    """
+    hundredths = round(100.0 * bound, 6)  # 1.1 is 110 of them, not 110.00000000000001
+    return f"{ceil(hundredths) / 100.0:.2f}"
 
 
 @dataclass(frozen=True)

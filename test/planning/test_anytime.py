@@ -14,6 +14,7 @@ from slap_ros.planning.effort import Effort
 from slap_ros.planning.landmark_cut import LandmarkCut, RelaxedOperator
 from slap_ros.planning.lazy_search import SearchLimits, search_lazily
 from slap_ros.planning.mutexes import may_hold_together
+from slap_ros.planning.plan import bound_as_text
 from slap_ros.planning.planner import make_planner
 from slap_ros.planning.problem import Problem
 from slap_ros.planning.relaxation import bits
@@ -121,6 +122,15 @@ def test_small_problems_are_solved_as_lazy_search_solves_them(shortcuts, tasks):
         ]
         assert found[0].steps == found[1].steps
         assert [one.bound for one in found] == [1.0, 1.0]
+
+
+@given(st.integers(1, 500), st.integers(0, 2000))
+def test_a_bound_as_text_is_a_bound_and_1_00_is_a_proof(least, more):
+    bound = (least + more) / least
+    text = bound_as_text(bound)
+    assert len(text.partition(".")[2]) == 2
+    assert bound - 1e-7 <= float(text) < bound + 0.01
+    assert (text == "1.00") == (more == 0)
 
 
 def improvements(domain, task, effort, library=None):
