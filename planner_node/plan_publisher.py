@@ -15,7 +15,7 @@ from ensemble import encode
 from ensemble.interfaces import PLAN, PLAN_EVENTS
 from ensemble.observation import Observation
 from slap_ros.messages.decode import stamp_ns
-from slap_ros.planning.plan import Plan
+from slap_ros.planning.plan import PlanningResult
 
 
 class PlanPublisher:
@@ -30,7 +30,7 @@ class PlanPublisher:
 
     def plan(
         self,
-        plan: Plan,
+        planned: PlanningResult,
         goal: int,
         number: int,
         at: Observation,
@@ -39,7 +39,7 @@ class PlanPublisher:
         """Publish a plan.
 
         Args:
-            plan: The plan.
+            planned: The plan, with what is proven of it.
             goal: What it is to reach, as a mask over the episode's atom space.
             number: Which plan of the run, from 0 on.
             at: Observation from which the plan starts.
@@ -47,7 +47,7 @@ class PlanPublisher:
         """
         space, episode = at.episode.space, at.episode.number
         self._plans.publish(
-            encode.plan(plan, goal, space, episode, number, self._now(), provenance)
+            encode.plan(planned, goal, space, episode, number, self._now(), provenance)
         )
 
     def event(self, kind: int, at: Observation, **details: Any) -> int:

@@ -9,16 +9,29 @@ from dataclasses import dataclass
 from slap_msgs.action import SolveTask
 
 from slap_ros.planning.options import OptionResult
+from slap_ros.planning.plan import PlanningResult
 
 
 @dataclass
 class RunStatistics:
-    """The sums of a run. Planning times are the events', so that a bag has them too."""
+    """The sums of a run, and its first plan. Planning times are the events', as bags have them."""
 
     first_step: int
     plans: int = 0
     planning_ns: int = 0
     edges_rolled_out: int = 0
+    first: PlanningResult | None = None  # first plan that was made
+
+    def add(self, planned: PlanningResult, planning_ns: int) -> None:
+        """Add a plan that was made.
+
+        Args:
+            planned: Plan, with the effort of finding it.
+            planning_ns: Time that planning took, ns.
+        """
+        self.planning_ns += planning_ns
+        self.edges_rolled_out += planned.edges_rolled_out
+        self.first = self.first or planned
 
     def result(self, last_step: int, outcome: OptionResult) -> SolveTask.Result:
         """The action's result."""
@@ -28,6 +41,7 @@ class RunStatistics:
             replans=max(self.plans - 1, 0),
             planning_seconds=self.planning_ns / 1e9,
             edges_rolled_out=self.edges_rolled_out,
+            bound=(self.first.bound if self.first is not None else None) or 0.0,
             error_code=int(outcome.code),
             error_msg=outcome.reason,
         )

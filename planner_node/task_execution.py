@@ -155,11 +155,9 @@ class TaskExecution:
         result: PlanningResult = job.result().result()
         if result.fails:
             self.node.get_logger().warning(f"the plan fails in the model: {result.fails}")
-        rolled_out = result.edges_rolled_out
-        done = self._event(PlanEvent.PLANNED, edges_rolled_out=rolled_out)
-        self._statistics.planning_ns += done - started
-        self._statistics.edges_rolled_out += rolled_out
-        self.publisher.plan(result.plan, self.goal_mask, number, self._latest, self.provenance)
+        done = self._event(PlanEvent.PLANNED, edges_rolled_out=result.edges_rolled_out)
+        self._statistics.add(result, done - started)
+        self.publisher.plan(result, self.goal_mask, number, self._latest, self.provenance)
         self._feedback(
             SolveTask.Feedback.EXECUTING,
             graph_nodes=result.graph_nodes,

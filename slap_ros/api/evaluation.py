@@ -40,6 +40,8 @@ class TrialRow:
         replans: Plans that replaced a diverged one.
         error: Name of the error code, as ``STEP_LIMIT``; ``NONE`` for a success.
         reason: Why it failed, in words; empty for a success.
+        bound: How many times as long as the shortest the first plan is at most; None where nothing
+            is proven.
     """
 
     domain: str
@@ -55,6 +57,7 @@ class TrialRow:
     replans: int
     error: str
     reason: str
+    bound: float | None
 
     @classmethod
     def of(cls, domain: Domain, approach: str, trial: Trial) -> TrialRow:

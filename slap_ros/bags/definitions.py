@@ -24,7 +24,7 @@ from rosbags.typesys.store import Typestore
 
 from slap_ros.bags.raw import Channel, MessageDefinition, one_line
 from slap_ros.errors import DamagedBagError, ForeignBagError
-from slap_ros.messages.interfaces import PACKAGE, definition, message_texts, typestore
+from slap_ros.messages.interfaces import PACKAGE, PLAN, definition, message_texts, typestore
 
 IDL_SEPARATOR = "=" * 80 + "\n"
 # With those of nested types, and constants; an array of fixed length counts as many fields as it
@@ -37,6 +37,7 @@ FIELDS_PER_DEFINITION = 10  # each of which takes as long as so many fields
 # Fields and constants of messages that earlier bags do not have, by type. In them they would have
 # been empty, so that being without them means the same.
 ADDED = {
+    PLAN: ("bound",),
     "slap_msgs/msg/PlanEdge": ("others_may_appear", "forbidden_atoms"),
     "slap_msgs/msg/AcquisitionEvent": (
         *("ROLLED_OUT", "JUDGED", "ACQUIRED", "operators", "iteration", "task", "progress"),
@@ -230,7 +231,9 @@ def _check_version(channel: Channel) -> None:
         wanted_constants, wanted_fields = ours.fielddefs[name]
         missing = [e[0] for e in wanted_constants if e not in constants]
         missing += [e[0] for e in wanted_fields if e not in fields]
-        missing = [entry for entry in missing if entry not in ADDED.get(name, ())]
+        theirs_too = {entry[0] for entry in (*constants, *fields)}
+        added = set(ADDED.get(name, ())) - theirs_too  # what is there must be what it is here
+        missing = [entry for entry in missing if entry not in added]
         if missing:
             raise ForeignBagError(
                 _mismatch(channel, f"{', '.join(missing)} of {name} missing or different")

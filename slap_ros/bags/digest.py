@@ -15,7 +15,7 @@ import numpy as np
 from slap_ros.bags.definitions import ADDED
 from slap_ros.bags.reader import read_bag
 from slap_ros.errors import DamagedBagError
-from slap_ros.messages.interfaces import DOMAIN_INFO
+from slap_ros.messages.interfaces import DOMAIN_INFO, PLAN
 
 EXCLUDED_TYPES = (  # they tell of the machine or repeat the states for the eye
     "diagnostic_msgs/msg/DiagnosticArray",
@@ -28,6 +28,7 @@ EXCLUDED_TYPES = (  # they tell of the machine or repeat the states for the eye
 EXCLUDED_FIELDS = {
     "std_msgs/msg/Header": ("stamp",),
     DOMAIN_INFO: ("versions",),
+    PLAN: ("bound",),  # what was proven of the plan, which changes nothing that happened
 }
 # Settings of domains that earlier bags do not have, at the values that change nothing.
 ADDED_SETTINGS = (("towers", "(1, 1)"),)
@@ -36,10 +37,10 @@ ADDED_SETTINGS = (("towers", "(1, 1)"),)
 def bag_digest(path: Path | str) -> str:
     """SHA-256 over what happened: the messages of each topic in order, topics by name.
 
-    When messages were sent and received does not count, nor do software versions, diagnostics,
-    logs, transforms and markers, nor types that cannot be deserialised. A field that older bags do
-    not have counts where it is not empty, and a setting where it changes something, so that the
-    same run has the digest that it always had.
+    When messages were sent and received does not count, nor do software versions, bounds of plans,
+    diagnostics, logs, transforms and markers, nor types that cannot be deserialised. A field that
+    older bags do not have counts where it is not empty, and a setting where it changes something,
+    so that the same run has the digest that it always had.
 
     Returns:
         64 hexadecimal digits.

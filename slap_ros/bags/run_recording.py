@@ -125,7 +125,7 @@ class _RunRecording:
         goal = self._space.mask(self.task.goal)
         at = EPISODE, self._number, self._stamp
         made = asdict(planned.origin)
-        self._put("slap/plan", self._encoder.plan(planned.plan, goal, self._space, *at, made))
+        self._put("slap/plan", self._encoder.plan(planned, goal, self._space, *at, made))
 
     def _write_edge(
         self, planned: PlanningResult, number: int, outcome: OptionResult, steps: int

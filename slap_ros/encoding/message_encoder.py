@@ -26,7 +26,7 @@ from slap_ros.messages.interfaces import (
 )
 from slap_ros.perception import Percept
 from slap_ros.planning.options import Option, OptionKind, OptionResult
-from slap_ros.planning.plan import Plan, PlanEdge
+from slap_ros.planning.plan import PlanEdge, PlanningResult
 from slap_ros.relational import AtomSpace, GroundAtom, LiftedOperator, State
 from slap_ros.relational.pddl import write_domain
 from slap_ros.shortcuts.shortcut import Sampling, Shortcut
@@ -265,7 +265,7 @@ class MessageEncoder:
 
     def plan(
         self,
-        value: Plan,
+        planned: PlanningResult,
         goal_mask: int,
         space: AtomSpace,
         episode: int,
@@ -276,7 +276,7 @@ class MessageEncoder:
         """The message of a plan.
 
         Args:
-            value: Plan to encode.
+            planned: Plan to encode, with what is proven of it.
             goal_mask: Goal of the plan, as a mask over ``space``.
             space: Atom space of the episode.
             episode: Number of the episode.
@@ -294,8 +294,9 @@ class MessageEncoder:
             episode=episode,
             number=number,
             goal=self.atoms(space.decode(goal_mask)),
-            edges=[self.plan_edge(edge, space) for edge in value.edges],
-            predicted_steps=value.predicted_steps,
+            edges=[self.plan_edge(edge, space) for edge in planned.plan.edges],
+            predicted_steps=planned.steps,
+            bound=planned.bound or 0.0,
         )
 
     def skill_info(self, operator: LiftedOperator, skill: Skill) -> Any:

@@ -126,6 +126,8 @@ class Trial:
         replans: Number of plans that replaced a diverged one.
         error_code: Error code of the failure, as in the ensemble's messages; 0 where the task was
             solved.
+        bound: How many times as long as the shortest the first plan is at most; None where nothing
+            is proven.
         edges: Edges that were executed, in order.
     """
 
@@ -139,6 +141,7 @@ class Trial:
     reason: str
     replans: int = 0
     error_code: int = 0
+    bound: float | None = None
     edges: tuple[ExecutedEdge, ...] = ()
 
     @property
@@ -169,6 +172,7 @@ class Trial:
             episode.error.reason,
             episode.replans,
             int(episode.error.code),
+            episode.bound,
             tuple(episode.edges),
         )
 

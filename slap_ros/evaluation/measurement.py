@@ -18,9 +18,11 @@ from slap_ros.evaluation.completeness import lost_options, planning_is_whole
 from slap_ros.evaluation.executed_options import ExecutedOption
 from slap_ros.evaluation.metrics import OPERATOR, SHORTCUT, UNKNOWN, OptionMetrics, RunMetrics
 from slap_ros.evaluation.recorded_run import EpisodeLog, RecordedRun
-from slap_ros.messages.decode import NANOSECONDS
+from slap_ros.messages.decode import NANOSECONDS, plan_bound
 from slap_ros.messages.events import PlanEventKind
 from slap_ros.planning.options import OptionKind
+
+OF_FIRST_PLAN = ("planner", "library", "samples", "bound")
 
 
 def measure(run: RecordedRun, options: Iterable[ExecutedOption]) -> RunMetrics:
@@ -55,6 +57,7 @@ def measure(run: RecordedRun, options: Iterable[ExecutedOption]) -> RunMetrics:
         planner=first.planner if first is not None else "",
         library=first.library if first is not None else "",
         samples=first.samples if first is not None else 0,
+        bound=plan_bound(first) if first is not None else None,
     )
     blanks: dict[str, Any] = dict.fromkeys(unknown)
     return replace(known, **blanks, unknown=unknown)
@@ -94,7 +97,7 @@ def _unknown(run: RecordedRun, options: Sequence[ExecutedOption]) -> dict[str, s
     if len(run.plans) < len(run.announced):
         reasons["shortcut_steps"] = "a plan is missing, which tells shortcuts from operators"
     if run.announced and run.announced[0] is None:
-        reasons |= dict.fromkeys(("planner", "library", "samples"), "the plan is missing")
+        reasons |= dict.fromkeys(OF_FIRST_PLAN, "the plan is missing")
     if not planning_is_whole(run.events.messages):
         planning = ("planning_seconds", "replans", "edges_rolled_out")
         reasons |= dict.fromkeys(planning, "an event of planning is missing")

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The metrics of runs: how a run went, and how each of its options went.
 
-A metric that the messages do not give is None, with the reason in ``RunMetrics.unknown``.
+A metric that the messages should give and do not is None, with the reason in
+``RunMetrics.unknown``.
 """
 
 from __future__ import annotations
@@ -49,6 +50,9 @@ class RunMetrics:
     planner: str | None  # planner of the first plan, as library and samples are; empty: no plan
     library: str | None  # digest of the shortcuts that it knew
     samples: int | None  # attempts of a shortcut in its model
+    # How many times as long as the shortest the first plan is at most; None: nothing is proven, or
+    # the plan was not recorded, which alone is in ``unknown``.
+    bound: float | None
     unknown: Mapping[str, str] = field(default_factory=dict)  # why a metric is None, by metric
 
     @property

@@ -16,6 +16,7 @@ from slap_ros.evaluation.measurement import measure_option
 from slap_ros.evaluation.metrics import RunMetrics
 from slap_ros.evaluation.recorded_run import EpisodeLog
 from slap_ros.evaluation.run_trace import RunTrace
+from slap_ros.messages.decode import plan_bound
 
 REASON = "the plan events are missing"
 OF_EVENTS = (
@@ -84,5 +85,6 @@ def _metrics(
         planner=plan.planner,
         library=plan.library,
         samples=plan.samples,
+        bound=plan_bound(plan),
         unknown=unknown,
     )

@@ -17,11 +17,13 @@ from slap_ros.messages.protocols import (
     Header,
     ObjectStateMessage,
     PlanEdgeMessage,
+    PlanMessage,
     StateMessage,
 )
 from slap_ros.relational import AtomSpace, GroundAtom, Layout, Object, State, Target, Type
 
 NANOSECONDS = 1_000_000_000  # in a second
+MORE_STEPS = 2.0**32  # than a message can say that a plan has
 
 
 def stamp_ns(header: Header) -> int:
@@ -129,6 +131,15 @@ def decode_target(msg: PlanEdgeMessage, space: AtomSpace) -> Target:
     if not msg.others_may_appear:
         return Target.exactly(expected)
     return Target(expected, decode_atoms(msg.forbidden_atoms, space))
+
+
+def plan_bound(msg: PlanMessage) -> float | None:
+    """How many times as long as the shortest a plan is at most; None where nothing is known.
+
+    Earlier versions recorded plans without a bound, and some messages have one that cannot be.
+    """
+    bound = float(getattr(msg, "bound", 0.0))
+    return bound if 1.0 <= bound < MORE_STEPS else None
 
 
 def decode_goal(msgs: Iterable[GroundAtomMessage], space: AtomSpace) -> frozenset[GroundAtom]:

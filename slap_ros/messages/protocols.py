@@ -144,6 +144,7 @@ class PlanMessage(Protocol):
     goal: Sequence[GroundAtomMessage]
     edges: Sequence[PlanEdgeMessage]
     predicted_steps: int
+    bound: float  # not in bags that were recorded before there was such a field
     planner: str
     library: str
     samples: int

@@ -113,6 +113,13 @@ class EpisodeResult:
         """Environment steps executed."""
         return len(self.actions)
 
+    @property
+    def bound(self) -> float | None:
+        """Bound of the first plan that was made; None without one, or where nothing is proven."""
+        made = (one.planned for one in self.plans if one.planned is not None)
+        first = next(made, None)
+        return None if first is None else first.bound
+
 
 @dataclass
 class Executor:

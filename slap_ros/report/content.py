@@ -18,6 +18,7 @@ from slap_ros.evaluation.atom_names import describe
 from slap_ros.evaluation.metrics import RunMetrics
 from slap_ros.evaluation.run_trace import RunTrace
 from slap_ros.messages.protocols import KeyValueMessage
+from slap_ros.planning.plan import bound_as_text
 from slap_ros.report.acquisitions import RecordedAcquisition, recorded_acquisitions
 from slap_ros.report.atom_timeline import AtomTimeline, atom_timeline
 from slap_ros.report.chain import PlanChain, chains
@@ -61,6 +62,16 @@ class RunReport:
         if not self.metrics.library:
             return PURE_PLANNING
         return "SLAP, 1 sample" if self.metrics.samples == 1 else "SLAP"
+
+    @property
+    def bound(self) -> str:
+        """How far from the shortest the first plan is at most, in words; empty if not known."""
+        bound = self.metrics.bound
+        if bound is None:
+            return ""
+        if bound == 1.0:
+            return "proven to be the shortest"
+        return f"at most {bound_as_text(bound)} times the shortest"
 
     @property
     def replan_steps(self) -> tuple[int, ...]:

@@ -39,6 +39,7 @@ def test_metrics_from_the_bag_are_those_of_the_run(bag, run, plan):
     assert [option.steps for option in metrics.options] == [edge.steps for edge in run.edges]
     assert metrics.planning_seconds == pytest.approx(plan.seconds, abs=1e-6)
     assert metrics.edges_rolled_out == plan.edges_rolled_out
+    assert metrics.bound == plan.bound == 1.0
     assert (metrics.seed, metrics.index) == (1, 0)
     assert not metrics.unknown
     assert not found.mismatches

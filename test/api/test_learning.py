@@ -56,6 +56,7 @@ def test_trials_are_those_of_the_command(domain, tmp_path):
     for row, trial in zip(rows, stored, strict=True):
         assert {name: getattr(row, name) for name in same} == {n: trial[n] for n in same}
         assert row.edges_rolled_out == trial["edges_rolled_out"]
+        assert row.bound == trial["bound"] == 1.0
         assert row.error == "NONE"
 
 

@@ -73,6 +73,7 @@ def test_the_command_line_makes_the_same_plan(domain, task, plan):
     assert found["plan"] == edges
     assert found["predicted_steps"] == plan.steps
     assert found["edges_rolled_out"] == plan.edges_rolled_out
+    assert found["bound"] == plan.bound
     pure = slap_ros.plan(domain, task, shortcuts=None)
     assert slap("plan", "obstacle2d", "--seed", 1, "--shortcuts", "none")["plan"] == [
         {"option": str(e), "predicted_steps": e.predicted_steps} for e in pure.plan.edges

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from slap_ros.bags import bag_digest
-from slap_ros.messages.interfaces import DOMAIN_INFO, STATE
+from slap_ros.messages.interfaces import DOMAIN_INFO, PLAN, STATE
 from support.programs import environment, program
 from support.truthful_run import Script, make, record, without
 
@@ -62,6 +62,18 @@ def test_a_setting_that_came_later_counts_where_it_changes_something(
         digests.append(bag_digest(tmp_path / value))
     assert digests[0] == bag_digest(honest_bag)
     assert digests[1] != bag_digest(honest_bag)
+
+
+def test_what_is_proven_of_a_plan_does_not_count(
+    script: Script, honest_bag: Path, tmp_path: Path
+) -> None:
+    messages = copy.deepcopy(script.messages)
+    plan = next(m.message for m in messages if m.type_name == PLAN)
+    assert plan.bound == 1.0
+    for bound in (0.0, 1.25):
+        plan.bound = bound
+        record(tmp_path / str(bound), messages)
+        assert bag_digest(tmp_path / str(bound)) == bag_digest(honest_bag)
 
 
 def test_diagnostics_do_not_count(script: Script, honest_bag: Path, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from math import inf, nan
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from slap_ros.bags import evaluate_bag
 from slap_ros.bags.evaluate import AtomMismatch
 from slap_ros.errors import ErrorCode, ForeignBagError, UnknownDomainError
-from slap_ros.messages.interfaces import ATOMS, DOMAIN_INFO
+from slap_ros.messages.interfaces import ATOMS, DOMAIN_INFO, PLAN
 from support.truthful_run import Script, record, without
 
 
@@ -38,6 +39,7 @@ def test_the_numbers_are_those_of_what_happened(tmp_path: Path, seed: int) -> No
         "planner": "lazy",
         "library": "0123456789abcdef",
         "samples": 16,
+        "bound": script.truth.bound,
         "unknown": {},
     }
     assert sum(option["steps"] for option in script.truth.options) == run.plan_length
@@ -61,6 +63,23 @@ def test_tampered_atoms_are_found(script: Script, tmp_path: Path) -> None:
             extra=(f"{fifth.atoms[0].predicate}(nobody)",),
         )
     ]
+
+
+@pytest.mark.parametrize("events", [True, False])
+@pytest.mark.parametrize(
+    ("recorded", "told"),
+    [(1.0, 1.0), (1.1, 1.1), *((odd, None) for odd in (0.0, 0.5, -2.0, 1e308, inf, nan))],
+)
+def test_a_bound_is_what_the_plan_says_or_not_known(
+    script: Script, tmp_path: Path, recorded: float, told: float | None, events: bool
+) -> None:
+    messages = copy.deepcopy(script.messages)
+    next(m.message for m in messages if m.type_name == PLAN).bound = recorded
+    kept = messages if events else without(messages, "/slap/plan_events")
+    record(tmp_path / "bag", kept)
+    (run,) = evaluate_bag(tmp_path / "bag").runs
+    assert run.bound == told
+    assert "bound" not in run.unknown  # the bag has all that the planner said
 
 
 def test_a_run_that_the_recording_cuts_off(script: Script, tmp_path: Path) -> None:

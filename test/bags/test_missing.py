@@ -103,11 +103,12 @@ def test_without_its_start_a_run_is_none_and_that_is_said(script: Script, tmp_pa
 def test_without_the_plan_nobody_knows_what_was_a_shortcut(script: Script, tmp_path: Path) -> None:
     record(tmp_path / "bag", [item for item in script.messages if item.type_name != PLAN])
     (run,) = evaluate_bag(tmp_path / "bag").runs
-    assert run.shortcut_steps is run.library is run.samples is None
+    assert run.shortcut_steps is run.library is run.samples is run.bound is None
     assert {option.kind for option in run.options} == {"unknown"}
     assert damages(tmp_path / "bag") == {"1 of 1 plans are missing"}
     plain = run.as_json()
-    assert plain["unknown"].keys() == {"shortcut_steps", "planner", "library", "samples"}
+    of_plan = {"shortcut_steps", "planner", "library", "samples", "bound"}
+    assert plain["unknown"].keys() == of_plan
 
 
 def test_a_skill_event_that_is_missing_is_missed(script: Script, tmp_path: Path) -> None:

@@ -32,6 +32,8 @@ def test_its_numbers_are_what_they_were() -> None:
         "atom_mismatches": len(found.mismatches),
     }
     assert {key: now[key] for key in THEN} == THEN
+    assert run.bound is None  # planners said nothing of it then
+    assert not run.unknown
 
 
 def test_its_commands_lead_to_the_same_states() -> None:

@@ -19,7 +19,7 @@ from slap_ros.bags import bag_digest, bag_info, evaluate_bag, read_bag, replay_b
 from slap_ros.bags.mcap_records import CHUNK
 from slap_ros.bags.rosbag2 import ROOT
 from slap_ros.errors import DamagedBagError, ForeignBagError, SlapError
-from slap_ros.messages.interfaces import TASK, definition, message_texts, typestore
+from slap_ros.messages.interfaces import PLAN, TASK, definition, message_texts, typestore
 from support.truthful_run import Published, Script, make, record, under
 
 SEPARATOR = "=" * 80
@@ -144,19 +144,24 @@ def test_a_foreign_bag_is_told_apart(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "named"),
-    [("int64 seed", "int64 sead", "seed"), ("uint32 index", "string index", "index")],
+    ("type_name", "old", "new", "named"),
+    [
+        (TASK, "int64 seed", "int64 sead", "seed"),
+        (TASK, "uint32 index", "string index", "index"),
+        (PLAN, "uint32 samples", "uint32 tries", "samples"),
+        (PLAN, "float64 bound", "string bound", "bound"),  # it may be missing, and nothing else
+    ],
 )
 def test_another_version_is_told_apart(
-    script: Script, tmp_path: Path, old: str, new: str, named: str
+    script: Script, tmp_path: Path, type_name: str, old: str, new: str, named: str
 ) -> None:
-    task = next(m for m in script.messages if m.type_name == TASK)
-    text = definition(TASK).replace(old, new)
+    item = next(m for m in script.messages if m.type_name == type_name)
+    text = definition(type_name).replace(old, new)
     store = get_typestore(Stores.EMPTY)
-    store.register(get_types_from_msg(text, TASK))
+    store.register(get_types_from_msg(text, type_name))
     with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        connection = writer.add_connection("/slap/task", TASK, typestore=store)
-        writer.write(connection, 1, task.cdr)
+        connection = writer.add_connection(item.topic, type_name, typestore=store)
+        writer.write(connection, 1, item.cdr)
     with pytest.raises(ForeignBagError, match=f"version mismatch.*{named}"):
         read_bag(tmp_path / "bag")
 

@@ -11,9 +11,12 @@ import pytest
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
+from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode
 from slap_ros.evaluation.experiment import Trial
-from slap_ros.planning.execution import ExecutedEdge
+from slap_ros.planning.execution import EpisodeResult, ExecutedEdge, PlanExecution
+from slap_ros.planning.options import hold_option
+from slap_ros.planning.plan import Plan, PlanEdge, PlanningResult
 
 LIBRARY = Path(__file__).parent.parent / "shortcuts" / "data" / "obstacle2d"
 COMMAND = ["evaluate", "obstacle2d", "--tasks", "2", "--seeds", "2", "--first-seed", "500"]
@@ -80,6 +83,21 @@ def test_an_edge_says_only_what_is_not_true_of_most():
     assert [edge.get("reached", "so") for edge in data["edges"]] == ["so", "so", False]
     assert Trial.from_json(json.loads(json.dumps(data))) == trial
     assert Trial.from_json(json.loads(json.dumps(asdict(trial)))) == trial  # of earlier versions
+    del data["bound"]  # which came later still
+    assert Trial.from_json(data) == trial
+
+
+def test_a_bound_is_that_of_the_first_plan_to_the_last_digit():
+    planned = [PlanningResult(Plan(()), 1, 0, 0), PlanningResult(a_step(159), 1, 1, 1, at_least=39)]
+    tried = [PlanExecution(0, one) for one in (None, planned[1], planned[0])]  # first: no plan
+    data = json.loads(json.dumps(Trial.of(500, 0, EpisodeResult(plans=tried)).as_json()))
+    assert data["bound"] == 159 / 39
+    assert Trial.of(500, 0, EpisodeResult(plans=tried[:1])).bound is None
+
+
+def a_step(steps):
+    hold = hold_option(get_domain("obstacle2d").action_space)
+    return Plan((PlanEdge(hold, hold.target(0), steps),))
 
 
 def test_the_data_of_another_command_stays(file):

@@ -64,9 +64,11 @@ class Story:
         self.plan_event(PlanEventKind.PLANNING_STARTED, step, episode)
         self.plan_event(PlanEventKind.PLANNED, step, episode, edges_rolled_out=rolled)
 
-    def plan(self, *edges: tuple[int, str], episode: int = 1, goal: Any = ()) -> None:
+    def plan(
+        self, *edges: tuple[int, str], episode: int = 1, goal: Any = (), bound: float = 0.0
+    ) -> None:
         named = [SimpleNamespace(kind=kind, name=name) for kind, name in edges]
-        origin = {"planner": "lazy", "library": "0123456789abcdef", "samples": 16}
+        origin = {"planner": "lazy", "library": "0123456789abcdef", "samples": 16, "bound": bound}
         number = self.plan_number
         self.tell(PLAN, episode=episode, number=number, edges=named, goal=goal, **origin)
 
@@ -92,13 +94,13 @@ def solved() -> Story:
     story.task()
     story.states(0, 0)
     story.planning(0, rolled=10)
-    story.plan((1, "Push"), (0, "Pick"))
+    story.plan((1, "Push"), (0, "Pick"), bound=1.25)
     story.skill(SkillEventKind.STARTED, 0, "Push")
     story.states(1, 4)
     story.skill(SkillEventKind.FAILED, 4, "Push")
     story.plan_event(PlanEventKind.DIVERGED, 4)
     story.planning(4, rolled=7)
-    story.plan((0, "Pick"))
+    story.plan((0, "Pick"), bound=1.0)
     story.skill(SkillEventKind.STARTED, 4)
     story.states(5, 8)
     story.states(9, 9, atoms=[*OTHER, *GOAL])
@@ -140,6 +142,7 @@ def test_a_solved_run() -> None:
         "planner": "lazy",
         "library": "0123456789abcdef",
         "samples": 16,
+        "bound": 1.25,
         "unknown": {},
     }
     plain = solved().run().as_json()
@@ -218,6 +221,17 @@ def test_solved_means_that_the_goal_is_perceived() -> None:
     assert not run.success
     assert run.error_code is ErrorCode.UNKNOWN
     assert "On(block1, target)" in run.error_msg
+
+
+def test_without_a_plan_there_is_no_bound() -> None:
+    story = Story()
+    story.task()
+    story.states(0, 0)
+    story.plan_event(PlanEventKind.PLANNING_STARTED, 0)
+    story.plan_event(PlanEventKind.FAILED, 0, error_code=30, error_msg="no way")
+    run = story.run()
+    assert run.bound is None
+    assert not run.unknown
 
 
 def test_a_goal_of_the_users_own_is_what_counts() -> None:

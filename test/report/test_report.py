@@ -20,7 +20,7 @@ from slap_ros.bags import evaluate_bag
 from slap_ros.bags.recording import Recording
 from slap_ros.errors import InvalidParameterError, StorageFullError
 from slap_ros.evaluation.run_log import RunLog
-from slap_ros.messages.interfaces import ATOMS, DOMAIN_INFO, MARKERS, STATE
+from slap_ros.messages.interfaces import ATOMS, DOMAIN_INFO, MARKERS, PLAN, STATE
 from slap_ros.relational import Type
 from slap_ros.report import check_output, read_report, render, write_page
 from slap_ros.report.traces import robot_series
@@ -48,6 +48,30 @@ def test_the_numbers_are_those_of_evaluate_to_the_digit(bags: Bags, name: str) -
     shown = [attributes["value"] for tag, attributes in page.elements if tag == "data"]
     assert shown == [str(run.plan_length), repr(run.planning_seconds)]
     assert page.texts["data"] == [str(run.plan_length), f"{run.planning_seconds:.3f}"]
+
+
+@pytest.mark.parametrize(
+    ("bound", "words"),
+    [
+        (1.0, "proven to be the shortest"),
+        (1.25, "at most 1.25 times the shortest"),
+        (1.1, "at most 1.10 times the shortest"),
+        (501 / 500, "at most 1.01 times the shortest"),  # at most, and not proven
+        (0.0, None),
+        (1e308, None),
+        (math.inf, None),
+    ],
+)
+def test_a_page_says_how_far_from_the_shortest_the_first_plan_is(
+    script: Script, tmp_path: Path, bound: float, words: str | None
+) -> None:
+    messages = copy.deepcopy(script.messages)
+    next(item.message for item in messages if item.type_name == PLAN).bound = bound
+    record(tmp_path / "bag", messages)
+    page = page_of(tmp_path / "bag")
+    told = [text for text in page.texts["dd"] if "shortest" in text]
+    assert told == ([] if words is None else [words])
+    assert page.texts["dt"].count("first plan") == len(told)
 
 
 def test_a_run_is_told_from_its_first_step_to_its_last(bags: Bags) -> None:

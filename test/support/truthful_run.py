@@ -53,6 +53,7 @@ class Truth:
     plan_length: int = 0
     planning_ns: int = 0
     edges_rolled_out: int = 0
+    bound: float = 0.0
     options: list[dict[str, Any]] = field(default_factory=list)
 
 
@@ -243,10 +244,12 @@ class Script:
             for ground in self.domain.ground(self.space)
         )
         graph = build_abstract_graph(self.space.abstract(state), self.space.mask(goal), operators)
-        plan = search_lazily(graph, state, model).require_plan()
+        outcome = search_lazily(graph, state, model)
+        plan = outcome.require_plan()
         self.clock_ns += 123_456_789
         self.plan_event(PlanEventKind.PLANNED, 0, rolled=model.executed)
         self.truth.planning_ns = self.clock_ns - started
+        self.truth.bound = plan.predicted_steps / (outcome.at_least or 1)
         self._publish_plan(plan, goal)
         self.truth.edges_rolled_out = model.executed
         return plan
@@ -274,6 +277,7 @@ class Script:
             goal=self.atoms_of(goal),
             edges=edges,
             predicted_steps=plan.predicted_steps,
+            bound=self.truth.bound,
             planner="lazy",
             library="0123456789abcdef",
             samples=16,
