@@ -65,7 +65,13 @@ class Model:
         return cls(domain.make_world(initial), domain.atom_space(initial), domain.action_space)
 
     def knows(self, option: Option, state: State, target: Target) -> bool:
-        """Whether a roll-out was made before; see :meth:`roll_out`."""
+        """Whether a roll-out was made before.
+
+        Args:
+            option: What would be executed.
+            state: Where it would start.
+            target: Where it should end.
+        """
         return (option, target, state.key) in self._cache
 
     def roll_out(self, option: Option, state: State, target: Target) -> Rollout:

@@ -250,7 +250,14 @@ def _path(vertex: Vertex) -> Iterator[tuple[Vertex, Vertex, Edge]]:
 def without_plan(
     graph: AbstractGraph, failed: Iterable[Vertex], model: Model, failures: Failures
 ) -> SearchOutcome:
-    """The outcome of a search that found no plan."""
+    """The outcome of a search that found no plan.
+
+    Args:
+        graph: The top level.
+        failed: Where operators that failed have left the robot, in order.
+        model: Model that rolled the options out.
+        failures: Options that were tried.
+    """
     what = f"no path through the {len(graph.nodes)} abstract states can be executed from here"
     why = failures.in_words()
     paths = tuple(
