@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from math import log
 from statistics import fmean
@@ -22,6 +23,7 @@ from benchmarks.printing import show
 from slap_ros.core import Domain, Task
 from slap_ros.domains import get_domain
 from slap_ros.domains.tabletop.transit import clear_caches
+from slap_ros.errors import PlanningLimitError
 from slap_ros.planning.anytime import AnytimePlanner
 from slap_ros.planning.plan import PlanningResult
 from slap_ros.planning.problem import Problem
@@ -103,9 +105,10 @@ def plan(domain: Domain, task: Task, library: str) -> _Planned | None:
     problem = Problem.of(domain, task.initial_state)
     planner = AnytimePlanner(problem, known)
     goal = problem.model.space.mask(task.goal)
-    found: list[tuple[PlanningResult, float]] = [
-        (result, process_time() - start) for result in planner.improve(task.initial_state, goal)
-    ]
+    found: list[tuple[PlanningResult, float]] = []
+    with suppress(PlanningLimitError):
+        for result in planner.improve(task.initial_state, goal):
+            found.append((result, process_time() - start))
     taken = process_time() - start
     return _Planned(found[0][0], found[-1][0], found[0][1], taken) if found else None
 

@@ -17,7 +17,7 @@ The effort is limited in roll-outs and abstract states, never in seconds.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 
@@ -150,22 +150,36 @@ class _Improvement:
 
         Args:
             abstract: Abstract state to start from, a mask.
+
+        Raises:
+            PlanningLimitError: No plan was found that can be executed.
         """
         self._at_least = self._least_steps(abstract)
-        first = self._find_first()
-        yield self._result(None, first.graph_nodes, first.graph_edges)
+        failure: PlanningLimitError | None = None
+        try:
+            first = self._find_first()
+            yield self._result(None, first.graph_nodes, first.graph_edges)
+        except PlanningLimitError as error:
+            failure = error  # a shortcut may still do what operators cannot
         self._limit = self._model.executed + self._planner.effort.rollouts // NEAR_PLANS
+        yield from self._around(abstract)
+        if self._best is None and failure is not None:
+            raise failure
+
+    def _around(self, abstract: int) -> Iterator[PlanningResult]:
+        """Search near the start, where shortcuts pay most, then near each plan that is better."""
         problem = self._planner.problem
         builder = CorridorBuilder(self._goal, problem.operators, self._planner.shortcuts)
-        route: Sequence[int] = [abstract]  # where shortcuts pay most, as a rule
+        route: list[int] = [abstract]
+        searched: Plan | None = None
         while True:
-            graph, before = builder.around(route), self._best
+            graph = builder.around(route)
             for weight in WEIGHTS:
                 if self._take(self._search(graph, weight).plan):
                     yield self._result(graph)
-            if self._model.executed >= self._limit or (self._best is before and len(route) > 1):
+            if self._best in (None, searched) or self._model.executed >= self._limit:
                 return
-            route = [abstract, *self._on_the_way()]
+            searched, route = self._best, [abstract, *self._on_the_way()]
 
     def _find_first(self) -> PlanningResult:
         """Take the plan that the FF heuristic finds.

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 import slap_ros
 from slap_ros.domains import get_domain
-from slap_ros.errors import InvalidParameterError, UnsolvableError
+from slap_ros.errors import InvalidParameterError, PlanningLimitError, UnsolvableError
 from slap_ros.planning.anytime import AnytimePlanner, PlanningInterrupted
 from slap_ros.planning.effort import Effort
 from slap_ros.planning.landmark_cut import LandmarkCut, RelaxedOperator
@@ -153,6 +153,16 @@ def test_a_tall_tower_is_planned_for_within_the_effort_and_each_plan_is_better()
     run = slap_ros.execute(domain, task, found[-1])
     assert run.success
     assert run.steps == steps[-1]
+
+
+def test_a_shortcut_does_what_operators_cannot():
+    """This tower sways, so that its top cannot be grasped."""
+    domain = slap_ros.make("obstacle_tower", obstacles=8)
+    task, effort = domain.task(seed=502), Effort(rollouts=60)
+    with pytest.raises(PlanningLimitError, match="no plan within the effort of planning"):
+        improvements(domain, task, effort)
+    (*_, last) = improvements(domain, task, effort, chosen_library("", domain))
+    assert slap_ros.execute(domain, task, last).success
 
 
 def test_the_same_plan_comes_of_the_same_effort():
