@@ -38,7 +38,7 @@ TABLES = (
     ("obstacle_tower", "fair:obstacles=3"),
     ("obstacle_tower", "fair:obstacles=5"),
     ("obstacle_tower", "fair:obstacles=8"),
-    ("obstacle_tower", "fair:distractors=7"),
+    ("obstacle_tower", "fair:distractors=5"),
     ("obstacle_tower", "fair:towers=3,obstacles=4,distractors=5"),
     ("cleanup_table", "fair:toys=4"),
     ("cleanup_table", "fair:toys=6"),
@@ -107,8 +107,9 @@ def plan(domain: Domain, task: Task, library: str) -> _Planned | None:
     goal = problem.model.space.mask(task.goal)
     found: list[tuple[PlanningResult, float]] = []
     with suppress(PlanningLimitError):
-        for result in planner.improve(task.initial_state, goal):
-            found.append((result, process_time() - start))
+        found.extend(
+            (result, process_time() - start) for result in planner.improve(task.initial_state, goal)
+        )
     taken = process_time() - start
     return _Planned(found[0][0], found[-1][0], found[0][1], taken) if found else None
 
