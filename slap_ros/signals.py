@@ -26,8 +26,13 @@ class TerminatedError(KeyboardInterrupt):
 
 
 def exit_code(error: KeyboardInterrupt) -> int:
-    """The exit code after a signal, as shells have it: 128 and the signal's number."""
-    return 128 + (signal.SIGTERM if isinstance(error, TerminatedError) else signal.SIGINT)
+    """The exit code after a signal, as shells have it: 128 and the signal's number.
+
+    Args:
+        error: What the signal raised, or what was raised from it.
+    """
+    first = error.__cause__ or error
+    return 128 + (signal.SIGTERM if isinstance(first, TerminatedError) else signal.SIGINT)
 
 
 def forget_interrupt() -> None:

@@ -63,7 +63,8 @@ def plan(
             raise InvalidParameterError(
                 "--within is not for PDDL files: --planner astar finds a plan of least cost"
             )
-        plan_pddl(Path(domain), problem or Path(domain), planner, effort or 1, json)
+        factor = 1 if effort is None else effort
+        plan_pddl(Path(domain), problem or Path(domain), planner, factor, json)
         return
     # Not above: what plans symbolically needs none of it.
     from slap_ros.cli.plan_task import plan_task

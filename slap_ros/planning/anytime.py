@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.planning.abstract_graph import AbstractGraph
@@ -29,7 +29,9 @@ from slap_ros.planning.ff_planner import FFPlanner
 from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.landmark_cut import LandmarkCut, RelaxedOperator
 from slap_ros.planning.lazy_search import SearchLimits, search_lazily
+from slap_ros.planning.model import CountedModel
 from slap_ros.planning.plan import Plan, PlanningResult
+from slap_ros.planning.planner_choice import ANYTIME
 from slap_ros.planning.problem import Problem
 from slap_ros.planning.search import SearchOutcome
 from slap_ros.planning.shortcut_source import ShortcutSource
@@ -73,7 +75,7 @@ class AnytimePlanner:
         Raises:
             PlanningInterrupted: An interrupt came when there was a plan.
         """
-        best = None
+        best, before = None, self.problem.model.executed
         try:
             for best in self.improve(state, goal):
                 if best.bound is not None and best.bound <= self.effort.within:
@@ -82,9 +84,10 @@ class AnytimePlanner:
             if best is None:
                 raise
             raise PlanningInterrupted(best, interrupt) from interrupt
-        if best is None:
-            return GraphPlanner(self.problem, shortcuts=self.shortcuts).plan(state, goal)
-        return best
+        if best is not None:
+            return best
+        result = GraphPlanner(self.problem, shortcuts=self.shortcuts).plan(state, goal)
+        return replace(result, edges_rolled_out=self.problem.model.executed - before)
 
     def improve(self, state: State, goal: int) -> Iterator[PlanningResult]:
         """Each plan that is better than those before, or of which more is proven.
@@ -118,30 +121,36 @@ class _Improvement:
 
     def __init__(self, planner: AnytimePlanner, state: State, goal: int) -> None:
         self._planner, self._state, self._goal = planner, state, goal
-        self._model = planner.problem.model
-        self._before = self._model.executed
-        self._limit = self._before + planner.effort.rollouts
+        self._simulated_before = planner.problem.model.executed
+        self._model = CountedModel(planner.problem.model)
+        self._problem = replace(planner.problem, model=self._model)
+        self._limit = planner.effort.rollouts
         self._best: Plan | None = None
+        self._no_first: PlanningLimitError | None = None  # why FF found no plan
         self._at_least = 0  # environment steps of any plan
 
     def through(self, graph: AbstractGraph) -> Iterator[PlanningResult]:
         """Search a graph as a whole, with falling weights where it is not small."""
         is_small = len(graph.nodes) <= SMALL
         if not is_small:
-            self._at_least = self._least_steps(graph.nodes[0])
             with suppress(PlanningLimitError):
                 self._find_first()
                 yield self._result(graph)
+            if self._best is None:
+                self._limit += self._model.executed  # what was tried in vain
+        leads_to_goal = self._is_through(graph)
         for weight in WEIGHTS[-1:] if is_small else WEIGHTS:
             outcome = self._search(graph, weight)
-            self._at_least = max(self._at_least, outcome.at_least or 0)
+            leads_to_goal |= outcome.plan is not None
+            if leads_to_goal:  # else a deeper graph may have a plan that is shorter
+                self._at_least = max(self._at_least, outcome.at_least or 0)
             if outcome.plan is None and not outcome.stopped and self._best is None:
                 return  # nothing can be executed
             if self._take(outcome.plan) or self._is_proven():
                 yield self._result(graph)
             if self._is_proven():
                 return
-        if self._best is None:  # of a small graph: others were tried
+        if self._best is None:
             self._find_first()
         yield self._result(graph)
 
@@ -154,7 +163,6 @@ class _Improvement:
         Raises:
             PlanningLimitError: No plan was found that can be executed.
         """
-        self._at_least = self._least_steps(abstract)
         failure: PlanningLimitError | None = None
         try:
             first = self._find_first()
@@ -168,8 +176,8 @@ class _Improvement:
 
     def _around(self, abstract: int) -> Iterator[PlanningResult]:
         """Search near the start, where shortcuts pay most, then near each plan that is better."""
-        problem = self._planner.problem
-        builder = CorridorBuilder(self._goal, problem.operators, self._planner.shortcuts)
+        operators, shortcuts = self._problem.operators, self._planner.shortcuts
+        builder = CorridorBuilder(self._goal, operators, shortcuts)
         route: list[int] = [abstract]
         searched: Plan | None = None
         while True:
@@ -182,15 +190,23 @@ class _Improvement:
             searched, route = self._best, [abstract, *self._on_the_way()]
 
     def _find_first(self) -> PlanningResult:
-        """Take the plan that the FF heuristic finds.
+        """Take the plan that the FF heuristic finds, and what landmarks prove of any plan.
 
         Raises:
-            PlanningLimitError: It finds none that can be executed.
+            PlanningLimitError: It finds none that can be executed, now or when it was asked before.
         """
+        if self._no_first is not None:
+            raise self._no_first
+        abstract = self._model.space.abstract(self._state)
+        self._at_least = max(self._at_least, self._least_steps(abstract))
         try:
-            first = FFPlanner(self._planner.problem).plan(self._state, self._goal)
-        except UnsolvableError as error:
-            raise PlanningLimitError(f"no plan within the effort of planning: {error}") from error
+            first = FFPlanner(self._problem).plan(self._state, self._goal)
+        except (UnsolvableError, PlanningLimitError) as error:
+            self._no_first = PlanningLimitError(
+                f"no plan within the effort of planning; give more, as in {ANYTIME}:effort=4: "
+                f"{error}"
+            )
+            raise self._no_first from error
         self._take(first.plan)
         return first
 
@@ -213,6 +229,11 @@ class _Improvement:
         assert self._best is not None
         return [edge.target.required for edge in self._best.edges[:-1]]
 
+    def _is_through(self, graph: AbstractGraph) -> bool:
+        """Whether the first plan is known to be one through a graph: by as few operators."""
+        fewest = graph.depth[graph.goal_nodes[0]]
+        return self._best is not None and len(self._best.edges) == fewest
+
     def _is_proven(self) -> bool:
         return self._best is not None and self._at_least >= self._best.predicted_steps
 
@@ -220,7 +241,7 @@ class _Improvement:
         """Steps of any plan, by landmarks of operators and shortcuts."""
         operators = [
             RelaxedOperator(ground.preconditions, ground.add_effects, option.skill.least_steps)
-            for ground, option in self._planner.problem.operators
+            for ground, option in self._problem.operators
         ]
         if self._planner.shortcuts is not None:
             operators += self._planner.shortcuts.relaxed()
@@ -231,5 +252,5 @@ class _Improvement:
     ) -> PlanningResult:
         assert self._best is not None
         sizes = (nodes, edges) if graph is None else (len(graph.nodes), len(graph.edges))
-        rolled_out = self._model.executed - self._before
-        return PlanningResult(self._best, *sizes, rolled_out, graph=graph, at_least=self._at_least)
+        simulated = self._planner.problem.model.executed - self._simulated_before
+        return PlanningResult(self._best, *sizes, simulated, graph=graph, at_least=self._at_least)

@@ -104,3 +104,19 @@ class Model:
             if isinstance(action, OptionResult):
                 return Rollout(action.reached, execution.steps, state, abstract, action)
             state = self._world.step(action)
+
+
+class CountedModel(Model):
+    """A model for one plan: it counts from 0, and roll-outs known from earlier plans count as well.
+
+    So a limit of roll-outs leads to the same plan, whatever was planned before. What is known takes
+    no time.
+    """
+
+    def __init__(self, model: Model) -> None:
+        """Count what is asked of a model from now on."""
+        super().__init__(model._world, model.space, model._actions)
+        self._model = model
+
+    def _simulate(self, option: Option, state: State, target: Target) -> Rollout:
+        return self._model.roll_out(option, state, target)

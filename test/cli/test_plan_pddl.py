@@ -72,6 +72,13 @@ def planned(tmp_path: Path, texts: tuple[str, str], *options: str) -> dict[str, 
     return found
 
 
+@pytest.mark.parametrize("effort", ["0", "-1"])
+def test_no_effort_is_refused(tmp_path: Path, effort: str) -> None:
+    result = invoke(tmp_path, PAIRS["survey"], "plan", "--effort", effort)
+    assert result.exit_code == ErrorCode.INVALID_PARAMETER
+    assert f"the effort of planning must be 1 at least, got {effort}" in result.stderr
+
+
 def test_a_rover_sends_from_where_it_sampled(tmp_path: Path) -> None:
     found = planned(tmp_path, PAIRS["survey"])
     assert found == {"plan": ["sample(r, hill)", "send(r, hill, hill, camp)"]}
