@@ -39,7 +39,7 @@ TABLES = (
     ("obstacle_tower", "fair:obstacles=5"),
     ("obstacle_tower", "fair:obstacles=8"),
     ("obstacle_tower", "fair:distractors=5"),
-    ("obstacle_tower", "fair:towers=3,obstacles=4,distractors=5"),
+    ("obstacle_tower", "fair:towers=3,obstacles=4,distractors=4"),
     ("cleanup_table", "fair:toys=4"),
     ("cleanup_table", "fair:toys=6"),
     ("cleanup_table", "fair:toys=8"),
