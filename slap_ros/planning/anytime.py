@@ -17,7 +17,7 @@ The effort is limited in roll-outs and abstract states, never in seconds.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
@@ -89,6 +89,11 @@ class AnytimePlanner:
         result = GraphPlanner(self.problem, shortcuts=self.shortcuts).plan(state, goal)
         return replace(result, edges_rolled_out=self.problem.model.executed - before)
 
+    @property
+    def _most_abstract_states(self) -> int:
+        """Abstract states of a graph that is searched as a whole."""
+        return self.effort.tests // max(1, len(self.problem.operators))
+
     def improve(self, state: State, goal: int) -> Iterator[PlanningResult]:
         """Each plan that is better than those before, or of which more is proven.
 
@@ -108,12 +113,12 @@ class AnytimePlanner:
         planner = GraphPlanner(self.problem, shortcuts=self.shortcuts)
         run = _Improvement(self, state, goal)
         try:
-            graph = planner.graph(abstract, goal, max_nodes=self.effort.abstract_states)
+            graph = planner.graph(abstract, goal, max_nodes=self._most_abstract_states)
         except PlanningLimitError:
             self.problem.require_reachable(abstract, goal)
             yield from run.near_plans(abstract)
         else:
-            yield from run.through(graph)
+            yield from run.through(graph, planner.add_shortcuts)
 
 
 class _Improvement:
@@ -129,8 +134,15 @@ class _Improvement:
         self._no_first: PlanningLimitError | None = None  # why FF found no plan
         self._at_least = 0  # environment steps of any plan
 
-    def through(self, graph: AbstractGraph) -> Iterator[PlanningResult]:
-        """Search a graph as a whole, with falling weights where it is not small."""
+    def through(
+        self, graph: AbstractGraph, add_shortcuts: Callable[[AbstractGraph], None]
+    ) -> Iterator[PlanningResult]:
+        """Search a graph as a whole, with falling weights where it is not small.
+
+        Args:
+            graph: The top level.
+            add_shortcuts: Function that adds shortcuts to it, which takes longer than a first plan.
+        """
         is_small = len(graph.nodes) <= SMALL
         if not is_small:
             with suppress(PlanningLimitError):
@@ -138,6 +150,7 @@ class _Improvement:
                 yield self._result(graph)
             if self._best is None:
                 self._limit += self._model.executed  # what was tried in vain
+        add_shortcuts(graph)
         leads_to_goal = self._is_through(graph)
         for weight in WEIGHTS[-1:] if is_small else WEIGHTS:
             outcome = self._search(graph, weight)

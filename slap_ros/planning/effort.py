@@ -16,7 +16,8 @@ class Effort:
     Args:
         rollouts: Options simulated, after which the best plan so far is taken; the first plan for
             a graph that is too large is made anyway.
-        abstract_states: Abstract states of a graph that is searched as a whole.
+        tests: How often it may be looked whether an operator is applicable, to make a graph that is
+            searched as a whole: abstract states times ground operators.
         within: Factor of the bound at which a plan is good enough, at least 1.
 
     Raises:
@@ -24,11 +25,11 @@ class Effort:
     """
 
     rollouts: int = 400
-    abstract_states: int = 3_000
+    tests: int = 500_000
     within: float = 1.0
 
     def __post_init__(self) -> None:
-        if min(self.rollouts, self.abstract_states) < 1:
+        if min(self.rollouts, self.tests) < 1:
             raise InvalidParameterError(f"no plan comes of so little effort: {self}")
         if not self.within >= 1.0:
             raise InvalidParameterError(
@@ -46,4 +47,4 @@ class Effort:
         if factor < 1:
             raise InvalidParameterError(f"the effort of planning must be 1 at least, got {factor}")
         usual = cls()
-        return cls(factor * usual.rollouts, factor * usual.abstract_states, within)
+        return cls(factor * usual.rollouts, factor * usual.tests, within)

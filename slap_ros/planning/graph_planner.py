@@ -93,6 +93,7 @@ class GraphPlanner:
         start = self.problem.model.space.abstract(state)
         for extra_depth in range(self.max_extra_depth + 1):
             graph = self.graph(start, goal, extra_depth)
+            self.add_shortcuts(graph)
             outcome = self.search(graph, state, self.problem.model)
             if outcome.plan is not None:
                 break
@@ -101,7 +102,7 @@ class GraphPlanner:
     def graph(
         self, start: int, goal: int, extra_depth: int = 0, max_nodes: int = MAX_NODES
     ) -> AbstractGraph:
-        """The top level with shortcuts.
+        """The top level, still without shortcuts.
 
         Args:
             start: Abstract state to start from, a mask.
@@ -119,9 +120,12 @@ class GraphPlanner:
         except UnsolvableError as error:
             raise UnsolvableError(f"{error}: {self.problem.why_not(start, goal)}") from error
         graph.space = self.problem.model.space
+        return graph
+
+    def add_shortcuts(self, graph: AbstractGraph) -> None:
+        """Add shortcuts to a graph, and what they alone lead to."""
         if self.shortcuts is not None:
             shortcuts, on_way = self.shortcuts.edges(graph), graph.on_way_to_goal()
             within = {edge.option.skill.name for edge in shortcuts if edge.target in on_way}
             add_beyond(graph, self.shortcuts.beyond(graph, within), self.problem.operators)
             graph.edges.extend(shortcuts)
-        return graph

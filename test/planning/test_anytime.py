@@ -143,7 +143,7 @@ def improvements(domain, task, effort, library=None):
 
 def test_a_tall_tower_is_planned_for_within_the_effort_and_each_plan_is_better():
     domain = slap_ros.make("obstacle_tower", obstacles=6)
-    task, effort = domain.task(seed=1), Effort(rollouts=12, abstract_states=500)
+    task, effort = domain.task(seed=1), Effort(rollouts=12, tests=10_000)
     found = improvements(domain, task, effort, chosen_library("", domain))
     steps, proven = [one.steps for one in found], [one.at_least for one in found]
     assert steps == sorted(steps, reverse=True)

@@ -24,7 +24,7 @@ from slap_ros.signals import TerminatedError, exit_code
 
 WORLD = Layout.of((Type("world", (Feature("mask", "1"), Feature("detail", "1")))("w"),))
 ATOMS = 7
-EFFORTS = (Effort(), Effort(rollouts=8), Effort(abstract_states=2))
+EFFORTS = (Effort(), Effort(rollouts=8), Effort(tests=20))
 LIFTED = get_domain("obstacle2d").operators[0]  # names the made-up ones
 
 
@@ -134,9 +134,7 @@ def plan(planner, start, goal):
         return None
 
 
-@pytest.mark.parametrize(
-    "effort", [Effort(), Effort(rollouts=8), Effort(abstract_states=2)], ids=str
-)
+@pytest.mark.parametrize("effort", [Effort(), Effort(rollouts=8), Effort(tests=20)], ids=str)
 @pytest.mark.parametrize("small", [0, anytime.SMALL])
 def test_lazy_search_finds_nothing_below_what_is_proven(effort, small, monkeypatch):
     monkeypatch.setattr(anytime, "SMALL", small)
@@ -186,7 +184,7 @@ def test_planning_near_a_plan_of_one_edge_ends():
     problem = Problem.of(domain, task.initial_state)
     start = problem.model.space.abstract(task.initial_state)
     first = next(ground for ground, _ in problem.operators if ground.applicable(start))
-    planner = AnytimePlanner(problem, effort=Effort(abstract_states=1))
+    planner = AnytimePlanner(problem, effort=Effort(tests=1))
     assert len(planner.plan(task.initial_state, first.apply(start)).plan.edges) == 1
     assert planner.plan(task.initial_state, start).bound == 1.0
 
@@ -216,6 +214,6 @@ def test_planning_that_is_terminated_says_so_in_its_exit_code():
     problem, start, goal = two_ways(TerminatedModel())
     problem = replace(problem, operators=problem.operators[1:])  # without the one that fails
     with pytest.raises(PlanningInterrupted) as caught:
-        AnytimePlanner(problem, effort=Effort(abstract_states=1)).plan(start, goal)
+        AnytimePlanner(problem, effort=Effort(tests=1)).plan(start, goal)
     assert caught.value.best.steps == 22
     assert exit_code(caught.value) == 143
