@@ -90,9 +90,7 @@ def test_generalisation_has_the_numbers_of_the_experiments(tmp_path):
 
 
 def test_a_task_without_a_plan_counts_as_failed_and_is_told_of(tmp_path, monkeypatch):
-    monkeypatch.setattr(
-        "slap_ros.planning.abstract_graph.build_abstract_graph.__defaults__", (0, 9)
-    )
+    monkeypatch.setattr("slap_ros.planning.graph_planner.GraphPlanner.graph.__defaults__", (0, 9))
     arguments = ["generalisation", "obstacle2d", "--tasks", 1, "--seeds", 3, *PLANNING]
     arguments += ["--vary", "bystanders=0,1", "--output", tmp_path]
     result = CliRunner().invoke(app, ["study", *map(str, arguments)])
