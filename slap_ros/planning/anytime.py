@@ -176,16 +176,13 @@ class _Improvement:
         Raises:
             PlanningLimitError: No plan was found that can be executed.
         """
-        failure: PlanningLimitError | None = None
-        try:
+        with suppress(PlanningLimitError):  # a shortcut may still do what operators cannot
             first = self._find_first()
             yield self._result(None, first.graph_nodes, first.graph_edges)
-        except PlanningLimitError as error:
-            failure = error  # a shortcut may still do what operators cannot
         self._limit = self._model.executed + self._planner.effort.rollouts // NEAR_PLANS
         yield from self._around(abstract)
-        if self._best is None and failure is not None:
-            raise failure
+        if self._best is None:
+            self._find_first()
 
     def _around(self, abstract: int) -> Iterator[PlanningResult]:
         """Search near the start, where shortcuts pay most, then near each plan that is better."""

@@ -93,11 +93,8 @@ class Problem:
             UnsolvableError: Atoms of it never hold, or never hold together.
         """
         grounds = [ground for ground, _ in self.operators]
-        space = self.model.space
-        if never := unreachable_atoms(start, goal, grounds):
-            raise UnsolvableError(f"no operator leads to {list_atoms(space, never)}")
-        if pair := never_together(goal, start, grounds):
-            raise UnsolvableError(f"{list_atoms(space, pair)} never hold together")
+        if why := _what_never_holds(self.model.space, start, goal, grounds):
+            raise UnsolvableError(why)
 
     def why_not(self, start: int, goal: int) -> str:
         """Why operators alone do not lead from an abstract state to a goal, both masks."""
@@ -127,9 +124,16 @@ def why_unreachable(
         lacking = [str(one) for one in sequence if one in unskilled]
         if lacking:
             return f"the plan {', '.join(map(str, sequence))} lacks a skill for {lacking[0]}"
-    never = unreachable_atoms(start, goal, operators)
-    if never:
+    why = _what_never_holds(space, start, goal, operators)
+    return why or f"{list_atoms(space, goal)} never hold all together"
+
+
+def _what_never_holds(
+    space: AtomSpace, start: int, goal: int, operators: Sequence[GroundOperator]
+) -> str:
+    """Atoms of a goal that never hold, or two that never hold together; empty if there are none."""
+    if never := unreachable_atoms(start, goal, operators):
         return f"no operator leads to {list_atoms(space, never)}"
     if pair := never_together(goal, start, operators):
         return f"{list_atoms(space, pair)} never hold together"
-    return f"{list_atoms(space, goal)} never hold all together"
+    return ""
