@@ -7,14 +7,10 @@ import subprocess
 import pytest
 import yaml
 
-from support.commands import LIMIT, ros2, started, wait_for_task
+from support.commands import LIMIT, parameter, started, wait_for_task
 
 pytestmark = pytest.mark.timeout(300)  # each starts several processes of ROS 2
 LAUNCH = ["ros2", "launch", "slap_ros", "ensemble.launch.py"]
-
-
-def has(node, parameter):
-    return ros2("param", "get", f"/{node}", parameter, "--hide-type").strip()
 
 
 def written(path, **nodes):
@@ -33,12 +29,15 @@ def test_a_parameter_file_goes_before_defaults_and_arguments_before_the_file(cli
     launch = [*LAUNCH, f"params_file:={file}", "index:=2", "patience:=5.0"]
     with started(launch, tmp_path / "launch.txt"):
         wait_for_task()
-        assert (has("sim_node", "seed"), has("sim_node", "index")) == ("7", "2")
-        assert has("sim_node", "visualize") == "False"
-        assert (has("planner_node", "planner"), has("planner_node", "samples")) == ("astar", "3")
-        assert has("planner_node", "patience") == "5.0"
-        assert has("skill_server", "state_timeout") == "3.5"
-        assert has("skill_server", "samples") == "16"
+        assert (parameter("sim_node", "seed"), parameter("sim_node", "index")) == ("7", "2")
+        assert parameter("sim_node", "visualize") == "False"
+        assert (parameter("planner_node", "planner"), parameter("planner_node", "samples")) == (
+            "astar",
+            "3",
+        )
+        assert parameter("planner_node", "patience") == "5.0"
+        assert parameter("skill_server", "state_timeout") == "3.5"
+        assert parameter("skill_server", "samples") == "16"
 
 
 @pytest.mark.parametrize(
@@ -60,5 +59,9 @@ def test_on_a_robot_a_skill_waits_longer_for_a_state(cli, tmp_path):
     launch = [*LAUNCH, "world:=mock", "domain:=obstacle_tower"]
     with started(launch, tmp_path / "launch.txt"):
         wait_for_task()
-        assert has("skill_server", "state_timeout") == "8.0"
-        assert has("mock_robot", "domain") == has("planner_node", "domain") == "obstacle_tower"
+        assert parameter("skill_server", "state_timeout") == "8.0"
+        assert (
+            parameter("mock_robot", "domain")
+            == parameter("planner_node", "domain")
+            == "obstacle_tower"
+        )

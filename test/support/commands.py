@@ -9,6 +9,7 @@ import subprocess
 from contextlib import contextmanager
 
 LIMIT = 100  # s, far more than anything here takes
+ANSWER_LIMIT = 30  # s, far more than a parameter takes on a busy machine
 
 
 def ros2(*arguments, limit=LIMIT, **environment):
@@ -28,6 +29,19 @@ def wait_for_task(**environment):
     """Return once a simulator has published its task."""
     latched = ["--qos-durability", "transient_local", "--qos-reliability", "reliable"]
     ros2("topic", "echo", "--once", *latched, "/slap/task", "slap_msgs/msg/Task", **environment)
+
+
+def parameter(node, name):
+    """The value of a node's parameter, as ROS 2 words it.
+
+    A node may answer before it has found who asks. Such an answer is lost, and ``ros2 param`` waits
+    for it for ever, so that it asks anew, as a person would.
+    """
+    ask = ("param", "get", f"/{node}", name, "--hide-type")
+    try:
+        return ros2(*ask, limit=ANSWER_LIMIT).strip()
+    except subprocess.TimeoutExpired:
+        return ros2(*ask).strip()
 
 
 def solve():
