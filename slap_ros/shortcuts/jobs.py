@@ -4,15 +4,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import inf
 from pathlib import Path
+from statistics import fmean
 from time import process_time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from slap_ros.errors import PlanningLimitError, SlapError, UnsolvableError
+from slap_ros.learning.random_goals import RandomGoalsChoice
 from slap_ros.learning.subproc_vec_env import make_vec_env
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.task_range import TaskRange
@@ -27,6 +30,7 @@ from slap_ros.shortcuts.shortcut_env_spec import ShortcutEnvSpec
 from slap_ros.shortcuts.shortcut_library import load_shortcut, save_shortcut
 from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.starts import StartRecord, find_start
+from slap_ros.shortcuts.stopping import PlanLengths, validation_record
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 
 if TYPE_CHECKING:
@@ -135,6 +139,27 @@ def plan_length(
     return result.plan.predicted_steps
 
 
+def any_goal(distribution: TaskDistribution, share: float) -> TaskDistribution:
+    """The tasks that are explored and validated on: the same, some for another goal.
+
+    Args:
+        distribution: Distribution of the tasks that are learned from.
+        share: Share of the tasks that have another goal than their own.
+    """
+    if not share:
+        return distribution
+    return replace(distribution, domain=RandomGoalsChoice.of_choice(distribution.domain, share))
+
+
+def mean_length(lengths: Sequence[int | str]) -> float:
+    """Mean plan length, environment steps; infinite where a task has no plan.
+
+    Args:
+        lengths: Results of :func:`plan_length`.
+    """
+    return fmean(length if isinstance(length, int) else inf for length in lengths)
+
+
 @dataclass(frozen=True)
 class LearningAttempt:
     """One attempt to learn a shortcut, as data that other processes can be sent.
@@ -146,6 +171,8 @@ class LearningAttempt:
         settings: All hyper-parameters of the training.
         folder: Folder of the shortcut, its checkpoints and its progress.
         number: Number of the attempt, counted from 0; each has other initial weights and noise.
+        validation: Indices of the validation tasks that have a plan.
+        learned: Shortcuts that were learned before, and are used beside this one.
     """
 
     distribution: TaskDistribution
@@ -154,6 +181,8 @@ class LearningAttempt:
     settings: TrainingSettings
     folder: str
     number: int = 0
+    validation: tuple[int, ...] = ()
+    learned: tuple[Shortcut, ...] = ()
 
     @property
     def work(self) -> ShortcutWorkFolder:
@@ -171,6 +200,25 @@ class LearningAttempt:
     def recorder(self) -> ProgressRecorder:
         """The recorder of the attempt's progress."""
         return ProgressRecorder(self.work, self.signature, self.settings.total_steps)
+
+    def plan_lengths(self, shortcut: Callable[[], Shortcut]) -> PlanLengths | None:
+        """The validations while the shortcut is learned; None where no rule asks for them.
+
+        Args:
+            shortcut: Function that returns the shortcut as it is now.
+        """
+        settings = self.settings
+        if settings.stopping is None:
+            return None
+        tasks = any_goal(self.distribution, settings.random_goals)
+
+        def plan() -> float:
+            used = (*self.learned, shortcut())
+            return mean_length(
+                [plan_length(tasks, i, used, settings.sampling) for i in self.validation]
+            )
+
+        return PlanLengths(self.work.plan_lengths, settings.stopping, plan)
 
     def parts(self, stage: int) -> list[ShortcutEnvSpec]:
         """The parts of a stage's environments, each with a seed of its own."""
@@ -231,7 +279,8 @@ def learn(attempt: LearningAttempt, processes: int) -> Shortcut:
         return load_shortcut(work.shortcut)
     recorder = attempt.recorder()
     learner = _learn_stages(attempt, len(attempt.settings.stages), recorder, processes)
-    shortcut = Shortcut(attempt.signature, learner.policy(), learner.shortest, recorder.record())
+    record = recorder.record() | validation_record(work.plan_lengths)
+    shortcut = Shortcut(attempt.signature, learner.policy(), learner.shortest, record)
     save_shortcut(work.shortcut, shortcut)
     work.finished.touch()
     return shortcut
@@ -254,7 +303,25 @@ def _learn_stages(
                 learner.initialise_from(earlier)
             if work.checkpoint(stage).exists():
                 learner.resume(work.checkpoint(stage))
-            learner.learn(recorder.of(stage, learner), work.path / "tensorboard")
+            _learn_stage(attempt, stage, learner, recorder)
             learner.save(work.checkpoint(stage))
     assert learner is not None  # there is one stage at least
     return learner
+
+
+def _learn_stage(
+    attempt: LearningAttempt, stage: int, learner: Learner, recorder: ProgressRecorder
+) -> None:
+    """Learn until the stage's environment steps are used up, or its rule says that it is over."""
+    report = recorder.of(stage, learner)
+    lengths = attempt.plan_lengths(
+        lambda: Shortcut(attempt.signature, learner.policy(), learner.shortest)
+    )
+    if lengths is None:
+        learner.learn(report, attempt.work.path / "tensorboard")
+    elif lengths.go_on(stage, steps=0):  # else an earlier run has ended it
+
+        def validate(progress: Progress) -> bool:
+            return report(progress) and lengths.go_on(stage, progress.steps)
+
+        learner.learn(validate, attempt.work.path / "tensorboard")

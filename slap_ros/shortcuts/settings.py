@@ -15,6 +15,7 @@ from slap_ros.learning.stored_keys import restored, stored
 from slap_ros.shortcuts.ppo_settings import PpoSettings
 from slap_ros.shortcuts.rewards import Rewards
 from slap_ros.shortcuts.shortcut import DEFAULT, PAPER, Sampling
+from slap_ros.shortcuts.stopping import Stopping
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,8 @@ class TrainingSettings:
             polished.
         random_goals: Share of the tasks for exploration and validation that have another goal than
             their own.
+        stopping: Rule by which a stage of learning ends early; None to use all of its environment
+            steps.
     """
 
     exploration: ExplorationSettings = field(default_factory=ExplorationSettings)
@@ -105,6 +108,7 @@ class TrainingSettings:
     sampling: Sampling = DEFAULT
     attempts: int = 1
     random_goals: float = 0.0
+    stopping: Stopping | None = None
 
     @property
     def stages(self) -> tuple[PpoSettings, ...]:
@@ -142,11 +146,11 @@ class TrainingSettings:
     def as_json(self) -> dict[str, Any]:
         """A JSON object, under the keys of :mod:`slap_ros.learning.stored_keys`.
 
-        A single attempt and no other goals are left out, as work folders have it from when there
-        was no other way.
+        A single attempt, no other goals and no rule that ends learning are left out, as work
+        folders have it from when there was no other way.
         """
         data = stored(self)
-        for name in ("attempts", "random_goals"):
+        for name in ("attempts", "random_goals", "stopping"):
             if getattr(self, name) == getattr(OURS, name):
                 del data[name]
         return data
@@ -182,9 +186,12 @@ _SEVERAL: Mapping[str, SettingValue] = {
     "validation": 48,  # over fewer tasks, a small saving does not show
     "shortcuts": 8,
 }
+SHORT = "ours_short"  # settings that end learning as soon as plans get no shorter
+_SHORT: Mapping[str, SettingValue] = {"stopping.every": Stopping().every}
+_VARIANTS = {SEVERAL: _SEVERAL, SHORT: _SHORT}  # of a domain's "ours"
 GENERAL: Mapping[str, TrainingSettings] = {
     "ours": OURS,
-    SEVERAL: changed(OURS, _SEVERAL),
+    **{name: changed(OURS, changes) for name, changes in _VARIANTS.items()},
     "paper": _PAPER,
 }
 
@@ -195,8 +202,8 @@ def training_settings(name: str, domain: Domain) -> TrainingSettings:
     Args:
         name: Name of the settings: one of ``GENERAL``, or of the domain's own, which differ from
             the general ``ours``.
-        domain: Domain whose ``Learning.settings`` give the differences. For ``SEVERAL``, its
-            ``ours`` do too.
+        domain: Domain whose ``Learning.settings`` give the differences. For variants of ``ours``,
+            its ``ours`` do too.
 
     Raises:
         InvalidParameterError: There are none of that name.
@@ -207,8 +214,8 @@ def training_settings(name: str, domain: Domain) -> TrainingSettings:
         known = ", ".join(dict.fromkeys([*GENERAL, *own]))
         raise InvalidParameterError(f"unknown settings {name!r}; there are {known}")
     base, changes = GENERAL.get(name, OURS), own.get(name, {})
-    if name == SEVERAL:
-        base, changes = training_settings("ours", domain), {**_SEVERAL, **changes}
+    if name in _VARIANTS:
+        base, changes = training_settings("ours", domain), {**_VARIANTS[name], **changes}
     try:
         return changed(base, changes)
     except InvalidParameterError as error:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from slap_ros.policies.mlp_policy import SampledPolicy
 from slap_ros.shortcuts.signature import Signature
@@ -26,7 +27,7 @@ class Shortcut:
     signature: Signature
     policy: SampledPolicy
     shortest: int
-    record: Mapping[str, str | int | float] = field(default_factory=dict, compare=False)
+    record: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
     @property
     def name(self) -> str:

@@ -8,7 +8,6 @@ interrupted.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -17,7 +16,6 @@ from typing import Any, Protocol, TypeVar
 
 from slap_ros.errors import UnsolvableError
 from slap_ros.learning.progress_callback import ProgressCallback
-from slap_ros.learning.random_goals import RandomGoalsChoice
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.task_range import TaskRange
 from slap_ros.learning.work_folder import WorkFolder
@@ -252,12 +250,8 @@ class Training:
 
     @property
     def _any_goal(self) -> TaskDistribution:
-        """The tasks that are explored and validated on: the same, some for another goal."""
-        share = self.settings.random_goals
-        if not share:
-            return self.distribution
-        domain = RandomGoalsChoice.of_choice(self.distribution.domain, share)
-        return replace(self.distribution, domain=domain)
+        """The tasks that are explored and validated on."""
+        return jobs.any_goal(self.distribution, self.settings.random_goals)
 
     # -- the steps --------------------------------------------------------------------------------
 
@@ -359,7 +353,14 @@ class Training:
         """
         folder = attempt_folder(self.folder, signature.name, number)
         return jobs.LearningAttempt(
-            self.distribution, signature, starts, self.settings, str(folder), number
+            self.distribution,
+            signature,
+            starts,
+            self.settings,
+            str(folder),
+            number,
+            tuple(self._validation),
+            tuple(self._shortcuts),
         )
 
     def _run_attempt(
@@ -373,8 +374,7 @@ class Training:
 
     def _plan_length(self, shortcuts: tuple[Shortcut, ...]) -> float:
         """Mean plan length on validation tasks, environment steps; infinite if one has no plan."""
-        lengths = self._plan(self._validation, shortcuts)
-        return fmean(length if isinstance(length, int) else math.inf for length in lengths)
+        return jobs.mean_length(self._plan(self._validation, shortcuts))
 
     def _plan(self, tasks: Sequence[int], shortcuts: tuple[Shortcut, ...]) -> list[int | str]:
         """Steps of a plan for each of these validation tasks, or why there is none."""

@@ -9,7 +9,7 @@
       explored.json, plans.json  results of its steps
       Clear_On-e41568a9/         a shortcut being learned
         starts.json
-        progress.jsonl, tensorboard/, checkpoint0.pt
+        progress.jsonl, plan_lengths.jsonl, tensorboard/, checkpoint0.pt
         snapshots/100352/Clear_On-e41568a9/  the shortcut after so many environment steps
         finished                 exists once the shortcut is learned
         Clear_On-e41568a9/       the shortcut, as in a library
@@ -72,6 +72,11 @@ class ShortcutWorkFolder:
     def progress(self) -> Path:
         """The file of progress: a JSON object per line, one for each rollout."""
         return self.path / "progress.jsonl"
+
+    @property
+    def plan_lengths(self) -> Path:
+        """The file of validations while the shortcut is learned: a JSON object per line."""
+        return self.path / "plan_lengths.jsonl"
 
     def append(self, progress: Mapping[str, Any]) -> None:
         """Add a line to the progress; NaN, where there is no number yet, as null."""

@@ -21,6 +21,7 @@ from slap_ros.shortcuts.progress import SNAPSHOTS, latest
 from slap_ros.shortcuts.settings import POLISH, ExplorationSettings, training_settings
 from slap_ros.shortcuts.shortcut_library import load_library, load_shortcut, save_library
 from slap_ros.shortcuts.signature import Signature
+from slap_ros.shortcuts.stopping import Stopping
 from slap_ros.shortcuts.training import CandidateGroup, Training, rank
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 from slap_ros.skills.domain_choice import DomainChoice
@@ -100,6 +101,19 @@ def test_tasks_with_two_uses_are_refused_at_once(tmp_path, settings):
     with pytest.raises(InvalidParameterError, match="choose settings with fewer"):
         train(tmp_path / "work", settings)
     assert not (tmp_path / "work").exists()
+
+
+@pytest.mark.training
+def test_learning_ends_where_plans_get_no_shorter(tmp_path):
+    rule = Stopping(every=1_000, patience=1, least_saving=0.9)  # nothing is 90 % shorter
+    long = replace(SMALL, ppo=replace(SMALL.ppo, total_steps=20_000), stopping=rule)
+    library, callback = train(tmp_path / "work", long)
+    ((_, _, after, _),) = callback.verdicts
+    (shortcut,) = library.shortcuts
+    lengths = shortcut.record["plan_lengths"]
+    assert shortcut.record["environment_steps"] == lengths[-1]["steps"] < 20_000
+    assert lengths[-1]["plan_length"] == after  # the rule looks at what decides
+    assert library.record["settings"]["stopping"]["every"] == 1_000
 
 
 @pytest.mark.training
