@@ -153,6 +153,7 @@ def test_discovery_switched_off(monkeypatch: pytest.MonkeyPatch) -> None:
     assert ros.settings(EMBEDDED).status == "ok"
 
 
+@pytest.mark.slow
 def test_nodes_that_do_not_see_each_other(
     monkeypatch: pytest.MonkeyPatch, about: ros.RclpyStatus
 ) -> None:

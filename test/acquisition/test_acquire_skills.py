@@ -49,6 +49,7 @@ def children_of(launcher, name):
     return [int(word) for word in found.stdout.split()]
 
 
+@pytest.mark.slow
 @pytest.mark.training
 @pytest.mark.timeout(180)  # learns both skills
 def test_skills_are_acquired_announced_and_recorded(network, tmp_path):
@@ -124,6 +125,7 @@ def begin(asker, spinner):
     return handle
 
 
+@pytest.mark.slow
 @pytest.mark.training
 @pytest.mark.timeout(180)  # a node and three trainings, each of which imports torch
 def test_a_training_that_was_killed_and_canceled_goes_on_with_the_same_goal(network, tmp_path):

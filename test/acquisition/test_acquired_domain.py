@@ -44,6 +44,7 @@ from support.steady_skills import PICKING, PUTTING, towards, write_library
 SHARED = HealthCheck.function_scoped_fixture  # the library, which nothing changes
 LIMIT_S = 120.0  # far more than anything here takes
 pytestmark = pytest.mark.usefixtures("points_installed")
+SOON = {"observation_timeout": 2.0}  # s, for a planner that will see no state
 IN_PROCESS = ("--in-process", "--patience", "10")  # for a loaded machine
 
 
@@ -315,6 +316,7 @@ def solved_by(nodes):
     return ended.result().result
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(180)  # runs an ensemble three times, and waits for one that refuses
 def test_nodes_with_another_library_refuse_and_those_with_a_copy_do_not(network, library, tmp_path):
     run = RunSettings(DomainChoice("points", "two", str(library)), 0, 0, "lazy", None, patience=5.0)
@@ -323,7 +325,7 @@ def test_nodes_with_another_library_refuse_and_those_with_a_copy_do_not(network,
     nodes["planner_node"]["skills"] = str(elsewhere)
     assert solved_by(nodes).success
     other = write_library(tmp_path / "other", replace(PICKING, horizon=40), PUTTING)
-    nodes["planner_node"]["skills"] = str(other)
+    nodes["planner_node"] |= {"skills": str(other), **SOON}
     refused = solved_by(nodes)
     assert refused.error_code == ErrorCode.SKILLS_CHANGED
     for path in (library, other):
@@ -337,7 +339,7 @@ def test_nodes_that_were_given_none_need_the_library_that_is_announced(network, 
     nodes = {name: dict(given) for name, given in node_parameters(run).items()}
     for name in ("perception_node", "skill_server", "planner_node"):
         nodes[name] |= {"skills": "", "domain": ""}
-    refused = solved_by(nodes)
+    refused = solved_by(nodes | {"planner_node": nodes["planner_node"] | SOON})
     assert refused.error_code == ErrorCode.SKILLS_CHANGED
     assert "no library of points ships: give the folder" in refused.error_msg
     shutil.copytree(library, shipped)

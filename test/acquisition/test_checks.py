@@ -228,6 +228,7 @@ def test_nothing_that_adds_the_goal_blames_everyone() -> None:
     assert "no action adds In" in verification.complaints[0].fact
 
 
+@pytest.mark.slow
 def test_operators_that_would_keep_the_planner_busy_are_too_large() -> None:
     """Thousands of groundings, each possible in nearly every state of astronomically many."""
     peg, hole = (PEGS.problem.types_by_name[name] for name in ("peg", "hole"))

@@ -55,6 +55,7 @@ def out_of_reach(start):
     return index, names, tuple(map(float, state.data))
 
 
+@pytest.mark.slow
 @pytest.mark.training
 def test_starts_that_the_world_refuses_are_left_out_and_counted(tmp_path):
     settings = AcquisitionSettings(segment_episodes=1, skill_steps=1)

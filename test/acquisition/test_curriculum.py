@@ -240,6 +240,7 @@ def test_acquired_skills_solve_what_training_never_saw(whole, finished):
     assert np.mean(done) >= 0.9
 
 
+@pytest.mark.slow
 @pytest.mark.training
 def test_the_library_is_the_same_after_interruptions(tmp_path, monkeypatch):
     """At every write of a training in turn, before and after it."""
@@ -289,6 +290,7 @@ def test_a_curriculum_without_budget_or_need_says_so(tmp_path):
     assert not events.judged
 
 
+@pytest.mark.slow
 @pytest.mark.training
 def test_a_skill_that_is_not_learned_is_given_up_and_the_record_says_how_it_failed(tmp_path):
     """Weights that hardly change make no progress, and there is no other skill to go on with."""
@@ -373,6 +375,7 @@ def files(path):
     return {str(p.relative_to(path)): p.read_bytes() for p in path.rglob("*") if p.is_file()}
 
 
+@pytest.mark.slow
 @pytest.mark.training
 def test_skills_that_are_there_are_kept_and_what_is_missing_is_learned(tmp_path):
     there = kept(tmp_path / "some", PICKING)

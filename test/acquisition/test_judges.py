@@ -53,6 +53,7 @@ def test_a_round_is_the_same_whoever_judges_it(tmp_path, enough, segments):
     assert not active_children()
 
 
+@pytest.mark.slow
 @pytest.mark.training
 def test_the_next_segment_is_learned_before_the_verdict(tmp_path, monkeypatch):
     """But for the last one, whose verdict ends the round."""
@@ -74,6 +75,7 @@ def test_the_next_segment_is_learned_before_the_verdict(tmp_path, monkeypatch):
     assert order == [*["begin", "learn", "verdict"] * SEGMENTS, "begin", "verdict"]
 
 
+@pytest.mark.slow
 @pytest.mark.training
 def test_a_judge_that_is_killed_is_noticed_and_the_same_job_goes_on(tmp_path, monkeypatch):
     undisturbed = jobs.learn(job(tmp_path / "undisturbed"))

@@ -33,6 +33,7 @@ def study(tmp_path, *libraries):
     return data["found"]["goals"], (tmp_path / "out" / "replanning_points.md").read_text()
 
 
+@pytest.mark.slow
 def test_figures_are_those_of_the_command(tmp_path):
     library = write_library(tmp_path / "bad", PICKING, DROPPING)
     rows, _ = study(tmp_path, library)

@@ -92,6 +92,7 @@ def test_gradients_of_critics_are_those_of_automatic_differentiation_to_the_bit(
         assert torch.equal(gradient, other)
 
 
+@pytest.mark.slow
 @pytest.mark.training
 def test_a_second_core_changes_nothing_that_is_learned():
     """Whether it is there all the time or now and then; the layers are those it is used for."""

@@ -28,6 +28,7 @@ def test_random_actions_are_tried_several_times_from_every_state():
     assert any(successes % 1 for successes in whole)  # shares that no single round has
 
 
+@pytest.mark.slow
 def test_its_spread_over_seeds_is_that_of_all_trials():
     """Of one round it would be more than twice as large."""
     few = range(10)

@@ -92,6 +92,7 @@ def propose(asker, spinner, **goal):
     return result.result().result
 
 
+@pytest.mark.slow
 def test_what_people_wrote_needs_no_model(network):
     with asking() as (asker, spinner):
         result = propose(asker, spinner)
@@ -166,6 +167,7 @@ def test_canceling_ends_the_wait(network):
         assert propose(asker, spinner).success
 
 
+@pytest.mark.slow
 def test_a_budget_is_kept_and_a_missing_model_is_said(network):
     with serving(SCRIPT) as server, asking(base_url=server.url, model="m") as (asker, spinner):
         result = propose(asker, spinner, proposer="language", attempts=1)

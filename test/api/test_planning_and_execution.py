@@ -80,6 +80,7 @@ def test_the_command_line_makes_the_same_plan(domain, task, plan):
     ]
 
 
+@pytest.mark.slow
 def test_shortcuts_are_those_that_ship_or_a_folders_or_a_library(domain, task, plan):
     folder = shipped_library("obstacle2d")
     library = load_library(folder, domain)

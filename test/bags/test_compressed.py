@@ -31,6 +31,7 @@ from slap_ros.bags.reading_budget import MAX_GROWTH
 from slap_ros.bags.rosbag2 import ROOT
 from slap_ros.errors import DamagedBagError, SlapError
 from slap_ros.messages.interfaces import STATE, definition, typestore
+from support.marks import slow
 from support.truthful_run import Published, Script, make
 
 MODES = (CompressionMode.FILE, CompressionMode.MESSAGE)
@@ -323,7 +324,7 @@ def in_files(folder: Path) -> Path:
     return folder / "bag"
 
 
-@pytest.mark.parametrize("make_bomb", [in_messages, in_chunks, in_files])
+@pytest.mark.parametrize("make_bomb", [in_messages, *slow(in_chunks, in_files)])
 def test_a_bag_unpacks_to_no_more_than_its_budget(
     tmp_path: Path, make_bomb: Callable[[Path], Path]
 ) -> None:

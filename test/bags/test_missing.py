@@ -287,6 +287,7 @@ def test_flipped_metadata_are_found_in_either_place(script: Script, tmp_path: Pa
     assert damage == "seed is another in metadata.yaml than in the data file"
 
 
+@pytest.mark.slow
 def test_every_flip_of_a_bit_in_the_metadata_is_found(script: Script, tmp_path: Path) -> None:
     record(tmp_path / "bag", script.messages)
     data = tmp_path / "bag/bag_0.mcap"

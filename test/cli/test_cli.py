@@ -86,6 +86,7 @@ def without_seconds(numbers):
     ]
 
 
+@pytest.mark.slow
 def test_with_a_library_three_approaches_are_compared_on_the_same_tasks():
     arguments = ["evaluate", "obstacle2d", "--tasks", 2, "--seeds", 2, "--json", "--samples", 4]
     arguments += ["--jobs", 1, "--shortcuts", LIBRARY]
@@ -261,6 +262,7 @@ def test_what_cannot_be_rendered_is_refused_before_anything_runs(tmp_path):
         assert words in result.stderr
 
 
+@pytest.mark.slow
 def test_a_recorded_tower_is_rendered_frame_by_frame(network, tmp_path):
     bag, gif, mp4 = tmp_path / "bag", tmp_path / "run.gif", tmp_path / "run.mp4"
     goal = ("--goal", "(Holding robot block1)")

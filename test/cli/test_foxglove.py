@@ -140,6 +140,7 @@ def test_a_port_that_is_taken_is_refused_where_it_was_asked_for(network: int) ->
     assert f"port {port}" in said
 
 
+@pytest.mark.slow
 def test_what_is_missing_is_said_with_how_to_get_it(network: int) -> None:
     code, said = slap("--watched", without="foxglove")
     assert code == 15

@@ -75,6 +75,7 @@ def test_a_pressed_body(off):
         assert hand_of(world.state)[2] > 0.005
 
 
+@pytest.mark.slow
 def test_a_jammed_body():
     """A rod that is pushed against a plate, and one held across that is pushed onto the table."""
     inserted_depth(-2.0, 1, steps=100)

@@ -66,6 +66,7 @@ def test_the_same_in_worlds_of_their_own(recorded):
             assert recorded.differing(world, [i]) == []
 
 
+@pytest.mark.slow
 def test_the_same_in_another_process(recorded, tmp_path):
     recorded.save(tmp_path / "steps.npz")
     answer = subprocess.run(

@@ -140,6 +140,7 @@ def test_surfaces_count_as_the_table_and_the_plate_does_not():
     assert atoms(above("plate", 0.04), held=1.0) == {f"Holding({bowl})", "IsClear(plate)"}
 
 
+@pytest.mark.slow
 def test_every_bowl_stands_on_the_table_or_on_furniture_at_first():
     """Beside a corner of the furniture, too."""
     for goal in ("task2", "task6"):

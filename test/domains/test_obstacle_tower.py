@@ -125,6 +125,7 @@ def test_tasks_differ_and_stand_by_themselves():
         assert after == task.initial_state
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_random_towers_are_taken_apart_within_the_speed_limit(seed):
     task = FAIR.task(seed)

@@ -124,9 +124,11 @@ def test_with_noise_things_that_rest_are_seen_at_rest(network, tmp_path):
     assert replay_bag(tmp_path / "bag").identical
 
 
+@pytest.mark.slow
 def test_nodes_that_were_given_other_skills_refuse_each_other(network):
     nodes = {name: dict(given) for name, given in node_parameters(settings()).items()}
-    nodes["planner_node"]["skills"] = "none"
+    # s, for it will see no state
+    nodes["planner_node"] |= {"skills": "none", "observation_timeout": 2.0}
     with (
         temporary_node(lambda: RunClient(lambda *_: None)) as (client, spinner),
         InProcessLauncher(nodes, spinner.executor),

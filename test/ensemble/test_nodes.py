@@ -194,6 +194,7 @@ def test_a_skill_server_that_comes_after_the_plan_is_waited_for(network):
             assert result.result().result.success
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(180)  # starts an ensemble, each node a process, and waits for a dead one
 def test_a_simulator_that_comes_back_opens_a_new_episode(network):
     nodes = parameters()
@@ -351,6 +352,7 @@ def victim_of(runner, victim, bag):
     raise AssertionError("the run did not get under way")
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(180)  # starts an ensemble, each node a process
 def test_a_full_disk_ends_the_run_and_keeps_what_was_recorded(network, tmp_path):
     import resource

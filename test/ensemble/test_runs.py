@@ -223,6 +223,7 @@ def test_the_story_of_a_run_is_told(network, capsys):
     assert "PlaceInTarget(robot, block1, target): reached" in told
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(180)  # waits for threads, of which the kernel may tell too long
 def test_10_runs_leave_no_thread_no_file_and_no_process(network, tmp_path):
     def left():

@@ -60,6 +60,7 @@ def slow_domain(install_domain):
     return install_domain("slow", SLOW)
 
 
+@pytest.mark.slow
 def test_a_slow_domain_is_waited_for(network, slow_domain):
     done = subprocess.run(
         [sys.executable, "-m", "ensemble.cli", "run", slow_domain, "--seed", "3",

@@ -17,6 +17,7 @@ from slap_ros.evaluation.experiment import Trial
 from slap_ros.planning.execution import EpisodeResult, ExecutedEdge, PlanExecution
 from slap_ros.planning.options import hold_option
 from slap_ros.planning.plan import Plan, PlanEdge, PlanningResult
+from support.marks import slow
 
 LIBRARY = Path(__file__).parent.parent / "shortcuts" / "data" / "obstacle2d"
 COMMAND = ["evaluate", "obstacle2d", "--tasks", "2", "--seeds", "2", "--first-seed", "500"]
@@ -50,7 +51,7 @@ def test_the_figures_are_those_of_the_trials(file):
     assert data["library"]["name"] == "obstacle2d"
 
 
-@pytest.mark.parametrize("more", [[], ["--shooting"]])
+@pytest.mark.parametrize("more", [[], *slow(["--shooting"])])
 def test_its_command_makes_it_again(file, tmp_path, more):
     if more:
         file = tmp_path / "data.json"

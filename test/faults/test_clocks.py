@@ -4,6 +4,7 @@
 
 from contextlib import contextmanager
 
+import pytest
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
@@ -88,6 +89,7 @@ def laboratory(bag):
         rclpy.shutdown()
 
 
+@pytest.mark.slow
 def test_a_clock_that_is_set_changes_nothing_but_stamps(network, tmp_path):
     with laboratory(tmp_path / "bag") as bench:
         solved = [bench.solve_while_it_is_set(seed, set_by) for seed, set_by in enumerate(SET_BY)]

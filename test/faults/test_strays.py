@@ -80,6 +80,7 @@ STRAYS = {
 }
 
 
+@pytest.mark.slow
 def test_strays_are_refused_and_do_not_stick(network, tmp_path):
     """In each episode there is one; the next shows what has stuck."""
     with laboratory(tmp_path / "bag") as bench:

@@ -33,6 +33,7 @@ def alone(seed):
     return Experiment(get_domain("obstacle2d"), tasks=1, seeds=1).run(seed, 0).plan_length
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(180)  # two ensembles at once
 def test_namespaces_keep_two_ensembles_apart(network, tmp_path):
     alive = {side: {f"/{side}/{name}" for name in NODES} for side in SEEDS}

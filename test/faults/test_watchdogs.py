@@ -34,6 +34,7 @@ def require_rest(bench):
     assert len(bench.told(STATE)) <= before + 1
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(3 * LIMIT)
 def test_a_planner_that_dies_leaves_the_robot_holding(network):
     with laboratory(3, None, SLOWLY, PATIENCE) as bench:

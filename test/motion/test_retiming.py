@@ -58,6 +58,7 @@ def test_multiples(path, multiple):
     assert (steps_of(path, checked) <= np.array(MAX_STEP) + 1e-9).all()
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(PATHS)
 def test_stops_at_corners_that_may_not_be_cut(path):

@@ -22,6 +22,7 @@ from slap_ros.planning.search import search_exhaustively
 from slap_ros.relational import State
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
 from slap_ros.shortcuts.shipped import chosen_library
+from support.marks import slow
 from test.planning.test_search import LAYOUT, MadeUpModel, made_up_graphs
 
 
@@ -108,7 +109,7 @@ def test_landmarks_never_count_more_than_the_cheapest_plan(problem):
         assert (bound == 0) == (truth == 0)
 
 
-@pytest.mark.parametrize(("shortcuts", "tasks"), [(False, 10), (True, 1)])
+@pytest.mark.parametrize(("shortcuts", "tasks"), [(False, 10), *slow((True, 1))])
 def test_small_problems_are_solved_as_lazy_search_solves_them(shortcuts, tasks):
     domain = get_domain("obstacle2d")
     library = chosen_library("" if shortcuts else "none", domain)
@@ -155,6 +156,7 @@ def test_a_tall_tower_is_planned_for_within_the_effort_and_each_plan_is_better()
     assert run.steps == steps[-1]
 
 
+@pytest.mark.slow
 def test_a_shortcut_does_what_operators_cannot():
     """This tower sways, so that its top cannot be grasped."""
     domain = slap_ros.make("obstacle_tower", obstacles=8)
@@ -201,9 +203,9 @@ class InterruptedWorld:
 
 
 def test_an_interrupt_leaves_the_best_plan_so_far():
-    domain = slap_ros.make("cleanup_table", toys=4)
+    domain = slap_ros.make("obstacle_tower", obstacles=4)
     task = domain.task(3)
-    first = improvements(domain, task, Effort())[0]
+    first = improvements(domain, task, Effort(rollouts=1))[0]
     problem = Problem.of(domain, task.initial_state)
     goal = problem.model.space.mask(task.goal)
     problem.model._world = InterruptedWorld(problem.model._world, 3 * first.steps)

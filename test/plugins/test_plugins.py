@@ -118,6 +118,7 @@ def test_entry_points_that_cannot_be_read_cost_only_their_distribution(content, 
     assert "entry points of broken: " in check.found
 
 
+@pytest.mark.slow
 def test_commands_go_on_beside_broken_domains(install):
     """The case that was seen: `slap domains` ended in a traceback of the stranger's."""
     pytest.importorskip("pybullet")
@@ -201,6 +202,7 @@ def test_what_ours_print_and_record_stays_fair():
     assert isinstance(get_domain("obstacle2d"), Domain)
 
 
+@pytest.mark.slow
 def test_nodes_of_their_own_run_a_strangers_default(install, network, tmp_path):
     """Every node imports the domain by itself; nothing tells them a preset."""
     install({"stranger": "stranger:make"}, stranger=PRESETS)

@@ -189,6 +189,7 @@ def study(name, folder, *arguments):
     return json.loads((folder / f"{name}_untaught.json").read_text())
 
 
+@pytest.mark.slow
 def test_study_of_demonstrations(installed, tmp_path):
     counts = ["--tasks", "3", "--others", "2"]
     data = study("demonstrations", tmp_path, *counts)

@@ -16,6 +16,7 @@ from selenium.webdriver.support.wait import WebDriverWait
 from slap_ros.report import read_report, render, write_page
 from support.browser import Browser, chromium
 
+pytestmark = pytest.mark.slow  # a real browser
 NAMES = ["compared", "tower", "hostile"]
 # The paths of what is drawn, live or at the end, in the order in which it is painted.
 LIVE = "[...document.querySelectorAll('svg[data-view] path')].map(p => p.getAttribute('d'))"

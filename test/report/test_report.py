@@ -326,6 +326,7 @@ def test_a_tower_is_told_without_pybullet(bags: Bags, tmp_path: Path) -> None:
     assert [words for words in page.texts["li"] if "not checked" in words]
 
 
+@pytest.mark.slow
 def test_a_run_can_be_told_without_keeping_its_bag(network: int, tmp_path: Path) -> None:
     scratch, output = tmp_path / "scratch", tmp_path / "page.html"
     scratch.mkdir()

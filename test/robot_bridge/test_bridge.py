@@ -214,6 +214,7 @@ def test_an_object_that_is_never_seen_is_named(network):
         assert not bench.states
 
 
+@pytest.mark.slow
 def test_sensors_that_fall_silent_stop_the_state(network):
     """The mock robot is taken away: joint positions, detections and controllers with it."""
     with lab(bridge={"joint_timeout": 5.0}) as bench:

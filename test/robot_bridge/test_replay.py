@@ -165,6 +165,7 @@ def test_another_start_is_refused(network, bag, tmp_path):
     assert "rad off where the recording begins" in told
 
 
+@pytest.mark.slow
 def test_a_controller_that_fails_ends_the_replay(network, bag):
     mock = f"{QUICK},fault=abort,fault_after=3"
     code, _, told = slap_alone(bag, "--to", "mock", "--mock", mock, "--robot", PATIENT)

@@ -3,6 +3,7 @@
 """Where the shortcuts begin that random rollouts find."""
 
 import numpy as np
+import pytest
 
 from slap_ros.domains import get_domain
 from slap_ros.shortcuts.explore import Explorer
@@ -16,6 +17,7 @@ def explore(nodes):
     return explorer.explore().candidates
 
 
+@pytest.mark.slow
 def test_what_is_found_where_the_hand_was_sent_is_tried_from_before_it_was():
     # At random the hand never gets from home to the blocks; over them it pushes some aside.
     assert not explore(nodes=1)

@@ -45,6 +45,7 @@ def test_a_shortcut_is_asked_for_what_its_change_says_and_for_what_its_node_has(
     assert rollout.abstract == start.target  # nothing was lost
 
 
+@pytest.mark.slow
 def test_plans_with_shortcuts_are_the_same_where_more_is_allowed():
     """What was learned changes what it says, so that it makes no difference."""
     for index in range(8):

@@ -37,6 +37,7 @@ def walk(env, count=30):
         yield from (getattr(steps, field.name) for field in fields(VecEnvStep))
 
 
+@pytest.mark.slow
 def test_how_many_processes_there_are_makes_no_difference():
     walks = []
     for processes in (1, 2, 3):

@@ -151,6 +151,7 @@ def test_a_ray_cluster_learns_the_same(tmp_path):
     assert there.digest == here.digest
 
 
+@pytest.mark.slow
 @pytest.mark.training
 def test_it_goes_on_where_it_was_interrupted(tmp_path):
     with pytest.raises(KeyboardInterrupt):

@@ -68,6 +68,7 @@ def compared(preset="fair"):
 # -- generalisation -------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_generalisation_has_the_numbers_of_the_experiments(tmp_path):
     data = study(tmp_path, "generalisation", "obstacle2d", "--tasks", 2, "--seeds", 2, *PLANNING)
     conditions = {one["preset"]: one for one in data["found"]["conditions"]}
@@ -298,6 +299,7 @@ def test_a_folder_without_a_training_or_with_another_domains_is_refused(tmp_path
     )
 
 
+@pytest.mark.slow
 def test_pruning_counts_what_a_training_has_explored(tmp_path, training):
     distribution = TaskDistribution(DomainChoice("obstacle2d", "fair"), 3)
     how = training_settings("ours", get_domain("obstacle2d")).exploration
@@ -334,6 +336,7 @@ def _candidates_of_library(explored):
     return [c for c in candidates if c.signature.patterns == shortcut.signature.patterns]
 
 
+@pytest.mark.slow
 def test_without_a_library_candidates_are_counted_all_the_same(tmp_path):
     arguments = ["--tasks", 1, "--seeds", 1, "--shortcuts", "none"]
     data = study(tmp_path, "pruning", "obstacle2d", *arguments)
@@ -342,6 +345,7 @@ def test_without_a_library_candidates_are_counted_all_the_same(tmp_path):
     assert data["found"]["tasks"][0]["candidates"] > 0
 
 
+@pytest.mark.slow
 def test_tasks_of_a_training_are_explored_as_it_does(tmp_path):
     how = training_settings("ours", get_domain("obstacle2d")).exploration
     other = TaskDistribution(DomainChoice("obstacle2d", "fair"), 0)
@@ -443,6 +447,7 @@ def test_without_matplotlib_nothing_is_begun(monkeypatch):
     assert "pip install 'slap_ros[studies]'" in message
 
 
+@pytest.mark.slow
 def test_noise_in_perception_is_measured_in_the_world(tmp_path, monkeypatch):
     monkeypatch.setattr(perception, "NOISE_KINDS", perception.NOISE_KINDS[1:2])
     arguments = ("perception", "obstacle2d", "--tasks", 2, "--seeds", 1, *PLANNING)
