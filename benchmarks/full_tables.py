@@ -13,7 +13,6 @@ import argparse
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
-from math import log
 from statistics import fmean
 from time import process_time
 
@@ -45,12 +44,6 @@ TABLES = (
     ("cleanup_table", "fair:toys=8"),
     ("cluttered_drawer", "fair"),
     ("cluttered_drawer", "fair:obstacles=10"),
-)
-GROWTH = (  # blocks, and the table on which so many stand
-    (4, "fair:towers=1,obstacles=2,distractors=1"),
-    (8, "fair:towers=2,obstacles=3,distractors=0"),
-    (12, "fair:towers=3,obstacles=3,distractors=0"),
-    (16, "fair:towers=3,obstacles=4,distractors=1"),
 )
 
 
@@ -137,23 +130,13 @@ def all_figures(tasks: int, tables: Sequence[str]) -> Iterator[tuple[str, dict[s
         tasks: Number of tasks of each row.
         tables: Domains with their presets; none for all of them.
     """
-    _warm_up()
+    warm_up()
     for name, preset in TABLES:
         if tables and f"{name} {preset}" not in tables:
             continue
         domain = get_domain(name, preset)
         for library, word in (("none", "pure"), ("", "shortcuts")):
             yield f"{name} {preset} {word}", asdict(measure(domain, tasks, library))
-
-
-def growth(tasks: int) -> dict[str, float]:
-    """The seconds of first plans over the number of blocks, and the slope of both logarithms."""
-    seconds = {
-        blocks: measure(get_domain("obstacle_tower", preset), tasks, "none").first_seconds
-        for blocks, preset in GROWTH
-    }
-    slope = np.polyfit([log(n) for n in seconds], [log(s) for s in seconds.values()], 1)[0]
-    return {f"{n} blocks": s for n, s in seconds.items()} | {"log-log slope": float(slope)}
 
 
 def markdown(rows: Mapping[str, Mapping[str, float]]) -> Iterator[str]:
@@ -170,7 +153,8 @@ def markdown(rows: Mapping[str, Mapping[str, float]]) -> Iterator[str]:
         )
 
 
-def _warm_up() -> None:
+def warm_up() -> None:
+    """Plan once, so that all is loaded and compiled."""
     domain = get_domain("obstacle_tower", "fair")
     plan(domain, domain.task(0), "")
 
@@ -191,8 +175,6 @@ def main() -> None:
             print(f"{row}: {numbers}", flush=True)
     if arguments.markdown:
         print("\n".join(markdown(figures)))
-    if not arguments.table:
-        figures["growth"] = growth(arguments.tasks)
     show(figures, arguments.json)
 
 

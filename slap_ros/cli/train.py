@@ -48,8 +48,9 @@ class TrainOptions:
     settings: Annotated[
         str,
         typer.Option(
-            help="Hyper-parameters: ours, ours_several (more shortcuts, also for random goals), "
-            "paper (the paper's), or the name of the domain's own."
+            help="Hyper-parameters: ours, ours_short (ends as soon as plans get no shorter), "
+            "ours_several (more shortcuts, also for random goals), paper (the paper's), or the "
+            "name of the domain's own."
         ),
     ] = "ours"
     set: Annotated[list[str] | None, setting_changes("exploration.rollouts=16")] = None

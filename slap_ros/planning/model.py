@@ -12,6 +12,7 @@ from slap_ros.planning.options import Option, OptionExecution, OptionResult
 from slap_ros.relational import AtomSpace, State, Target
 
 REACHED = OptionResult(ErrorCode.NONE)
+MOST_KEPT = 20_000  # roll-outs: some fifty plans that take all of their effort
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class Model:
     """The known transition function (the paper's f).
 
     A roll-out is a function of the option, its target and the state, bit for bit, so each is
-    made once and then cached.
+    made once and then cached; the oldest are forgotten, so that a long run needs no more memory.
     """
 
     def __init__(self, world: World, space: AtomSpace, actions: ActionSpace) -> None:
@@ -89,6 +90,8 @@ class Model:
         if key not in self._cache:
             self.executed += 1
             self._cache[key] = self._simulate(option, state, target)
+            if len(self._cache) > MOST_KEPT:
+                del self._cache[next(iter(self._cache))]  # the oldest
         return self._cache[key]
 
     def _simulate(self, option: Option, state: State, target: Target) -> Rollout:

@@ -21,6 +21,7 @@ from slap_ros.shortcuts.signature import Change
 
 MAX_NET_FAILURES = 3  # failures, less as many for each success, before a shortcut is given up
 MAX_NOISE_SCALE = 2.0  # temperature of the last rollout of a batch against that of the first
+MOST_KEPT = 2_000  # states for which successful rollouts are kept
 SPREAD_DECAY = 0.7  # ratio of the spread of variations in one round to that in the round before
 
 
@@ -121,6 +122,8 @@ class ShortcutRollouts:
             rng = np.random.default_rng(int.from_bytes(seed, "little"))
             self._cache[key] = self._sample(shortcut.policy, encoder, state, rng)
             self._failures[shortcut.name] += -MAX_NET_FAILURES if self._cache[key] else 1
+            if len(self._cache) > MOST_KEPT:
+                del self._cache[next(iter(self._cache))]  # the oldest
         return self._cache[key]
 
     def cached(self) -> Iterator[tuple[str, tuple[ShortcutRollout, ...]]]:
@@ -210,10 +213,10 @@ class ShortcutRollouts:
 
 
 def _rollout(past: Sequence[tuple[State, Weights]], world: int) -> ShortcutRollout:
-    """The rollout that was made in one of the worlds."""
+    """The rollout that was made in one of the worlds, copied: a view would keep all of them."""
     return ShortcutRollout(
-        tuple(actions[world] for _, actions in past),
-        tuple(State(states.layout, states.data[world]) for states, _ in past),
+        tuple(actions[world].copy() for _, actions in past),
+        tuple(State(states.layout, states.data[world].copy()) for states, _ in past),
     )
 
 

@@ -57,6 +57,13 @@ def test_each_rollout_does_in_a_world_of_its_own_what_it_says():
     assert seen > 6
 
 
+def test_a_rollout_that_is_kept_keeps_no_other():
+    ((encoder, state),) = situations(1)
+    for rollout in successes(DOMAIN, DEFAULT, encoder, state):
+        for array in (*rollout.actions, *(one.data for one in rollout.states)):
+            assert array.base is None  # else all that were tried together
+
+
 def test_worlds_that_cannot_be_stepped_together_try_one_after_the_other():
     """Without noise a batch has nothing to add: both find the same."""
     apart = replace(DOMAIN, learning=replace(DOMAIN.learning, make_vector_world=None))

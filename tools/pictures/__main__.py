@@ -9,7 +9,15 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from tools.imports import ROOT
-from tools.pictures import abstract_graph, animations, architecture, contact, proposal, two_levels
+from tools.pictures import (
+    abstract_graph,
+    animations,
+    architecture,
+    contact,
+    growth,
+    proposal,
+    two_levels,
+)
 
 IMAGES = ROOT / "docs" / "images"
 # Those that need nothing but this checkout. ``tools.pictures.report`` needs a browser, and
@@ -22,6 +30,7 @@ PICTURES: Mapping[str, Callable[[Path], None]] = {
     "contact_drawer.gif": contact.make_drawer,
     "contact_lid.gif": contact.make_lid,
     "contact_peg.gif": contact.make_peg,
+    "growth.svg": growth.make,
     "proposal.svg": proposal.make,
     "side_by_side.gif": animations.make_side_by_side,
     "two_levels.svg": two_levels.make,
