@@ -188,7 +188,6 @@ setup(
             "mock_robot = robot_bridge.mock.__main__:main",
         ],
         "embedded_ros.interfaces": ["slap_msgs = msg_schemas"],
-        "gymnasium.envs": ["slap_ros = slap_ros.environments.registration:register"],
     },
     zip_safe=False,
 )

@@ -5,4 +5,10 @@
 Read ``task_env.py`` first; then what it is put together from: ``slots.py`` and ``observations.py``
 (what is seen), ``task_rewards.py``, ``controls.py`` (what an action is). ``registration.py`` gives
 ``gymnasium.make`` their names.
+
+Importing the package registers them, and imports nothing but Gymnasium.
 """
+
+from slap_ros.environments.registration import register
+
+register()

@@ -1,8 +1,8 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Names for ``gymnasium.make``, which finds them through an entry point of the package.
+"""Names for ``gymnasium.make``, from the moment that ``slap_ros.environments`` is imported.
 
-Gymnasium calls :func:`register` when it is imported, so that nothing else may be imported here.
+Gymnasium 1.0 looks for no plug-ins any more: whoever wants environments imports their package.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from slap_ros.environments.task_env import TaskEnv
 
 OBSERVATIONS = ("state", "view", "dict")
-TASKS: Mapping[str, str] = {  # names within the namespace slap_ros, and their domains
+NAMESPACE = "slap_ros"
+TASKS: Mapping[str, str] = {  # names within the namespace, and their domains
     "Obstacle2D-v0": "obstacle2d",
     "ObstacleTower-v0": "obstacle_tower",
     "ClutteredDrawer-v0": "cluttered_drawer",
@@ -29,12 +30,12 @@ TASKS: Mapping[str, str] = {  # names within the namespace slap_ros, and their d
 
 
 def register() -> None:
-    """Register an environment for each of our domains, in the namespace that Gymnasium has set."""
+    """Register an environment for each of our domains."""
     import gymnasium
 
     for name, domain in TASKS.items():
         gymnasium.register(
-            name,
+            f"{NAMESPACE}/{name}",
             entry_point="slap_ros.environments.registration:make_task_env",
             kwargs={"domain": domain},
         )

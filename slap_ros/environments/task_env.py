@@ -5,6 +5,7 @@
 ::
 
     import gymnasium
+    import slap_ros.environments
 
     env = gymnasium.make("slap_ros/ObstacleTower-v0", preset="fair")
     observation, info = env.reset(seed=500, options={"index": 3})

@@ -32,9 +32,9 @@ def test_every_domain_of_ours_has_a_name():
     assert len(set(TASKS.values())) == len(TASKS) == 10
 
 
-def test_gymnasium_finds_them_by_itself_and_imports_nothing_else():
+def test_names_are_registered_and_nothing_else_is_imported():
     code = (
-        "import sys, gymnasium\n"
+        "import sys, gymnasium, slap_ros.environments\n"
         "spec = gymnasium.spec('slap_ros/Obstacle2D-v0')\n"
         "heavy = {'torch', 'pybullet', 'rclpy', 'numba'} & set(sys.modules)\n"
         "print(spec.kwargs, sorted(heavy))"
@@ -183,7 +183,8 @@ def test_a_domain_without_a_learners_interface_says_so():
 
 
 def test_gymnasium_makes_them():
-    env = gymnasium.make("slap_ros/Obstacle2D-v0", preset="fair", render_mode="rgb_array")
+    name = "slap_ros.environments:slap_ros/Obstacle2D-v0"  # imports it, wherever that was not done
+    env = gymnasium.make(name, preset="fair", render_mode="rgb_array")
     env.reset(seed=0)
     assert env.render().shape == (360, 480, 3)
     env.close()
