@@ -31,12 +31,15 @@ class Control(Protocol):
         ...
 
     def act(self, action: Any, episode: TaskEpisode, world: World) -> Iterator[State]:
-        """Act: the states, one after each environment step.
+        """Act, one environment step after the other.
 
         Args:
             action: Action, one of the space.
             episode: Episode, which is told of each state before the next is asked for.
             world: World in the episode's state.
+
+        Returns:
+            The state after each step.
 
         Raises:
             InvalidCommandError: The action is not in the space; nothing moved.
@@ -133,6 +136,9 @@ def run_option(
         number: Number of the option.
         episode: Episode, which is told of each state before the next is asked for.
         world: World in the episode's state.
+
+    Returns:
+        The state after each step.
     """
     ground, option = options[number]
     actions, abstract = episode.domain.action_space, episode.abstract

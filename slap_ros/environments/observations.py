@@ -37,7 +37,7 @@ class FeatureObservation:
     """All features of all objects, scaled, from the mean of the same kind in some tasks."""
 
     def __init__(self, slots: ObjectSlots, examples: Sequence[tuple[State, AtomSpace]]) -> None:
-        """Measure means.
+        """Measure the mean of each feature of each kind of object.
 
         Args:
             slots: Slots for the objects.

@@ -98,7 +98,7 @@ class StagedReward:
     """The targets of a plan with given skills, one after the other; dense on the way to each."""
 
     def begin(self, episode: TaskEpisode) -> None:
-        """Plan.
+        """Make the plan whose targets are the stages.
 
         Raises:
             InvalidDomainError: The domain has no learner's interface.

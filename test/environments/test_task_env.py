@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Domains as Gymnasium environments: the tasks of evaluations, for any learner."""
 
+import re
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -24,6 +26,7 @@ from slap_ros.errors import (
 from slap_ros.planning.planner import make_planner
 from support.marks import slow
 
+ROOT = Path(__file__).parents[2]
 OURS = ("obstacle2d", "obstacle_tower", "cluttered_drawer", "cleanup_table")
 
 
@@ -180,6 +183,15 @@ def test_a_domain_without_a_learners_interface_says_so():
     space = domain.atom_space(state)
     with pytest.raises(InvalidDomainError, match="obstacle2d"):
         ViewObservation(domain, ObjectSlots.of([space]), space, state)
+
+
+def test_the_examples_of_the_page_run():
+    page = (ROOT / "docs" / "learners.md").read_text(encoding="utf-8")
+    first, *_, masked = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    exec(first, {})
+    known: dict[str, object] = {}
+    exec(masked.replace("range(300)", "range(2)"), known)
+    assert known["steps"] < 0.0
 
 
 def test_gymnasium_makes_them():
