@@ -84,6 +84,8 @@ class AnytimePlanner:
             if best is None:
                 raise
             raise PlanningInterrupted(best, interrupt) from interrupt
+        except UnsolvableError:  # as far as operators say
+            best = None
         if best is not None:
             return best
         result = GraphPlanner(self.problem, shortcuts=self.shortcuts).plan(state, goal)
