@@ -46,6 +46,7 @@ PHYSICS = [
     "opencv-python-headless>=4.9",  # MP4; its FFmpeg is LGPL
 ]
 TRAIN = ["torch>=2.4", "stable-baselines3>=2.3", "tensorboard>=2.15"]
+GYM = [*PHYSICS, "gymnasium>=1.0"]  # our domains by `gymnasium.make`; MIT
 RAY = ["ray>=2.40"]
 STUDIES = ["matplotlib>=3.8"]
 LIVE = ["foxglove-sdk>=0.30,<1"]  # serves `slap run --live` to Foxglove; MIT
@@ -167,6 +168,7 @@ setup(
     extras_require={
         "physics": PHYSICS,
         "train": TRAIN,
+        "gym": GYM,
         "ray": RAY,
         "studies": STUDIES,
         "docs": DOCS,
@@ -186,6 +188,7 @@ setup(
             "mock_robot = robot_bridge.mock.__main__:main",
         ],
         "embedded_ros.interfaces": ["slap_msgs = msg_schemas"],
+        "gymnasium.envs": ["slap_ros = slap_ros.environments.registration:register"],
     },
     zip_safe=False,
 )
