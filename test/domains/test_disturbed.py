@@ -14,6 +14,7 @@ from slap_ros.errors import InvalidCommandError, InvalidParameterError, InvalidS
 from slap_ros.planning.model import Model
 from slap_ros.planning.options import OptionExecution, given_option
 from slap_ros.relational import State
+from slap_ros.robot.robot_world import require_robot
 
 FAIR = get_domain("obstacle_tower")
 STOCHASTIC = get_domain("obstacle_tower", "stochastic")
@@ -281,6 +282,13 @@ def test_a_model_needs_no_generator():
     actions = random_actions(3)
     ours = follow(STOCHASTIC.model_world(fair), actions)
     assert [one.key for one in ours] == [one.key for one in follow(FAIR.make_world(fair), actions)]
+
+
+def test_robots_have_no_such_world():
+    state = STOCHASTIC.task(0).initial_state
+    with pytest.raises(InvalidParameterError, match="preset stochastic has disturbances"):
+        require_robot(STOCHASTIC, state)
+    require_robot(FAIR, FAIR.task(0).initial_state)
 
 
 def test_shortcuts_are_trained_in_the_disturbed_world():

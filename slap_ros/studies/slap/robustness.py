@@ -231,7 +231,16 @@ def prepare(
 
 
 def open_library(folder: Path, domain: Domain, tell: Tell) -> TrainedLibrary | None:
-    """A library and its name; None where there is none."""
+    """Open a library, and name it after its folder.
+
+    Args:
+        folder: Folder of the library.
+        domain: Domain that the library must fit.
+        tell: Function that receives warnings about shortcuts that are left out.
+
+    Returns:
+        The library and its name; None where there is none.
+    """
     library = choose_library(str(folder), domain, "lazy", tell)
     name = "/".join(folder.resolve().parts[-2:])
     return None if library is None else TrainedLibrary(name, library)
