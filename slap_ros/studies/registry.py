@@ -26,6 +26,7 @@ from slap_ros.studies.slap import (
     planning_time,
     pruning,
     table1,
+    transfer,
 )
 from slap_ros.studies.study import PaperFigure, Study, not_made
 
@@ -38,6 +39,7 @@ STUDIES: Mapping[str, Study[Any]] = {
         pruning.STUDY,
         perception.STUDY,
         planning_time.STUDY,
+        transfer.STUDY,
         demonstrations.STUDY,
         vacuity.STUDY,
         acquisition.STUDY,
