@@ -11,8 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum
 
 import numpy as np
@@ -30,12 +29,7 @@ from slap_ros.relational import Object, State
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.limits import STEP_TOLERANCE, JointMotion, Limits
 from slap_ros.robot.scene_config import SceneConfig
-from slap_ros.robot.state_assembly import (
-    Grasp,
-    StateAssembler,
-    feature_values,
-    possible_joints,
-)
+from slap_ros.robot.state_assembly import Grasp, StateAssembler, feature_values
 from slap_ros.robot.tracking import Detection, PoseEstimate, Track, TrackingSettings, measured_pose
 from slap_ros.worlds.contact.features import ROBOT as HAND_OF_FORCES
 from slap_ros.worlds.features import JOINT_FEATURES
@@ -48,7 +42,6 @@ GAP_SHUT = 0.0  # m
 GRASPED = 0.5  # of the expected gap; with less there is nothing between the fingers
 FOLLOWS = 0.03  # m, between a held object and where the hand has it; further away it was lost
 FARTHEST = 10.0  # m, from the base; what is detected further away is in another unit
-RAISES = (0.0, 0.001, 0.003)  # m, by which what slipped is taken to be higher than it is seen
 DRIFT = 0.02  # rad, of a joint of an arm that is taken to stand
 
 
@@ -186,46 +179,12 @@ class RobotWorld:
             return None
         if not moving and not all(s.at_rest for s in known.values()):
             return None
-        state = self._accepted(reading, known, since_s)
+        state = self._assembler.assemble(reading, known, self._grasp)
+        self._model.reset(state)
         for obj, estimate in known.items():
             self._tracks[obj].remember(estimate)
         self._state = state
         return state
-
-    def _accepted(
-        self, reading: JointReading, known: Mapping[Object, PoseEstimate], since_s: float
-    ) -> State:
-        """The state with what is held where it slipped to, or else where it was held before.
-
-        What slipped may be pressed onto something. Where the model takes it to be inside, it is
-        taken to be a little higher.
-
-        Raises:
-            InvalidStateError: The model accepts neither.
-        """
-        slipped = self._slipped(reading, since_s)
-        for grasp in slipped:
-            state = self._assembler.assemble(reading, known, grasp)
-            with suppress(InvalidStateError):
-                self._model.reset(state)
-                self._grasp = grasp
-                return state
-        state = self._assembler.assemble(reading, known, self._grasp)
-        self._model.reset(state)
-        return state
-
-    def _slipped(self, reading: JointReading, since_s: float) -> list[Grasp]:
-        """How what is held may be held now, likeliest first; nothing where it did not slip."""
-        grasp = self._grasp
-        if grasp is None:
-            return []
-        hand = hand_pose(possible_joints(reading.joints))
-        seen = self._tracks[grasp.obj].moved_from(hand.compose(grasp.pose), since_s)
-        if seen is None:
-            return []
-        x, y, z = seen.position
-        raised = (Pose((x, y, z + rise), seen.quaternion) for rise in RAISES)
-        return [replace(grasp, pose=hand.inverse().compose(pose)) for pose in raised]
 
     def _detect_grasp_loss(
         self, reading: JointReading, estimates: Mapping[Object, PoseEstimate | None]

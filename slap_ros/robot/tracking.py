@@ -116,24 +116,6 @@ class Track:
             return None
         return _standing(many) if self._agree(many) else _moving(many)
 
-    def moved_from(self, expected: Pose, since_s: float) -> Pose | None:
-        """Where the object is, if detections since then agree, and not with where it should be.
-
-        Args:
-            expected: Pose that the object should have, in the base's frame.
-            since_s: Time from which on detections count, s.
-
-        Returns:
-            The mean of the newest detections; None where noise explains the difference, or where
-            they are too few.
-        """
-        fresh = [d for d in self._detections if d.stamp_s > since_s]
-        few = fresh[-self._settings.confirmations :]
-        if len(few) < self._settings.confirmations or not self._agree(few):
-            return None
-        found = mean_pose([d.pose for d in few])
-        return None if self._near(found, expected, math.sqrt(1.0 / len(few))) else found
-
     def remember(self, estimate: PoseEstimate) -> None:
         """Keep a pose at rest, against which later detections are compared."""
         self._known = estimate if estimate.at_rest else None
