@@ -29,6 +29,7 @@ from slap_ros.studies.slap import (
     pruning,
     stochastic,
     table1,
+    transfer,
 )
 from slap_ros.studies.study import PaperFigure, Study, not_made
 
@@ -44,6 +45,7 @@ STUDIES: Mapping[str, Study[Any]] = {
         occluded.STUDY,
         perturbed.STUDY,
         planning_time.STUDY,
+        transfer.STUDY,
         demonstrations.STUDY,
         vacuity.STUDY,
         acquisition.STUDY,
