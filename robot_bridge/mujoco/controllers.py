@@ -185,7 +185,15 @@ class MujocoGripperController:
         settings: MujocoRobotParameters,
         counts: Counter[str],
     ) -> None:
-        """Open the action server; see :class:`MujocoArmController`."""
+        """Open the action server.
+
+        Args:
+            node: Node that has the server.
+            plant: What it moves.
+            noise: Noise model that draws how late each motion begins.
+            settings: Parameters of the robot.
+            counts: Where goals are counted by outcome.
+        """
         self._node, self._plant, self._noise = node, plant, noise
         self._scale, self._counts = settings.gripper_scale, counts
         self._tracker = FingerTracker()

@@ -16,7 +16,7 @@ from tools.imports import ROOT
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-DATA = ROOT / "docs" / "results" / "growth.json"
+DATA = ROOT / "docs" / "images" / "growth.json"
 SIZE = (5.0, 3.2)  # inches
 TICKS_S = (0.25, 0.5, 1.0, 2.0, 4.0)
 
