@@ -60,6 +60,7 @@ KINDER = ["kindergarden>=0.2.5,<0.3"]
 # `slap plan --planner up:NAME`: engines of the field to compare with; Apache-2.0, and MIT (aries).
 # Some other engines are GPL: whoever wants them installs them.
 UP = ["unified-planning>=1.1", "up-aries>=0.4"]
+MUJOCO = ["mujoco>=3.3"]  # `slap run --world mujoco`: a robot in another engine; Apache-2.0
 DOCS = [
     "mkdocs>=1.6,<2",
     "mkdocs-material>=9.7,<10",
@@ -88,6 +89,7 @@ TEST = [
     *EXPORT,
     "websocket-client>=1.8",  # watches a live run as Foxglove does
     *UP,
+    *MUJOCO,
     "colcon-common-extensions>=0.3",
     "build>=1",  # makes the sdists and wheels that a test installs
     "hatchling>=1.24",  # embedded_ros is built with it
@@ -177,6 +179,7 @@ setup(
         "kinder": KINDER,
         "meshes": MESHES,
         "up": UP,
+        "mujoco": MUJOCO,
         "test": TEST,
     },
     entry_points={
@@ -184,6 +187,7 @@ setup(
             "slap = ensemble.cli:main",
             *(f"{node} = {node}.__main__:main" for node in NODES),
             "mock_robot = robot_bridge.mock.__main__:main",
+            "mujoco_robot = robot_bridge.mujoco.__main__:main",
         ],
         "embedded_ros.interfaces": ["slap_msgs = msg_schemas"],
     },

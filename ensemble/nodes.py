@@ -10,7 +10,7 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any
 
-from slap_ros.robot.worlds import MOCK, SIM
+from slap_ros.robot.worlds import MOCK, MUJOCO, SIM
 from slap_ros.shortcuts.shortcut import DEFAULT
 from slap_ros.skills.domain_choice import DomainChoice
 
@@ -19,6 +19,7 @@ NODE_CLASSES: Mapping[str, str] = {  # by the name of the module that is run as 
     "sim_node": "sim_node.node:SimNode",
     "robot_bridge": "robot_bridge.node:RobotBridge",
     "robot_bridge.mock": "robot_bridge.mock.node:MockRobot",
+    "robot_bridge.mujoco": "robot_bridge.mujoco.node:MujocoRobot",
     "robot_bridge.player": "robot_bridge.player:Player",
     "perception_node": "perception_node.node:PerceptionNode",
     "skill_server": "skill_server.node:SkillServer",
@@ -51,10 +52,11 @@ class RunSettings:
     shortcuts: str = ""  # a library's folder, or none; empty: the shipped one
     samples: int = DEFAULT.samples  # attempts of a shortcut in the model
     patience: float = 1.0  # factor of all deadlines
-    world: str = SIM  # the simulator, a robot, or the bridge with a mock robot behind it
+    world: str = SIM  # the simulator, a robot, or the bridge with a simulated robot behind it
     scene: str = ""  # a robot's scene file; empty: the objects of the sampled task
-    # Parameters of the mock robot, of the bridge and of perception that are not the default.
+    # Parameters of the simulated robots, of the bridge and of perception that are not the default.
     mock: Mapping[str, str | int | float] = field(default_factory=dict)
+    mujoco: Mapping[str, str | int | float] = field(default_factory=dict)
     bridge: Mapping[str, str | int | float] = field(default_factory=dict)
     perception: Mapping[str, str | int | float] = field(default_factory=dict)
     # Parameters of the acquisition node that are not the default; None: it does not run.
@@ -114,4 +116,6 @@ def _world_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int
     bridge = {"robot_bridge": task | scene | dict(settings.bridge)}
     if settings.world == MOCK:
         return {"robot_bridge.mock": task | dict(settings.mock)} | bridge
+    if settings.world == MUJOCO:
+        return {"robot_bridge.mujoco": task | dict(settings.mujoco)} | bridge
     return bridge

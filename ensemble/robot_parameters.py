@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The ROS parameters of a robot, real or mock, which the command line sets as well."""
+"""The ROS parameters of a robot, real or simulated, which the command line sets as well."""
 
 from __future__ import annotations
 
@@ -102,8 +102,8 @@ class PlayerParameters(RobotParameters):
 
 
 @dataclass(frozen=True)
-class MockRobotParameters(WorldParameters):
-    """What a mock robot is: see the docstring of ``robot_bridge.mock.node``."""
+class SimulatedRobotParameters(WorldParameters):
+    """What every simulated robot has: a task to begin with, interfaces, noise and pace."""
 
     domain: str = parameter("obstacle_tower", "which domain")
     preset: str = parameter("", "as the bridge's")
@@ -125,8 +125,26 @@ class MockRobotParameters(WorldParameters):
         1.0, "how many times faster than a real one it moves", low=0.01, high=1e3
     )
     noise_seed: int = parameter(0, "noise and delays are a function of it", high=MAX_SEED)
+
+
+@dataclass(frozen=True)
+class MockRobotParameters(SimulatedRobotParameters):
+    """What a mock robot is: see the docstring of ``robot_bridge.mock.node``."""
+
     fault: str = parameter("", "reject, abort or ignore: what is done to a motion")
     fault_after: int = parameter(0, "and after how many good ones")
+
+
+@dataclass(frozen=True)
+class MujocoRobotParameters(SimulatedRobotParameters):
+    """What a robot in MuJoCo is: see the docstring of ``robot_bridge.mujoco.node``."""
+
+    pose_noise: float = parameter(0.0, "m, of detections along each axis")
+    turn_noise: float = parameter(0.0, "rad, of detections about each axis")
+    path_tolerance: float = parameter(0.2, "rad, by which a joint may be off its path; 0: any")
+    goal_tolerance: float = parameter(0.01, "rad, by which a joint may be off at the end; 0: any")
+    stopped_velocity: float = parameter(0.01, "rad/s, of a joint that stands; 0: any")
+    goal_time: float = parameter(1.0, "s, by which the arm may arrive late; 0: any time")
 
 
 def parse_mock_robot(text: str) -> dict[str, str | int | float]:
@@ -139,3 +157,15 @@ def parse_mock_robot(text: str) -> dict[str, str | int | float]:
         InvalidParameterError: An unknown parameter, or a value that it cannot have.
     """
     return parse_parameters(text, MockRobotParameters, "mock robot", GIVEN_WITH_THE_RUN)
+
+
+def parse_mujoco_robot(text: str) -> dict[str, str | int | float]:
+    """The parameters of a robot in MuJoCo as a command line has them: ``pace=5,dropout=0.1``.
+
+    Returns:
+        Parameters by name, of the types that they have.
+
+    Raises:
+        InvalidParameterError: An unknown parameter, or a value that it cannot have.
+    """
+    return parse_parameters(text, MujocoRobotParameters, "MuJoCo robot", GIVEN_WITH_THE_RUN)

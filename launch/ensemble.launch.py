@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The whole ensemble: ``ros2 launch slap_ros ensemble.launch.py domain:=obstacle2d seed:=3``.
 
-On a robot: ``domain:=obstacle_tower world:=robot scene:=FILE``, or ``world:=mock`` without one.
+On a robot: ``domain:=obstacle_tower world:=robot scene:=FILE``. Without one: ``world:=mock``, or
+``world:=mujoco`` for a robot in another engine than the planner's.
 
 ``params_file:=FILE`` sets any other parameter of any node, in a copy of ``config/ensemble.yaml``.
 
@@ -31,7 +32,10 @@ from slap_ros.doctor.settings import RANGE, RANGE_HINT
 from slap_ros.errors import InvalidParameterError
 
 ARGUMENTS = {
-    "world": ("sim", "sim; robot: the bridge; mock: the bridge with a mock robot behind it"),
+    "world": (
+        "sim",
+        "sim; robot: the bridge; mock, mujoco: the bridge with a simulated robot behind it",
+    ),
     "params_file": ("", "parameter file for all nodes, such as a changed copy of ensemble.yaml"),
     "acquisition": (
         "false",
@@ -41,7 +45,8 @@ ARGUMENTS = {
     "rviz": ("false", "open RViz as well"),
     "namespace": ("", "namespace of every node: /robot1 gives /robot1/slap/state"),
 }
-CHOICES = {"world": ["sim", "robot", "mock"]}
+CHOICES = {"world": ["sim", "robot", "mock", "mujoco"]}
+SIMULATED = {"mock": "mock_robot", "mujoco": "mujoco_robot"}  # robots, by world
 # Arguments that are parameters of nodes. They have no defaults here: a node's parameter that is not
 # given is what the parameter files say.
 PARAMETERS = {
@@ -56,9 +61,9 @@ PARAMETERS = {
     "samples": (int, "attempts of a shortcut in the model; the shortest is used"),
     "scene": (str, "scene file of a robot"),
     "arm": (str, "arm of a robot: panda or fr3"),
-    "latency": (float, "latency of the mock robot, s"),
-    "pose_noise": (float, "noise of the mock robot's detections, m"),
-    "dropout": (float, "share of detections that the mock robot loses"),
+    "latency": (float, "latency of a simulated robot, s"),
+    "pose_noise": (float, "noise of a simulated robot's detections, m"),
+    "dropout": (float, "share of detections that a simulated robot loses"),
     "pace": (float, "environment steps per second, for watching; 0: at full speed"),
     "patience": (float, "factor of all deadlines, for slow domains and machines"),
     "language_settings": (str, "JSON file with model and server, for acquisition_node"),
@@ -70,6 +75,7 @@ TAKEN = {  # arguments that each node takes as its parameters
     "sim_node": (*TASK, "pace"),
     "robot_bridge": (*TASK, "arm", "scene"),
     "mock_robot": (*TASK, "arm", "latency", "pose_noise", "dropout"),
+    "mujoco_robot": (*TASK, "arm", "latency", "pose_noise", "dropout"),
     "perception_node": COMMON,
     "skill_server": (*COMMON, *SHORTCUTS),
     "planner_node": (*COMMON, *SHORTCUTS, "planner"),
@@ -108,7 +114,7 @@ def _nodes(context: LaunchContext) -> list[Node]:
     """The nodes that the arguments ask for."""
     given = {name: value for name, value in context.launch_configurations.items() if value}
     names = ["sim_node"] if given["world"] == "sim" else ["robot_bridge"]
-    names += ["mock_robot"] if given["world"] == "mock" else []
+    names += [SIMULATED[given["world"]]] if given["world"] in SIMULATED else []
     names += ["perception_node", "skill_server", "planner_node"]
     names += ["recorder_node"] if "record" in given else []
     acquires = IfCondition(LaunchConfiguration("acquisition"))

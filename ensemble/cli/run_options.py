@@ -38,7 +38,7 @@ from slap_ros.files import require_writable
 from slap_ros.planning.execution import MAX_REPLANS
 from slap_ros.planning.planner import require_planner
 from slap_ros.planning.planner_choice import DEFAULT_PLANNER, with_settings
-from slap_ros.robot.worlds import MOCK, ROBOT, SIM, WORLDS
+from slap_ros.robot.worlds import MOCK, MUJOCO, ROBOT, SIM, WORLDS
 from slap_ros.skills.domain_choice import SHIPPED
 
 
@@ -127,8 +127,8 @@ class RunOptions:
     world: Annotated[
         str,
         typer.Option(
-            help="World to act in: sim, robot (see docs/real-robot.md), or mock (a simulated "
-            "robot)."
+            help="World to act in: sim, robot (see docs/real-robot.md), mock (a simulated robot "
+            "in the planner's own physics), or mujoco (one in MuJoCo)."
         ),
     ] = SIM
     scene: Annotated[
@@ -137,6 +137,10 @@ class RunOptions:
     mock: Annotated[
         str,
         typer.Option(help="Parameters of the mock robot, such as latency=0.05,pose_noise=0.003."),
+    ] = ""
+    mujoco: Annotated[
+        str,
+        typer.Option(help="Parameters of the robot in MuJoCo, such as pace=5,dropout=0.1."),
     ] = ""
     acquire: Annotated[
         bool,
@@ -194,6 +198,8 @@ class RunOptions:
             )
         if self.mock and world != MOCK:
             raise InvalidParameterError(f"--mock is for --world mock, not for --world {world}")
+        if self.mujoco and world != MUJOCO:
+            raise InvalidParameterError(f"--mujoco is for --world mujoco, not for --world {world}")
 
     def _check_acquisition(self) -> None:
         require_known("--proposer", self.proposer, PROPOSERS)

@@ -23,7 +23,7 @@ from ensemble.nodes import RunSettings
 from ensemble.parameters import parse_parameters
 from ensemble.patience import grown_patience
 from ensemble.perception_parameters import PerceptionParameters
-from ensemble.robot_parameters import parse_mock_robot
+from ensemble.robot_parameters import parse_mock_robot, parse_mujoco_robot
 from ensemble.run import RunRequest
 from ensemble.run import run as run_ensemble
 from ensemble.skill_request import SkillRequest
@@ -41,7 +41,8 @@ from slap_ros.messages.interfaces import STATE
 from slap_ros.messages.protocols import StateMessage
 from slap_ros.planning.planner import make_planner
 from slap_ros.relational import GroundAtom
-from slap_ros.robot.worlds import SIM
+from slap_ros.robot.mujoco.installed import require_mujoco
+from slap_ros.robot.worlds import MUJOCO, SIM
 from slap_ros.shortcuts.shipped import chosen_library
 from slap_ros.skills.domain_choice import DomainChoice
 
@@ -102,6 +103,8 @@ def _request(options: RunOptions, domain: Domain, task: Task, import_s: float) -
         from slap_ros.robot.robot_world import require_robot
 
         require_robot(domain, task.initial_state)
+    if options.world == MUJOCO:
+        require_mujoco()
     perception = parse_parameters(options.perception, PerceptionParameters, "perception")
     quality = PerceptionParameters(**perception).quality
     quality.require_known(task.initial_state.layout.by_name.keys())
@@ -119,6 +122,7 @@ def _request(options: RunOptions, domain: Domain, task: Task, import_s: float) -
         world=options.world,
         scene=str(options.scene or ""),
         mock=parse_mock_robot(options.mock),
+        mujoco=parse_mujoco_robot(options.mujoco),
         perception=perception,
         acquisition=_acquisition(options),
     )

@@ -11,13 +11,12 @@ from control_msgs.action import FollowJointTrajectory, GripperCommand
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.node import Node
-from rclpy.task import Future
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 from ensemble.robot_parameters import MockRobotParameters, action_name, arm_joints
-from ensemble.steady_time import create_timer
-from robot_bridge.mock.noise_model import NoiseModel
 from robot_bridge.mock.plant import Plant
+from robot_bridge.simulated.noise_model import NoiseModel
+from robot_bridge.simulated.waiting import pause
 from slap_ros.worlds.panda import JOINT_HIGH, JOINT_LOW, JOINTS
 
 LONGEST_PAUSE = 1.0  # s
@@ -164,13 +163,3 @@ def _possible(goal: FollowJointTrajectory.Goal) -> bool:
             for low, q, high in zip(JOINT_LOW, end.positions, JOINT_HIGH, strict=True)
         )
     )
-
-
-async def pause(node: Node, duration_s: float) -> None:
-    """Wait without blocking the executor."""
-    over = Future()
-    timer = create_timer(node, max(duration_s, 1e-3), lambda: over.done() or over.set_result(None))
-    try:
-        await over
-    finally:
-        node.destroy_timer(timer)

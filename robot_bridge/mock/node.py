@@ -39,7 +39,6 @@ from __future__ import annotations
 from collections import Counter
 from typing import Any
 
-import numpy as np
 from rclpy.node import Node
 
 from ensemble.diagnostics import DiagnosticsPublisher
@@ -48,9 +47,9 @@ from ensemble.parameters import read_parameters
 from ensemble.robot_parameters import MockRobotParameters
 from ensemble.steady_time import create_timer
 from robot_bridge.mock.controllers import MockControllers
-from robot_bridge.mock.noise_model import NoiseModel, NoiseSettings
 from robot_bridge.mock.plant import Plant
-from robot_bridge.mock.sensors import MockSensors
+from robot_bridge.simulated.noise_model import NoiseModel
+from robot_bridge.simulated.sensors import SimulatedSensors
 from slap_ros.errors import InvalidParameterError
 from slap_ros.skills.domain_choice import open_domain
 
@@ -77,13 +76,13 @@ class MockRobot(Node):
             raise InvalidParameterError("parameters rate, joint_rate and pace must be above 0")
         domain = open_domain(settings.choice)
         period_s = domain.execution.control_period_s / settings.pace
-        noise = NoiseModel(_noise_settings(settings), np.random.default_rng(settings.noise_seed))
+        noise = NoiseModel.of(settings)
         self._plant = Plant(domain, settings.first_task(domain).initial_state)
         self._counts = Counter(motions=0, grips=0, refused=0, aborted=0, canceled=0)
         self._controllers = MockControllers(
             self, self._plant, noise, settings, period_s, self._counts
         )
-        self._sensors = MockSensors(self, self._plant, noise, settings)
+        self._sensors = SimulatedSensors(self, self._plant, noise, settings)
         create_timer(self, period_s, self._idle)
         DiagnosticsPublisher(self, lambda: self._counts)
 
@@ -96,17 +95,6 @@ class MockRobot(Node):
         """Let time pass for objects that still move; a goal under way lets it pass by itself."""
         if not self._controllers.busy and not self._plant.at_rest:
             self._plant.idle()
-
-
-def _noise_settings(settings: MockRobotParameters) -> NoiseSettings:
-    return NoiseSettings(
-        settings.latency,
-        settings.jitter,
-        settings.pose_noise,
-        settings.turn_noise,
-        settings.joint_noise,
-        settings.dropout,
-    )
 
 
 def main() -> int:

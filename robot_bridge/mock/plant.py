@@ -37,6 +37,11 @@ class Plant:
         return [float(self._world.state.get(self._robot, f.name)) for f in JOINT_FEATURES]
 
     @property
+    def joint_velocities(self) -> list[float]:
+        """None: the arm is at rest whenever it is looked at."""
+        return []
+
+    @property
     def holding(self) -> bool:
         """Whether something is in the hand."""
         return any(self._world.state.get(obj, "held") > 0.5 for obj in self._movable)

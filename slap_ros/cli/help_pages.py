@@ -31,7 +31,7 @@ PANELS: Mapping[str, str] = {
         ("settings", "set", "steps", "work", "ray", "begin", "encoder", "keep"), LEARNING
     ),
     **dict.fromkeys(
-        ("world", "scene", "mock", "perception", "to", "robot", "dry_run", "yes"), ROBOT
+        ("world", "scene", "mock", "mujoco", "perception", "to", "robot", "dry_run", "yes"), ROBOT
     ),
     **dict.fromkeys(
         ("output", "json", "record", "render", "size", "report", "live", "live_port", "watched"),

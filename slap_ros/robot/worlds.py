@@ -2,4 +2,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the ensemble can run in."""
 
-SIM, ROBOT, MOCK = WORLDS = ("sim", "robot", "mock")  # mock: the bridge, a mock robot behind it
+# mock: the bridge, with a mock robot behind it; mujoco: the bridge, with a robot in MuJoCo behind it
+SIM, ROBOT, MOCK, MUJOCO = WORLDS = ("sim", "robot", "mock", "mujoco")

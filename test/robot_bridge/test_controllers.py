@@ -19,8 +19,8 @@ from ensemble.robot_parameters import (
     finger_joints,
 )
 from ensemble.spinner import temporary_node
-from robot_bridge.mock.controllers import pause
 from robot_bridge.robot import GAP_OPEN, GAP_SHUT, Robot
+from robot_bridge.simulated.waiting import pause
 from slap_ros.domains import get_domain
 from slap_ros.errors import ControllerAbortedError
 from slap_ros.robot.limits import JointMotion

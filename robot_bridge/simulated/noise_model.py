@@ -5,10 +5,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ensemble.robot_parameters import SimulatedRobotParameters
 from slap_ros.errors import InvalidParameterError
 from slap_ros.geometry.pose import Pose, multiply
 
@@ -43,6 +45,23 @@ class NoiseModel:
     def __init__(self, settings: NoiseSettings, rng: np.random.Generator) -> None:
         self._settings, self._rng = settings, rng
 
+    @classmethod
+    def of(cls, parameters: SimulatedRobotParameters) -> NoiseModel:
+        """The noise that a node's parameters ask for.
+
+        Raises:
+            InvalidParameterError: Negative, or everything lost.
+        """
+        settings = NoiseSettings(
+            parameters.latency,
+            parameters.jitter,
+            parameters.pose_noise,
+            parameters.turn_noise,
+            parameters.joint_noise,
+            parameters.dropout,
+        )
+        return cls(settings, np.random.default_rng(parameters.noise_seed))
+
     def delay_s(self) -> float:
         """A delay, s."""
         return self._settings.latency_s + self._settings.jitter_s * float(self._rng.random())
@@ -51,7 +70,7 @@ class NoiseModel:
         """Whether a detection is lost."""
         return bool(self._rng.random() < self._settings.dropout)
 
-    def joints(self, joints: list[float]) -> list[float]:
+    def joints(self, joints: Sequence[float]) -> list[float]:
         """Joint positions as encoders measure them, rad."""
         noise = self._settings.joint_rad * self._rng.standard_normal(len(joints))
         return [float(q + n) for q, n in zip(joints, noise, strict=True)]

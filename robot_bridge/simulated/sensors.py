@@ -1,12 +1,14 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The mock robot's sensors: joint states, and detections that are noisy, late and lost."""
+"""A simulated robot's sensors: joint states, and detections that are noisy, late and lost."""
 
 from __future__ import annotations
 
 import heapq
+from collections.abc import Mapping, Sequence
 from itertools import count
 from time import monotonic
+from typing import Protocol
 
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from rclpy.node import Node
@@ -15,21 +17,52 @@ from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from ensemble.interfaces import JOINT_STATES, SENSOR_DATA, TF
-from ensemble.robot_parameters import MockRobotParameters, arm_joints, base_frame, finger_joints
+from ensemble.robot_parameters import (
+    SimulatedRobotParameters,
+    arm_joints,
+    base_frame,
+    finger_joints,
+)
 from ensemble.steady_time import create_timer
-from robot_bridge.mock.noise_model import NoiseModel
-from robot_bridge.mock.plant import Plant
+from robot_bridge.simulated.noise_model import NoiseModel
 from slap_ros.geometry.pose import Pose
 from slap_ros.robot.scene_config import DETECTED
 
 DELIVERY_PERIOD = 0.005  # s, between two looks at which detections are due
 
 
-class MockSensors:
+class MeasuredPlant(Protocol):
+    """What can be measured of a robot and the objects around it."""
+
+    @property
+    def joints(self) -> Sequence[float]:
+        """Joint positions, rad."""
+        ...
+
+    @property
+    def joint_velocities(self) -> Sequence[float]:
+        """Joint velocities, rad/s; empty: not measured."""
+        ...
+
+    @property
+    def gap(self) -> float:
+        """Distance between the fingers, m."""
+        ...
+
+    def poses(self) -> Mapping[str, Pose]:
+        """Where what can move is, by name."""
+        ...
+
+
+class SimulatedSensors:
     """Publishes joint states, and detections a little after they are made."""
 
     def __init__(
-        self, node: Node, plant: Plant, noise: NoiseModel, settings: MockRobotParameters
+        self,
+        node: Node,
+        plant: MeasuredPlant,
+        noise: NoiseModel,
+        settings: SimulatedRobotParameters,
     ) -> None:
         """Begin to publish.
 
@@ -56,8 +89,11 @@ class MockSensors:
     def _publish_joints(self) -> None:
         finger = 0.5 * self._plant.gap
         positions = [*self._noise.joints(self._plant.joints), finger, finger]
+        velocities = [*measured, 0.0, 0.0] if (measured := self._plant.joint_velocities) else []
         self._joints.publish(
-            JointState(header=self._header(), name=self._names, position=positions)
+            JointState(
+                header=self._header(), name=self._names, position=positions, velocity=velocities
+            )
         )
 
     def _detect(self) -> None:

@@ -1,0 +1,281 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The controllers of the robot in MuJoCo: action servers, and what they do in each period.
+
+They answer as drivers do: ros2_control's joint_trajectory_controller, and a gripper that succeeds
+where its fingers stall, and says that they did.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+
+from control_msgs.action import FollowJointTrajectory, GripperCommand
+from control_msgs.msg import JointTolerance
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.action.server import ServerGoalHandle
+from rclpy.node import Node
+from rclpy.task import Future
+
+from ensemble.robot_parameters import MujocoRobotParameters, action_name, arm_joints
+from robot_bridge.simulated.noise_model import NoiseModel
+from robot_bridge.simulated.waiting import pause
+from slap_ros.errors import InvalidCommandError
+from slap_ros.messages.decode import stamp_ns
+from slap_ros.robot.finger_tracking import FingerTracker, GripOutcome
+from slap_ros.robot.joint_trajectory import TrajectoryPoint, require_followable
+from slap_ros.robot.mujoco.arm import FINGER_FORCE
+from slap_ros.robot.mujoco.plant import MujocoPlant
+from slap_ros.robot.trajectory_tracking import (
+    TrajectoryCode,
+    TrajectoryOutcome,
+    TrajectoryTolerances,
+    TrajectoryTracker,
+)
+
+UNCHECKED = -1.0  # of a goal's tolerance: any
+PREEMPTED = TrajectoryOutcome(TrajectoryCode.INVALID_GOAL, "another goal came")
+CANCELED = TrajectoryOutcome(TrajectoryCode.SUCCESSFUL, "canceled")
+
+
+class MujocoArmController:
+    """The arm's controller: one trajectory at a time; a new one replaces it."""
+
+    def __init__(
+        self,
+        node: Node,
+        plant: MujocoPlant,
+        noise: NoiseModel,
+        settings: MujocoRobotParameters,
+        counts: Counter[str],
+    ) -> None:
+        """Open the action server.
+
+        Args:
+            node: Node that has the server.
+            plant: What it moves.
+            noise: Noise model that draws how late each motion begins.
+            settings: Parameters of the robot.
+            counts: Where goals are counted by outcome.
+        """
+        self._node, self._plant, self._noise = node, plant, noise
+        self._settings, self._counts = settings, counts
+        self._joints = arm_joints(settings.arm)
+        self._tracker = TrajectoryTracker(plant.joints)
+        self._ended: Future | None = None  # of the motion under way
+        self._handle: ServerGoalHandle | None = None
+        self._server = ActionServer(
+            node,
+            FollowJointTrajectory,
+            action_name(settings.trajectory_action, settings.arm),
+            self._move,
+            goal_callback=self._on_goal,
+            cancel_callback=lambda _: CancelResponse.ACCEPT,
+        )
+
+    def destroy(self) -> None:
+        """Destroy the action server."""
+        self._server.destroy()
+
+    @property
+    def busy(self) -> bool:
+        """Whether a motion is under way."""
+        return self._tracker.busy
+
+    def update(self) -> None:
+        """Command the arm for the next period, or end the motion under way."""
+        plant = self._plant
+        if self._handle is not None and self._handle.is_cancel_requested:
+            self._tracker.hold(plant.joints)
+            self._end(CANCELED)
+        outcome = self._tracker.check(plant.time_s, plant.joints, plant.joint_velocities)
+        if outcome is not None:
+            self._end(outcome)
+        plant.command(self._tracker.command(plant.time_s))
+
+    def _end(self, outcome: TrajectoryOutcome) -> None:
+        if self._ended is not None and not self._ended.done():
+            self._ended.set_result(outcome)
+        self._ended = self._handle = None
+
+    def _on_goal(self, goal: FollowJointTrajectory.Goal) -> GoalResponse:
+        try:
+            require_followable(goal.trajectory.joint_names, self._joints, _points(goal))
+            self._require_to_come(goal)
+        except InvalidCommandError as error:
+            self._counts["refused"] += 1
+            self._node.get_logger().warning(f"refused: {error}")
+            return GoalResponse.REJECT
+        return GoalResponse.ACCEPT
+
+    def _require_to_come(self, goal: FollowJointTrajectory.Goal) -> None:
+        """Refuse a trajectory that was to end in the past."""
+        if self._late_s(goal) > _points(goal)[-1].time_s:
+            raise InvalidCommandError("the trajectory was to end in the past")
+
+    def _late_s(self, goal: FollowJointTrajectory.Goal) -> float:
+        """How long ago the trajectory was to start, s of the plant; 0 without a stamp."""
+        stamp = stamp_ns(goal.trajectory.header)
+        if stamp == 0:
+            return 0.0
+        return (self._node.get_clock().now().nanoseconds - stamp) * 1e-9 * self._settings.pace
+
+    async def _move(self, handle: ServerGoalHandle) -> FollowJointTrajectory.Result:
+        await pause(self._node, self._noise.delay_s())
+        self._end(PREEMPTED)
+        goal, plant = handle.request, self._plant
+        order = [list(goal.trajectory.joint_names).index(name) for name in self._joints]
+        self._tracker.start(
+            [_sorted(point, order) for point in _points(goal)],
+            self._tolerances(goal),
+            plant.time_s - self._late_s(goal),
+            plant.joints,
+            plant.joint_velocities,
+        )
+        self._handle, self._ended = handle, Future()
+        outcome: TrajectoryOutcome = await self._ended
+        return self._result(handle, outcome)
+
+    def _result(
+        self, handle: ServerGoalHandle, outcome: TrajectoryOutcome
+    ) -> FollowJointTrajectory.Result:
+        if outcome is CANCELED:
+            self._counts["canceled"] += 1
+            handle.canceled()
+        elif outcome.code is TrajectoryCode.SUCCESSFUL:
+            self._counts["motions"] += 1
+            handle.succeed()
+        else:
+            self._counts["aborted"] += 1
+            handle.abort()
+        return FollowJointTrajectory.Result(
+            error_code=int(outcome.code), error_string=outcome.reason
+        )
+
+    def _tolerances(self, goal: FollowJointTrajectory.Goal) -> TrajectoryTolerances:
+        """The node's, where the goal does not have its own."""
+        settings, time = self._settings, goal.goal_time_tolerance
+        late_s = time.sec + time.nanosec * 1e-9
+        return TrajectoryTolerances(
+            self._positions(goal.path_tolerance, settings.path_tolerance),
+            self._positions(goal.goal_tolerance, settings.goal_tolerance),
+            settings.stopped_velocity,
+            0.0 if late_s < 0.0 else late_s or settings.goal_time,
+        )
+
+    def _positions(self, given: Sequence[JointTolerance], otherwise: float) -> tuple[float, ...]:
+        """Tolerances by joint: 0 stands for the node's, -1 for none."""
+        own = {item.name: item.position for item in given if item.position != 0.0}
+        wanted = [own.get(name, otherwise) for name in self._joints]
+        return tuple(0.0 if value == UNCHECKED else value for value in wanted)
+
+
+class MujocoGripperController:
+    """The gripper's controller: one motion of the fingers at a time."""
+
+    def __init__(
+        self,
+        node: Node,
+        plant: MujocoPlant,
+        noise: NoiseModel,
+        settings: MujocoRobotParameters,
+        counts: Counter[str],
+    ) -> None:
+        """Open the action server; see :class:`MujocoArmController`."""
+        self._node, self._plant, self._noise = node, plant, noise
+        self._scale, self._counts = settings.gripper_scale, counts
+        self._tracker = FingerTracker()
+        self._ended: Future | None = None
+        self._handle: ServerGoalHandle | None = None
+        self._server = ActionServer(
+            node,
+            GripperCommand,
+            action_name(settings.gripper_action, settings.arm),
+            self._grip,
+            goal_callback=self._on_goal,
+            cancel_callback=lambda _: CancelResponse.ACCEPT,
+        )
+
+    def destroy(self) -> None:
+        """Destroy the action server."""
+        self._server.destroy()
+
+    @property
+    def busy(self) -> bool:
+        """Whether the fingers are moving to where they were told to be."""
+        return self._tracker.busy
+
+    def update(self) -> None:
+        """End the motion under way where it is over."""
+        plant = self._plant
+        if self._handle is not None and self._handle.is_cancel_requested:
+            self._tracker.stop()
+            plant.command_fingers(0.5 * plant.gap)
+            self._end(None)
+        outcome = self._tracker.check(plant.time_s, plant.gap, plant.gap_velocity)
+        if outcome is not None:
+            self._end(outcome)
+
+    def _end(self, outcome: GripOutcome | None) -> None:
+        if self._ended is not None and not self._ended.done():
+            self._ended.set_result(outcome)
+        self._ended = self._handle = None
+
+    def _on_goal(self, goal: GripperCommand.Goal) -> GoalResponse:
+        command = goal.command
+        if not (math.isfinite(command.position) and math.isfinite(command.max_effort)):
+            self._counts["refused"] += 1
+            return GoalResponse.REJECT
+        return GoalResponse.ACCEPT
+
+    async def _grip(self, handle: ServerGoalHandle) -> GripperCommand.Result:
+        await pause(self._node, self._noise.delay_s())
+        self._end(None)
+        command = handle.request.command
+        gap = command.position / self._scale
+        force = command.max_effort if command.max_effort > 0.0 else FINGER_FORCE
+        self._plant.command_fingers(0.5 * gap, force)
+        self._tracker.start(gap, self._plant.time_s)
+        self._handle, self._ended = handle, Future()
+        outcome: GripOutcome | None = await self._ended
+        return self._result(handle, outcome)
+
+    def _result(self, handle: ServerGoalHandle, outcome: GripOutcome | None) -> GripperCommand.Result:
+        if outcome is not None:
+            self._counts["grips"] += 1
+            handle.succeed()
+        elif handle.is_cancel_requested:
+            self._counts["canceled"] += 1
+            handle.canceled()
+        else:  # replaced by another goal
+            self._counts["aborted"] += 1
+            handle.abort()
+        return GripperCommand.Result(
+            position=self._plant.gap * self._scale,
+            stalled=outcome is GripOutcome.STALLED,
+            reached_goal=outcome is GripOutcome.REACHED,
+        )
+
+
+def _points(goal: FollowJointTrajectory.Goal) -> list[TrajectoryPoint]:
+    return [
+        TrajectoryPoint(
+            point.time_from_start.sec + point.time_from_start.nanosec * 1e-9,
+            tuple(point.positions),
+            tuple(point.velocities),
+            tuple(point.accelerations),
+        )
+        for point in goal.trajectory.points
+    ]
+
+
+def _sorted(point: TrajectoryPoint, order: Sequence[int]) -> TrajectoryPoint:
+    """The point with its joints in the controller's order."""
+    return TrajectoryPoint(
+        point.time_s,
+        tuple(point.positions[i] for i in order),
+        tuple(point.velocities[i] for i in order) if point.velocities else (),
+        tuple(point.accelerations[i] for i in order) if point.accelerations else (),
+    )

@@ -1,0 +1,102 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The Panda in MuJoCo: links and meshes of PyBullet's URDF, with motors that hold by stiffness.
+
+Each joint is pulled to its commanded position, as by a drive's position loop: a moving arm lags.
+Its own weight is compensated, that of what it holds is not. Both fingers move alike, as the real
+gripper's do, and press with a force that is set.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from slap_ros.robot.mujoco.engine import mujoco
+from slap_ros.worlds.bullet import PANDA
+from slap_ros.worlds.panda import JOINTS
+
+PERIOD_S = 0.002  # of the physics and of the controllers
+ARM_JOINTS = tuple(f"panda_joint{i + 1}" for i in range(JOINTS))
+FINGER_JOINTS = ("panda_finger_joint1", "panda_finger_joint2")
+
+STIFFNESS = (4500.0, 4500.0, 3500.0, 3500.0, 2000.0, 2000.0, 2000.0)  # Nm/rad
+LAG_S = 0.05  # s, by which a joint in motion is behind: damping over stiffness
+TORQUE = (87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0)  # Nm, Franka's data sheet
+ARMATURE = 0.1  # kg m², of a motor, seen from the joint
+JOINT_DAMPING = 1.0  # Nm s/rad
+
+FINGER_STIFFNESS = 2000.0  # N/m
+FINGER_DAMPING = 40.0  # N s/m
+FINGER_ARMATURE = 0.1  # kg
+FINGER_FORCE = 40.0  # N, of each finger
+LARGEST_FINGER_FORCE = 70.0  # N, Franka's data sheet
+
+# Who touches whom: the arm touches everything but itself.
+ARM_CONTACTS = {"contype": 2, "conaffinity": 1}
+BODY_CONTACTS = {"contype": 1, "conaffinity": 3}
+# Hard contacts, for the step is short: fingers that press a toy of 10 g do not sink into it.
+SOLREF = (2.0 * PERIOD_S, 1.0)  # s, 1: time constant and damping ratio
+SOLIMP = (0.95, 0.99, 0.001, 0.5, 2.0)
+
+
+def arm_spec() -> Any:
+    """A new ``mujoco.MjSpec`` with the arm alone, its base at the origin."""
+    spec = mujoco.MjSpec.from_string(_urdf())
+    _set_options(spec.option)
+    for body in spec.bodies:
+        body.gravcomp = 1.0
+    for geom in spec.geoms:
+        geom.contype, geom.conaffinity = ARM_CONTACTS["contype"], ARM_CONTACTS["conaffinity"]
+        geom.solref, geom.solimp, geom.condim = SOLREF, SOLIMP, 4
+    for joint in spec.joints:
+        finger = joint.name in FINGER_JOINTS
+        joint.armature = FINGER_ARMATURE if finger else ARMATURE
+        joint.damping = [0.0 if finger else JOINT_DAMPING, 0.0, 0.0]
+    for name, stiffness, torque in zip(ARM_JOINTS, STIFFNESS, TORQUE, strict=True):
+        _add_motor(spec, name, stiffness, LAG_S * stiffness, torque)
+    for name in FINGER_JOINTS:
+        _add_motor(spec, name, FINGER_STIFFNESS, FINGER_DAMPING, FINGER_FORCE)
+    _couple_fingers(spec)
+    return spec
+
+
+def _urdf() -> str:
+    """PyBullet's URDF with paths and settings that MuJoCo understands."""
+    text = (PANDA / "panda.urdf").read_text(encoding="utf-8")
+    for prefix in ("package://meshes/collision/", "package://meshes/visual/"):
+        text = text.replace(prefix, "")
+    head, _, rest = text.partition("<robot")
+    tag, _, body = rest.partition(">")
+    settings = (
+        f'<mujoco><compiler meshdir="{PANDA / "meshes" / "collision"}" discardvisual="true" '
+        'fusestatic="false" balanceinertia="true"/></mujoco>'
+    )
+    return f"{head}<robot{tag}>{settings}{body}"
+
+
+def _set_options(option: Any) -> None:
+    option.timestep = PERIOD_S
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.impratio = 10.0  # what is held creeps less
+
+
+def _add_motor(spec: Any, joint: str, stiffness: float, damping: float, force: float) -> None:
+    """A motor that pulls a joint to its command: Nm or N per rad or m."""
+    motor = spec.add_actuator()
+    motor.name, motor.target, motor.trntype = joint, joint, mujoco.mjtTrn.mjTRN_JOINT
+    motor.gaintype = mujoco.mjtGain.mjGAIN_FIXED
+    motor.biastype = mujoco.mjtBias.mjBIAS_AFFINE
+    motor.gainprm[0] = stiffness
+    motor.biasprm[1], motor.biasprm[2] = -stiffness, -damping
+    motor.forcerange, motor.forcelimited = [-force, force], True
+
+
+def _couple_fingers(spec: Any) -> None:
+    """One drive moves both fingers, so that what they hold stays where they met it."""
+    both = spec.add_equality()
+    both.name, both.type = "fingers", mujoco.mjtEq.mjEQ_JOINT
+    both.objtype = mujoco.mjtObj.mjOBJ_JOINT
+    both.name1, both.name2 = FINGER_JOINTS
+    both.data[:5] = [0.0, 1.0, 0.0, 0.0, 0.0]  # the first is the second
+    both.solref, both.solimp = SOLREF, SOLIMP

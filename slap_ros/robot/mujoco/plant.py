@@ -1,0 +1,162 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The robot and its objects in MuJoCo, where time passes a period at a time.
+
+All that a period depends on is in :meth:`MujocoPlant.save`: restored there, or in another plant of
+the same model, the next periods are the same, bit for bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slap_ros.core import Domain
+from slap_ros.geometry.pose import Pose
+from slap_ros.relational import State
+from slap_ros.robot.mujoco.arm import (
+    ARM_JOINTS,
+    FINGER_FORCE,
+    FINGER_JOINTS,
+    LARGEST_FINGER_FORCE,
+    PERIOD_S,
+)
+from slap_ros.robot.mujoco.engine import mujoco
+from slap_ros.robot.mujoco.model import compiled, scene_around, scene_spec
+from slap_ros.worlds.joint_space.scene import Scene
+from slap_ros.worlds.joint_space.snapshot import SceneIndex
+from slap_ros.worlds.panda import FINGER_CLOSED, FINGER_OPEN, JOINTS
+
+SETTLING_S = 0.3  # s, at least, before anything is measured
+LONGEST_SETTLING_S = 3.0  # s
+RESTING = 1e-3  # m/s, rad/s: what is slower stands still
+
+Array = NDArray[np.float64]
+
+
+class MujocoPlant:
+    """An arm, its fingers and free bodies.
+
+    Args:
+        model: Compiled ``mujoco.MjModel`` of a scene.
+        scene: Bodies of the scene.
+        state: State to begin in; what moves there comes to rest first.
+    """
+
+    def __init__(self, model: Any, scene: Scene, state: State) -> None:
+        self._model, self._data = model, mujoco.MjData(model)
+        self._names = [body.name for body in scene.free]
+        self._bodies = [model.body(name).id for name in self._names]
+        self._arm_at = [model.joint(name).qposadr[0] for name in ARM_JOINTS]
+        self._arm_speeds = [model.joint(name).dofadr[0] for name in ARM_JOINTS]
+        self._fingers_at = [model.joint(name).qposadr[0] for name in FINGER_JOINTS]
+        self._finger_speeds = [model.joint(name).dofadr[0] for name in FINGER_JOINTS]
+        snapshot = SceneIndex.of(scene, state.layout).read(state)
+        self._data.qpos[self._arm_at] = snapshot.joints
+        self._data.qpos[self._fingers_at] = snapshot.finger
+        self.command(snapshot.joints)
+        self.command_fingers(FINGER_OPEN if snapshot.held is None else FINGER_CLOSED)
+        self._settle()
+
+    @classmethod
+    def of(cls, domain: Domain, state: State) -> MujocoPlant:
+        """The plant of a domain's state.
+
+        Raises:
+            InvalidSceneError: MuJoCo cannot express a body.
+            InvalidParameterError: The domain has no Panda.
+        """
+        scene = scene_around(domain, state)
+        return cls(compiled(scene_spec(scene, state)), scene, state)
+
+    # -- what is measured -----------------------------------------------------------------------
+
+    @property
+    def time_s(self) -> float:
+        """Time of the plant since it was made, s."""
+        return float(self._data.time)
+
+    @property
+    def joints(self) -> list[float]:
+        """Joint positions, rad."""
+        return [float(q) for q in self._data.qpos[self._arm_at]]
+
+    @property
+    def joint_velocities(self) -> list[float]:
+        """Joint velocities, rad/s."""
+        return [float(v) for v in self._data.qvel[self._arm_speeds]]
+
+    @property
+    def gap(self) -> float:
+        """Distance between the fingers, m."""
+        return float(sum(self._data.qpos[self._fingers_at]))
+
+    @property
+    def gap_velocity(self) -> float:
+        """How fast the fingers part, m/s."""
+        return float(sum(self._data.qvel[self._finger_speeds]))
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether nothing moves."""
+        return bool(np.abs(self._data.qvel).max() < RESTING)
+
+    def poses(self) -> dict[str, Pose]:
+        """Where what can move is, by name."""
+        return {
+            name: _pose(self._data.xpos[body], self._data.xquat[body])
+            for name, body in zip(self._names, self._bodies, strict=True)
+        }
+
+    # -- what is commanded ----------------------------------------------------------------------
+
+    def command(self, joints: Sequence[float]) -> None:
+        """Have the arm pulled to joint positions, rad, from now on."""
+        self._data.ctrl[:JOINTS] = joints
+
+    def command_fingers(self, finger: float, force: float = FINGER_FORCE) -> None:
+        """Have the fingers move from now on.
+
+        Args:
+            finger: Distance of each finger from the middle, m.
+            force: Largest force of each finger, N.
+        """
+        limit = min(force, LARGEST_FINGER_FORCE)
+        self._data.ctrl[JOINTS:] = finger
+        self._model.actuator_forcerange[JOINTS:] = (-limit, limit)
+
+    def step(self) -> None:
+        """Let a period pass."""
+        mujoco.mj_step(self._model, self._data)
+
+    # -- all of it ------------------------------------------------------------------------------
+
+    def save(self) -> Array:
+        """All that the next periods depend on, besides what is commanded."""
+        kind = mujoco.mjtState.mjSTATE_INTEGRATION
+        saved = np.zeros(mujoco.mj_stateSize(self._model, kind))
+        mujoco.mj_getState(self._model, self._data, saved, kind)
+        return saved
+
+    def restore(self, saved: Array) -> None:
+        """Go on from what was saved."""
+        mujoco.mj_setState(self._model, self._data, saved, mujoco.mjtState.mjSTATE_INTEGRATION)
+        mujoco.mj_forward(self._model, self._data)
+
+    def _settle(self) -> None:
+        """Let bodies come to rest upon one another, for our physics and MuJoCo's differ."""
+        while self.time_s < SETTLING_S or not (self.at_rest or self.time_s > LONGEST_SETTLING_S):
+            self.step()
+        mujoco.mj_forward(self._model, self._data)
+
+
+def _pose(position: Array, quaternion: Array) -> Pose:
+    x, y, z = position.tolist()
+    w, qx, qy, qz = quaternion.tolist()
+    return Pose((x, y, z), (qx, qy, qz, w))
+
+
+__all__ = ["PERIOD_S", "MujocoPlant"]
