@@ -99,10 +99,12 @@ def _start(name: str, parameters: Mapping[str, str | int | float]) -> subprocess
     )
 
 
-def _as_yaml(value: str | int | float) -> str:
+def _as_yaml(value: str | int | float | tuple[float, ...]) -> str:
     """A parameter's value as ROS reads it: texts quoted, or ``2024`` and ``x #y`` are others."""
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_as_yaml, value))}]"
     text = str(value)
     return text if "." in text else text.replace("e", ".0e")  # 1e-12 is a text in YAML
 

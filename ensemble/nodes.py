@@ -10,6 +10,7 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any
 
+from ensemble.robot_parameters import BEFORE_MUJOCO
 from slap_ros.robot.worlds import MOCK, MUJOCO, SIM
 from slap_ros.shortcuts.shortcut import DEFAULT
 from slap_ros.skills.domain_choice import DomainChoice
@@ -117,5 +118,6 @@ def _world_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int
     if settings.world == MOCK:
         return {"robot_bridge.mock": task | dict(settings.mock)} | bridge
     if settings.world == MUJOCO:
+        bridge["robot_bridge"] = dict(BEFORE_MUJOCO) | bridge["robot_bridge"]
         return {"robot_bridge.mujoco": task | dict(settings.mujoco)} | bridge
     return bridge

@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from types import MappingProxyType
 
 from ensemble.parameters import MAX_SEED, parameter, parse_parameters
 from ensemble.world_parameters import WorldParameters
@@ -16,6 +18,10 @@ from slap_ros.worlds.panda import JOINTS
 # As MoveIt's configurations of Franka's arms have them; ``ros2 action list`` shows them.
 TRAJECTORY_ACTION = "ARM_arm_controller/follow_joint_trajectory"
 GRIPPER_ACTION = "franka_gripper/gripper_action"
+# Of the bridge to a robot in MuJoCo, where tables, which are as high as domains want, stop the arm.
+BEFORE_MUJOCO: Mapping[str, float | tuple[float, ...]] = MappingProxyType(
+    {"workspace": (-0.9, -0.9, -0.4, 0.9, 0.9, 1.2), "gripper_effort": 40.0}
+)
 WORKSPACE = (*Workspace().low, *Workspace().high)
 GIVEN_WITH_THE_RUN = frozenset(item.name for item in fields(WorldParameters))
 
@@ -142,7 +148,7 @@ class MujocoRobotParameters(SimulatedRobotParameters):
     pose_noise: float = parameter(0.0, "m, of detections along each axis")
     turn_noise: float = parameter(0.0, "rad, of detections about each axis")
     path_tolerance: float = parameter(0.2, "rad, by which a joint may be off its path; 0: any")
-    goal_tolerance: float = parameter(0.01, "rad, by which a joint may be off at the end; 0: any")
+    goal_tolerance: float = parameter(0.05, "rad, by which a joint may be off at the end; 0: any")
     stopped_velocity: float = parameter(0.01, "rad/s, of a joint that stands; 0: any")
     goal_time: float = parameter(1.0, "s, by which the arm may arrive late; 0: any time")
 
@@ -169,3 +175,16 @@ def parse_mujoco_robot(text: str) -> dict[str, str | int | float]:
         InvalidParameterError: An unknown parameter, or a value that it cannot have.
     """
     return parse_parameters(text, MujocoRobotParameters, "MuJoCo robot", GIVEN_WITH_THE_RUN)
+
+
+def parse_robot_bridge(text: str) -> dict[str, str | int | float | tuple[float, ...]]:
+    """The bridge's parameters as a command line has them: ``speed=0.1,arm=fr3``.
+
+    Returns:
+        Parameters by name, of the types that they have.
+
+    Raises:
+        InvalidParameterError: An unknown parameter, or a value that it cannot have.
+    """
+    given = GIVEN_WITH_THE_RUN | {"scene"}
+    return parse_parameters(text, RobotBridgeParameters, "robot", given)

@@ -162,6 +162,8 @@ def _parameter_files(given: Mapping[str, str]) -> list[str]:
     files = [_config() / "ensemble.yaml"]
     if given["world"] != "sim":
         files.append(_config() / "robot.yaml")
+    if given["world"] == "mujoco":
+        files.append(_config() / "mujoco.yaml")
     if "params_file" in given:
         files.append(Path(given["params_file"]).expanduser())
         if not files[-1].is_file():

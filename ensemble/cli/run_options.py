@@ -134,6 +134,9 @@ class RunOptions:
     scene: Annotated[
         Path | None, typer.Option(help="Scene file: what stands around the robot.")
     ] = None
+    robot: Annotated[
+        str, typer.Option(help="Parameters of robot_bridge, such as arm=fr3,speed=0.1.")
+    ] = ""
     mock: Annotated[
         str,
         typer.Option(help="Parameters of the mock robot, such as latency=0.05,pose_noise=0.003."),
@@ -198,6 +201,8 @@ class RunOptions:
             )
         if self.mock and world != MOCK:
             raise InvalidParameterError(f"--mock is for --world mock, not for --world {world}")
+        if self.robot and world == SIM:
+            raise InvalidParameterError("--robot is for a robot, not for --world sim")
         if self.mujoco and world != MUJOCO:
             raise InvalidParameterError(f"--mujoco is for --world mujoco, not for --world {world}")
 

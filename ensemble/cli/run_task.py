@@ -23,7 +23,11 @@ from ensemble.nodes import RunSettings
 from ensemble.parameters import parse_parameters
 from ensemble.patience import grown_patience
 from ensemble.perception_parameters import PerceptionParameters
-from ensemble.robot_parameters import parse_mock_robot, parse_mujoco_robot
+from ensemble.robot_parameters import (
+    parse_mock_robot,
+    parse_mujoco_robot,
+    parse_robot_bridge,
+)
 from ensemble.run import RunRequest
 from ensemble.run import run as run_ensemble
 from ensemble.skill_request import SkillRequest
@@ -123,6 +127,7 @@ def _request(options: RunOptions, domain: Domain, task: Task, import_s: float) -
         scene=str(options.scene or ""),
         mock=parse_mock_robot(options.mock),
         mujoco=parse_mujoco_robot(options.mujoco),
+        bridge=parse_robot_bridge(options.robot),
         perception=perception,
         acquisition=_acquisition(options),
     )

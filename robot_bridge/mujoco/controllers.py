@@ -86,6 +86,8 @@ class MujocoArmController:
 
     def update(self) -> None:
         """Command the arm for the next period, or end the motion under way."""
+        if not self._tracker.busy:
+            return  # it holds what it was commanded last
         plant = self._plant
         if self._handle is not None and self._handle.is_cancel_requested:
             self._tracker.hold(plant.joints)
@@ -209,6 +211,8 @@ class MujocoGripperController:
 
     def update(self) -> None:
         """End the motion under way where it is over."""
+        if not self._tracker.busy:
+            return
         plant = self._plant
         if self._handle is not None and self._handle.is_cancel_requested:
             self._tracker.stop()
@@ -242,7 +246,9 @@ class MujocoGripperController:
         outcome: GripOutcome | None = await self._ended
         return self._result(handle, outcome)
 
-    def _result(self, handle: ServerGoalHandle, outcome: GripOutcome | None) -> GripperCommand.Result:
+    def _result(
+        self, handle: ServerGoalHandle, outcome: GripOutcome | None
+    ) -> GripperCommand.Result:
         if outcome is not None:
             self._counts["grips"] += 1
             handle.succeed()

@@ -14,7 +14,7 @@ ROS Parameters:
     trajectory_action (string, "ARM_arm_controller/follow_joint_trajectory"),
     gripper_action (string, "franka_gripper/gripper_action"): names of the actions, as the bridge's.
     gripper_scale (double, 0.5): position that is sent per m between the fingers.
-    path_tolerance (double, 0.2), goal_tolerance (double, 0.01): rad, by which a joint may be off
+    path_tolerance (double, 0.2), goal_tolerance (double, 0.05): rad, by which a joint may be off
         on the way and at the end, where a goal says nothing else; 0: any.
     stopped_velocity (double, 0.01): rad/s, of a joint that stands at the end.
     goal_time (double, 1.0): s, by which the arm may arrive late; 0: any time.
@@ -59,7 +59,7 @@ from slap_ros.robot.mujoco.plant import MujocoPlant
 from slap_ros.skills.domain_choice import open_domain
 
 TICK = 0.01  # s, between two looks at how much time has to pass
-BUSY = 0.008  # s of a tick that physics may take: callbacks need the rest
+BUSY = 0.005  # s of a tick that physics may take: callbacks need the rest
 
 
 class MujocoRobot(Node):

@@ -15,7 +15,9 @@ from slap_ros.worlds.features import JOINT_FEATURES, POSE_FEATURES, VELOCITY_FEA
 from slap_ros.worlds.joint_space.features import GRASP_FEATURES, ROBOT
 from slap_ros.worlds.joint_space.scene import Scene
 from slap_ros.worlds.joint_space.settling import resting_poses
-from slap_ros.worlds.panda import FINGER_OPEN, hand_pose
+from slap_ros.worlds.panda import FINGER_OPEN, JOINT_HIGH, JOINT_LOW, hand_pose
+
+BEYOND_LIMIT = 0.02  # rad, by which a joint at its limit may be measured beyond it
 
 Changes = dict[tuple[Object, str], float]
 
@@ -62,7 +64,8 @@ class StateAssembler:
                 changes |= _named(obj, VELOCITY_FEATURES, motion) | {(obj, "held"): 0.0}
             changes |= _pose_changes(obj, pose)
         if grasp is not None:
-            changes |= _pose_changes(grasp.obj, hand_pose(reading.joints).compose(grasp.pose))
+            hand = hand_pose(possible_joints(reading.joints))
+            changes |= _pose_changes(grasp.obj, hand.compose(grasp.pose))
             changes |= _named(grasp.obj, VELOCITY_FEATURES, (*ORIGIN, *ORIGIN))
             changes |= {(grasp.obj, "held"): 1.0}
         return self._template.replace(changes)
@@ -71,7 +74,7 @@ class StateAssembler:
         pose = IDENTITY if grasp is None else grasp.pose
         finger = FINGER_OPEN if grasp is None else grasp.finger
         return {
-            **_named(self._robot, JOINT_FEATURES, reading.joints),
+            **_named(self._robot, JOINT_FEATURES, possible_joints(reading.joints)),
             **_named(self._robot, GRASP_FEATURES, (*pose.position, *pose.quaternion)),
             (self._robot, "finger"): finger,
         }
@@ -96,6 +99,24 @@ class StateAssembler:
             return known[obj].pose
         x, y, z, qx, qy, qz, qw = feature_values(self._template, obj, POSE_FEATURES)
         return Pose((x, y, z), (qx, qy, qz, qw))
+
+
+def possible_joints(measured: Sequence[float]) -> list[float]:
+    """Where the joints are: a real arm at a limit overshoots, and encoders have noise.
+
+    Args:
+        measured: Joint positions as measured, rad.
+
+    Returns:
+        The same, at the limit where they are a little beyond it; what is further beyond stays.
+    """
+    at_limits = (
+        min(max(q, low), high) for low, q, high in zip(JOINT_LOW, measured, JOINT_HIGH, strict=True)
+    )
+    return [
+        limited if abs(limited - q) <= BEYOND_LIMIT else q
+        for limited, q in zip(at_limits, measured, strict=True)
+    ]
 
 
 def feature_values(state: State, obj: Object, features: Sequence[Feature]) -> list[float]:

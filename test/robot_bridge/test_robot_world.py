@@ -21,7 +21,9 @@ from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.limits import PANDA, Workspace
 from slap_ros.robot.robot_world import GripperAction, RobotWorld
 from slap_ros.robot.scene_config import read_scene_config, sampled_scene_config
+from slap_ros.robot.state_assembly import possible_joints
 from slap_ros.worlds.features import JOINT_FEATURES, POSE_FEATURES
+from slap_ros.worlds.panda import HOME, JOINT_HIGH, JOINT_LOW
 
 DOMAIN = get_domain("obstacle_tower", "fair")
 TASK = DOMAIN.task(1)
@@ -305,3 +307,12 @@ def test_a_detection_in_another_unit_is_refused():
     in_mm = Pose((450.0, 0.0, 20.0), IDENTITY.quaternion)
     with pytest.raises(InvalidMeasurementError, match=r"block1 is detected 450\.\d+ m away"):
         bench.robot_world.add_detection("detected_block1", 1.0, IDENTITY, in_mm)
+
+
+def test_an_arm_that_is_measured_a_little_beyond_a_limit_stands_at_it():
+    low, high = list(JOINT_LOW), list(JOINT_HIGH)
+    measured = [low[0] - 0.001, high[1] + 0.019, *HOME[2:]]
+    assert possible_joints(measured) == [low[0], high[1], *HOME[2:]]
+    far = [low[0] - 0.03, *HOME[1:]]
+    assert possible_joints(far) == far
+    assert possible_joints(HOME) == list(HOME)

@@ -19,8 +19,10 @@ PERIOD_S = 0.002  # of the physics and of the controllers
 ARM_JOINTS = tuple(f"panda_joint{i + 1}" for i in range(JOINTS))
 FINGER_JOINTS = ("panda_finger_joint1", "panda_finger_joint2")
 
-STIFFNESS = (4500.0, 4500.0, 3500.0, 3500.0, 2000.0, 2000.0, 2000.0)  # Nm/rad
-LAG_S = 0.05  # s, by which a joint in motion is behind: damping over stiffness
+# Softer than a position controller's, whose arm jams where it meets something, and harder than an
+# impedance controller's, whose arm would sag under a block by a centimetre.
+STIFFNESS = (1100.0, 1100.0, 900.0, 900.0, 500.0, 500.0, 500.0)  # Nm/rad
+LAG_S = 0.07  # s, by which a joint in motion is behind: damping over stiffness
 TORQUE = (87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0)  # Nm, Franka's data sheet
 ARMATURE = 0.1  # kg m², of a motor, seen from the joint
 JOINT_DAMPING = 1.0  # Nm s/rad
@@ -94,6 +96,8 @@ def _add_motor(spec: Any, joint: str, stiffness: float, damping: float, force: f
 
 def _couple_fingers(spec: Any) -> None:
     """One drive moves both fingers, so that what they hold stays where they met it."""
+    for made_of_the_urdf in list(spec.equalities):
+        spec.delete(made_of_the_urdf)
     both = spec.add_equality()
     both.name, both.type = "fingers", mujoco.mjtEq.mjEQ_JOINT
     both.objtype = mujoco.mjtObj.mjOBJ_JOINT

@@ -113,7 +113,7 @@ class MujocoPlant:
 
     # -- what is commanded ----------------------------------------------------------------------
 
-    def command(self, joints: Sequence[float]) -> None:
+    def command(self, joints: Sequence[float] | Array) -> None:
         """Have the arm pulled to joint positions, rad, from now on."""
         self._data.ctrl[:JOINTS] = joints
 

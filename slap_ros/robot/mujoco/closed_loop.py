@@ -1,0 +1,183 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The robot in MuJoCo behind the core of the bridge, in one process and without ROS.
+
+Time is the plant's: commands become safe motions, the controllers follow them, and what is
+measured becomes a state, by the same code as in ``robot_bridge``. A state is what a robot can
+measure, so a step is not a function of it: use it to execute plans, not to plan.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from slap_ros.core import Action, Domain
+from slap_ros.errors import (
+    ControllerAbortedError,
+    InvalidStateError,
+    NoDetectionError,
+)
+from slap_ros.geometry.pose import IDENTITY
+from slap_ros.relational import State
+from slap_ros.robot.finger_tracking import FingerTracker
+from slap_ros.robot.joint_reading import JointReading
+from slap_ros.robot.joint_trajectory import TrajectoryPoint
+from slap_ros.robot.limits import PANDA, JointMotion, Limits, Workspace
+from slap_ros.robot.mujoco.arm import PERIOD_S
+from slap_ros.robot.mujoco.plant import MujocoPlant
+from slap_ros.robot.robot_world import GAP_OPEN, GAP_SHUT, GripperAction, RobotWorld
+from slap_ros.robot.scene_config import DETECTED, sampled_scene_config
+from slap_ros.robot.tracking import TrackingSettings
+from slap_ros.robot.trajectory_tracking import (
+    TrajectoryCode,
+    TrajectoryTolerances,
+    TrajectoryTracker,
+)
+from slap_ros.worlds.panda import JOINTS
+
+REACH = Workspace((-0.9, -0.9, -0.4), (0.9, 0.9, 1.2))  # m: all that the arm reaches
+TOLERANCES = TrajectoryTolerances((0.2,) * JOINTS, (0.05,) * JOINTS, goal_time_s=1.0)
+STILL = (0.0,) * JOINTS
+
+
+@dataclass(frozen=True)
+class ClosedLoopSettings:
+    """Settings of bridge, controllers and detections: the defaults of the nodes.
+
+    Args:
+        limits: Limits of the arm.
+        tracking: How far detections can be trusted.
+        tolerances: Tolerances of the arm's controller.
+        finger_force: Largest force of each finger, N.
+        detection_period_s: Time between two detections, s.
+        settle_time_s: Time to wait for what moves to come to rest, s.
+        detection_timeout_s: Time without a state after which a step fails, s.
+    """
+
+    limits: Limits = field(default_factory=lambda: PANDA.scaled(0.5, REACH))
+    tracking: TrackingSettings = field(default_factory=TrackingSettings)
+    tolerances: TrajectoryTolerances = TOLERANCES
+    finger_force: float = 40.0
+    detection_period_s: float = 1.0 / 30.0
+    settle_time_s: float = 1.5
+    detection_timeout_s: float = 2.0
+
+
+class ClosedLoopWorld:
+    """A world whose states are measured on a plant of its own.
+
+    Args:
+        domain: Domain with a Panda.
+        initial: State of a task, in which the plant begins.
+        settings: Settings of the loop.
+
+    Raises:
+        SlapError: MuJoCo cannot express the scene, or it cannot be measured.
+    """
+
+    def __init__(
+        self,
+        domain: Domain,
+        initial: State,
+        settings: ClosedLoopSettings | None = None,
+    ) -> None:
+        settings = settings or ClosedLoopSettings()
+        self._settings = settings
+        self._period_s = domain.execution.control_period_s
+        self.plant = MujocoPlant.of(domain, initial)
+        self._robot = RobotWorld(
+            domain, sampled_scene_config(initial), settings.limits, settings.tracking
+        )
+        self._arm, self._fingers = TrajectoryTracker(self.plant.joints), FingerTracker()
+        self._detected_s = self.plant.time_s
+        self._state = self._measured(self.plant.time_s)
+
+    @property
+    def state(self) -> State:
+        """The state that was measured last."""
+        return self._state
+
+    def reset(self, state: State) -> None:  # noqa: ARG002
+        """Refuse: objects of a robot are arranged by hand.
+
+        Raises:
+            InvalidStateError: Always.
+        """
+        raise InvalidStateError("a robot cannot be put into a state")
+
+    def step(self, action: Action) -> State:
+        """Act, wait until everything is at rest, and measure.
+
+        Raises:
+            SlapError: The command is unsafe, a controller gave up, or nothing can be measured.
+        """
+        command = self._robot.plan_command(action)
+        self._actuate(command.gripper)
+        self._move(command.motion)
+        self._state = self._measured(self.plant.time_s)
+        return self._state
+
+    def close(self) -> None:
+        """Release what the core of the bridge uses."""
+        self._robot.close()
+
+    def _actuate(self, action: GripperAction) -> None:
+        """As the bridge does: what closes around nothing is opened again."""
+        if action is GripperAction.CLOSE:
+            self._move_fingers(GAP_SHUT)
+            if self._robot.confirm_grasp(self.plant.gap):
+                return
+        if action is not GripperAction.KEEP:
+            self._move_fingers(GAP_OPEN)
+            self._robot.confirm_release()
+
+    def _move_fingers(self, gap: float) -> None:
+        plant = self.plant
+        plant.command_fingers(0.5 * gap, self._settings.finger_force)
+        self._fingers.start(gap, plant.time_s)
+        while self._fingers.check(plant.time_s, plant.gap, plant.gap_velocity) is None:
+            self._pass_period()
+
+    def _move(self, motion: JointMotion) -> None:
+        plant = self.plant
+        points = [TrajectoryPoint(motion.duration_s, motion.target, STILL, STILL)]
+        velocities = plant.joint_velocities
+        self._arm.start(points, self._settings.tolerances, plant.time_s, plant.joints, velocities)
+        while True:
+            self._pass_period()
+            outcome = self._arm.check(plant.time_s, plant.joints, plant.joint_velocities)
+            if outcome is not None and outcome.code is not TrajectoryCode.SUCCESSFUL:
+                raise ControllerAbortedError(f"a motion: {outcome.code.name}, {outcome.reason}")
+            if outcome is not None:
+                return
+
+    def _measured(self, since_s: float) -> State:
+        """The state since a time, s, once it is known."""
+        settings, invalid = self._settings, ""
+        while (waited := self.plant.time_s - since_s) <= settings.detection_timeout_s:
+            if self._pass_period():
+                try:
+                    state = self._robot.measure(since_s, waited > settings.settle_time_s)
+                except InvalidStateError as error:
+                    invalid = str(error)
+                    continue
+                if state is not None:
+                    return state
+        if invalid:
+            raise InvalidStateError(invalid)
+        raise NoDetectionError(f"not detected: {', '.join(self._robot.undetected(since_s))}")
+
+    def _pass_period(self) -> bool:
+        """Let a period pass; whether something was measured at its end."""
+        plant = self.plant
+        plant.command(self._arm.command(plant.time_s))
+        plant.step()
+        if plant.time_s - self._detected_s < self._settings.detection_period_s - 0.5 * PERIOD_S:
+            return False
+        self._detected_s = now_s = plant.time_s
+        self._robot.add_joint_reading(
+            JointReading(now_s, tuple(plant.joints), tuple(plant.joint_velocities), plant.gap)
+        )
+        for name, pose in plant.poses().items():
+            self._robot.add_detection(f"{DETECTED}{name}", now_s, IDENTITY, pose)
+        return True
