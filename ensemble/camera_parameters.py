@@ -36,7 +36,7 @@ class CameraParameters:
 
     @property
     def pinhole(self) -> PinholeCamera:
-        """Its intrinsics."""
+        """The intrinsics of the camera."""
         return PinholeCamera.centred(self.camera_width, self.camera_height, self.camera_focal)
 
     @property

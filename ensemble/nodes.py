@@ -33,9 +33,10 @@ NODE_CLASSES: Mapping[str, str] = {  # by the name of the module that is run as 
 
 # s without a state after which a skill is given up: a robot takes its time to move and to look.
 ROBOT_STATE_TIMEOUT = 8.0
-# s without a measured state until the robot holds, with a camera that is rendered by a processor:
-# ten pictures of what was moved take it 3 to 5 s.
+# s until the robot holds, with a camera that is rendered by a processor: ten pictures of what was
+# moved take it 3 to 10 s, and the robot's controllers wait for each.
 SLOW_CAMERA_TIMEOUT = 15.0
+WAITING = ("detection_timeout", "controller_timeout", "joint_timeout", "settle_time")
 
 
 def node_class(name: str) -> Any:
@@ -128,7 +129,7 @@ def _world_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int
         return {
             "robot_bridge.mujoco": task | scene | dict(settings.mujoco),
             "robot_bridge.tag_detector": detector | scene,
-            "robot_bridge": {"detection_timeout": SLOW_CAMERA_TIMEOUT} | bridge["robot_bridge"],
+            "robot_bridge": dict.fromkeys(WAITING, SLOW_CAMERA_TIMEOUT) | bridge["robot_bridge"],
         }
     if settings.world == MUJOCO:
         bridge["robot_bridge"] = dict(BEFORE_MUJOCO) | bridge["robot_bridge"]

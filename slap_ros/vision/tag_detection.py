@@ -36,7 +36,7 @@ class TagDetection:
 
     Args:
         tag: Number of the tag.
-        corners: Its corners in the picture, 4 × 2, pixels.
+        corners: Corners of the tag in the picture, 4 × 2, pixels.
         pose: Pose of the tag in the camera's optical frame.
     """
 
@@ -95,7 +95,7 @@ def tag_pose(corners: NDArray[np.float64], camera: PinholeCamera, size: float) -
     """Where a tag is.
 
     Args:
-        corners: Its corners in the picture, 4 × 2, pixels, in the order of ``CORNERS``.
+        corners: Corners of the tag in the picture, 4 × 2, pixels, in the order of ``CORNERS``.
         camera: Camera that took the picture.
         size: Edge of the black square, m.
 
