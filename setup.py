@@ -62,6 +62,11 @@ KINDER = ["kindergarden>=0.2.5,<0.3"]
 # Some other engines are GPL: whoever wants them installs them.
 UP = ["unified-planning>=1.1", "up-aries>=0.4"]
 MUJOCO = ["mujoco>=3.3"]  # `slap run --world mujoco`: a robot in another engine; Apache-2.0
+CAMERA = [  # tags: pictures and poses, and `slap scene --tags`
+    "pupil-apriltags>=1.0.4.post10",  # the AprilTag library itself; MIT, and BSD-2-Clause
+    "opencv-python-headless>=4.9",  # has the tags' patterns in its ArUco module; Apache-2.0
+    "pillow>=10.1",
+]
 DOCS = [
     "mkdocs>=1.6,<2",
     "mkdocs-material>=9.7,<10",
@@ -91,6 +96,8 @@ TEST = [
     "websocket-client>=1.8",  # watches a live run as Foxglove does
     *UP,
     *MUJOCO,
+    *CAMERA,
+    "pypdfium2>=4",  # looks at PDFs of tags; BSD-3-Clause, Apache-2.0
     "colcon-common-extensions>=0.3",
     "build>=1",  # makes the sdists and wheels that a test installs
     "hatchling>=1.24",  # embedded_ros is built with it
@@ -182,6 +189,7 @@ setup(
         "meshes": MESHES,
         "up": UP,
         "mujoco": MUJOCO,
+        "camera": CAMERA,
         "test": TEST,
     },
     entry_points={
@@ -190,6 +198,7 @@ setup(
             *(f"{node} = {node}.__main__:main" for node in NODES),
             "mock_robot = robot_bridge.mock.__main__:main",
             "mujoco_robot = robot_bridge.mujoco.__main__:main",
+            "tag_detector = robot_bridge.tag_detector.__main__:main",
         ],
         "embedded_ros.interfaces": ["slap_msgs = msg_schemas"],
     },

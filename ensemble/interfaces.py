@@ -15,7 +15,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from slap_msgs.action import AcquireSkills, ExecuteSkill, ProposeOperators, SolveTask
 from slap_msgs.msg import (
     AbstractState,
@@ -63,6 +63,13 @@ SENSOR_DATA = QoSProfile(
     reliability=ReliabilityPolicy.BEST_EFFORT,
     durability=DurabilityPolicy.VOLATILE,
 )
+# Of pictures, which are large: the last one, from a camera that publishes reliably or not.
+NEWEST_PICTURE = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST,
+    depth=1,
+    reliability=ReliabilityPolicy.BEST_EFFORT,
+    durability=DurabilityPolicy.VOLATILE,
+)
 
 
 @dataclass(frozen=True)
@@ -101,6 +108,10 @@ MARKERS = _topic("slap/markers", MarkerArray)
 TF = _topic("tf", TFMessage)
 TF_STATIC = _topic("tf_static", TFMessage)
 JOINT_STATES = _topic("joint_states", JointState)
+# As a camera's driver and image_proc name them; not recorded, for they are large.
+PICTURES = Topic("camera/image_rect", Image, _profile(qos.PICTURES))
+COMPRESSED_PICTURES = Topic("camera/image_rect/compressed", CompressedImage, PICTURES.qos)
+CAMERA_INFO = Topic("camera/camera_info", CameraInfo, PICTURES.qos)
 RECORDED = (
     DOMAIN,
     TASK,

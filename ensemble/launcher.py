@@ -101,7 +101,7 @@ def _start(name: str, parameters: Mapping[str, str | int | float]) -> subprocess
 
 def _as_yaml(value: str | int | float | tuple[float, ...]) -> str:
     """A parameter's value as ROS reads it: texts quoted, or ``2024`` and ``x #y`` are others."""
-    if isinstance(value, str):
+    if isinstance(value, str | bool):
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, tuple):
         return f"[{', '.join(map(_as_yaml, value))}]"

@@ -21,6 +21,7 @@ NODE_CLASSES: Mapping[str, str] = {  # by the name of the module that is run as 
     "robot_bridge": "robot_bridge.node:RobotBridge",
     "robot_bridge.mock": "robot_bridge.mock.node:MockRobot",
     "robot_bridge.mujoco": "robot_bridge.mujoco.node:MujocoRobot",
+    "robot_bridge.tag_detector": "robot_bridge.tag_detector.node:TagDetectorNode",
     "robot_bridge.player": "robot_bridge.player:Player",
     "perception_node": "perception_node.node:PerceptionNode",
     "skill_server": "skill_server.node:SkillServer",
@@ -32,6 +33,10 @@ NODE_CLASSES: Mapping[str, str] = {  # by the name of the module that is run as 
 
 # s without a state after which a skill is given up: a robot takes its time to move and to look.
 ROBOT_STATE_TIMEOUT = 8.0
+# s until the robot holds, with a camera that is rendered by a processor: ten pictures of what was
+# moved take it 3 to 10 s, and the robot's controllers wait for each.
+SLOW_CAMERA_TIMEOUT = 15.0
+WAITING = ("detection_timeout", "controller_timeout", "joint_timeout", "settle_time")
 
 
 def node_class(name: str) -> Any:
@@ -72,6 +77,8 @@ def node_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int |
     waiting: dict[str, str | int | float] = {}
     if settings.world != SIM:
         waiting["state_timeout"] = ROBOT_STATE_TIMEOUT
+    if settings.mujoco.get("camera"):
+        waiting["state_timeout"] = ROBOT_STATE_TIMEOUT + SLOW_CAMERA_TIMEOUT
     if "debounce" in settings.perception:  # what is debounced is late
         waiting["hold_steps"] = int(settings.perception["debounce"]) - 1
     common: dict[str, str | int | float] = {
@@ -117,6 +124,13 @@ def _world_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int
     bridge = {"robot_bridge": task | scene | dict(settings.bridge)}
     if settings.world == MOCK:
         return {"robot_bridge.mock": task | dict(settings.mock)} | bridge
+    if settings.world == MUJOCO and settings.mujoco.get("camera"):
+        detector = {name: task[name] for name in ("domain", "preset", "skills")}
+        return {
+            "robot_bridge.mujoco": task | scene | dict(settings.mujoco),
+            "robot_bridge.tag_detector": detector | scene,
+            "robot_bridge": dict.fromkeys(WAITING, SLOW_CAMERA_TIMEOUT) | bridge["robot_bridge"],
+        }
     if settings.world == MUJOCO:
         bridge["robot_bridge"] = dict(BEFORE_MUJOCO) | bridge["robot_bridge"]
         return {"robot_bridge.mujoco": task | dict(settings.mujoco)} | bridge

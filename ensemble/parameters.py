@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import field, fields
 from typing import Any, TypeVar
 
@@ -51,6 +51,13 @@ def read_parameters(node: Node, kind: type[P]) -> P:
     return kind(**values)
 
 
+# What turns a text into a value, by the type of the default, where that is not the type itself.
+_VALUES: Mapping[type, Callable[[str], Any]] = {
+    bool: {"true": True, "false": False}.__getitem__,
+    tuple: lambda text: tuple(map(float, text.split())),
+}
+
+
 def parse_parameters(
     text: str, kind: type[P], what: str, given: Collection[str] = ()
 ) -> dict[str, Any]:
@@ -81,11 +88,10 @@ def parse_parameters(
                 f"the {what} has no parameter {name!r}; it has {', '.join(known)}"
             )
         try:
-            found[name] = (
-                tuple(map(float, value.split())) if kinds[name] is tuple else kinds[name](value)
-            )
-        except ValueError:
-            raise InvalidParameterError(f"the {what}'s {name} is a number, not {value!r}") from None
+            found[name] = _VALUES.get(kinds[name], kinds[name])(value)
+        except (ValueError, KeyError):
+            kind = "true or false" if kinds[name] is bool else "a number"
+            raise InvalidParameterError(f"the {what}'s {name} is {kind}, not {value!r}") from None
         _require_within(f"the {what}'s {name}", found[name], known_fields[name].metadata)
     return found
 

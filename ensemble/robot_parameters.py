@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from types import MappingProxyType
 
+from ensemble.camera_parameters import CameraParameters
 from ensemble.parameters import MAX_SEED, parameter, parse_parameters
 from ensemble.world_parameters import WorldParameters
 from slap_ros.errors import InvalidParameterError
@@ -23,7 +24,7 @@ BEFORE_MUJOCO: Mapping[str, float | tuple[float, ...]] = MappingProxyType(
     {"workspace": (-0.9, -0.9, -0.4, 0.9, 0.9, 1.2), "gripper_effort": 40.0}
 )
 WORKSPACE = (*Workspace().low, *Workspace().high)
-GIVEN_WITH_THE_RUN = frozenset(item.name for item in fields(WorldParameters))
+GIVEN_WITH_THE_RUN = frozenset(item.name for item in fields(WorldParameters)) | {"scene"}
 
 
 def action_name(name: str, arm: str) -> str:
@@ -142,7 +143,7 @@ class MockRobotParameters(SimulatedRobotParameters):
 
 
 @dataclass(frozen=True)
-class MujocoRobotParameters(SimulatedRobotParameters):
+class MujocoRobotParameters(CameraParameters, SimulatedRobotParameters):
     """What a robot in MuJoCo is: see the docstring of ``robot_bridge.mujoco.node``."""
 
     pose_noise: float = parameter(0.0, "m, of detections along each axis")

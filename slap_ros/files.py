@@ -16,7 +16,8 @@ import os
 import shutil
 import stat
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -260,7 +261,8 @@ def parse_yaml(text: str) -> Any:
     """The data of a YAML text of plain types.
 
     Raises:
-        ValueError: It is none, is nested too deep, or grows without bounds by references.
+        ValueError: It is none, is nested too deep, grows without bounds by references, or has a key
+            twice.
     """
     import yaml  # few files are read as YAML, and all are read by this module
 
@@ -275,11 +277,22 @@ def parse_yaml(text: str) -> Any:
                 raise ValueError(f"more than {MAX_YAML_NODES} values")
             if any(map(_is_long_integer, known)):
                 raise ValueError(f"no YAML: an integer of more than {MAX_YAML_INTEGER} characters")
+            _require_distinct_keys(known)
             return loader.construct_document(node)
         finally:
             loader.dispose()
     except (yaml.YAMLError, *SCALAR_ERRORS) as error:
         raise ValueError(f"no YAML: {' '.join(str(error).split())[:200]}") from error
+
+
+def _require_distinct_keys(nodes: Iterable[yaml.Node]) -> None:
+    """Refuse a key that a mapping has twice: PyYAML would silently keep the last."""
+    for node in nodes:
+        if isinstance(node.value, list) and node.value and isinstance(node.value[0], tuple):
+            keys = Counter(key.value for key, _ in node.value if isinstance(key.value, str))
+            if twice := [key for key, number in keys.items() if number > 1 and key != "<<"]:
+                line = node.start_mark.line + 1
+                raise ValueError(f"{twice[0]} is stated twice in the mapping at line {line}")
 
 
 def _is_long_integer(node: yaml.Node) -> bool:

@@ -33,7 +33,7 @@ FLOORS = (
     ("motion",),
     ("worlds",),
     ("core",),
-    ("relational", "meshes", "geometry"),
+    ("relational", "meshes", "vision", "geometry"),
     ("versions", "files", "signals", "portable_math", "redaction", "errors", "slap_ros"),
 )
 ORDER = [package for floor in FLOORS for package in floor]

@@ -14,7 +14,8 @@ from slap_ros.shortcuts.shipped import shipped_library
 from slap_ros.shortcuts.shortcut_library import load_library
 from tools.reproduce import PUBLISHED, differences, figures, main
 
-BY_A_BENCHMARK = {"soak", "robot_bridge_obstacle_tower"}  # of a whole ensemble; pages name them
+# Of a whole ensemble, or by OpenGL; pages name them.
+BY_A_BENCHMARK = {"soak", "robot_bridge_obstacle_tower", "detections_obstacle_tower"}
 
 
 def test_every_figure_has_its_command():

@@ -195,7 +195,7 @@ class RunOptions:
         if world not in WORLDS:
             known = ", ".join(WORLDS)
             raise InvalidParameterError(f"--world must be one of {known}, not {world!r}")
-        if self.scene is not None and world != ROBOT:
+        if self.scene is not None and world not in (ROBOT, MUJOCO):
             raise InvalidParameterError(
                 f"--scene is what is around a robot, not for --world {world}"
             )

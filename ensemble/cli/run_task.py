@@ -38,7 +38,7 @@ from slap_ros.cli.render import picture_size
 from slap_ros.cli.render import render as write_animation
 from slap_ros.cli.skill_choice import open_chosen
 from slap_ros.core import Domain, Task, task_with_goal
-from slap_ros.errors import NoSkillsError
+from slap_ros.errors import InvalidParameterError, NoSkillsError
 from slap_ros.evaluation.metrics import RunMetrics, known
 from slap_ros.messages.decode import decode_state
 from slap_ros.messages.interfaces import STATE
@@ -49,6 +49,7 @@ from slap_ros.robot.mujoco.installed import require_mujoco
 from slap_ros.robot.worlds import MUJOCO, SIM
 from slap_ros.shortcuts.shipped import chosen_library
 from slap_ros.skills.domain_choice import DomainChoice
+from slap_ros.vision.installed import require_camera_libraries
 
 LOOK_S = 0.05  # s, between two looks at whether somebody watches
 
@@ -109,6 +110,7 @@ def _request(options: RunOptions, domain: Domain, task: Task, import_s: float) -
         require_robot(domain, task.initial_state)
     if options.world == MUJOCO:
         require_mujoco()
+        _require_camera(options, domain)
     perception = parse_parameters(options.perception, PerceptionParameters, "perception")
     quality = PerceptionParameters(**perception).quality
     quality.require_known(task.initial_state.layout.by_name.keys())
@@ -141,6 +143,27 @@ def _request(options: RunOptions, domain: Domain, task: Task, import_s: float) -
         skills=SkillRequest(options.proposer, options.rewarder) if options.acquire else None,
         shown=(ACQUISITION_EVENTS,) if options.acquire else (),
     )
+
+
+def _require_camera(options: RunOptions, domain: Domain) -> None:
+    """Refuse a camera without libraries or tags.
+
+    Raises:
+        InvalidParameterError: A library, or the scene file, is missing.
+        InvalidSceneError: The scene file is malformed, or its tags are.
+    """
+    if not parse_mujoco_robot(options.mujoco).get("camera"):
+        return
+    require_camera_libraries()
+    if options.scene is None:
+        raise InvalidParameterError(
+            f"a camera needs tags: slap scene {options.domain} --seed {options.task_seed} "
+            "--tags FOLDER, then --scene FOLDER/scene.yaml"
+        )
+    from slap_ros.robot.scene_config import read_scene_config
+    from slap_ros.robot.tagged_scene import placed_tags
+
+    placed_tags(read_scene_config(options.scene, domain))
 
 
 def _acquisition(options: RunOptions) -> dict[str, str | int | float] | None:

@@ -49,7 +49,7 @@ from ensemble.steady_time import create_timer
 from robot_bridge.mock.controllers import MockControllers
 from robot_bridge.mock.plant import Plant
 from robot_bridge.simulated.noise_model import NoiseModel
-from robot_bridge.simulated.sensors import SimulatedSensors
+from robot_bridge.simulated.sensors import DetectionPublisher, JointStatePublisher
 from slap_ros.errors import InvalidParameterError
 from slap_ros.skills.domain_choice import open_domain
 
@@ -82,7 +82,8 @@ class MockRobot(Node):
         self._controllers = MockControllers(
             self, self._plant, noise, settings, period_s, self._counts
         )
-        self._sensors = SimulatedSensors(self, self._plant, noise, settings)
+        self._joints = JointStatePublisher(self, self._plant, noise, settings)
+        self._detections = DetectionPublisher(self, self._plant, noise, settings)
         create_timer(self, period_s, self._idle)
         DiagnosticsPublisher(self, lambda: self._counts)
 

@@ -27,10 +27,22 @@ ROS Parameters:
     hidden (string, ""): an object that is never detected.
     pace (double, 1.0): how many times faster than a real one it moves.
     noise_seed (int, 0): noise and delays are a function of it.
+    camera (bool, false): whether a camera with tags takes the place of exact frames.
+    scene (string, ""): scene file with the tags, for the camera.
+    camera_eye (double[3], [1.05, -0.45, 0.75]), camera_target (double[3], [0.5, -0.02, 0.15]): m,
+        where the camera is and what it looks at, in the base's frame.
+    camera_width (int, 1280), camera_height (int, 720), camera_focal (double, 1200.0): pixels.
+    camera_rate (double, 5.0): Hz of pictures, at most.
+    image_noise (double, 2.0): grey levels of 255; image_blur (double, 0.0): pixels; standard
+        deviations.
+    image_loss (double, 0.0): share of pictures that are lost.
 
 Publishers:
     joint_states (sensor_msgs/JointState): of arm and fingers.
-    tf (tf2_msgs/TFMessage): objects, as frames detected_NAME.
+    tf (tf2_msgs/TFMessage): objects, as frames detected_NAME; nothing where there is a camera.
+    camera/image_rect (sensor_msgs/Image), camera/image_rect/compressed
+        (sensor_msgs/CompressedImage), camera/camera_info (sensor_msgs/CameraInfo): with a camera.
+    tf_static (tf2_msgs/TFMessage): the camera's optical frame, camera_optical_frame.
     diagnostics (diagnostic_msgs/DiagnosticArray): goals by outcome; 1 Hz.
 
 Action servers:
@@ -51,9 +63,10 @@ from ensemble.entry_point import run_node
 from ensemble.parameters import read_parameters
 from ensemble.robot_parameters import MujocoRobotParameters
 from ensemble.steady_time import create_timer
+from robot_bridge.mujoco.camera import CameraPublisher, plant_with_camera
 from robot_bridge.mujoco.controllers import MujocoArmController, MujocoGripperController
 from robot_bridge.simulated.noise_model import NoiseModel
-from robot_bridge.simulated.sensors import SimulatedSensors
+from robot_bridge.simulated.sensors import DetectionPublisher, JointStatePublisher
 from slap_ros.robot.mujoco.arm import PERIOD_S
 from slap_ros.robot.mujoco.plant import MujocoPlant
 from slap_ros.skills.domain_choice import open_domain
@@ -80,18 +93,27 @@ class MujocoRobot(Node):
         settings = read_parameters(self, MujocoRobotParameters)
         noise = NoiseModel.of(settings)
         domain = open_domain(settings.choice)
-        self._plant = MujocoPlant.of(domain, settings.first_task(domain).initial_state)
+        initial = settings.first_task(domain).initial_state
+        self._camera: CameraPublisher | None = None
+        if settings.camera:
+            self._plant, model = plant_with_camera(domain, initial, settings)
+            self._camera = CameraPublisher(self, self._plant, model, settings)
+        else:
+            self._plant = MujocoPlant.of(domain, initial)
+            self._detections = DetectionPublisher(self, self._plant, noise, settings)
         self._counts = Counter(motions=0, grips=0, refused=0, aborted=0, canceled=0)
         self._arm = MujocoArmController(self, self._plant, noise, settings, self._counts)
         self._gripper = MujocoGripperController(self, self._plant, noise, settings, self._counts)
-        self._sensors = SimulatedSensors(self, self._plant, noise, settings)
+        self._joints = JointStatePublisher(self, self._plant, noise, settings)
         self._pace, self._passed_s = settings.pace, monotonic()
         self._owed_s = 0.0  # time of the plant that has yet to pass
         create_timer(self, TICK, self._pass_time)
         DiagnosticsPublisher(self, lambda: self._counts)
 
     def destroy_node(self) -> None:
-        """Destroy the action servers as well."""
+        """Destroy the action servers as well, and end the camera."""
+        if self._camera is not None:
+            self._camera.close()
         self._arm.destroy()
         self._gripper.destroy()
         super().destroy_node()

@@ -10,7 +10,7 @@ from itertools import count
 from time import monotonic
 from typing import Protocol
 
-from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
+from geometry_msgs.msg import TransformStamped
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
@@ -25,6 +25,7 @@ from ensemble.robot_parameters import (
 )
 from ensemble.steady_time import create_timer
 from robot_bridge.simulated.noise_model import NoiseModel
+from robot_bridge.transforms import transform
 from slap_ros.geometry.pose import Pose
 from slap_ros.robot.scene_config import DETECTED
 
@@ -54,8 +55,8 @@ class MeasuredPlant(Protocol):
         ...
 
 
-class SimulatedSensors:
-    """Publishes joint states, and detections a little after they are made."""
+class JointStatePublisher:
+    """Publishes the joint positions that encoders measure."""
 
     def __init__(
         self,
@@ -70,35 +71,54 @@ class SimulatedSensors:
             node: Publishes.
             plant: What is measured.
             noise: What comes between.
-            settings: Rates, the arm's name, and what is never detected.
+            settings: Rate, and the arm's name.
         """
-        self._node, self._plant, self._noise, self._settings = node, plant, noise, settings
+        self._node, self._plant, self._noise = node, plant, noise
         self._frame = base_frame(settings.arm)
         self._names = [*arm_joints(settings.arm), *finger_joints(settings.arm)]
-        self._pending: list[tuple[float, int, TransformStamped]] = []  # by the time they are due
-        self._numbers = count()
-        self._frames = node.create_publisher(TF.type, TF.name, TF.qos)
         self._joints = node.create_publisher(JOINT_STATES.type, JOINT_STATES.name, SENSOR_DATA)
-        create_timer(node, 1.0 / settings.joint_rate, self._publish_joints)
-        create_timer(node, 1.0 / settings.rate, self._detect)
-        create_timer(node, DELIVERY_PERIOD, self._deliver)
+        create_timer(node, 1.0 / settings.joint_rate, self._publish)
 
-    def _header(self) -> Header:
-        return Header(stamp=self._node.get_clock().now().to_msg(), frame_id=self._frame)
-
-    def _publish_joints(self) -> None:
+    def _publish(self) -> None:
         finger = 0.5 * self._plant.gap
         positions = [*self._noise.joints(self._plant.joints), finger, finger]
         velocities = [*measured, 0.0, 0.0] if (measured := self._plant.joint_velocities) else []
+        header = Header(stamp=self._node.get_clock().now().to_msg(), frame_id=self._frame)
         self._joints.publish(
-            JointState(
-                header=self._header(), name=self._names, position=positions, velocity=velocities
-            )
+            JointState(header=header, name=self._names, position=positions, velocity=velocities)
         )
+
+
+class DetectionPublisher:
+    """Publishes where objects are, with noise, a little after that is measured."""
+
+    def __init__(
+        self,
+        node: Node,
+        plant: MeasuredPlant,
+        noise: NoiseModel,
+        settings: SimulatedRobotParameters,
+    ) -> None:
+        """Begin to publish.
+
+        Args:
+            node: Publishes.
+            plant: What is measured.
+            noise: What comes between.
+            settings: Rate, the arm's name, and what is never detected.
+        """
+        self._node, self._plant, self._noise, self._settings = node, plant, noise, settings
+        self._frame = base_frame(settings.arm)
+        self._pending: list[tuple[float, int, TransformStamped]] = []  # by the time they are due
+        self._numbers = count()
+        self._frames = node.create_publisher(TF.type, TF.name, TF.qos)
+        create_timer(node, 1.0 / settings.rate, self._detect)
+        create_timer(node, DELIVERY_PERIOD, self._deliver)
 
     def _detect(self) -> None:
         """Measure everything now; it is published a little later, not always in order."""
-        now_s, header = monotonic(), self._header()
+        now_s = monotonic()
+        header = Header(stamp=self._node.get_clock().now().to_msg(), frame_id=self._frame)
         for name, pose in self._plant.poses().items():
             if self._noise.dropped() or name == self._settings.hidden:
                 continue
@@ -113,15 +133,3 @@ class SimulatedSensors:
             due.append(heapq.heappop(self._pending)[2])
         if due:
             self._frames.publish(TFMessage(transforms=due))
-
-
-def transform(pose: Pose, child: str) -> TransformStamped:
-    """A pose as the transform of the frame ``child``."""
-    x, y, z = pose.position
-    qx, qy, qz, qw = pose.quaternion
-    return TransformStamped(
-        child_frame_id=child,
-        transform=Transform(
-            translation=Vector3(x=x, y=y, z=z), rotation=Quaternion(x=qx, y=qy, z=qz, w=qw)
-        ),
-    )

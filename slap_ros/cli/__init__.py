@@ -53,6 +53,11 @@ COMMANDS = (
         "Check that a domain keeps its contract: Markov states, margins, bounds, tasks.",
     ),
     CommandEntry(
+        "scene",
+        "slap_ros.cli.scene:scene",
+        "Write a scene file with AprilTags on every object, and a PDF of these tags to print.",
+    ),
+    CommandEntry(
         "domains",
         "slap_ros.cli.domains:domains",
         "List the installed domains, or the predicates, metrics, goals and operators of one.",

@@ -49,6 +49,7 @@ EXAMPLES: Mapping[str, str] = {  # those of studies are in their files
     "acquire": "slap acquire stow_hammer --output runs/skills/stow_hammer",
     "skills": "slap skills models/skills/stow_hammer",
     "check": "slap check obstacle2d",
+    "scene": "slap scene obstacle_tower --seed 1 --tags runs/tags",
     "domains": "slap domains stow_hammer",
     "list": "slap list",
     "doctor": "slap doctor",

@@ -27,6 +27,7 @@ EPISODE = OfferedQos(1000, transient_local=True)
 VOLATILE = OfferedQos(1000, transient_local=False)
 FRAMES = OfferedQos(100, transient_local=False)
 STATIC_FRAMES = OfferedQos(100, transient_local=True)
+PICTURES = OfferedQos(1, transient_local=False)  # large: none waits for who is slow
 ROS_DEFAULT = OfferedQos(10, transient_local=False)
 
 # By name, without a namespace.

@@ -93,7 +93,11 @@ class RobotWorld:
         self._bodies = [template.layout.object(body.name) for body in world.scene.free]
         self._tracks = {obj: Track(self.tracking) for obj in self.scene_config.detected}
         self._assembler = StateAssembler(template, world.scene)
-        self._frames = {how.frame: (obj, how) for obj, how in self.scene_config.detected.items()}
+        self._frames = {
+            how.frame: (obj, how)
+            for obj, frames in self.scene_config.detected.items()
+            for how in frames
+        }
         self._reading: JointReading | None = None
         self._grasp: Grasp | None = None
         self._candidate: Grasp | None = None  # what the gripper is to close around
@@ -124,7 +128,7 @@ class RobotWorld:
                 f"{obj.name} is detected {math.hypot(*pose.position):.6g} m away from the robot: "
                 "are positions in m?"
             )
-        self._tracks[obj].add(Detection(stamp_s, pose))
+        self._tracks[obj].add(Detection(stamp_s, pose, frame))
 
     def add_joint_reading(self, reading: JointReading) -> None:
         """Take joint positions.

@@ -11,6 +11,13 @@ first block is the target block)::
         frame: tag36h11:1        # child frame of the detections
         offset: [0, 0, -0.025]   # m, from that frame to the object's middle, in the frame's axes
         features: {mass: 0.5, friction: 0.9, half_x: 0.025, ...}
+      block2:                    # with a tag on each face: whichever are seen count
+        type: block
+        tag_size: 0.04           # m, edge of the black square, for ``tag_detector``
+        frames:                  # the object's middle in each frame: m, quaternion x y z w
+          tag36h11:2: [0, 0, -0.025, 0, 0, 0, 1]
+          tag36h11:3: [0, 0, -0.025, -0.5, -0.5, -0.5, 0.5]
+        features: {mass: 0.5, friction: 0.9, half_x: 0.025, ...}
       table:
         type: surface
         pose: [0.5, 0, -0.175, 0, 0, 0, 1]   # m and quaternion x y z w, in the base's frame
@@ -19,7 +26,7 @@ first block is the target block)::
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -37,7 +44,7 @@ from slap_ros.worlds.panda import HOME
 MAX_SCENE_BYTES = 2**20
 DETECTED = "detected_"  # prefix of detection frames where no scene file names them
 PARKED = 10.0  # m from the base: where what was not yet detected is out of everything's way
-KEYS = frozenset({"type", "frame", "offset", "pose", "features"})
+KEYS = frozenset({"type", "frame", "offset", "frames", "tag_size", "pose", "features"})
 MALFORMED = (
     AttributeError,
     LookupError,
@@ -54,6 +61,7 @@ class DetectedFrame:
 
     frame: str  # child frame in TF
     offset: Pose = IDENTITY  # of the object's middle, in the detected frame
+    tag_size: float | None = None  # m, edge of a tag's black square; None: not said
 
 
 @dataclass(frozen=True)
@@ -62,17 +70,31 @@ class SceneConfig:
 
     Args:
         template: A state of the objects; poses of detected ones in it have no meaning.
-        detected: The objects that are detected, and how.
+        detected: The objects that are detected, and the frames of each, no frame twice.
+
+    Raises:
+        InvalidSceneError: A frame is stated twice.
     """
 
     template: State
-    detected: Mapping[Object, DetectedFrame]
+    detected: Mapping[Object, Sequence[DetectedFrame]]
+
+    def __post_init__(self) -> None:
+        whose: dict[str, Object] = {}
+        for obj, frames in self.detected.items():
+            for how in frames:
+                if how.frame in whose:
+                    raise InvalidSceneError(
+                        f"frame {how.frame} is both {whose[how.frame].name}'s and {obj.name}'s: "
+                        "each tag is on one object, once"
+                    )
+                whose[how.frame] = obj
 
 
 def sampled_scene_config(initial: State) -> SceneConfig:
     """The scene of a sampled task: what can move is detected, the rest is where the task has it."""
     movable = [o for o in initial.objects if "held" in {f.name for f in o.type.features}]
-    return SceneConfig(initial, {o: DetectedFrame(f"{DETECTED}{o.name}") for o in movable})
+    return SceneConfig(initial, {o: (DetectedFrame(f"{DETECTED}{o.name}"),) for o in movable})
 
 
 def read_scene_config(path: Path, domain: Domain) -> SceneConfig:
@@ -88,7 +110,7 @@ def read_scene_config(path: Path, domain: Domain) -> SceneConfig:
     if not isinstance(content, dict) or not isinstance(content.get("objects"), dict):
         raise InvalidSceneError(f"scene file {path} has no mapping `objects`")
     features: dict[Object, Mapping[str, float]] = {ROBOT("robot"): robot_features(HOME)}
-    detected: dict[Object, DetectedFrame] = {}
+    detected: dict[Object, Sequence[DetectedFrame]] = {}
     for name, entry in content["objects"].items():
         parked = Pose((PARKED + len(features), 0.0, 0.0))
         try:
@@ -96,34 +118,55 @@ def read_scene_config(path: Path, domain: Domain) -> SceneConfig:
         except MALFORMED as error:
             raise InvalidSceneError(f"scene file {path}, object {name}: {error}") from error
         features[obj] = given
-        if how is not None:
+        if how:
             detected[obj] = how
     try:
         return SceneConfig(State.build(features), detected)
-    except InvalidStateError as error:
+    except (InvalidStateError, InvalidSceneError) as error:
         raise InvalidSceneError(f"scene file {path}: {error}") from error
 
 
 def _object(
     name: str, entry: Mapping[str, Any], domain: Domain, parked: Pose
-) -> tuple[Object, Mapping[str, float], DetectedFrame | None]:
+) -> tuple[Object, Mapping[str, float], Sequence[DetectedFrame]]:
     if unknown := set(entry) - KEYS:
         raise ValueError(f"unknown keys {sorted(unknown)}; there are {sorted(KEYS)}")
     kinds = domain.types_by_name
     if entry.get("type") not in kinds:
         raise ValueError(f"unknown type {entry.get('type')!r}; there are {', '.join(kinds)}")
-    if ("frame" in entry) == ("pose" in entry):
-        raise ValueError("an object has either a frame, in which it is detected, or a pose")
+    if len(entry.keys() & {"frame", "frames", "pose"}) != 1:
+        raise ValueError(
+            "an object has either a frame, or several frames, in which it is detected, or a pose"
+        )
     given = {str(k): float(v) for k, v in entry.get("features", {}).items()}
     obj = kinds[entry["type"]](name)
     moves = "held" in {feature.name for feature in obj.type.features}
-    if "frame" in entry:
-        x, y, z = map(float, entry.get("offset", ORIGIN))
+    if "pose" not in entry:
         start = body_features(parked.position) if moves else pose_features(parked)
-        return obj, {**start, **given}, DetectedFrame(str(entry["frame"]), Pose((x, y, z)))
+        return obj, {**start, **given}, _frames(entry)
     if moves:
         raise ValueError("what can move needs a frame, in which it is detected")
-    numbers = [float(v) for v in entry["pose"]]
-    if len(numbers) != 7:
+    return obj, {**pose_features(_pose(entry["pose"])), **given}, ()
+
+
+def _frames(entry: Mapping[str, Any]) -> Sequence[DetectedFrame]:
+    """The frames in which an object is detected: one with an offset, or several with poses."""
+    size = float(entry["tag_size"]) if "tag_size" in entry else None
+    if "frame" in entry:
+        x, y, z = map(float, entry.get("offset", ORIGIN))
+        return (DetectedFrame(str(entry["frame"]), Pose((x, y, z)), size),)
+    if "offset" in entry:
+        raise ValueError("offset belongs to frame; frames have a pose each")
+    if not entry["frames"]:
+        raise ValueError("frames is empty: in which is the object detected?")
+    return tuple(
+        DetectedFrame(str(frame), _pose(numbers), size)
+        for frame, numbers in entry["frames"].items()
+    )
+
+
+def _pose(numbers: Sequence[Any]) -> Pose:
+    values = [float(v) for v in numbers]
+    if len(values) != 7:
         raise ValueError("a pose is x y z and a quaternion x y z w")
-    return obj, {**pose_features(measured_pose(numbers[:3], numbers[3:])), **given}, None
+    return measured_pose(values[:3], values[3:])

@@ -28,6 +28,7 @@ class Detection(NamedTuple):
 
     stamp_s: float  # when it was seen
     pose: Pose  # in the base's frame
+    frame: str = ""  # in which it was seen: an object may have a tag on each face
 
 
 @dataclass(frozen=True)
@@ -82,19 +83,26 @@ class Track:
         self._settings = settings
         self._detections: deque[Detection] = deque(maxlen=LONGEST)
         self._known: PoseEstimate | None = None  # its pose at rest
+        self._together: dict[str, Pose] = {}  # of the newest picture, by frame
 
     def add(self, detection: Detection) -> None:
-        """Take a detection.
+        """Take a detection; several frames that one picture shows count as their mean.
 
         Raises:
             InvalidMeasurementError: It is not newer than the last one: late, or sent twice.
         """
-        if self._detections and detection.stamp_s <= self._detections[-1].stamp_s:
+        if detection.stamp_s == self.newest_s and detection.frame not in self._together:
+            self._together[detection.frame] = detection.pose
+            mean = mean_pose(list(self._together.values()))
+            self._detections[-1] = Detection(detection.stamp_s, mean)
+            return
+        if detection.stamp_s <= self.newest_s:
             raise InvalidMeasurementError(
                 f"a detection is {self._detections[-1].stamp_s - detection.stamp_s:.3f} s older "
                 "than the one before"
             )
         self._detections.append(detection)
+        self._together = {detection.frame: detection.pose}
 
     @property
     def newest_s(self) -> float:

@@ -124,3 +124,20 @@ def test_cameras_hang_from_the_base_by_static_frames():
     frames.add("egg", "hen", Pose())
     frames.add("hen", "egg", Pose())
     assert frames.in_base("egg") is None
+
+
+def test_frames_of_one_picture_count_as_their_mean_and_as_one_detection():
+    """A block with a tag on each face: what two faces say at once is no second confirmation."""
+    track = Track(TrackingSettings())
+    for number in range(10):
+        for frame, x in (("tag36h11:0", 0.001), ("tag36h11:1", 0.003)):
+            assert number == 9 or track.estimate(-1.0) is None
+            track.add(Detection(0.1 * number, Pose((x, 0.0, 0.0)), frame))
+    found = track.estimate(-1.0)
+    assert found.at_rest
+    assert found.weight == 10
+    assert found.pose.position[0] == pytest.approx(0.002)
+    with pytest.raises(InvalidMeasurementError):
+        track.add(Detection(0.9, Pose(), "tag36h11:1"))  # sent twice
+    with pytest.raises(InvalidMeasurementError):
+        track.add(Detection(0.85, Pose(), "tag36h11:2"))  # late

@@ -111,6 +111,12 @@ class MujocoPlant:
             for name, body in zip(self._names, self._bodies, strict=True)
         }
 
+    @property
+    def positions(self) -> Array:
+        """All positions, ``qpos`` of the model: for pictures, not for whoever plans."""
+        copied: Array = self._data.qpos.copy()
+        return copied
+
     # -- what is commanded ----------------------------------------------------------------------
 
     def command(self, joints: Sequence[float] | Array) -> None:

@@ -1,0 +1,162 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A camera over the robot in MuJoCo: pictures of what is there, a little after they are taken."""
+
+from __future__ import annotations
+
+from concurrent.futures import Future as Job
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rclpy.node import Node
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from std_msgs.msg import Header
+from tf2_msgs.msg import TFMessage
+
+from ensemble.camera_parameters import OPTICAL_FRAME
+from ensemble.futures import submit
+from ensemble.interfaces import CAMERA_INFO, COMPRESSED_PICTURES, PICTURES, TF_STATIC
+from ensemble.robot_parameters import MujocoRobotParameters, base_frame
+from ensemble.steady_time import create_timer
+from robot_bridge.transforms import transform
+from slap_ros.core import Domain
+from slap_ros.errors import InvalidParameterError
+from slap_ros.relational import State
+from slap_ros.robot.mujoco.camera import MujocoCamera, add_camera, add_tags
+from slap_ros.robot.mujoco.model import compiled, scene_around, scene_spec
+from slap_ros.robot.mujoco.plant import MujocoPlant
+from slap_ros.robot.scene_config import read_scene_config
+from slap_ros.robot.tagged_scene import placed_tags
+from slap_ros.vision.image_encoding import RGB8, compressed
+
+Picture = NDArray[np.uint8]
+
+
+def plant_with_camera(
+    domain: Domain, initial: State, settings: MujocoRobotParameters
+) -> tuple[MujocoPlant, Any]:
+    """A plant whose objects have the tags of a scene file, and its model with a camera.
+
+    Args:
+        domain: Domain of the state.
+        initial: State to begin in.
+        settings: Scene file and camera.
+
+    Raises:
+        InvalidParameterError: There is no scene file.
+        InvalidSceneError: The scene file is malformed, or its tags or objects are not the task's.
+    """
+    if not settings.scene:
+        raise InvalidParameterError(
+            "a camera needs a scene file, which says where tags are: slap scene "
+            f"{domain.name} --seed {settings.seed} --tags FOLDER, then --scene FOLDER/scene.yaml"
+        )
+    tags = placed_tags(read_scene_config(Path(settings.scene), domain))
+    scene = scene_around(domain, initial)
+    spec = scene_spec(scene, initial)
+    add_camera(spec, settings.pinhole, settings.optical_pose)
+    add_tags(spec, tags)
+    model = compiled(spec)
+    return MujocoPlant(model, scene, initial), model
+
+
+class CameraPublisher:
+    """Publishes pictures, the camera's intrinsics, and where it is.
+
+    One thread renders, with its own copy of the positions: physics goes on meanwhile.
+    """
+
+    def __init__(
+        self, node: Node, plant: MujocoPlant, model: Any, settings: MujocoRobotParameters
+    ) -> None:
+        """Begin to take pictures.
+
+        Args:
+            node: Publishes.
+            plant: What is seen.
+            model: Compiled ``mujoco.MjModel`` of the plant, with a camera and tags.
+            settings: Camera, noise and rate.
+
+        Raises:
+            InvalidParameterError: There is no OpenGL; says what to install.
+        """
+        self._node, self._plant, self._camera = node, plant, settings.pinhole
+        self._noise = settings.picture_noise
+        self._rng = np.random.default_rng(settings.noise_seed)
+        self._thread = ThreadPoolExecutor(1)
+        self._renderer = self._thread.submit(MujocoCamera, model).result()
+        self._rendering = False
+        self._pictures = node.create_publisher(PICTURES.type, PICTURES.name, PICTURES.qos)
+        self._compressed = node.create_publisher(
+            COMPRESSED_PICTURES.type, COMPRESSED_PICTURES.name, COMPRESSED_PICTURES.qos
+        )
+        self._infos = node.create_publisher(CAMERA_INFO.type, CAMERA_INFO.name, CAMERA_INFO.qos)
+        self._publish_pose(settings)
+        create_timer(node, 1.0 / settings.camera_rate, self._take)
+
+    def close(self) -> None:
+        """End the picture that is being rendered, and release what OpenGL holds."""
+        self._thread.submit(self._renderer.close).result()
+        self._thread.shutdown()
+
+    def _publish_pose(self, settings: MujocoRobotParameters) -> None:
+        frames = self._node.create_publisher(TF_STATIC.type, TF_STATIC.name, TF_STATIC.qos)
+        item = transform(settings.optical_pose, OPTICAL_FRAME)
+        stamp = self._node.get_clock().now().to_msg()
+        item.header = Header(stamp=stamp, frame_id=base_frame(settings.arm))
+        frames.publish(TFMessage(transforms=[item]))
+
+    def _take(self) -> None:
+        """Take a picture of now, unless the last one is still being rendered."""
+        if self._rendering:
+            return
+        self._rendering = True
+        stamp = self._node.get_clock().now().to_msg()
+        header = Header(stamp=stamp, frame_id=OPTICAL_FRAME)
+        positions = self._plant.positions
+        done = submit(self._thread, lambda: self._picture(positions))
+        done.add_done_callback(lambda future: self._publish(header, future.result()))
+
+    def _picture(self, positions: NDArray[np.float64]) -> tuple[Picture, bytes] | None:
+        """What the camera gives, compressed as well; runs in the renderer's thread."""
+        picture = self._noise.taken(self._renderer.picture(positions), self._rng)
+        return None if picture is None else (picture, compressed(picture))
+
+    def _publish(self, header: Header, job: Job[tuple[Picture, bytes] | None]) -> None:
+        self._rendering = False
+        taken = job.result()
+        if taken is None:
+            return
+        picture, jpeg = taken
+        height, width, channels = picture.shape
+        self._infos.publish(self._info(header))
+        self._compressed.publish(CompressedImage(header=header, format="jpeg", data=jpeg))
+        self._pictures.publish(
+            Image(
+                header=header,
+                height=height,
+                width=width,
+                encoding=RGB8,
+                is_bigendian=0,
+                step=width * channels,
+                data=picture.tobytes(),
+            )
+        )
+
+    def _info(self, header: Header) -> CameraInfo:
+        camera = self._camera
+        matrix = [float(value) for value in camera.matrix.ravel()]
+        projection = [*matrix[:3], 0.0, *matrix[3:6], 0.0, *matrix[6:], 0.0]
+        return CameraInfo(
+            header=header,
+            height=camera.height,
+            width=camera.width,
+            distortion_model="plumb_bob",
+            d=[0.0] * 5,
+            k=matrix,
+            r=[float(value) for value in np.eye(3).ravel()],
+            p=projection,
+        )
