@@ -84,6 +84,11 @@ class Sighting:
     seconds: Mapping[str, float]
 
 
+def by_library(values: Sequence[float]) -> dict[str, float]:
+    """A value of each library, by its name."""
+    return dict(zip(LIBRARIES, values, strict=True))
+
+
 @dataclass(frozen=True)
 class Table:
     """The first state of a task.
@@ -171,12 +176,9 @@ def sighting(
     other = by_aruco(grey)
     ended = perf_counter()
     ours, theirs = off(found[0].pose if found else None, pose), off(other, pose)
-    return Sighting(
-        distance,
-        angle,
-        *(dict(zip(LIBRARIES, pair, strict=True)) for pair in zip(ours, theirs, strict=True)),
-        dict(zip(LIBRARIES, (between - began, ended - between), strict=True)),
-    )
+    seconds = between - began, ended - between
+    lengths, angles = zip(ours, theirs, strict=True)
+    return Sighting(distance, angle, by_library(lengths), by_library(angles), by_library(seconds))
 
 
 def by_aruco(grey: NDArray[np.uint8]) -> Pose | None:
