@@ -170,12 +170,16 @@ def sighting(
     between = perf_counter()
     other = by_aruco(grey)
     ended = perf_counter()
-    ours, theirs = off(found[0].pose if found else None, pose), off(other, pose)
+    errors = {
+        "AprilTag": off(found[0].pose if found else None, pose),
+        "ArUco": off(other, pose),
+    }
     return Sighting(
         distance,
         angle,
-        *(dict(zip(LIBRARIES, pair, strict=True)) for pair in zip(ours, theirs, strict=True)),
-        dict(zip(LIBRARIES, (between - began, ended - between), strict=True)),
+        {library: error[0] for library, error in errors.items()},
+        {library: error[1] for library, error in errors.items()},
+        {"AprilTag": between - began, "ArUco": ended - between},
     )
 
 
