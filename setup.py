@@ -46,6 +46,7 @@ PHYSICS = [
     "opencv-python-headless>=4.9",  # MP4; its FFmpeg is LGPL
 ]
 TRAIN = ["torch>=2.4", "stable-baselines3>=2.3", "tensorboard>=2.15"]
+GYM = [*PHYSICS, "gymnasium>=1.0"]  # our domains by `gymnasium.make`; MIT
 RAY = ["ray>=2.40"]
 STUDIES = ["matplotlib>=3.8"]
 LIVE = ["foxglove-sdk>=0.30,<1"]  # serves `slap run --live` to Foxglove; MIT
@@ -176,6 +177,7 @@ setup(
     extras_require={
         "physics": PHYSICS,
         "train": TRAIN,
+        "gym": GYM,
         "ray": RAY,
         "studies": STUDIES,
         "docs": DOCS,

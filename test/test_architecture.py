@@ -22,7 +22,7 @@ FLOORS = (
     ("studies",),
     ("api",),
     ("report",),
-    ("robot", "bags", "evaluation", "encoding"),
+    ("environments", "robot", "bags", "evaluation", "encoding"),
     ("acquisition", "shortcuts"),
     ("learning", "language"),
     ("skills",),

@@ -74,6 +74,8 @@ class Domain(ShownInNotebooks):
     default_goal: Goal  # of a state given without a goal
     step_limit: int  # environment steps of a task
     execution: Execution
+    # Where planners roll options out, if not in such a world: it may differ from what will happen.
+    make_model: Callable[[State], World] | None = None
     operators: tuple[LiftedOperator, ...] = ()
     skills: Mapping[str, Skill] = field(default_factory=dict)  # by operator name
     # Operators without a skill: no plan has them, but a message says where a plan would need one.
@@ -217,6 +219,16 @@ class Domain(ShownInNotebooks):
         if self.learning is not None and self.learning.make_vector_world is not None:
             return self.learning.make_vector_world(states)
         return SyncVectorWorld(self.make_world, states)
+
+    def model_world(self, state: State) -> World:
+        """A world as planners know it, in a state; it is nobody else's."""
+        return (self.make_model or self.make_world)(state)
+
+    def model_worlds(self, states: Sequence[State]) -> VectorWorld:
+        """Worlds as planners know them, one in each of these states, to be stepped together."""
+        if self.make_model is not None:
+            return SyncVectorWorld(self.make_model, states)
+        return self.make_vector_world(states)
 
     def task(self, seed: int, index: int = 0, goal: str | None = None) -> Task:
         """The ``index``-th task of a seed; every (seed, index) has a stream of its own.

@@ -84,10 +84,19 @@ class AnytimePlanner:
             if best is None:
                 raise
             raise PlanningInterrupted(best, interrupt) from interrupt
+        except UnsolvableError:  # as far as operators say
+            if (unforeseen := self._whole.past_unforeseen(state, goal)) is None:
+                raise
+            return unforeseen
         if best is not None:
             return best
-        result = GraphPlanner(self.problem, shortcuts=self.shortcuts).plan(state, goal)
+        result = self._whole.plan(state, goal)
         return replace(result, edges_rolled_out=self.problem.model.executed - before)
+
+    @property
+    def _whole(self) -> GraphPlanner:
+        """The planner that searches the whole graph."""
+        return GraphPlanner(self.problem, shortcuts=self.shortcuts)
 
     @property
     def _most_abstract_states(self) -> int:
@@ -110,7 +119,7 @@ class AnytimePlanner:
             PlanningLimitError: No plan was found within the limits.
         """
         abstract = self.problem.model.space.abstract(state)
-        planner = GraphPlanner(self.problem, shortcuts=self.shortcuts)
+        planner = self._whole
         run = _Improvement(self, state, goal)
         try:
             graph = planner.graph(abstract, goal, max_nodes=self._most_abstract_states)

@@ -21,6 +21,7 @@ from slap_ros.planning.problem import Problem
 from slap_ros.planning.recovery import Recovery
 from slap_ros.planning.search import SearchOutcome
 from slap_ros.planning.shortcut_source import ShortcutSource
+from slap_ros.planning.unforeseen import UnforeseenSearch
 from slap_ros.relational import State
 
 Search = Callable[[AbstractGraph, State, Model], SearchOutcome]
@@ -39,7 +40,8 @@ class GraphPlanner:
     :mod:`slap_ros.planning.search`. A plan that shortcuts make possible in a shallower graph is
     taken, though a deeper one might have a shorter plan.
 
-    Where skills fail on every path, see :mod:`slap_ros.planning.recovery`.
+    Where skills fail on every path, see :mod:`slap_ros.planning.recovery`; where no operators lead
+    to the goal, :mod:`slap_ros.planning.unforeseen`.
 
     Args:
         problem: The model, and the ground operators with their options.
@@ -62,7 +64,12 @@ class GraphPlanner:
         """See :class:`~slap_ros.planning.planner.Planner`."""
         model = self.problem.model
         before, remark = model.executed, ""
-        graph, outcome = self.search_to(state, goal)
+        try:
+            graph, outcome = self.search_to(state, goal)
+        except UnsolvableError:
+            if (unforeseen := self.past_unforeseen(state, goal)) is None:
+                raise
+            return unforeseen
         plan = outcome.plan
         if plan is None:
             recovery = Recovery(self.problem, graph, state, goal, outcome.failed)
@@ -76,6 +83,22 @@ class GraphPlanner:
         sizes = len(graph.nodes), len(graph.edges)
         at_least = outcome.at_least or 0
         return PlanningResult(plan, *sizes, rolled_out, remark, graph, at_least=at_least)
+
+    def past_unforeseen(self, state: State, goal: int) -> PlanningResult | None:
+        """A plan from where no operators lead to the goal; None if none is found.
+
+        Args:
+            state: Low-level state to start from.
+            goal: Mask of atoms that must hold.
+        """
+        before = self.problem.model.executed
+        search = UnforeseenSearch(self.problem, goal, self.search_to)
+        found = search.plan(state) if self.problem.exact else None
+        if found is None:
+            return None
+        plan, graph = found
+        rolled_out = self.problem.model.executed - before
+        return PlanningResult(plan, len(graph.nodes), len(graph.edges), rolled_out, graph=graph)
 
     def search_to(self, state: State, goal: int) -> tuple[AbstractGraph, SearchOutcome]:
         """Search the shallowest graph in which there is a plan, else the deepest one.

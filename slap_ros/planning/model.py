@@ -63,7 +63,7 @@ class Model:
     @classmethod
     def of(cls, domain: Domain, initial: State) -> Model:
         """A model for the tasks over these objects."""
-        return cls(domain.make_world(initial), domain.atom_space(initial), domain.action_space)
+        return cls(domain.model_world(initial), domain.atom_space(initial), domain.action_space)
 
     def knows(self, option: Option, state: State, target: Target) -> bool:
         """Whether a roll-out was made before.

@@ -273,10 +273,15 @@ def require_robot(domain: Domain, initial: State) -> None:
     """Refuse a domain without a Panda before anything is started for it.
 
     Raises:
-        InvalidParameterError: Its robot is another one.
+        InvalidParameterError: Its robot is another one, or its world is disturbed on purpose.
         OpenLoopOnlyError: Its robot is a hand that acts by forces.
     """
     _require_closed_loop(domain)
+    if domain.make_model is not None:
+        raise InvalidParameterError(
+            f"{domain} has disturbances of its own, which only a simulation can have; use another "
+            "preset, or --world sim"
+        )
     if ROBOT not in domain.types or not isinstance(domain.make_world(initial), PandaWorld):
         raise InvalidParameterError(
             f"{domain.name} has no Panda, which the robots here are; use --world sim"

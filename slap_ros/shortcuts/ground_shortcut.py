@@ -88,7 +88,7 @@ class GroundShortcut:
                 f"{len(successes)} times within {self.step_limit} steps in the model; attempt "
                 f"{self.attempt + 1} was asked for"
             )
-        return RolloutFollower(self, successes[self.attempt])
+        return RolloutFollower(self, successes[self.attempt], self.encoder.kept_grasp(state))
 
     def command(self, action: Weights) -> Action:
         """The robot's action for one of the policy's, from -1 to 1."""
@@ -101,17 +101,29 @@ class RolloutFollower:
     Objects that are pushed never move quite as predicted in a real world, nor are they seen while
     they move. As long as the robot itself is where it should be, the rollout is still the best
     guess: it ends where the next option can begin, which the policy alone does not promise.
+
+    Where the hand loses what it holds, and the shortcut has no gripper to take it again, the
+    shortcut is over.
     """
 
-    def __init__(self, skill: GroundShortcut, rollout: ShortcutRollout) -> None:
-        self._skill = skill
+    def __init__(self, skill: GroundShortcut, rollout: ShortcutRollout, grasp: int) -> None:
+        """Begin at the first step of a rollout.
+
+        Args:
+            skill: Shortcut that is executed.
+            rollout: Rollout to follow.
+            grasp: Atoms about what is held that must stay as they are, a mask.
+        """
+        self._skill, self._grasp = skill, grasp
         self._predicted: Sequence[tuple[State, Weights]] = list(
             zip(rollout.states, rollout.actions, strict=True)
         )
         self._step = 0
 
-    def __call__(self, state: State) -> Action:
-        """The next action."""
+    def __call__(self, state: State) -> Action | None:
+        """The next action; None where the shortcut cannot succeed any more."""
+        if self._skill.encoder.kept_grasp(state) != self._grasp:
+            return None
         if self._step < len(self._predicted):
             predicted, action = self._predicted[self._step]
             if self._is_as_predicted(state, predicted):

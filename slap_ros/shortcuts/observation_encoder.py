@@ -135,6 +135,7 @@ class ObservationEncoder:
         self._kinds = self._of_kinds()
         self.action_map = make_action_map(domain, signature)
         self.robot_columns = _robot_columns(domain, space)
+        self._kept_grasp = 0 if uses_gripper(domain, signature) else self._grasp_atoms()
 
     def _group(self, wanted: bool, predicate: Predicate, atoms: Sequence[GroundAtom]) -> _Atoms:
         columns = tuple(Column(objs) for objs in zip(*(a.objects for a in atoms), strict=True))
@@ -209,6 +210,19 @@ class ObservationEncoder:
             abstract = self.space.abstract(State(state.layout, state.data[i]))
             success[i] = abstract == targets[int(i)]
         return success
+
+    def _grasp_atoms(self) -> int:
+        """The atoms about what is held, a mask."""
+        grasping = self.interface.grasping
+        return self.space.mask(atom for atom in self.space.atoms if atom.predicate in grasping)
+
+    def kept_grasp(self, state: State) -> int:
+        """The atoms about what is held that must stay as they are, a mask.
+
+        None of them of a shortcut that acts with the gripper. Any other cannot take again what
+        fell out of the hand.
+        """
+        return self.space.abstract(state) & self._kept_grasp if self._kept_grasp else 0
 
     def accepts(self, state: State) -> bool:
         """Whether a shortcut may end in this state once its target's atoms hold."""

@@ -91,10 +91,8 @@ class ShortcutRollouts:
         together = domain.steps_together
         self._count = (sampling.samples - 1) * (sampling.batch if together else 1)  # with noise
         self._at_once = self._count + 1 if together else 1
-        self._world = domain.make_vector_world([initial])
-        self._worlds = (
-            domain.make_vector_world([initial] * self._at_once) if together else self._world
-        )
+        self._world = domain.model_worlds([initial])
+        self._worlds = domain.model_worlds([initial] * self._at_once) if together else self._world
         self._cache: dict[tuple[str, Change, bytes], tuple[ShortcutRollout, ...]] = {}
         self._failures: Counter[str] = Counter()  # of each shortcut, beyond those expected
 

@@ -58,6 +58,7 @@ APPROACH_STYLES = {
     "slap_1_sample": ApproachStyle("SLAP, 1 sample", MUTED, "^"),
     "shooting": ApproachStyle("search without learning", "#e69f00", "D"),
     "slap": ApproachStyle("SLAP", SHORTCUT, "s"),
+    "slap_trained_perturbed": ApproachStyle("SLAP, trained perturbed", "#009e73", "v"),
 }
 
 

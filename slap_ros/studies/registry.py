@@ -22,10 +22,14 @@ from slap_ros.studies.slap import (
     dynamics,
     generalisation,
     goals,
+    occluded,
     perception,
+    perturbed,
     planning_time,
     pruning,
+    stochastic,
     table1,
+    transfer,
 )
 from slap_ros.studies.study import PaperFigure, Study, not_made
 
@@ -37,7 +41,11 @@ STUDIES: Mapping[str, Study[Any]] = {
         goals.STUDY,
         pruning.STUDY,
         perception.STUDY,
+        stochastic.STUDY,
+        occluded.STUDY,
+        perturbed.STUDY,
         planning_time.STUDY,
+        transfer.STUDY,
         demonstrations.STUDY,
         vacuity.STUDY,
         acquisition.STUDY,
@@ -63,12 +71,6 @@ WITHOUT_STUDY = (
         domains=("cleanup_table",),
         found={"": "PPO 113.7, SAC 160.2, SAC+HER 131.0 steps; pure planning 446"},
         not_run="only PPO learns shortcuts here",
-    ),
-    not_made(
-        "SLAP Tables 7 and 8",
-        "another physics than in planning",
-        "65 → 78%, trained again 86%",
-        "no study perturbs the world without the planner's model",
     ),
     not_made(
         "SLAP Fig. 6",

@@ -197,7 +197,7 @@ def test_names_that_no_command_line_could_tell_apart_are_refused(names):
 
 def test_what_ours_print_and_record_stays_fair():
     pytest.importorskip("pybullet")
-    assert all(preset_names(name) == ("fair", "paper") for name in OURS)
+    assert all(preset_names(name)[:2] == ("fair", "paper") for name in OURS)
     assert get_domain("obstacle2d") is get_domain("obstacle2d", "fair")
     assert isinstance(get_domain("obstacle2d"), Domain)
 

@@ -67,3 +67,13 @@ def test_the_rollout_is_left_where_the_robot_is_elsewhere(shortcut_of_plan):
     assert np.array_equal(
         again, shortcut.skill.command(shortcut.skill.shortcut.policy.mean(seen)[0])
     )
+
+
+def test_a_shortcut_without_gripper_is_over_where_what_is_held_is_lost(shortcut_of_plan):
+    shortcut, start = shortcut_of_plan
+    held = [o for o in start.objects if "held" in o.type.column and start.get(o, "held") > 0.5]
+    dropped = start.replace({(held[0], "held"): 0.0})
+    follow = shortcut.skill.start(start, shortcut.objects)
+    uses_gripper = any("Holding" in p for _, p, _ in shortcut.skill.shortcut.signature.patterns)
+    assert (follow(dropped) is None) is not uses_gripper
+    assert shortcut.skill.start(start, shortcut.objects)(start) is not None

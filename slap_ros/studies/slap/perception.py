@@ -314,12 +314,11 @@ STUDY = Study(
     summary=_summary,
     figures=(
         PaperFigure(
-            "SLAP Tables 5 and 6, D.3, D.4",
+            "SLAP Table 5, D.3, D.4",
             "predicates and perception that err",
             SLAP_DOMAINS,
             {
                 "cluttered_drawer": "thresholds in [w/2, w]: 54 → 92%, in [w, 2w]: 63 → 0%",
-                "obstacle_tower": "stochastic: 84 → 92%; top block hidden: 2 → 78%",
             },
         ),
     ),

@@ -370,7 +370,11 @@ class Table1Options:
     first_seed: FirstSeed = FRESH_SEED
     presets: Annotated[
         list[str] | None,
-        CommandOption("Preset of the domain. May be repeated. Default: all.", name="--preset"),
+        CommandOption(
+            "Preset of the domain. May be repeated. Default: all whose world is as the planner's "
+            "model.",
+            name="--preset",
+        ),
     ] = None
     samples: Samples = SAMPLES
     jobs: Jobs = 1
@@ -380,7 +384,7 @@ class Table1Options:
 def prepare(options: Table1Options, tell: Tell) -> PreparedStudy:
     """Open every preset and every library."""
     domain = options.domain
-    chosen = [get_domain(domain, preset) for preset in options.presets or preset_names(domain)]
+    chosen = under_presets(domain, options.presets)
     trained = [
         TrainedLibrary(_library_name(folder), loaded)
         for folder in options.libraries or shipped_libraries(domain)
@@ -395,6 +399,20 @@ def prepare(options: Table1Options, tell: Tell) -> PreparedStudy:
         lambda runner: study(experiments, trained, sampling(options.samples), runner),
         {"library": options.libraries, "preset": options.presets, **own},
     )
+
+
+def under_presets(domain: str, presets: Sequence[str] | None) -> list[Domain]:
+    """A domain under each of some presets.
+
+    Args:
+        domain: Name of the domain.
+        presets: Names of the presets; None for all but those whose world differs from the planner's
+            model, which have studies of their own.
+    """
+    if presets is not None:
+        return [get_domain(domain, preset) for preset in presets]
+    every = [get_domain(domain, preset) for preset in preset_names(domain)]
+    return [one for one in every if one.make_model is None]
 
 
 def _library_name(folder: Path) -> str:

@@ -1,0 +1,165 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What an action of a learner does: move the joints, run a skill, or one of both."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Protocol
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from slap_ros.core import Domain, World
+from slap_ros.environments.episode import TaskEpisode
+from slap_ros.errors import InvalidCommandError, SkillNotApplicableError
+from slap_ros.planning.options import Option, OptionExecution, OptionResult
+from slap_ros.planning.problem import GroundedOptions, ground_options
+from slap_ros.policies.action_map import ActionMap
+from slap_ros.relational import AtomSpace, State, Target
+
+ACTIVE = 0.5  # activation from which on a skill is run
+
+
+class Control(Protocol):
+    """What actions are, and what they do."""
+
+    @property
+    def space(self) -> spaces.Space[Any]:
+        """The space of actions."""
+        ...
+
+    def act(self, action: Any, episode: TaskEpisode, world: World) -> Iterator[State]:
+        """Act, one environment step after the other.
+
+        Args:
+            action: Action, one of the space.
+            episode: Episode, which is told of each state before the next is asked for.
+            world: World in the episode's state.
+
+        Returns:
+            The state after each step.
+
+        Raises:
+            InvalidCommandError: The action is not in the space; nothing moved.
+        """
+        ...
+
+
+class JointControl:
+    """Each axis of the learned actions, from -1 to 1: one environment step."""
+
+    def __init__(self, domain: Domain) -> None:
+        self._map = ActionMap(domain, gripper=True)
+        self.space = spaces.Box(-1.0, 1.0, (self._map.size,), np.float32)
+
+    def act(self, action: Any, episode: TaskEpisode, world: World) -> Iterator[State]:
+        """See :class:`Control`."""
+        del episode
+        given = np.asarray(action, dtype=np.float64)
+        if given.shape != self.space.shape or not np.isfinite(given).all():
+            raise InvalidCommandError(
+                f"an action is {self._map.size} finite numbers from -1 to 1, not {action!r}"
+            )
+        yield world.step(self._map(given))
+
+
+class SkillControl:
+    """A ground skill, which runs to its end; one that does not apply holds still for a step."""
+
+    def __init__(self, domain: Domain, space: AtomSpace) -> None:
+        """Ground the skills.
+
+        Args:
+            domain: Domain with the skills.
+            space: Atoms of the tasks, which all have the same objects.
+
+        Raises:
+            NoSkillsError: The domain has no skills.
+        """
+        self.options: GroundedOptions = ground_options(domain, space)
+        self.space = spaces.Discrete(len(self.options))
+
+    def act(self, action: Any, episode: TaskEpisode, world: World) -> Iterator[State]:
+        """See :class:`Control`."""
+        if not self.space.contains(action):
+            raise InvalidCommandError(
+                f"an action is the number of a skill from 0 to {len(self.options) - 1}, "
+                f"not {action!r}"
+            )
+        yield from run_option(self.options, int(action), episode, world)
+
+    def mask(self, episode: TaskEpisode) -> NDArray[np.bool_]:
+        """Whether each skill's preconditions hold, shape (skills,)."""
+        abstract = episode.abstract
+        return np.array([ground.applicable(abstract) for ground, _ in self.options])
+
+
+class MixedControl:
+    """Joints, and an activation of each skill: the highest above one half runs to its end."""
+
+    def __init__(self, domain: Domain, space: AtomSpace) -> None:
+        """See :class:`SkillControl`."""
+        self.joints, self.skills = JointControl(domain), SkillControl(domain, space)
+        (axes,) = self.joints.space.shape
+        self._axes = int(axes)
+        size = self._axes + len(self.skills.options)
+        self.space = spaces.Box(-1.0, 1.0, (size,), np.float32)
+
+    def act(self, action: Any, episode: TaskEpisode, world: World) -> Iterator[State]:
+        """See :class:`Control`."""
+        given = np.asarray(action, dtype=np.float64)
+        if given.shape != self.space.shape or not np.isfinite(given).all():
+            raise InvalidCommandError(
+                f"an action is {self.space.shape[0]} finite numbers from -1 to 1, not {action!r}"
+            )
+        activations = given[self._axes :]
+        if activations.max(initial=-1.0) > ACTIVE:
+            chosen = int(activations.argmax())
+            yield from run_option(self.skills.options, chosen, episode, world)
+        else:
+            yield from self.joints.act(given[: self._axes], episode, world)
+
+    def mask(self, episode: TaskEpisode) -> NDArray[np.bool_]:
+        """See :meth:`SkillControl.mask`."""
+        return self.skills.mask(episode)
+
+
+def run_option(
+    options: GroundedOptions, number: int, episode: TaskEpisode, world: World
+) -> Iterator[State]:
+    """Run a skill until it ends, or hold still for a step where it does not apply.
+
+    Args:
+        options: Ground operators with their options.
+        number: Number of the option.
+        episode: Episode, which is told of each state before the next is asked for.
+        world: World in the episode's state.
+
+    Returns:
+        The state after each step.
+    """
+    ground, option = options[number]
+    actions, abstract = episode.domain.action_space, episode.abstract
+    execution: OptionExecution | None = None
+    if ground.applicable(abstract):
+        target = option.target(ground.apply(abstract))
+        execution = _begun(option, target, episode)
+    command = None if execution is None else execution.advance(episode.state, abstract)
+    if execution is None or command is None or isinstance(command, OptionResult):
+        yield world.step(actions.hold)
+        return
+    while not isinstance(command, OptionResult):
+        yield world.step(command)
+        command = execution.advance(episode.state, episode.abstract)
+
+
+def _begun(option: Option, target: Target, episode: TaskEpisode) -> OptionExecution | None:
+    """The execution of an option; None where its skill finds no way from here."""
+    try:
+        return OptionExecution(
+            option, target, episode.space, episode.domain.action_space, episode.state
+        )
+    except SkillNotApplicableError:
+        return None

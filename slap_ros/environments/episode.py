@@ -1,0 +1,56 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""An episode of a task environment: the task, its atoms, and how far it has come."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from slap_ros.core import Domain, Task
+from slap_ros.relational import AtomSpace, State
+
+
+@dataclass
+class TaskEpisode:
+    """A task that is under way.
+
+    Args:
+        domain: Domain of the task.
+        task: Task to be solved.
+        space: Atoms of the task.
+        goal: Mask of the atoms that must hold.
+        state: Newest state.
+        steps: Environment steps so far.
+    """
+
+    domain: Domain
+    task: Task
+    space: AtomSpace
+    goal: int
+    state: State
+    steps: int = 0
+
+    @classmethod
+    def of(cls, domain: Domain, task: Task) -> TaskEpisode:
+        """The beginning of a task.
+
+        Raises:
+            UnknownObjectError: The goal has objects that are not in the state.
+        """
+        space = domain.atom_space(task.initial_state)
+        return cls(domain, task, space, space.mask(task.goal), task.initial_state)
+
+    @property
+    def abstract(self) -> int:
+        """The atoms that hold, a mask."""
+        return self.space.abstract(self.state)
+
+    @property
+    def solved(self) -> bool:
+        """Whether the goal holds."""
+        return self.goal & ~self.abstract == 0
+
+    @property
+    def at_limit(self) -> bool:
+        """Whether the task allows no further step."""
+        return self.steps >= self.task.step_limit

@@ -1,0 +1,51 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Plans from where operators do not lead to the goal, and skills do."""
+
+import pytest
+
+from slap_ros.domains import get_domain
+from slap_ros.errors import UnsolvableError
+from slap_ros.planning.execution import Executor
+from slap_ros.planning.planner import make_planner
+
+DOMAIN = get_domain("obstacle_tower", "fair:obstacles=0,distractors=0")
+TASK = DOMAIN.task(0)
+
+
+def half_on_target(beside):
+    """The task with its block half on the target, as one that was dropped there."""
+    state = TASK.initial_state
+    block, target = (state.layout.object(name) for name in ("block1", "target"))
+    x, y = (float(state.get(target, axis)) for axis in ("x", "y"))
+    return state.replace({(block, "x"): x + beside, (block, "y"): y})
+
+
+@pytest.mark.parametrize("planner", ["lazy", "anytime"])
+def test_a_block_half_on_the_target_is_picked_up_and_put_down_again(planner):
+    state = half_on_target(0.02)
+    space = DOMAIN.atom_space(state)
+    on_table = space.bit(space.atom("On", ("block1", "table")))
+    room = space.bit(space.atom("NothingOn", ("target",)))
+    assert space.abstract(state) & (on_table | room) == on_table
+    episode = Executor(
+        DOMAIN,
+        make_planner(planner, DOMAIN, state),
+        DOMAIN.make_world(state),
+        space,
+        space.mask(TASK.goal),
+        TASK.step_limit,
+    ).run()
+    assert episode.success
+    assert episode.replans == 0
+    assert [edge.option for edge in episode.edges] == ["Pick", "PlaceInTarget"]
+
+
+def test_what_no_skill_can_do_stays_unsolvable():
+    """The block is on the floor, out of reach."""
+    state = half_on_target(0.0)
+    block = state.layout.object("block1")
+    state = state.replace({(block, "x"): -0.9, (block, "z"): -0.4})
+    space = DOMAIN.atom_space(state)
+    with pytest.raises(UnsolvableError, match="On\\(block1, target\\)"):
+        make_planner("lazy", DOMAIN, state).plan(state, space.mask(TASK.goal))
