@@ -84,11 +84,6 @@ class Sighting:
     seconds: Mapping[str, float]
 
 
-def by_library(values: Sequence[float]) -> dict[str, float]:
-    """A value of each library, by its name."""
-    return dict(zip(LIBRARIES, values, strict=True))
-
-
 @dataclass(frozen=True)
 class Table:
     """The first state of a task.
@@ -175,10 +170,17 @@ def sighting(
     between = perf_counter()
     other = by_aruco(grey)
     ended = perf_counter()
-    ours, theirs = off(found[0].pose if found else None, pose), off(other, pose)
-    seconds = between - began, ended - between
-    lengths, angles = zip(ours, theirs, strict=True)
-    return Sighting(distance, angle, by_library(lengths), by_library(angles), by_library(seconds))
+    errors = {
+        "AprilTag": off(found[0].pose if found else None, pose),
+        "ArUco": off(other, pose),
+    }
+    return Sighting(
+        distance,
+        angle,
+        {library: error[0] for library, error in errors.items()},
+        {library: error[1] for library, error in errors.items()},
+        {"AprilTag": between - began, "ArUco": ended - between},
+    )
 
 
 def by_aruco(grey: NDArray[np.uint8]) -> Pose | None:

@@ -17,7 +17,6 @@ from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from ensemble.camera_parameters import OPTICAL_FRAME
-from ensemble.futures import submit
 from ensemble.interfaces import CAMERA_INFO, COMPRESSED_PICTURES, PICTURES, TF_STATIC
 from ensemble.robot_parameters import MujocoRobotParameters, base_frame
 from ensemble.steady_time import create_timer
@@ -33,6 +32,7 @@ from slap_ros.robot.tagged_scene import placed_tags
 from slap_ros.vision.image_encoding import RGB8, compressed
 
 Picture = NDArray[np.uint8]
+LOOK = 0.01  # s, between two looks at whether a picture is rendered
 
 
 def plant_with_camera(
@@ -88,7 +88,7 @@ class CameraPublisher:
         self._rng = np.random.default_rng(settings.noise_seed)
         self._thread = ThreadPoolExecutor(1)
         self._renderer = self._thread.submit(MujocoCamera, model).result()
-        self._rendering = False
+        self._job: tuple[Header, Job[tuple[Picture, bytes] | None]] | None = None
         self._pictures = node.create_publisher(PICTURES.type, PICTURES.name, PICTURES.qos)
         self._compressed = node.create_publisher(
             COMPRESSED_PICTURES.type, COMPRESSED_PICTURES.name, COMPRESSED_PICTURES.qos
@@ -96,6 +96,7 @@ class CameraPublisher:
         self._infos = node.create_publisher(CAMERA_INFO.type, CAMERA_INFO.name, CAMERA_INFO.qos)
         self._publish_pose(settings)
         create_timer(node, 1.0 / settings.camera_rate, self._take)
+        create_timer(node, LOOK, self._deliver)
 
     def close(self) -> None:
         """End the picture that is being rendered, and release what OpenGL holds."""
@@ -111,26 +112,27 @@ class CameraPublisher:
 
     def _take(self) -> None:
         """Take a picture of now, unless the last one is still being rendered."""
-        if self._rendering:
+        if self._job is not None:
             return
-        self._rendering = True
         stamp = self._node.get_clock().now().to_msg()
         header = Header(stamp=stamp, frame_id=OPTICAL_FRAME)
         positions = self._plant.positions
-        done = submit(self._thread, lambda: self._picture(positions))
-        done.add_done_callback(lambda future: self._publish(header, future.result()))
+        self._job = header, self._thread.submit(self._picture, positions)
+
+    def _deliver(self) -> None:
+        """Publish the picture that is done, from the node's thread."""
+        if self._job is not None and self._job[1].done():
+            (header, job), self._job = self._job, None
+            taken = job.result()
+            if taken is not None:
+                self._publish(header, *taken)
 
     def _picture(self, positions: NDArray[np.float64]) -> tuple[Picture, bytes] | None:
         """What the camera gives, compressed as well; runs in the renderer's thread."""
         picture = self._noise.taken(self._renderer.picture(positions), self._rng)
         return None if picture is None else (picture, compressed(picture))
 
-    def _publish(self, header: Header, job: Job[tuple[Picture, bytes] | None]) -> None:
-        self._rendering = False
-        taken = job.result()
-        if taken is None:
-            return
-        picture, jpeg = taken
+    def _publish(self, header: Header, picture: Picture, jpeg: bytes) -> None:
         height, width, channels = picture.shape
         self._infos.publish(self._info(header))
         self._compressed.publish(CompressedImage(header=header, format="jpeg", data=jpeg))

@@ -43,9 +43,9 @@ from tf2_msgs.msg import TFMessage
 from ensemble.camera_parameters import TagDetectorParameters
 from ensemble.diagnostics import DiagnosticsPublisher
 from ensemble.entry_point import run_node
-from ensemble.futures import submit
 from ensemble.interfaces import NEWEST_PICTURE, TF
 from ensemble.parameters import read_parameters
+from ensemble.steady_time import create_timer
 from robot_bridge.transforms import transform
 from slap_ros.errors import InvalidMeasurementError, InvalidParameterError
 from slap_ros.robot.scene_config import read_scene_config
@@ -56,6 +56,7 @@ from slap_ros.vision.pinhole_camera import PinholeCamera
 from slap_ros.vision.tag_detection import TagDetection, TagDetector
 from slap_ros.vision.tags import tag_frame
 
+LOOK = 0.01  # s, between two looks at whether a picture is searched
 QUIET = 10.0  # s between two log lines about pictures that cannot be used
 Grey = NDArray[np.uint8]
 
@@ -82,10 +83,11 @@ class TagDetectorNode(Node):
         self._camera: PinholeCamera | None = None
         self._counts = Counter(pictures=0, tags=0, refused=0)
         self._workers = ThreadPoolExecutor(1)
-        self._searching = False
+        self._search: tuple[Header, Job[list[TagDetection]]] | None = None
         self._waiting: tuple[Header, Callable[[], Grey]] | None = None
         self._frames = self.create_publisher(TF.type, TF.name, TF.qos)
         self._subscribe(settings)
+        create_timer(self, LOOK, self._go_on)
         DiagnosticsPublisher(self, lambda: self._counts)
 
     def _subscribe(self, settings: TagDetectorParameters) -> None:
@@ -116,18 +118,19 @@ class TagDetectorNode(Node):
         self._take(message.header, lambda: decompressed(message.data))
 
     def _take(self, header: Header, decode: Callable[[], Grey]) -> None:
-        """Search a picture, or have it wait for the one that is being searched."""
+        """Have a picture wait for the one that is being searched; it replaces what waits."""
         self._waiting = (header, decode)
-        if not self._searching:
-            self._search_next()
 
-    def _search_next(self) -> None:
-        if self._waiting is None or self._camera is None:
-            return
-        (header, decode), camera = self._waiting, self._camera
-        self._waiting, self._searching = None, True
-        found = submit(self._workers, lambda: self._found(decode(), camera))
-        found.add_done_callback(lambda done: self._on_found(header, done.result()))
+    def _go_on(self) -> None:
+        """Publish what was found in a picture, and begin with the next."""
+        if self._search is not None and self._search[1].done():
+            (header, job), self._search = self._search, None
+            self._on_found(header, job)
+        if self._search is None and self._waiting is not None and self._camera is not None:
+            (header, decode), camera = self._waiting, self._camera
+            self._waiting = None
+            job = self._workers.submit(lambda: self._found(decode(), camera))
+            self._search = header, job
 
     def _found(self, grey: Grey, camera: PinholeCamera) -> list[TagDetection]:
         """The tags in a picture; runs in the worker's thread."""
@@ -140,14 +143,12 @@ class TagDetectorNode(Node):
         return self._detector.detect(grey, camera)
 
     def _on_found(self, header: Header, job: Job[list[TagDetection]]) -> None:
-        self._searching = False
         try:
             tags = job.result()
         except InvalidMeasurementError as error:
             self._refuse(error)
         else:
             self._publish(header, tags)
-        self._search_next()
 
     def _publish(self, header: Header, tags: list[TagDetection]) -> None:
         self._counts["pictures"] += 1
