@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from slap_ros.files import read_text
 from slap_ros.robot.mujoco.engine import mujoco
 from slap_ros.worlds.bullet import PANDA
 from slap_ros.worlds.panda import JOINTS
@@ -64,7 +65,7 @@ def arm_spec() -> Any:
 
 def _urdf() -> str:
     """PyBullet's URDF with paths and settings that MuJoCo understands."""
-    text = (PANDA / "panda.urdf").read_text(encoding="utf-8")
+    text = read_text(PANDA / "panda.urdf")
     for prefix in ("package://meshes/collision/", "package://meshes/visual/"):
         text = text.replace(prefix, "")
     head, _, rest = text.partition("<robot")
