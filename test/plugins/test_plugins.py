@@ -128,7 +128,7 @@ def test_commands_go_on_beside_broken_domains(install):
     listed = CliRunner().invoke(app, ["domains", "--json"])
     assert listed.exit_code == 0
     found = [(one["name"], one["preset"]) for one in json.loads(listed.stdout)]
-    ours = [(name, preset) for name in OURS for preset in ("fair", "paper")]
+    ours = [(name, preset) for name in OURS for preset in preset_names(name)]
     assert found[: len(ours)] == ours
     assert ("sweeping", "default") in found
     for name in ("'exits'", "'dies'"):
