@@ -15,7 +15,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
+from sensor_msgs.msg import JointState
 from slap_msgs.action import AcquireSkills, ExecuteSkill, ProposeOperators, SolveTask
 from slap_msgs.msg import (
     AbstractState,
@@ -40,7 +40,8 @@ from slap_ros.messages.qos import OfferedQos
 
 
 @cache
-def _profile(offered: OfferedQos) -> QoSProfile:
+def qos_profile(offered: OfferedQos) -> QoSProfile:
+    """The QoS with which something is published; it keeps the last messages, reliably."""
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
         depth=offered.depth,
@@ -53,9 +54,9 @@ def _profile(offered: OfferedQos) -> QoSProfile:
     )
 
 
-LATCHED = _profile(qos.LATCHED)
-EPISODE = _profile(qos.EPISODE)
-VOLATILE = _profile(qos.VOLATILE)
+LATCHED = qos_profile(qos.LATCHED)
+EPISODE = qos_profile(qos.EPISODE)
+VOLATILE = qos_profile(qos.VOLATILE)
 # As a robot's driver publishes, reliable or not; old messages are of no use.
 SENSOR_DATA = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,
@@ -89,7 +90,7 @@ class Topic:
 
 def _topic(name: str, message_type: Any) -> Topic:
     """A topic that is offered as the table for publishers and bags says."""
-    return Topic(name, message_type, _profile(qos.OFFERED[name]))
+    return Topic(name, message_type, qos_profile(qos.OFFERED[name]))
 
 
 DOMAIN = _topic("slap/domain", DomainInfo)
@@ -108,10 +109,6 @@ MARKERS = _topic("slap/markers", MarkerArray)
 TF = _topic("tf", TFMessage)
 TF_STATIC = _topic("tf_static", TFMessage)
 JOINT_STATES = _topic("joint_states", JointState)
-# As a camera's driver and image_proc name them; not recorded, for they are large.
-PICTURES = Topic("camera/image_rect", Image, _profile(qos.PICTURES))
-COMPRESSED_PICTURES = Topic("camera/image_rect/compressed", CompressedImage, PICTURES.qos)
-CAMERA_INFO = Topic("camera/camera_info", CameraInfo, PICTURES.qos)
 RECORDED = (
     DOMAIN,
     TASK,

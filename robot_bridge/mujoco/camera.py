@@ -17,7 +17,8 @@ from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from ensemble.camera_parameters import OPTICAL_FRAME
-from ensemble.interfaces import CAMERA_INFO, COMPRESSED_PICTURES, PICTURES, TF_STATIC
+from ensemble.camera_topics import CAMERA_INFO, COMPRESSED_PICTURES, PICTURES
+from ensemble.interfaces import TF_STATIC
 from ensemble.robot_parameters import MujocoRobotParameters, base_frame
 from ensemble.steady_time import create_timer
 from robot_bridge.transforms import transform

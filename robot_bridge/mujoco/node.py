@@ -54,7 +54,7 @@ from __future__ import annotations
 
 from collections import Counter
 from time import monotonic
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rclpy.node import Node
 
@@ -63,13 +63,15 @@ from ensemble.entry_point import run_node
 from ensemble.parameters import read_parameters
 from ensemble.robot_parameters import MujocoRobotParameters
 from ensemble.steady_time import create_timer
-from robot_bridge.mujoco.camera import CameraPublisher, plant_with_camera
 from robot_bridge.mujoco.controllers import MujocoArmController, MujocoGripperController
 from robot_bridge.simulated.noise_model import NoiseModel
 from robot_bridge.simulated.sensors import DetectionPublisher, JointStatePublisher
 from slap_ros.robot.mujoco.arm import PERIOD_S
 from slap_ros.robot.mujoco.plant import MujocoPlant
 from slap_ros.skills.domain_choice import open_domain
+
+if TYPE_CHECKING:
+    from robot_bridge.mujoco.camera import CameraPublisher
 
 TICK = 0.01  # s, between two looks at how much time has to pass
 BUSY = 0.005  # s of a tick that physics may take: callbacks need the rest
@@ -96,6 +98,8 @@ class MujocoRobot(Node):
         initial = settings.first_task(domain).initial_state
         self._camera: CameraPublisher | None = None
         if settings.camera:
+            from robot_bridge.mujoco.camera import CameraPublisher, plant_with_camera
+
             self._plant, model = plant_with_camera(domain, initial, settings)
             self._camera = CameraPublisher(self, self._plant, model, settings)
         else:

@@ -41,17 +41,15 @@ def slap(*arguments):
 
 
 def test_trials_are_those_of_the_command(domain, tmp_path):
-    rows = slap_ros.evaluate(domain, tasks=1, seeds=2)
+    rows = slap_ros.evaluate(domain, tasks=1, seeds=1)
     file = tmp_path / "trials.json"
-    slap("evaluate", "obstacle2d", "--tasks", 1, "--seeds", 2, "--output", file)
+    slap("evaluate", "obstacle2d", "--tasks", 1, "--seeds", 1, "--output", file)
     stored = [
         {"approach": one["approach"], **trial}
         for one in json.loads(file.read_text(encoding="utf-8"))["approaches"]
         for trial in one["trials"]
     ]
-    assert [row.approach for row in rows] == ["pure_planning"] * 2 + ["slap_1_sample"] * 2 + [
-        "slap"
-    ] * 2
+    assert [row.approach for row in rows] == ["pure_planning", "slap_1_sample", "slap"]
     same = ("approach", "seed", "index", "success", "plan_length", "shortcut_steps", "replans")
     for row, trial in zip(rows, stored, strict=True):
         assert {name: getattr(row, name) for name in same} == {n: trial[n] for n in same}

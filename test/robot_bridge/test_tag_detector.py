@@ -9,7 +9,8 @@ from rclpy.node import Node
 from sensor_msgs.msg import CameraInfo, Image
 
 from ensemble.camera_parameters import OPTICAL_FRAME, CameraParameters
-from ensemble.interfaces import CAMERA_INFO, PICTURES, SENSOR_DATA, TF, TF_STATIC
+from ensemble.camera_topics import CAMERA_INFO, PICTURES
+from ensemble.interfaces import SENSOR_DATA, TF, TF_STATIC
 from ensemble.launcher import InProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.robot_parameters import parse_mujoco_robot
