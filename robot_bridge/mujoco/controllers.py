@@ -40,6 +40,30 @@ PREEMPTED = TrajectoryOutcome(TrajectoryCode.INVALID_GOAL, "another goal came")
 CANCELED = TrajectoryOutcome(TrajectoryCode.SUCCESSFUL, "canceled")
 
 
+class GoalUnderWay:
+    """The goal that a controller carries out, until something ends it."""
+
+    def __init__(self) -> None:
+        self._handle: ServerGoalHandle | None = None
+        self._ended: Future | None = None
+
+    @property
+    def is_cancel_requested(self) -> bool:
+        """Whether there is one, and its end is asked for."""
+        return self._handle is not None and self._handle.is_cancel_requested
+
+    def begin(self, handle: ServerGoalHandle) -> Future:
+        """A goal is under way from now on; the future that is done at its end, with the outcome."""
+        self._handle, self._ended = handle, Future()
+        return self._ended
+
+    def end(self, outcome: TrajectoryOutcome | GripOutcome | None) -> None:
+        """End the goal that is under way, if there is one."""
+        if self._ended is not None and not self._ended.done():
+            self._ended.set_result(outcome)
+        self._ended = self._handle = None
+
+
 class MujocoArmController:
     """The arm's controller: one trajectory at a time; a new one replaces it."""
 
@@ -64,8 +88,7 @@ class MujocoArmController:
         self._settings, self._counts = settings, counts
         self._joints = arm_joints(settings.arm)
         self._tracker = TrajectoryTracker(plant.joints)
-        self._ended: Future | None = None  # of the motion under way
-        self._handle: ServerGoalHandle | None = None
+        self._goal = GoalUnderWay()
         self._server = ActionServer(
             node,
             FollowJointTrajectory,
@@ -89,18 +112,13 @@ class MujocoArmController:
         if not self._tracker.busy:
             return  # it holds what it was commanded last
         plant = self._plant
-        if self._handle is not None and self._handle.is_cancel_requested:
+        if self._goal.is_cancel_requested:
             self._tracker.hold(plant.joints)
-            self._end(CANCELED)
+            self._goal.end(CANCELED)
         outcome = self._tracker.check(plant.time_s, plant.joints, plant.joint_velocities)
         if outcome is not None:
-            self._end(outcome)
+            self._goal.end(outcome)
         plant.command(self._tracker.command(plant.time_s))
-
-    def _end(self, outcome: TrajectoryOutcome) -> None:
-        if self._ended is not None and not self._ended.done():
-            self._ended.set_result(outcome)
-        self._ended = self._handle = None
 
     def _on_goal(self, goal: FollowJointTrajectory.Goal) -> GoalResponse:
         try:
@@ -126,7 +144,7 @@ class MujocoArmController:
 
     async def _move(self, handle: ServerGoalHandle) -> FollowJointTrajectory.Result:
         await pause(self._node, self._noise.delay_s())
-        self._end(PREEMPTED)
+        self._goal.end(PREEMPTED)
         goal, plant = handle.request, self._plant
         order = [list(goal.trajectory.joint_names).index(name) for name in self._joints]
         self._tracker.start(
@@ -136,8 +154,7 @@ class MujocoArmController:
             plant.joints,
             plant.joint_velocities,
         )
-        self._handle, self._ended = handle, Future()
-        outcome: TrajectoryOutcome = await self._ended
+        outcome: TrajectoryOutcome = await self._goal.begin(handle)
         return self._result(handle, outcome)
 
     def _result(
@@ -197,8 +214,7 @@ class MujocoGripperController:
         self._node, self._plant, self._noise = node, plant, noise
         self._scale, self._counts = settings.gripper_scale, counts
         self._tracker = FingerTracker()
-        self._ended: Future | None = None
-        self._handle: ServerGoalHandle | None = None
+        self._goal = GoalUnderWay()
         self._server = ActionServer(
             node,
             GripperCommand,
@@ -222,18 +238,13 @@ class MujocoGripperController:
         if not self._tracker.busy:
             return
         plant = self._plant
-        if self._handle is not None and self._handle.is_cancel_requested:
+        if self._goal.is_cancel_requested:
             self._tracker.stop()
             plant.command_fingers(0.5 * plant.gap)
-            self._end(None)
+            self._goal.end(None)
         outcome = self._tracker.check(plant.time_s, plant.gap, plant.gap_velocity)
         if outcome is not None:
-            self._end(outcome)
-
-    def _end(self, outcome: GripOutcome | None) -> None:
-        if self._ended is not None and not self._ended.done():
-            self._ended.set_result(outcome)
-        self._ended = self._handle = None
+            self._goal.end(outcome)
 
     def _on_goal(self, goal: GripperCommand.Goal) -> GoalResponse:
         command = goal.command
@@ -244,14 +255,13 @@ class MujocoGripperController:
 
     async def _grip(self, handle: ServerGoalHandle) -> GripperCommand.Result:
         await pause(self._node, self._noise.delay_s())
-        self._end(None)
+        self._goal.end(None)
         command = handle.request.command
         gap = command.position / self._scale
         force = command.max_effort if command.max_effort > 0.0 else FINGER_FORCE
         self._plant.command_fingers(0.5 * gap, force)
         self._tracker.start(gap, self._plant.time_s)
-        self._handle, self._ended = handle, Future()
-        outcome: GripOutcome | None = await self._ended
+        outcome: GripOutcome | None = await self._goal.begin(handle)
         return self._result(handle, outcome)
 
     def _result(

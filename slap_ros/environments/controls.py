@@ -11,7 +11,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from slap_ros.core import Domain, World
+from slap_ros.core import Action, Domain, World
 from slap_ros.environments.episode import TaskEpisode
 from slap_ros.errors import InvalidCommandError, SkillNotApplicableError
 from slap_ros.planning.options import Option, OptionExecution, OptionResult
@@ -57,12 +57,7 @@ class JointControl:
     def act(self, action: Any, episode: TaskEpisode, world: World) -> Iterator[State]:
         """See :class:`Control`."""
         del episode
-        given = np.asarray(action, dtype=np.float64)
-        if given.shape != self.space.shape or not np.isfinite(given).all():
-            raise InvalidCommandError(
-                f"an action is {self._map.size} finite numbers from -1 to 1, not {action!r}"
-            )
-        yield world.step(self._map(given))
+        yield world.step(self._map(checked(action, self.space)))
 
 
 class SkillControl:
@@ -109,11 +104,7 @@ class MixedControl:
 
     def act(self, action: Any, episode: TaskEpisode, world: World) -> Iterator[State]:
         """See :class:`Control`."""
-        given = np.asarray(action, dtype=np.float64)
-        if given.shape != self.space.shape or not np.isfinite(given).all():
-            raise InvalidCommandError(
-                f"an action is {self.space.shape[0]} finite numbers from -1 to 1, not {action!r}"
-            )
+        given = checked(action, self.space)
         activations = given[self._axes :]
         if activations.max(initial=-1.0) > ACTIVE:
             chosen = int(activations.argmax())
@@ -124,6 +115,20 @@ class MixedControl:
     def mask(self, episode: TaskEpisode) -> NDArray[np.bool_]:
         """See :meth:`SkillControl.mask`."""
         return self.skills.mask(episode)
+
+
+def checked(action: Any, space: spaces.Box) -> Action:
+    """An action of a space of numbers; ones beyond its limits are left to what takes them.
+
+    Raises:
+        InvalidCommandError: It has another shape, or numbers that are not finite.
+    """
+    given: Action = np.asarray(action, dtype=np.float64)
+    if given.shape != space.shape or not np.isfinite(given).all():
+        raise InvalidCommandError(
+            f"an action is {space.shape[0]} finite numbers from -1 to 1, not {action!r}"
+        )
+    return given
 
 
 def run_option(

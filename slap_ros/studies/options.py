@@ -16,6 +16,14 @@ Tasks = Annotated[int, CommandOption("Tasks per seed.", least=1)]
 Seeds = Annotated[int, CommandOption("Number of task seeds.", least=1)]
 FirstSeed = Annotated[int, CommandOption("First task seed.", least=0)]
 FreshSeed = Annotated[int, CommandOption("Seed of the tasks.", least=0, limit=MAX_SEED)]
+Libraries = Annotated[
+    list[Path] | None,
+    CommandOption(
+        "Folder of a library, one per training seed. May be repeated. Default: all that ship.",
+        metavar="FOLDER",
+        name="--library",
+    ),
+]
 Output = Annotated[Path, CommandOption("Folder for the files STUDY_DOMAIN.json, .svg and .md.")]
 
 

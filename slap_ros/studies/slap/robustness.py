@@ -35,7 +35,7 @@ from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.comparison import PlanningSetup, format_spread, named_tasks, not_solved
 from slap_ros.studies.figures import APPROACH_STYLES, label
 from slap_ros.studies.job_runner import Job, JobRunner
-from slap_ros.studies.options import FRESH_SEED, RESULTS, FirstSeed, Output, Seeds, Tasks
+from slap_ros.studies.options import FRESH_SEED, RESULTS, FirstSeed, Libraries, Output, Seeds, Tasks
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.row_figures import name_rows, plot_interval
 from slap_ros.studies.slap.table1 import LibraryTrials, Row, TrainedLibrary, relative_cell
@@ -124,14 +124,7 @@ class RobustnessOptions:
     """Options that these studies share."""
 
     domain: DomainName
-    libraries: Annotated[
-        list[Path] | None,
-        CommandOption(
-            "Folder of a library, one per training seed. May be repeated. Default: all that ship.",
-            metavar="FOLDER",
-            name="--library",
-        ),
-    ] = None
+    libraries: Libraries = None
     tasks: Tasks = 10
     seeds: Seeds = 5
     first_seed: FirstSeed = FRESH_SEED

@@ -38,7 +38,7 @@ from slap_ros.studies.comparison import (
 )
 from slap_ros.studies.figures import APPROACH_STYLES, label
 from slap_ros.studies.job_runner import Job, JobRunner
-from slap_ros.studies.options import FRESH_SEED, RESULTS, FirstSeed, Output, Seeds, Tasks
+from slap_ros.studies.options import FRESH_SEED, RESULTS, FirstSeed, Libraries, Output, Seeds, Tasks
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, PreparedStudy, Study, format_steps
 
@@ -357,14 +357,7 @@ class Table1Options:
     """Options of this study."""
 
     domain: DomainName
-    libraries: Annotated[
-        list[Path] | None,
-        CommandOption(
-            "Folder of a library, one per training seed. May be repeated. Default: all that ship.",
-            metavar="FOLDER",
-            name="--library",
-        ),
-    ] = None
+    libraries: Libraries = None
     tasks: Tasks = 10
     seeds: Seeds = 5
     first_seed: FirstSeed = FRESH_SEED
