@@ -18,10 +18,10 @@ from slap_ros.studies.slap.robustness import (
     PapersRow,
     RobustnessOptions,
     RobustnessStudy,
-    open_library,
     renamed_way,
     summary,
 )
+from slap_ros.studies.slap.table1 import open_library
 from slap_ros.studies.study import PaperFigure, PreparedStudy, Study
 
 TRAINED = "slap_trained_perturbed"  # the approach with libraries that were trained in such worlds

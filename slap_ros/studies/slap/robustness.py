@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -19,8 +18,7 @@ import numpy as np
 from slap_ros.api.command_options import CommandOption, DomainName, Jobs, Preset, Samples
 from slap_ros.api.left_out import Tell
 from slap_ros.api.library_descriptions import describe_library
-from slap_ros.api.shortcut_choice import SAMPLES, choose_library, sampling
-from slap_ros.core import Domain
+from slap_ros.api.shortcut_choice import SAMPLES, sampling
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.approaches import PURE_PLANNING, Approach, approaches
@@ -38,7 +36,13 @@ from slap_ros.studies.job_runner import Job, JobRunner
 from slap_ros.studies.options import FRESH_SEED, RESULTS, FirstSeed, Libraries, Output, Seeds, Tasks
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.row_figures import name_rows, plot_interval
-from slap_ros.studies.slap.table1 import LibraryTrials, Row, TrainedLibrary, relative_cell
+from slap_ros.studies.slap.table1 import (
+    LibraryTrials,
+    Row,
+    TrainedLibrary,
+    open_library,
+    relative_cell,
+)
 from slap_ros.studies.study import PreparedStudy, format_steps
 
 if TYPE_CHECKING:
@@ -221,22 +225,6 @@ def prepare(
         lambda runner: _study(made, experiment, (*ways, *more), conditions, runner),
         {"library": options.libraries, **own, **(given or {})},
     )
-
-
-def open_library(folder: Path, domain: Domain, tell: Tell) -> TrainedLibrary | None:
-    """Open a library, and name it after its folder.
-
-    Args:
-        folder: Folder of the library.
-        domain: Domain that the library must fit.
-        tell: Function that receives warnings about shortcuts that are left out.
-
-    Returns:
-        The library and its name; None where there is none.
-    """
-    library = choose_library(str(folder), domain, "lazy", tell)
-    name = "/".join(folder.resolve().parts[-2:])
-    return None if library is None else TrainedLibrary(name, library)
 
 
 def _way(trained: TrainedLibrary, approach: Approach) -> PlannedWay:

@@ -378,11 +378,8 @@ def prepare(options: Table1Options, tell: Tell) -> PreparedStudy:
     """Open every preset and every library."""
     domain = options.domain
     chosen = under_presets(domain, options.presets)
-    trained = [
-        TrainedLibrary(_library_name(folder), loaded)
-        for folder in options.libraries or shipped_libraries(domain)
-        if (loaded := choose_library(str(folder), chosen[0], "lazy", tell)) is not None
-    ]
+    folders = options.libraries or shipped_libraries(domain)
+    trained = [one for folder in folders if (one := open_library(folder, chosen[0], tell))]
     tasks, seeds, first_seed = options.tasks, options.seeds, options.first_seed
     own = {"tasks": tasks, "seeds": seeds, "first_seed": first_seed, "samples": options.samples}
     described = [describe_library(one.name, one.library) for one in trained]
@@ -408,9 +405,20 @@ def under_presets(domain: str, presets: Sequence[str] | None) -> list[Domain]:
     return [one for one in every if one.make_model is None]
 
 
-def _library_name(folder: Path) -> str:
-    """As people tell libraries of a domain apart: by the folder, and the training's seed."""
-    return "/".join(folder.resolve().parts[-2:])
+def open_library(folder: Path, domain: Domain, tell: Tell) -> TrainedLibrary | None:
+    """Open a library, and name it as people tell them apart: by the folder, and the seed.
+
+    Args:
+        folder: Folder of the library.
+        domain: Domain that the library must fit.
+        tell: Function that receives warnings about shortcuts that are left out.
+
+    Returns:
+        The library and its name; None where there is none.
+    """
+    library = choose_library(str(folder), domain, "lazy", tell)
+    name = "/".join(folder.resolve().parts[-2:])
+    return None if library is None else TrainedLibrary(name, library)
 
 
 STUDY = Study(
