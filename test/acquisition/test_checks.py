@@ -117,6 +117,7 @@ EXAMPLES: list[tuple[ComplaintClass, Example]] = [
     (C.CONTRADICTORY_EFFECT, lambda: of_operator("?peg", "", "Holding(?peg)", "Holding(?peg)")),
     (C.NO_EFFECT, lambda: of_operator("?peg", "Holding(?peg)", "", "")),
     (C.NO_EFFECT, lambda: of_operator("?peg", "Holding(?peg)", "", "Holding(?peg)")),
+    (C.NO_EFFECT, lambda: of_operator("?peg", "OnTable(?peg)", "OnTable(?peg)", "")),
     (C.DELETED_NOT_REQUIRED, lambda: of_operator("?peg", "", "OnTable(?peg)", "Holding(?peg)")),
     (C.IMPOSSIBLE_CHANGE, lambda: block("?hole", "", "", "IsClear(?hole)", STATIC)),
     (C.IMPOSSIBLE_CHANGE, lambda: block("?lid", "", "", "IsLidOpen(?lid)", NO_LID)),
