@@ -207,6 +207,7 @@ def result(process):
     return out.split(), err
 
 
+@pytest.mark.slow
 def test_without_numba_plans_are_the_same():
     (name, digest), _ = result(run(PROGRAM))
     (other, same), _ = result(run(WITHOUT_NUMBA))
@@ -214,6 +215,7 @@ def test_without_numba_plans_are_the_same():
     assert same == digest
 
 
+@pytest.mark.slow
 def test_where_no_cache_can_be_written_code_is_compiled_again():
     program = """
 import numpy as np
