@@ -13,8 +13,8 @@ from rich.table import Table
 
 from slap_ros.api.command_line import command_line
 from slap_ros.api.command_options import DomainName, Jobs, Preset, Samples, ShortcutFolder
-from slap_ros.api.evaluation import compared_approaches, run_approaches
-from slap_ros.api.library_descriptions import describe_library, describe_skills
+from slap_ros.api.evaluation import against_skills, compared_approaches, run_approaches
+from slap_ros.api.library_descriptions import both_in_words, describe_library, describe_skills
 from slap_ros.cli.bars import counting_bars
 from slap_ros.cli.console import console, print_json
 from slap_ros.cli.options import EffortFactor, Goal, Json, Planner, Within, at_most
@@ -61,6 +61,13 @@ def evaluate(
             "often as SLAP tries its policies.",
         ),
     ] = False,
+    against: Annotated[
+        str | None,
+        typer.Option(
+            help="What plans with shortcuts are compared with: skills, for the acquired skills "
+            "that they were learned over, alone. Default: planning without shortcuts."
+        ),
+    ] = None,
     planner: Planner = DEFAULT_PLANNER,
     within: Within = None,
     effort: EffortFactor = None,
@@ -73,13 +80,15 @@ def evaluate(
     """Plan and execute many tasks; print success, plan length and planning time.
 
     A library adds two rows for the same tasks: SLAP with one sample, as the paper evaluates it, and
-    with --samples. Spreads are mean ± sample standard deviation over all tasks.
+    with --samples. With --against skills, the first row is named after the acquired skills, and the
+    digests of skills and shortcuts are printed. Spreads are mean ± sample standard deviation over
+    all tasks.
     """
     planner = with_settings(planner, within, effort)
     chosen = open_chosen(domain, preset, skills)
     settings = {"preset": chosen.preset, "tasks": tasks, "seeds": seeds, "first_seed": first_seed}
     settings |= {"samples": samples, "planner": planner}
-    besides = ("goal", goal), ("skills", skills), ("shooting", with_shooting)
+    besides = ("goal", goal), ("skills", skills), ("shooting", with_shooting), ("against", against)
     settings |= {name: value for name, value in besides if value}
     command = command_line("evaluate", domain, shortcuts=shortcuts, **settings)
     if output is not None:
@@ -87,11 +96,15 @@ def evaluate(
         require_replaceable(output, command)
     library = choose(shortcuts, chosen, planner)
     compared = compared_approaches(library, chosen, samples, with_shooting)
+    libraries = _libraries(chosen, shortcuts, library)
+    if against is not None:
+        compared = against_skills(against, compared, chosen)
+        console.print(both_in_words(libraries))
     experiment = Experiment(chosen, tasks, seeds, first_seed, planner, goal=goal, skills=skills)
     results = _run(experiment, compared, jobs)
     if output is not None:
         origin = {"command": command, "domain": domain} | settings
-        write_evaluation(output, origin | _libraries(chosen, shortcuts, library), results)
+        write_evaluation(output, origin | libraries, results)
     return _show(experiment, [summary for summary, _ in results], json)
 
 

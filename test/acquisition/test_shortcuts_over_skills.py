@@ -99,6 +99,25 @@ def test_shortcuts_over_other_skills_are_refused_with_both_digests(trained, tmp_
         choose_library(load_library(library, domains[1]), domains[1], "lazy", print)
 
 
+def test_an_evaluation_against_skills_names_them_and_both_digests(trained, tmp_path):
+    skills, library = trained.folder / "steady", trained.folder / "library"
+    given = ["--preset", "line", "--skills", skills, "--tasks", 2, "--seeds", 1]
+    against = [*given, "--shortcuts", library, "--against", "skills"]
+    answer = slap("evaluate", "points", *against, "--json", "--output", tmp_path / "all.json")
+    assert answer.exit_code == 0, answer.output
+    rows = json.loads(answer.stdout)["approaches"]
+    assert [row["approach"] for row in rows] == ["skills", "slap_1_sample", "slap"]
+    assert rows[0]["relative_length"] == 1.0 > rows[2]["relative_length"]
+    made_of = json.loads((tmp_path / "all.json").read_text())
+    assert made_of["skills"]["digest"] in answer.stderr
+    assert made_of["library"]["digest"] in answer.stderr
+    assert made_of["command"].endswith("--against skills")
+    for wrong in ([*given, "--against", "skills"], [*against[:-1], "everything"]):
+        refused = slap("evaluate", "points", *wrong)
+        assert refused.exit_code == ErrorCode.INVALID_PARAMETER
+        assert "skills" in refused.stderr
+
+
 def test_the_same_training_goes_on_with_the_same_skills_alone(trained, tmp_path):
     """Wherever their folder is; others make another training."""
     elsewhere = shutil.copytree(trained.folder / "steady", tmp_path / "elsewhere")
