@@ -20,9 +20,8 @@ from typing import Any
 import numpy as np
 
 from slap_ros.core import Domain, Task
-from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.learning.stored_keys import restored, stored
-from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
+from slap_ros.planning.abstract_graph import Edge, build_abstract_graph
 from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.plan import Plan
 from slap_ros.planning.problem import Problem
@@ -38,11 +37,11 @@ from slap_ros.shortcuts.exploration_policies import (
 from slap_ros.shortcuts.rollout_origins import OptionRetracer, RolloutOrigin
 from slap_ros.shortcuts.settings import ExplorationSettings
 from slap_ros.shortcuts.signature import Change, Signature, context_of
+from slap_ros.shortcuts.way_on import WayOn, steps_to_goal
 
 OperatorPath = tuple[str, ...]  # operators by which a shortcut's source was reached
 ABSORBED_MOTION = 0.5  # share of a motion's steps that remain where it is part of a shortcut
 UNBATCHED_WORLDS = 4  # worlds where a domain's cannot be stepped together
-MAX_BEYOND_NODES = 2_000  # abstract states after which a way on from beyond the graph is given up
 
 
 @dataclass(frozen=True)
@@ -143,15 +142,19 @@ class _Reached:
     """Rollouts that reached an abstract state.
 
     Args:
+        shortest: State in which the shortest of them was there.
         lengths: Environment steps of each rollout until it was there.
         found_by: Names of the exploration policies of the rollouts, without repetitions.
     """
 
+    shortest: State
     lengths: list[int] = field(default_factory=list)
     found_by: dict[str, None] = field(default_factory=dict)  # a set that keeps its order
 
-    def add(self, steps: int, policy: ExplorationPolicy) -> None:
-        """Take note of one more rollout."""
+    def add(self, steps: int, state: State, policy: ExplorationPolicy) -> None:
+        """Take note of one more rollout, which was there after so many steps, in a state."""
+        if steps < min(self.lengths, default=steps + 1):
+            self.shortest = state
         self.lengths.append(steps)
         self.found_by[policy.name] = None
 
@@ -216,7 +219,7 @@ class Explorer:
             domain.model_world(task.initial_state), self.space, domain.action_space
         )
         self._indexed: tuple[Vertex, Mapping[int, int]] | None = None  # of the latest vertex
-        self._beyond: dict[int, float] = {}  # steps to a goal from outside of the graph
+        self._way_on = WayOn(problem, self.graph.goal)
         self._steps = 0
 
     @classmethod
@@ -257,13 +260,13 @@ class Explorer:
             for abstract, reached in self._roll_out(origin).items():
                 if len(reached.lengths) < self._settings.hits:
                     continue
-                target = self._destination(origin, abstract, to_go, operator_steps)
+                target = self._destination(origin, abstract, reached, to_go, operator_steps)
                 if target is not None:
                     candidates += self._candidates(origin, target, reached)
         return ExplorationResult(
             tuple(candidate for candidate in candidates if candidate.expected_saving > 0.0),
             len(self.graph.candidates()),
-            self._steps + self._aim.steps + self._retracer.steps,
+            self._steps + self._aim.steps + self._retracer.steps + self._way_on.steps,
             operator_steps,
         )
 
@@ -286,6 +289,7 @@ class Explorer:
         self,
         origin: RolloutOrigin,
         abstract: int,
+        reached: _Reached,
         to_go: Sequence[float],
         operator_steps: Mapping[str, float],
     ) -> _Destination | None:
@@ -296,6 +300,7 @@ class Explorer:
         Args:
             origin: Origin of the rollouts.
             abstract: Abstract state that the rollouts reached, a mask.
+            reached: Rollouts that reached it.
             to_go: Estimated environment steps from each node to a goal.
             operator_steps: Mean environment steps of each operator, by name.
         """
@@ -308,7 +313,8 @@ class Explorer:
             return _Destination(nodes[j], to_go[j], beyond=False) if j > vertex.node else None
         if not self._settings.beyond or target in nodes:
             return None
-        return _Destination(target, self._to_go_beyond(target, operator_steps), beyond=True)
+        to_go_beyond = self._way_on.measure(reached.shortest, target, operator_steps)
+        return _Destination(target, to_go_beyond, beyond=True)
 
     def _index_after(self, vertex: Vertex) -> Mapping[int, int]:
         """The nodes by the abstract states that are reached in them from a vertex."""
@@ -320,17 +326,6 @@ class Explorer:
             }
             self._indexed = vertex, index
         return self._indexed[1]
-
-    def _to_go_beyond(self, node: int, operator_steps: Mapping[str, float]) -> float:
-        """Estimated environment steps to a goal from an abstract state that the graph has not."""
-        if node not in self._beyond:
-            operators, goal = self._problem.operators, self.graph.goal
-            try:
-                graph = build_abstract_graph(node, goal, operators, max_nodes=MAX_BEYOND_NODES)
-                self._beyond[node] = steps_to_goal(graph, operator_steps)[0]
-            except (UnsolvableError, PlanningLimitError):
-                self._beyond[node] = float("inf")
-        return self._beyond[node]
 
     def _sources(self, origin: RolloutOrigin) -> Iterator[Vertex]:
         """Yield the vertices where a shortcut may begin that does what rollouts did.
@@ -437,8 +432,8 @@ class Explorer:
         reached: dict[int, _Reached] = {}
         for policy in self._policies(origin.state):
             for first in self._roll_out_batch(origin.state, policy):
-                for abstract, steps in first.items():
-                    reached.setdefault(abstract, _Reached()).add(steps, policy)
+                for abstract, (steps, state) in first.items():
+                    reached.setdefault(abstract, _Reached(state)).add(steps, state, policy)
         return reached
 
     def _policies(self, state: State) -> Iterator[ExplorationPolicy]:
@@ -450,12 +445,14 @@ class Explorer:
         for _ in range(settings.pushes):
             yield from self._aim.pushes(state)
 
-    def _roll_out_batch(self, state: State, policy: ExplorationPolicy) -> list[dict[int, int]]:
-        """The first step at which each abstract state was reached, at rest, in every world."""
+    def _roll_out_batch(
+        self, state: State, policy: ExplorationPolicy
+    ) -> list[dict[int, tuple[int, State]]]:
+        """When and where each abstract state was first reached, at rest, in every world."""
         learner = learner_interface(self._domain)
         for world in range(self._count):
             self._worlds.reset(world, state)
-        first: list[dict[int, int]] = [{} for _ in range(self._count)]
+        first: list[dict[int, tuple[int, State]]] = [{} for _ in range(self._count)]
         alive = np.ones(self._count, dtype=bool)
         for step in range(self._settings.length):
             states = self._worlds.step(policy.actions(step))
@@ -466,7 +463,9 @@ class Explorer:
             if at_rest.size:
                 abstracts = self.space.abstract_each(State(states.layout, states.data[at_rest]))
             for number, abstract in zip(at_rest.tolist(), abstracts, strict=True):
-                first[number].setdefault(abstract, step + 1)
+                if abstract not in first[number]:
+                    there = State(states.layout, states.data[number].copy())
+                    first[number][abstract] = step + 1, there
             if not alive.any():
                 break
         return first
@@ -480,28 +479,3 @@ def operator_path_to(vertex: Vertex) -> OperatorPath:
         names.append(at.edge.option.skill.name)
         at = at.parent
     return tuple(reversed(names))
-
-
-def steps_to_goal(graph: AbstractGraph, operator_steps: Mapping[str, float]) -> list[float]:
-    """Estimated environment steps from each node to a goal; infinite where there is no way.
-
-    Operators count with their mean, and those without one with the mean of the others.
-    """
-    usual = float(np.mean(list(operator_steps.values()) or [1.0]))
-    incoming: list[list[Edge]] = [[] for _ in graph.nodes]
-    for edge in graph.edges:
-        incoming[edge.target].append(edge)
-    to_go = [float("inf")] * len(graph.nodes)
-    queue = [(0.0, goal) for goal in graph.goal_nodes]
-    for _, goal in queue:
-        to_go[goal] = 0.0
-    while queue:
-        rest, node = heapq.heappop(queue)
-        if rest > to_go[node]:
-            continue
-        for edge in incoming[node]:
-            longer = rest + operator_steps.get(edge.option.skill.name, usual)
-            if longer < to_go[edge.source]:
-                to_go[edge.source] = longer
-                heapq.heappush(queue, (longer, edge.source))
-    return to_go
