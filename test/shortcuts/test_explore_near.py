@@ -10,6 +10,7 @@ import pytest
 from slap_ros.core import SyncVectorWorld
 from slap_ros.domains import get_domain
 from slap_ros.planning.abstract_graph import Edge
+from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.model import Model
 from slap_ros.planning.problem import Problem
 from slap_ros.planning.search import Vertex
@@ -17,9 +18,12 @@ from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.relational import Column, State
 from slap_ros.shortcuts.exploration_policies import PUSH, PushAim
 from slap_ros.shortcuts.explore import Explorer, ShortcutCandidate
+from slap_ros.shortcuts.observation_encoder import ObservationEncoder
 from slap_ros.shortcuts.rollout_origins import OptionRetracer
 from slap_ros.shortcuts.settings import ExplorationSettings
+from slap_ros.shortcuts.signature import Change, Signature
 from slap_ros.shortcuts.starts import find_start
+from slap_ros.shortcuts.way_on import NO_WAY, WayOn
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.skills.scripted_skill import ScriptedSkill
 
@@ -142,3 +146,35 @@ def test_a_thing_in_a_hand_that_moves_is_at_rest_and_one_that_is_pushed_is_not(b
     assert at_rest(state.alone()) and not at_rest(moving.alone())
     assert at_rest(moving.replace({(things["cube0"], "held"): 1.0}).alone())
     assert not at_rest(moving.replace({(things["cube1"], "held"): 1.0}).alone())
+
+
+def test_the_way_on_is_executed_and_there_is_none_where_operators_lead_nowhere(blocked):
+    task = blocked.task(SEED, 0)
+    state, problem = task.initial_state, Problem.of(blocked, task.initial_state)
+    space, steps = problem.model.space, dict.fromkeys(blocked.skills, 20.0)
+    way_on = WayOn(problem, space.mask(task.goal))
+    start = space.abstract(state)
+    measured = way_on.measure(state, start, steps)
+    plan = GraphPlanner(problem).plan(state, space.mask(task.goal)).plan
+    assert plan.predicted_steps <= measured == way_on.steps < NO_WAY
+    assert way_on.measure(state, 0, steps) == NO_WAY  # nothing holds, so no operator applies
+    # Where the skill that comes next fails, there is no way: here its cube is out of reach.
+    cube = state.layout.object("cube2")
+    elsewhere = state.replace({(cube, "x"): 1.1, (cube, "z"): 0.02})
+    assert way_on.measure(elsewhere, start, steps) == NO_WAY
+
+
+def test_more_atoms_may_hold_where_a_shortcut_over_acquired_skills_ends(blocked):
+    """As where an operator's skill ends, and not where given skills say exactly what changes."""
+    state = blocked.task(SEED, 0).initial_state
+    space = blocked.atom_space(state)
+    atoms = {str(atom): space.mask([atom]) for atom in space.atoms}
+    change = Change(atoms["IsClear(target0)"], atoms["On(cube2, target0)"])
+    cube = state.layout.object("cube2")
+    aside = state.replace({(cube, "x"): 0.3, (cube, "y"): 0.3, (cube, "z"): 0.02}).alone()
+    target = change.apply(space.abstract(state))
+    assert space.abstract_each(aside)[0] == target | atoms["OnTable(cube2)"]
+    for exact in (False, True):
+        domain = replace(blocked, exact=exact)
+        encoder = ObservationEncoder(domain, space, Signature.of(change, space), change)
+        assert encoder.success(aside, encoder.encode(aside), [target]).tolist() == [not exact]
