@@ -33,6 +33,19 @@ from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 from slap_ros.skills.domain_choice import SHIPPED
 from slap_ros.versions import versions
 
+FirstSeed = Annotated[
+    int,
+    typer.Option(
+        min=0, help="First seed of the tasks. Training samples its tasks from seed 1000000 on."
+    ),
+]
+Against = Annotated[
+    str | None,
+    typer.Option(
+        help="What plans with shortcuts are compared with: skills, for the acquired skills that "
+        "they were learned over, alone. Default: planning without shortcuts."
+    ),
+]
 Tasks = Annotated[int, typer.Option(min=1, callback=at_most(10**6), help="Tasks per seed.")]
 Seeds = Annotated[int, typer.Option(min=1, callback=at_most(10**6), help="Number of seeds.")]
 
@@ -41,13 +54,7 @@ def evaluate(
     domain: DomainName,
     tasks: Tasks = 10,
     seeds: Seeds = 5,
-    first_seed: Annotated[
-        int,
-        typer.Option(
-            min=0,
-            help="First seed of the tasks. Training samples its tasks from seed 1000000 on.",
-        ),
-    ] = 0,
+    first_seed: FirstSeed = 0,
     preset: Preset = None,
     goal: Goal = None,
     skills: Skills = SHIPPED,
@@ -61,13 +68,7 @@ def evaluate(
             "often as SLAP tries its policies.",
         ),
     ] = False,
-    against: Annotated[
-        str | None,
-        typer.Option(
-            help="What plans with shortcuts are compared with: skills, for the acquired skills "
-            "that they were learned over, alone. Default: planning without shortcuts."
-        ),
-    ] = None,
+    against: Against = None,
     planner: Planner = DEFAULT_PLANNER,
     within: Within = None,
     effort: EffortFactor = None,

@@ -49,12 +49,15 @@ class OptionRetracer:
         self.steps = 0  # environment steps so far
 
     def inside(self, vertex: Vertex, target: Target, every: int) -> Iterator[RolloutOrigin]:
-        """Yield states along the option that led to a vertex, in equal numbers of steps.
+        """Execute the option that led to a vertex once more.
 
         Args:
             vertex: Vertex that the option led to.
             target: Target of the option.
             every: Environment steps from one of the states to the next.
+
+        Yields:
+            States along its way, in equal numbers of steps; neither the first nor the last.
         """
         if vertex.parent is None or vertex.edge is None:
             return

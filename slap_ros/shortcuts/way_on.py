@@ -38,12 +38,15 @@ class WayOn:
         self.steps = 0  # environment steps so far
 
     def measure(self, state: State, node: int, operator_steps: Mapping[str, float]) -> float:
-        """Environment steps of the way on that looks cheapest; infinite where it fails.
+        """Execute the way on that looks cheapest.
 
         Args:
             state: State in which the way begins.
             node: Abstract state that stands for the state, a mask; more atoms may hold.
             operator_steps: Mean environment steps of each operator, by name.
+
+        Returns:
+            Environment steps; infinite where there is no way, or a skill on it fails.
         """
         graph = self._graph(node)
         if graph is None:
