@@ -13,8 +13,8 @@ from rich.table import Table
 
 from slap_ros.api.command_line import command_line
 from slap_ros.api.command_options import DomainName, Jobs, Preset, Samples, ShortcutFolder
-from slap_ros.api.evaluation import compared_approaches, run_approaches
-from slap_ros.api.library_descriptions import describe_library, describe_skills
+from slap_ros.api.evaluation import against_skills, compared_approaches, run_approaches
+from slap_ros.api.library_descriptions import both_in_words, describe_library, describe_skills
 from slap_ros.cli.bars import counting_bars
 from slap_ros.cli.console import console, print_json
 from slap_ros.cli.options import EffortFactor, Goal, Json, Planner, Within, at_most
@@ -33,6 +33,19 @@ from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 from slap_ros.skills.domain_choice import SHIPPED
 from slap_ros.versions import versions
 
+FirstSeed = Annotated[
+    int,
+    typer.Option(
+        min=0, help="First seed of the tasks. Training samples its tasks from seed 1000000 on."
+    ),
+]
+Against = Annotated[
+    str | None,
+    typer.Option(
+        help="What plans with shortcuts are compared with: skills, for the acquired skills that "
+        "they were learned over, alone. Default: planning without shortcuts."
+    ),
+]
 Tasks = Annotated[int, typer.Option(min=1, callback=at_most(10**6), help="Tasks per seed.")]
 Seeds = Annotated[int, typer.Option(min=1, callback=at_most(10**6), help="Number of seeds.")]
 
@@ -41,13 +54,7 @@ def evaluate(
     domain: DomainName,
     tasks: Tasks = 10,
     seeds: Seeds = 5,
-    first_seed: Annotated[
-        int,
-        typer.Option(
-            min=0,
-            help="First seed of the tasks. Training samples its tasks from seed 1000000 on.",
-        ),
-    ] = 0,
+    first_seed: FirstSeed = 0,
     preset: Preset = None,
     goal: Goal = None,
     skills: Skills = SHIPPED,
@@ -61,6 +68,7 @@ def evaluate(
             "often as SLAP tries its policies.",
         ),
     ] = False,
+    against: Against = None,
     planner: Planner = DEFAULT_PLANNER,
     within: Within = None,
     effort: EffortFactor = None,
@@ -73,13 +81,15 @@ def evaluate(
     """Plan and execute many tasks; print success, plan length and planning time.
 
     A library adds two rows for the same tasks: SLAP with one sample, as the paper evaluates it, and
-    with --samples. Spreads are mean ± sample standard deviation over all tasks.
+    with --samples. With --against skills, the first row is named after the acquired skills, and the
+    digests of skills and shortcuts are printed. Spreads are mean ± sample standard deviation over
+    all tasks.
     """
     planner = with_settings(planner, within, effort)
     chosen = open_chosen(domain, preset, skills)
     settings = {"preset": chosen.preset, "tasks": tasks, "seeds": seeds, "first_seed": first_seed}
     settings |= {"samples": samples, "planner": planner}
-    besides = ("goal", goal), ("skills", skills), ("shooting", with_shooting)
+    besides = ("goal", goal), ("skills", skills), ("shooting", with_shooting), ("against", against)
     settings |= {name: value for name, value in besides if value}
     command = command_line("evaluate", domain, shortcuts=shortcuts, **settings)
     if output is not None:
@@ -87,11 +97,15 @@ def evaluate(
         require_replaceable(output, command)
     library = choose(shortcuts, chosen, planner)
     compared = compared_approaches(library, chosen, samples, with_shooting)
+    libraries = _libraries(chosen, shortcuts, library)
+    if against is not None:
+        compared = against_skills(against, compared, chosen)
+        console.print(both_in_words(libraries))
     experiment = Experiment(chosen, tasks, seeds, first_seed, planner, goal=goal, skills=skills)
     results = _run(experiment, compared, jobs)
     if output is not None:
         origin = {"command": command, "domain": domain} | settings
-        write_evaluation(output, origin | _libraries(chosen, shortcuts, library), results)
+        write_evaluation(output, origin | libraries, results)
     return _show(experiment, [summary for summary, _ in results], json)
 
 

@@ -16,7 +16,10 @@ PANELS: Mapping[str, str] = {
         ("seed", "index", "preset", "goal", "tasks", "seeds", "first_seed", "presets"), TASK
     ),
     **dict.fromkeys(
-        ("shortcuts", "samples", "planner", "within", "effort", "max_replans", "with_shooting"),
+        (
+            *("shortcuts", "samples", "planner", "within", "effort", "max_replans"),
+            *("with_shooting", "against"),
+        ),
         PLANNING,
     ),
     **dict.fromkeys(
