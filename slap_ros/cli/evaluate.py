@@ -18,6 +18,7 @@ from slap_ros.api.library_descriptions import describe_library, describe_skills
 from slap_ros.cli.bars import counting_bars
 from slap_ros.cli.console import console, print_json
 from slap_ros.cli.options import EffortFactor, Goal, Json, Planner, Within, at_most
+from slap_ros.cli.rivals import Against, RivalResults, run_rivals
 from slap_ros.cli.shortcuts import SAMPLES, choose
 from slap_ros.cli.skill_choice import Skills, open_chosen
 from slap_ros.core import Domain
@@ -61,6 +62,7 @@ def evaluate(
             "often as SLAP tries its policies.",
         ),
     ] = False,
+    against: Against = None,
     planner: Planner = DEFAULT_PLANNER,
     within: Within = None,
     effort: EffortFactor = None,
@@ -81,7 +83,8 @@ def evaluate(
     settings |= {"samples": samples, "planner": planner}
     besides = ("goal", goal), ("skills", skills), ("shooting", with_shooting)
     settings |= {name: value for name, value in besides if value}
-    command = command_line("evaluate", domain, shortcuts=shortcuts, **settings)
+    named = {"shortcuts": shortcuts, "against": against or []}
+    command = command_line("evaluate", domain, **named, **settings)
     if output is not None:
         require_writable(output)
         require_replaceable(output, command)
@@ -89,10 +92,12 @@ def evaluate(
     compared = compared_approaches(library, chosen, samples, with_shooting)
     experiment = Experiment(chosen, tasks, seeds, first_seed, planner, goal=goal, skills=skills)
     results = _run(experiment, compared, jobs)
+    rivals = run_rivals(experiment, against, results[0][1], jobs)
     if output is not None:
-        origin = {"command": command, "domain": domain} | settings
-        write_evaluation(output, origin | _libraries(chosen, shortcuts, library), results)
-    return _show(experiment, [summary for summary, _ in results], json)
+        made = _libraries(chosen, shortcuts, library) | rivals.described
+        origin = {"command": command, "domain": domain} | settings | made
+        write_evaluation(output, origin, results + rivals.results)
+    return _show(experiment, results, rivals, json)
 
 
 def _libraries(
@@ -105,16 +110,23 @@ def _libraries(
     return ({"skills": skills} if skills else {}) | {"library": described}
 
 
-def _show(experiment: Experiment, summaries: Sequence[Summary], json: bool) -> int:
-    """Print what came out; the command's exit code."""
+def _show(
+    experiment: Experiment,
+    results: Sequence[tuple[Summary, list[Trial]]],
+    rivals: RivalResults,
+    json: bool,
+) -> int:
+    """Print what came out; the command's exit code, which is that of planning before rivals'."""
+    summaries = [summary for summary, _ in results]
+    compared = [*summaries, *(summary for summary, _ in rivals.results)]
     if json:
-        rows = [summary.as_row() for summary in summaries]
+        rows = [summary.as_row() for summary in compared]
         made = {"approaches": rows, "versions": versions()}
         print_json(summaries[-1].as_json() | made)
     else:
-        console.print(_table(experiment, summaries))
+        console.print(_table(experiment, compared))
     solved = all(summary.success_rate == 1.0 for summary in summaries)
-    return 0 if solved else int(ErrorCode.UNKNOWN)
+    return rivals.exit_code if solved else int(ErrorCode.UNKNOWN)
 
 
 def _run(
