@@ -22,6 +22,7 @@ FLOORS = (
     ("studies",),
     ("api",),
     ("report",),
+    ("baselines",),
     ("environments", "robot", "bags", "evaluation", "encoding"),
     ("acquisition", "shortcuts"),
     ("learning", "language"),
@@ -117,6 +118,7 @@ def test_nothing_that_is_read_is_executed():
     found = []
     packages = (
         "acquisition",
+        "baselines",
         "bags",
         "language",
         "learning",

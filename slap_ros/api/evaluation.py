@@ -159,21 +159,16 @@ def compared_approaches(
     return compared
 
 
-def against_skills(against: str, compared: Sequence[Approach], domain: Domain) -> list[Approach]:
+def against_skills(compared: Sequence[Approach], domain: Domain) -> list[Approach]:
     """What is compared, the first being called the acquired skills alone.
 
     Args:
-        against: What shortcuts are compared with; there is ``skills``.
         compared: Ways to plan, without shortcuts first.
         domain: Domain with the skills.
 
     Raises:
-        InvalidParameterError: There is no such comparison, or nothing to compare.
+        InvalidParameterError: There is nothing to compare.
     """
-    if against != SKILLS_ALONE:
-        raise InvalidParameterError(
-            f"shortcuts cannot be compared with {against!r}; there is {SKILLS_ALONE}"
-        )
     without, *others = compared
     if not describe_skills(domain) or not others:
         raise InvalidParameterError(

@@ -74,6 +74,11 @@ COMMANDS = (
         "Check ROS 2, DDS on this network, libraries and disk, and say what to do.",
     ),
     CommandEntry(
+        "baseline",
+        "slap_ros.cli.baseline:app",
+        "Train the learners that SLAP is compared with: PPO, SAC with hindsight, and more.",
+    ),
+    CommandEntry(
         "study",
         "slap_ros.cli.study:app",
         "Make a figure of the papers again: data, a picture and a page. After an interruption, "

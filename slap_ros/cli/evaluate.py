@@ -13,11 +13,17 @@ from rich.table import Table
 
 from slap_ros.api.command_line import command_line
 from slap_ros.api.command_options import DomainName, Jobs, Preset, Samples, ShortcutFolder
-from slap_ros.api.evaluation import against_skills, compared_approaches, run_approaches
+from slap_ros.api.evaluation import (
+    SKILLS_ALONE,
+    against_skills,
+    compared_approaches,
+    run_approaches,
+)
 from slap_ros.api.library_descriptions import both_in_words, describe_library, describe_skills
 from slap_ros.cli.bars import counting_bars
 from slap_ros.cli.console import console, print_json
 from slap_ros.cli.options import EffortFactor, Goal, Json, Planner, Within, at_most
+from slap_ros.cli.rivals import Against, RivalResults, run_rivals
 from slap_ros.cli.shortcuts import SAMPLES, choose
 from slap_ros.cli.skill_choice import Skills, open_chosen
 from slap_ros.core import Domain
@@ -37,13 +43,6 @@ FirstSeed = Annotated[
     int,
     typer.Option(
         min=0, help="First seed of the tasks. Training samples its tasks from seed 1000000 on."
-    ),
-]
-Against = Annotated[
-    str | None,
-    typer.Option(
-        help="What plans with shortcuts are compared with: skills, for the acquired skills that "
-        "they were learned over, alone. Default: planning without shortcuts."
     ),
 ]
 Tasks = Annotated[int, typer.Option(min=1, callback=at_most(10**6), help="Tasks per seed.")]
@@ -89,24 +88,27 @@ def evaluate(
     chosen = open_chosen(domain, preset, skills)
     settings = {"preset": chosen.preset, "tasks": tasks, "seeds": seeds, "first_seed": first_seed}
     settings |= {"samples": samples, "planner": planner}
-    besides = ("goal", goal), ("skills", skills), ("shooting", with_shooting), ("against", against)
+    besides = ("goal", goal), ("skills", skills), ("shooting", with_shooting)
     settings |= {name: value for name, value in besides if value}
-    command = command_line("evaluate", domain, shortcuts=shortcuts, **settings)
+    named = {"shortcuts": shortcuts, "against": against or []}
+    command = command_line("evaluate", domain, **named, **settings)
     if output is not None:
         require_writable(output)
         require_replaceable(output, command)
     library = choose(shortcuts, chosen, planner)
     compared = compared_approaches(library, chosen, samples, with_shooting)
     libraries = _libraries(chosen, shortcuts, library)
-    if against is not None:
-        compared = against_skills(against, compared, chosen)
+    folders = [Path(one) for one in against or () if one != SKILLS_ALONE]
+    if len(folders) < len(against or ()):
+        compared = against_skills(compared, chosen)
         console.print(both_in_words(libraries))
     experiment = Experiment(chosen, tasks, seeds, first_seed, planner, goal=goal, skills=skills)
     results = _run(experiment, compared, jobs)
+    rivals = run_rivals(experiment, folders, results[0][1], jobs)
     if output is not None:
-        origin = {"command": command, "domain": domain} | settings
-        write_evaluation(output, origin | libraries, results)
-    return _show(experiment, [summary for summary, _ in results], json)
+        origin = {"command": command, "domain": domain} | settings | libraries | rivals.described
+        write_evaluation(output, origin, results + rivals.results)
+    return _show(experiment, results, rivals, json)
 
 
 def _libraries(
@@ -119,16 +121,23 @@ def _libraries(
     return ({"skills": skills} if skills else {}) | {"library": described}
 
 
-def _show(experiment: Experiment, summaries: Sequence[Summary], json: bool) -> int:
-    """Print what came out; the command's exit code."""
+def _show(
+    experiment: Experiment,
+    results: Sequence[tuple[Summary, list[Trial]]],
+    rivals: RivalResults,
+    json: bool,
+) -> int:
+    """Print what came out; the command's exit code, which is that of planning before rivals'."""
+    summaries = [summary for summary, _ in results]
+    compared = [*summaries, *(summary for summary, _ in rivals.results)]
     if json:
-        rows = [summary.as_row() for summary in summaries]
+        rows = [summary.as_row() for summary in compared]
         made = {"approaches": rows, "versions": versions()}
         print_json(summaries[-1].as_json() | made)
     else:
-        console.print(_table(experiment, summaries))
+        console.print(_table(experiment, compared))
     solved = all(summary.success_rate == 1.0 for summary in summaries)
-    return 0 if solved else int(ErrorCode.UNKNOWN)
+    return rivals.exit_code if solved else int(ErrorCode.UNKNOWN)
 
 
 def _run(

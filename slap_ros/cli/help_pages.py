@@ -16,10 +16,11 @@ PANELS: Mapping[str, str] = {
         ("seed", "index", "preset", "goal", "tasks", "seeds", "first_seed", "presets"), TASK
     ),
     **dict.fromkeys(
-        (
-            *("shortcuts", "samples", "planner", "within", "effort", "max_replans"),
-            *("with_shooting", "against"),
-        ),
+        ("shortcuts", "samples", "planner", "within", "effort", "max_replans"),
+        PLANNING,
+    ),
+    **dict.fromkeys(
+        ("with_shooting", "against"),
         PLANNING,
     ),
     **dict.fromkeys(
@@ -71,6 +72,8 @@ EXAMPLES: Mapping[str, str] = {  # those of studies are in their files
     "bag replay": "slap bag replay runs/tower",
     "bag export": "slap bag export runs/tower --output runs/tower.npz",
     "study readme": "slap study readme",
+    "baseline train": "slap baseline train ppo obstacle2d --preset paper",
+    "baseline list": "slap baseline list",
 }
 
 

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 from slap_ros.core import Domain, Task
 from slap_ros.relational import AtomSpace, State
@@ -29,6 +30,8 @@ class TaskEpisode:
     goal: int
     state: State
     steps: int = 0
+    _abstracted: tuple[State, int] | None = field(default=None, init=False, repr=False)
+    _named: tuple[int, tuple[str, ...]] | None = field(default=None, init=False, repr=False)
 
     @classmethod
     def of(cls, domain: Domain, task: Task) -> TaskEpisode:
@@ -42,8 +45,23 @@ class TaskEpisode:
 
     @property
     def abstract(self) -> int:
-        """The atoms that hold, a mask."""
-        return self.space.abstract(self.state)
+        """The atoms that hold, a mask; worked out once for each state."""
+        if self._abstracted is None or self._abstracted[0] is not self.state:
+            self._abstracted = self.state, self.space.abstract(self.state)
+        return self._abstracted[1]
+
+    @property
+    def atom_names(self) -> tuple[str, ...]:
+        """The names of the atoms that hold, which most steps leave as they were."""
+        abstract = self.abstract
+        if self._named is None or self._named[0] != abstract:
+            self._named = abstract, tuple(map(str, self.space.decode(abstract)))
+        return self._named[1]
+
+    @cached_property
+    def goal_names(self) -> tuple[str, ...]:
+        """The names of the atoms that must hold, in order."""
+        return tuple(sorted(map(str, self.task.goal)))
 
     @property
     def solved(self) -> bool:

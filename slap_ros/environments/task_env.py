@@ -13,7 +13,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import count, islice
 from typing import Any
 
 import gymnasium
@@ -21,7 +23,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from slap_ros.core import Domain, PictureSize, Task, World
+from slap_ros.core import Domain, PictureSize, Task, World, task_with_goal
 from slap_ros.drawing.body_pictures import canvas_of, draw_bodies, viewpoint, visible
 from slap_ros.environments.controls import JointControl, MixedControl, SkillControl
 from slap_ros.environments.episode import TaskEpisode
@@ -53,8 +55,9 @@ class TaskEnv(gymnasium.Env[Any, Any]):
 
     ``reset(seed=S, options={"index": I, "goal": NAME})`` begins the task that ``slap evaluate`` has
     at that seed and index; without a seed, the next index follows. ``options={"state": STATE}``
-    begins in a state, with the domain's goal for it. ``info`` has ``atoms`` and ``goal`` (names of
-    atoms), ``success`` and ``is_success``, ``steps``, and with skills ``action_mask``.
+    begins in a state, with the domain's goal for it, and ``options={"task": TASK}`` a task.
+    ``info`` has ``atoms`` and ``goal`` (names of atoms), ``success`` and ``is_success``, ``steps``,
+    and with skills ``action_mask``.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012 -- Gymnasium's own
@@ -68,21 +71,24 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         obs: str = "state",
         reward: str = "sparse",
         control: str = "joints",
+        goal: str | None = None,
+        like: str | None = None,
         render_mode: str | None = None,
     ) -> None:
         """Look at some tasks, for what there is to be seen.
 
         Args:
             domain: Name of the domain.
-            preset: Name of a preset, maybe with settings, as ``fair:obstacles=4``; empty for the
-                domain's first.
-            skills: Choice of the skills, as of :func:`slap_ros.make`, for actions that run skills.
-            obs: Observation: ``state`` (all features of all objects) or ``view`` (what shortcuts
-                see).
+            preset: Preset, maybe with settings, as ``fair:obstacles=4``; empty for the first.
+            skills: Choice of the skills, as of :func:`slap_ros.make`.
+            obs: Observation: ``state`` (features of all objects) or ``view`` (what shortcuts see).
             reward: Reward: ``sparse`` (-1 a step), ``dense`` (the potential that shortcuts get on
                 the way to the goal) or ``stages`` (on the way to each state of a plan).
             control: Actions: ``joints``, ``skills`` (a number for each ground skill) or ``both``
                 (joints and an activation of each skill).
+            goal: Goal of every task, by name or as atoms; None for each task's own.
+            like: Preset whose tasks say for how many objects observations have room, and how
+                features are scaled; None for the environment's own.
             render_mode: ``rgb_array``, or None; ``gymnasium.wrappers.HumanRendering`` shows it.
 
         Raises:
@@ -91,20 +97,23 @@ class TaskEnv(gymnasium.Env[Any, Any]):
             InvalidDomainError: The domain has no learner's interface, for ``view`` and for rewards
                 other than ``sparse``.
             NoSkillsError: The domain has no skills to run.
+            UnknownGoalError: There is no goal of that name.
         """
         _require("obs", obs, OBSERVATIONS)
         _require("reward", reward, tuple(REWARDS))
         _require("control", control, CONTROLS)
         if render_mode is not None:
             _require("render_mode", render_mode, self.metadata["render_modes"])
-        chosen = "" if skills == "shipped" else skills
-        self.domain: Domain = open_domain(DomainChoice(domain, preset, chosen))
-        self.render_mode, self._obs = render_mode, obs
-        census = [self.domain.task(0, index) for index in range(CENSUS)]
+        chosen = DomainChoice(domain, preset, "" if skills == "shipped" else skills)
+        self.domain: Domain = open_domain(chosen)
+        self.render_mode, self._obs, self._goal = render_mode, obs, goal
+        task_with_goal(self.domain, 0, 0, goal)  # refused here rather than in the first reset
+        model = self.domain if like is None else open_domain(replace(chosen, preset=like))
+        census = [model.task(0, index) for index in range(CENSUS)]
         atoms = [self.domain.atom_space(task.initial_state) for task in census]
         self._first = atoms[0]
         self._slots = ObjectSlots.of(atoms)
-        self._encode = self._encoder(census, atoms)
+        self.encode = self._encoder(census, atoms)
         self._reward: TaskReward = REWARDS[reward]()
         self._control = self._make_control(control)
         self.action_space = self._control.space
@@ -129,7 +138,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         super().reset(seed=seed)
         chosen = dict(options or {})
         for name in chosen:
-            _require("option", name, ("index", "goal", "state"))
+            _require("option", name, ("index", "goal", "state", "task"))
         task = self._task(seed, **chosen)
         self._episode = TaskEpisode.of(self.domain, task)
         self._enter(task.initial_state)
@@ -163,6 +172,11 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         canvas = canvas_of([first], view, PICTURE)
         bodies = visible(self.domain.display, episode.state)
         return np.asarray(draw_bodies(bodies, view, canvas, PICTURE), dtype=np.uint8)
+
+    @property
+    def observed_features(self) -> int:
+        """Number of features in an observation, those of goals as well."""
+        return int(spaces.flatdim(self.observation_space))
 
     def close(self) -> None:
         """Give the world back."""
@@ -200,7 +214,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         return made(self.domain, self._first)
 
     def _make_observation_space(self) -> spaces.Space[Any]:
-        return vector_space(self._encode.size)
+        return vector_space(self.encode.size)
 
     @property
     def _needs_same_objects(self) -> bool:
@@ -215,26 +229,43 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         index: int | None = None,
         goal: str | None = None,
         state: State | None = None,
+        task: Task | None = None,
     ) -> Task:
         """The task that begins: the one that is asked for, or the next that fits."""
+        if state is not None:
+            task = Task(state, self.domain.default_goal(state), self.domain.step_limit)
+        if task is not None:
+            self._require_fit(task)
+            return task
         if seed is not None or self._seed is None:
             drawn = int(self.np_random.integers(2**31)) if seed is None else seed
             self._seed, self._index = drawn, -1
-        if state is not None:
-            task = Task(state, self.domain.default_goal(state), self.domain.step_limit)
-            self._require_fit(task)
+        if index is None:
+            task = self.first_task(self._seed, count(self._index + 1), goal)
+            self._index = task.index
             return task
-        if index is not None:
-            self._index = index
-            task = self.domain.task(self._seed, index, goal)
-            self._require_fit(task)
-            return task
-        for _ in range(MOST_DRAWN):
-            self._index += 1
-            task = self.domain.task(self._seed, self._index, goal)
-            if self._why_unfit(task) is None:
+        self._index = index
+        task = task_with_goal(self.domain, self._seed, index, goal or self._goal)
+        self._require_fit(task)
+        return task
+
+    def first_task(self, seed: int, indices: Iterator[int], goal: str | None = None) -> Task:
+        """The first of some tasks that can be observed and acted in.
+
+        Args:
+            seed: Seed of the tasks.
+            indices: Indices of the tasks, of which as many are taken as are looked at.
+            goal: Goal of the task; None for that of the environment.
+
+        Raises:
+            InvalidStateError: None of a thousand can.
+        """
+        for index in islice(indices, MOST_DRAWN):
+            task = task_with_goal(self.domain, seed, index, goal or self._goal)
+            reason = self._why_unfit(task)
+            if reason is None:
                 return task
-        raise InvalidStateError(f"{self._why_unfit(task)}; so have the {MOST_DRAWN} before it")
+        raise InvalidStateError(f"{reason}; so have the {MOST_DRAWN} before it")
 
     def _require_fit(self, task: Task) -> None:
         if reason := self._why_unfit(task):
@@ -272,14 +303,14 @@ class TaskEnv(gymnasium.Env[Any, Any]):
 
     def _observe(self) -> Any:
         episode = self._under_way
-        return self._encode(episode.state.alone(), episode.space)[0]
+        return self.encode(episode.state.alone(), episode.space)[0]
 
     def _info(self) -> dict[str, Any]:
         episode = self._under_way
         solved = episode.solved
         info: dict[str, Any] = {
-            "atoms": tuple(map(str, episode.space.decode(episode.abstract))),
-            "goal": tuple(sorted(map(str, episode.task.goal))),
+            "atoms": episode.atom_names,
+            "goal": episode.goal_names,
             "success": solved,
             "is_success": solved,
             "steps": episode.steps,

@@ -1,0 +1,141 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""One training of a baseline: learn, keep checkpoints, choose the noise on validation tasks."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+from statistics import fmean
+from time import monotonic
+from typing import Any
+
+from slap_ros.baselines.method import (
+    CHECKPOINT,
+    BaselineProgress,
+    Method,
+    MethodSettings,
+    Report,
+    TaskLearner,
+)
+from slap_ros.baselines.trained_baseline import TrainedBaseline
+from slap_ros.baselines.training_tasks import VALIDATION
+from slap_ros.baselines.trials import try_baseline
+from slap_ros.environments.registration import make_task_env
+from slap_ros.environments.task_env import TaskEnv
+from slap_ros.learning.stored_keys import stored
+from slap_ros.learning.task_distribution import TaskDistribution
+from slap_ros.learning.work_folder import WorkFolder
+from slap_ros.versions import processor, versions
+
+PROGRESS = "progress.jsonl"
+CHECKPOINT_S = 60.0  # time between checkpoints
+WITH_NOISE, WITHOUT_NOISE = 1.0, 0.0
+
+
+@dataclass(frozen=True)
+class BaselineTraining:
+    """What is trained, on which tasks, and where it is kept.
+
+    Args:
+        method: Name of the method.
+        kind: The method itself.
+        settings: Settings of the method.
+        distribution: Distribution of the tasks.
+        goal: Goal of every task, by name or as atoms; None for each task's own.
+        folder: Work folder: settings, checkpoints, progress.
+    """
+
+    method: str
+    kind: Method
+    settings: MethodSettings
+    distribution: TaskDistribution
+    goal: str | None
+    folder: Path
+
+    def run(self, report: Report) -> TrainedBaseline:
+        """Train, or go on where an earlier run was interrupted.
+
+        Args:
+            report: Function that receives the figures about a hundred times.
+
+        Raises:
+            InvalidParameterError: The folder has another training, or is damaged.
+        """
+        WorkFolder(self.folder).require_same(self._identity)
+        tasks, count = self.distribution.task_seed, self.settings.n_envs
+        envs = self.kind.make_envs(self._make_env, tasks, count)
+        learner = self.kind.make_learner(self.settings, envs, self.distribution.seed)
+        if (self.folder / CHECKPOINT).exists():
+            learner.resume(self.folder)
+        try:
+            learner.learn(_TrainingLog(self.folder, learner, report).report)
+        finally:  # after Ctrl-C too
+            learner.save(self.folder)
+        return self._chosen(learner)
+
+    @property
+    def _identity(self) -> dict[str, Any]:
+        place = self.distribution.as_json() | {"goal": self.goal}
+        return {"method": self.method, "place": place, "settings": stored(self.settings)}
+
+    def _make_env(self) -> TaskEnv:
+        """An environment of the tasks."""
+        choice = self.distribution.domain
+        return make_task_env(
+            choice.name, choice.preset, goal=self.goal, **dict(self.kind.environment)
+        )
+
+    def _chosen(self, learner: TaskLearner) -> TrainedBaseline:
+        """The policy, with or without its noise: whichever does better on validation tasks."""
+        choice, progress = self.distribution.domain, learner.progress
+        trained = TrainedBaseline(
+            self.method,
+            choice.name,
+            choice.preset,
+            self.goal,
+            self.kind.environment,
+            learner.policy(),
+            WITHOUT_NOISE,
+        )
+        scales = (WITHOUT_NOISE, WITH_NOISE) if self.kind.noisy else (WITHOUT_NOISE,)
+        validated = {scale: self._success(replace(trained, noise=scale)) for scale in scales}
+        record = {
+            "seed": self.distribution.seed,
+            "environment_steps": progress.steps,
+            "episodes": progress.episodes,
+            **progress.figures,
+            "cpu_s": round(progress.cpu_s, 1),
+            "validation": {f"noise {scale:g}": rate for scale, rate in validated.items()},
+            "settings": stored(self.settings),
+            "versions": dict(versions()),
+            "processor": processor(),
+        }
+        best = max(validated, key=lambda scale: validated[scale])
+        return replace(trained, noise=best, record=record)
+
+    def _success(self, baseline: TrainedBaseline) -> float:
+        """The share of validation tasks that are solved."""
+        seed, preset = self.distribution.task_seed, baseline.preset
+        tasks = VALIDATION.batch(0, self.settings.validation)
+        return fmean(
+            try_baseline(baseline, preset, self.goal, seed, index).success for index in tasks
+        )
+
+
+class _TrainingLog:
+    """Appends figures to the progress file, and saves a checkpoint now and then."""
+
+    def __init__(self, folder: Path, learner: TaskLearner, report: Report) -> None:
+        self._folder, self._learner, self._report = folder, learner, report
+        self._saved = monotonic()
+
+    def report(self, progress: BaselineProgress) -> None:
+        """Write a line, and maybe a checkpoint."""
+        with (self._folder / PROGRESS).open("a", encoding="utf-8") as file:
+            file.write(json.dumps(progress.as_json()) + "\n")
+        if monotonic() - self._saved > CHECKPOINT_S:
+            self._learner.save(self._folder)
+            self._saved = monotonic()
+        self._report(progress)

@@ -1,0 +1,91 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The option ``--against`` of ``slap evaluate``: baselines beside planning, on the same tasks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from slap_ros.cli.bars import counting_bars
+from slap_ros.cli.console import console, styled
+from slap_ros.errors import ErrorCode
+from slap_ros.evaluation.experiment import Experiment, Trial
+from slap_ros.evaluation.summary import Summary
+
+Against = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="skills|FOLDER",
+        help="What to compare with: skills, for the acquired skills that the shortcuts were "
+        "learned over, alone; or the folder of a baseline that `slap baseline train` made. May be "
+        "repeated.",
+    ),
+]
+
+
+@dataclass
+class RivalResults:
+    """What came of the baselines.
+
+    Args:
+        results: Summary and trials of each.
+        described: What a file of results says of them; empty where there are none.
+        refused: Number of folders that could not be used.
+    """
+
+    results: list[tuple[Summary, list[Trial]]] = field(default_factory=list)
+    described: dict[str, Any] = field(default_factory=dict)
+    refused: int = 0
+
+    def complain(self, reason: str) -> None:
+        """Say why a folder cannot be used; the others are."""
+        self.refused += 1
+        console.print(styled("error", "bold red", f" {reason}"))
+
+    @property
+    def exit_code(self) -> int:
+        """The code of a command that has to do without some of them."""
+        return int(ErrorCode.INVALID_LIBRARY if self.refused else ErrorCode.NONE)
+
+
+def run_rivals(
+    experiment: Experiment, folders: Sequence[Path], yardstick: Sequence[Trial], jobs: int
+) -> RivalResults:
+    """Let each baseline act in every task.
+
+    Args:
+        experiment: Tasks to solve.
+        folders: Folders of baselines.
+        yardstick: Trials of pure planning on the same tasks.
+        jobs: Number of processes.
+
+    Returns:
+        What came of those that can be used, and how many cannot.
+    """
+    found = RivalResults()
+    if not folders:
+        return found
+    from slap_ros.api.baselines import describe_baseline, open_baselines, run_baseline
+
+    baselines = open_baselines(folders, experiment.domain, found.complain)
+    with counting_bars() as bar:
+        total = len(experiment) * len(baselines)
+        watched = bar.add_task("baselines", total=total)
+        for name, baseline in baselines.items():
+            trials = run_baseline(experiment, baseline, jobs, lambda _: bar.advance(watched))
+            found.results.append((Summary.of(experiment, name, trials, yardstick), trials))
+            found.described.setdefault("against", {})[name] = describe_baseline(baseline)
+            for reason, count in _reasons(trials).items():
+                console.print(f"{name}: {count} of {len(trials)} tasks not solved: {reason}")
+    return found
+
+
+def _reasons(trials: Sequence[Trial]) -> dict[str, int]:
+    """How many tasks were not solved for each reason."""
+    reasons = [trial.reason for trial in trials if not trial.success]
+    return {reason: reasons.count(reason) for reason in dict.fromkeys(reasons)}

@@ -1,0 +1,234 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Baselines: what they learn from, what is kept of them, and how they are put beside planning."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+import torch
+from gymnasium import spaces
+from typer.testing import CliRunner
+
+from ensemble.cli.application import app
+from slap_ros.api.baselines import train_baseline
+from slap_ros.baselines.hindsight_buffer import HindsightBuffer
+from slap_ros.baselines.option_rollouts import OptionRolloutBuffer
+from slap_ros.baselines.sac_her import REPLAY
+from slap_ros.baselines.trained_baseline import load_baseline
+from slap_ros.baselines.training_envs import joined_envs, separate_envs
+from slap_ros.baselines.trials import try_baseline
+from slap_ros.domains import get_domain
+from slap_ros.environments.registration import make_task_env
+from slap_ros.errors import ErrorCode, InvalidLibraryError, InvalidParameterError
+
+SHORT = {"n_envs": 2, "n_steps": 32, "batch_size": 32, "n_epochs": 1, "validation": 1}
+
+EVALUATE = ["evaluate", "obstacle2d", "--preset", "paper", "--seeds", "1", "--shortcuts", "none"]
+
+
+@pytest.fixture(scope="module")
+def domain():
+    return get_domain("obstacle2d", "paper")
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory, domain):
+    folder = tmp_path_factory.mktemp("baselines") / "ppo"
+    train_baseline("ppo", domain, folder, steps=256, changes=SHORT)
+    return folder
+
+
+def slap(*arguments):
+    result = CliRunner().invoke(app, list(map(str, arguments)))
+    return result.exit_code, result.stdout, " ".join(result.stderr.split())
+
+
+# -- what they learn from -------------------------------------------------------------------------
+
+
+def test_tasks_stepped_together_are_those_stepped_one_by_one():
+    """Of three different sets of objects, and over the ends of episodes."""
+    joined, separate = (
+        make(lambda: make_task_env("obstacle2d", "fair"), 7, 5)
+        for make in (joined_envs, separate_envs)
+    )
+    one, other = joined.make(), separate.make()
+    assert np.array_equal(one.reset(), other.reset())
+    rng = np.random.default_rng(0)
+    for _ in range(120):
+        actions = rng.uniform(-1.0, 1.0, (5, 3)).astype(np.float32)
+        seen, rewards, dones, infos = one.step(actions)
+        same, rewarded, ended, told = other.step(actions)
+        assert np.array_equal(seen, same)
+        assert np.array_equal(rewards, rewarded)
+        assert np.array_equal(dones, ended)
+        for i in np.flatnonzero(dones):
+            for key in ("terminal_observation", "TimeLimit.truncated"):
+                assert np.array_equal(infos[i][key], told[i][key])
+    assert joined.tally.steps == separate.tally.steps == 600
+    assert joined.tally.episodes == separate.tally.episodes >= 10
+
+
+class Goals:
+    """Stands for the environments, of which the buffer asks rewards alone."""
+
+    def env_method(self, name, achieved, desired, infos, indices):
+        return [np.where((achieved >= desired).all(axis=-1), 0.0, -1.0)]
+
+
+def test_hindsight_gives_goals_that_are_still_to_be_achieved_and_end_there():
+    space = spaces.Dict(
+        {
+            name: spaces.Box(0.0, 1.0, (3,), np.float32)
+            for name in ("achieved_goal", "desired_goal", "observation")
+        }
+    )
+    buffer = HindsightBuffer(100, space, spaces.Box(-1.0, 1.0, (1,)), Goals(), device="cpu")
+    np.random.seed(0)  # noqa: NPY002 -- stable-baselines3 samples with it
+    atoms = np.array([[1, 0, 0], [1, 0, 0], [1, 1, 0], [1, 1, 0]], dtype=np.float32)
+    wanted = np.array([0, 0, 1], dtype=np.float32)
+    for step in range(3):
+        now, after = (
+            {"achieved_goal": a, "desired_goal": wanted, "observation": a}
+            for a in atoms[step : step + 2]
+        )
+        buffer.add(
+            now,
+            after,
+            np.zeros((1, 1)),
+            np.array([-1.0]),
+            np.array([step == 2]),
+            [{"TimeLimit.truncated": step == 2}],
+        )
+    sampled = buffer.sample(500)
+    goals, begun = (
+        sampled.observations["desired_goal"].numpy(),
+        sampled.observations["achieved_goal"].numpy(),
+    )
+    assert {tuple(goal) for goal in goals} == {(0, 0, 1), (0, 1, 0)}  # its own, and what was gained
+    assert not (begun >= goals).all(axis=-1).any()  # none of length 0
+    assert torch.equal(sampled.dones, (sampled.rewards == 0.0).float())
+    assert 0 < sampled.dones.sum() < 500
+
+
+def test_what_follows_a_long_action_is_discounted_by_its_steps():
+    buffer = OptionRolloutBuffer(
+        2,
+        spaces.Box(0, 1, (1,)),
+        spaces.Box(-1, 1, (1,)),
+        "cpu",
+        1.0,
+        0.9,
+        1,
+        durations=lambda: [7],
+    )
+    zero = np.zeros((1, 1), np.float32)
+    for first in (1.0, 0.0):
+        buffer.add(zero, zero, np.zeros(1), np.array([first]), torch.zeros(1), torch.zeros(1))
+    buffer.compute_returns_and_advantage(torch.tensor([[1.0]]), np.array([False]))
+    assert buffer.returns[:, 0] == pytest.approx([0.9**14, 0.9**7])
+
+
+# -- training -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", ["ppo", "hierarchical", "sac-her"])
+def test_an_interrupted_training_goes_on(tmp_path, domain, method):
+    changes = {"n_envs": 2, "batch_size": 8, "validation": 1}
+    changes |= {"learning_starts": 102} if method == "sac-her" else {"n_steps": 16}
+
+    def stop(progress):
+        if progress.steps >= 120 and not (tmp_path / "stopped").exists():
+            (tmp_path / "stopped").touch()
+            raise KeyboardInterrupt
+
+    given = {"steps": 200, "changes": changes, "report": stop}
+    with pytest.raises(KeyboardInterrupt):
+        train_baseline(method, domain, tmp_path / "x", **given)
+    before = torch.load(tmp_path / "x-training" / "checkpoint.pt", weights_only=True)["steps"]
+    record = train_baseline(method, domain, tmp_path / "x", **given).record
+    assert 120 <= before < 200 <= record["environment_steps"] < 300
+    with pytest.raises(InvalidParameterError, match="other settings"):
+        train_baseline(method, domain, tmp_path / "x", **given, seed=1)
+    if method == "sac-her":
+        assert np.load(tmp_path / "x-training" / REPLAY)["rewards"].size >= 100
+    (tmp_path / "x-training" / "checkpoint.pt").write_bytes(b"PK damaged")
+    with pytest.raises(InvalidParameterError, match=r"checkpoint\.pt: damaged"):
+        train_baseline(method, domain, tmp_path / "x", **given)
+
+
+def test_the_same_seed_learns_the_same_weights(tmp_path, domain, trained):
+    again = train_baseline("ppo", domain, tmp_path / "again", steps=256, changes=SHORT)
+    first = load_baseline(trained, domain)
+    for one, other in zip(first.policy.layers, again.policy.layers, strict=True):
+        assert all(np.array_equal(*pair) for pair in zip(one, other, strict=True))
+    other = train_baseline("ppo", domain, tmp_path / "other", steps=256, changes=SHORT, seed=1)
+    assert not np.array_equal(first.policy.layers[0][0], other.policy.layers[0][0])
+
+
+# -- trying ---------------------------------------------------------------------------------------
+
+
+def test_an_evaluation_has_a_row_for_a_baseline(tmp_path, trained):
+    file = tmp_path / "evaluation.json"
+    code, said, _ = slap(
+        *EVALUATE, "--tasks", 2, "--json", "--against", trained, "--output", file,
+    )  # fmt: skip
+    assert code == 0
+    rows = json.loads(said)["approaches"]
+    assert [row["approach"] for row in rows] == ["pure_planning", "ppo"]
+    written = json.loads(file.read_text())
+    assert written["against"]["ppo"]["environment_steps"] >= 256
+    trials = written["approaches"][1]["trials"]
+    assert [(t["success"], t["plan_length"]) for t in trials] == [(False, 50)] * 2
+    assert trials[0]["error_code"] == ErrorCode.STEP_LIMIT
+
+
+def test_what_cannot_be_used_is_named_and_the_rest_is_computed(tmp_path, trained):
+    shutil.copytree(trained, tmp_path / "damaged")
+    weights = tmp_path / "damaged" / "policy.safetensors"
+    weights.write_bytes(weights.read_bytes()[:-4] + b"\1\1\1\1")
+    code, said, complaints = slap(
+        *EVALUATE, "--tasks", 1, "--json", "--against", tmp_path / "damaged",
+        "--against", tmp_path / "nowhere", "--against", trained,
+    )  # fmt: skip
+    assert code == ErrorCode.INVALID_LIBRARY
+    assert "policy.safetensors: damaged" in complaints
+    assert "nowhere: no trained baseline; `slap baseline train METHOD obstacle2d`" in complaints
+    assert [row["approach"] for row in json.loads(said)["approaches"]] == ["pure_planning", "ppo"]
+
+
+def test_a_baseline_of_another_domain_is_refused(trained):
+    with pytest.raises(InvalidLibraryError, match="of domain 'obstacle2d', not of 'stow_hammer'"):
+        load_baseline(trained, get_domain("stow_hammer"))
+
+
+def test_more_objects_than_a_policy_has_room_for_count_as_failed(trained, domain):
+    trial = try_baseline(load_baseline(trained, domain), "fair:bystanders=2", None, 0, 0)
+    assert (trial.success, trial.error_code) == (False, ErrorCode.INVALID_STATE)
+    assert "observations have room for 2" in trial.reason
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (("dreamer", "obstacle2d"), 2, "there are ppo, sac-her, hierarchical"),
+        (("ppo", "moon"), ErrorCode.UNKNOWN_DOMAIN, "moon"),
+        (("ppo", "obstacle2d", "--settings", "best"), 15, "there are ours, paper"),
+        (("ppo", "obstacle2d", "--set", "tau=1"), 15, "unknown setting 'tau'; there are n_envs"),
+        (("ppo", "obstacle2d", "--goal", "nirvana"), ErrorCode.UNKNOWN_GOAL, "nirvana"),
+    ],
+)
+def test_what_there_is_not_is_refused(tmp_path, arguments, code, words):
+    found, _, said = slap("baseline", "train", *arguments, "--output", tmp_path / "x")
+    assert found == code
+    assert words in said.replace("│ ", "").replace(" │", "")
+    assert not list(tmp_path.iterdir())
+
+
+def test_methods_are_listed():
+    code, said, _ = slap("baseline", "list", "--json")
+    assert code == 0
+    assert list(json.loads(said)) == ["ppo", "sac-her", "hierarchical"]

@@ -1,0 +1,51 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Each rival learns a task that it can learn: one that cannot would prove nothing by its 0 %."""
+
+import pytest
+
+from slap_ros.api.baselines import train_baseline
+from slap_ros.domains import get_domain
+
+EASY = "fair:bystanders=0,grasp_reach=0.2,grasp_gap=0.2"
+HOLDING = "(Holding robot block1)"  # random actions hold it in a tenth of the episodes
+SMALL = {"learning_rate": 1e-3, "gamma": 0.95}
+QUICK_SAC = {
+    "n_envs": 4,
+    "gradient_steps": 2,
+    "batch_size": 64,
+    "net_arch": (64, 64),
+    "learning_rate": 3e-3,
+    "gamma": 0.95,
+    "tau": 0.02,
+    "ent_coef_init": 0.1,
+}
+
+
+def success(method, preset, goal, steps, changes, folder):
+    domain = get_domain("obstacle2d", preset)
+    trained = train_baseline(
+        method, domain, folder / method, goal=goal, steps=steps, changes=changes
+    )
+    return max(trained.record["validation"].values())
+
+
+@pytest.mark.slow  # 15,000 environment steps, and half as many updates
+@pytest.mark.training
+def test_ppo_takes_a_block(tmp_path):
+    changes = {"n_envs": 16, "n_steps": 64, **SMALL}
+    assert success("ppo", EASY, HOLDING, 15_000, changes, tmp_path) >= 0.8
+
+
+@pytest.mark.slow  # 2,000 updates of actor and critics
+@pytest.mark.training
+@pytest.mark.timeout(180)
+def test_sac_with_hindsight_takes_a_block(tmp_path):
+    assert success("sac-her", EASY, HOLDING, 5_000, QUICK_SAC, tmp_path) >= 0.8
+
+
+@pytest.mark.slow  # 15,000 environment steps, one after the other
+@pytest.mark.training
+@pytest.mark.timeout(180)
+def test_hierarchical_learning_finds_the_four_skills_of_a_task(tmp_path):
+    assert success("hierarchical", "paper", None, 15_000, {}, tmp_path) >= 0.8
