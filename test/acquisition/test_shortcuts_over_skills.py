@@ -101,6 +101,17 @@ def test_shortcuts_over_other_skills_are_refused_with_both_digests(trained, tmp_
         choose_library(load_library(library, domains[1]), domains[1], "lazy", print)
 
 
+def test_shortcuts_that_ship_are_used_with_their_skills_alone(trained, tmp_path, monkeypatch):
+    shutil.copytree(
+        trained.folder / "library", tmp_path / "share/slap_ros/models/shortcuts/points"
+    )  # fmt: skip
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
+    steady = open_domain(DomainChoice("points", "line", str(trained.folder / "steady")))
+    assert chosen_library("", steady).shortcuts
+    slower = write_library(tmp_path / "slower", PICKING, replace(PUTTING, horizon=20))
+    assert chosen_library("", open_domain(DomainChoice("points", "line", str(slower)))) is None
+
+
 def test_a_node_takes_shortcuts_up_with_the_skills_of_the_episode(trained, tmp_path):
     """Skills may be announced later, and others again: what was loaded before does not count."""
     slower = write_library(tmp_path / "slower", PICKING, replace(PUTTING, horizon=20))
