@@ -13,16 +13,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from safetensors.numpy import save
 
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidLibraryError
 from slap_ros.policies.library_files import (
     load_policy,
+    policy_tensors,
     read_object,
     replace_folder,
     save_policy,
@@ -64,6 +67,11 @@ class TrainedBaseline:
     def name(self) -> str:
         """What the rows of tables are called."""
         return self.method.replace("-", "_")
+
+    @property
+    def digest(self) -> str:
+        """A hash of what was learned, 16 hexadecimal digits."""
+        return sha256(save(policy_tensors(self.policy))).hexdigest()[:16]
 
     @property
     def features(self) -> int:
