@@ -14,7 +14,8 @@ from tempfile import TemporaryFile
 from threading import Timer
 from typing import IO, Any
 
-from ensemble.launcher import KNOWN_CODES, die_with_parent
+from ensemble.fork_server import die_with_parent
+from ensemble.launcher import KNOWN_CODES
 from slap_ros.errors import SlapError, TrainerDiedError, error_from
 from slap_ros.signals import WORDS
 

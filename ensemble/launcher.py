@@ -4,11 +4,8 @@
 
 from __future__ import annotations
 
-import ctypes
 import json
 import signal
-import subprocess
-import sys
 from collections.abc import Mapping
 from typing import Protocol, Self
 
@@ -16,13 +13,10 @@ from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from ensemble.node_process import ForkServer, NodeProcess
 from ensemble.nodes import node_class
 from slap_ros.errors import ErrorCode, NodeDiedError
 
-STOP_TIMEOUT = 5.0  # s, after which a node that was asked to stop is killed
-PR_SET_PDEATHSIG = 1  # <sys/prctl.h>
-
-LIBC = ctypes.CDLL(None)  # opened here: between fork and exec nothing may be loaded
 KNOWN_CODES = frozenset(int(code) for code in ErrorCode if code > ErrorCode.UNKNOWN)
 
 NodeParameters = Mapping[str, Mapping[str, str | int | float]]
@@ -55,14 +49,24 @@ class NodeLauncher(Protocol):
 class ProcessLauncher:
     """Runs each node as a process. None outlives this one, however it ends."""
 
-    def __init__(self, nodes: NodeParameters) -> None:
-        """Run nodes, given their parameters by name."""
+    def __init__(self, nodes: NodeParameters, server: ForkServer | None = None) -> None:
+        """Run nodes from entering on.
+
+        Args:
+            nodes: Their parameters by name.
+            server: What makes their processes; None for one of its own.
+        """
         self._nodes = nodes
-        self.processes: dict[str, subprocess.Popen[bytes]] = {}
+        self._server = server or ForkServer(nodes)
+        self.processes: dict[str, NodeProcess] = {}
 
     def __enter__(self) -> Self:
-        for name, parameters in self._nodes.items():
-            self.processes[name] = _start(name, parameters)
+        try:
+            for name, parameters in self._nodes.items():
+                self.processes[name] = self._server.run(_arguments(name, parameters))
+        except BaseException:
+            self._stop()
+            raise
         return self
 
     def check(self) -> None:
@@ -77,26 +81,22 @@ class ProcessLauncher:
             raise _died(name, code)
 
     def __exit__(self, *_: object) -> None:
+        self._stop()
+
+    def _stop(self) -> None:
         # SIGTERM rather than SIGINT: it also ends a node quietly that is still importing.
-        for process in self.processes.values():
-            process.terminate()
-        for process in self.processes.values():
-            try:
-                process.wait(STOP_TIMEOUT)
-            except subprocess.TimeoutExpired:
-                process.kill()
+        with self._server:
+            for process in self.processes.values():
+                process.terminate()
+            for process in self.processes.values():
                 process.wait()
 
 
-def _start(name: str, parameters: Mapping[str, str | int | float]) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", name, "--ros-args", "--log-level", "warn"]
+def _arguments(name: str, parameters: Mapping[str, str | int | float]) -> list[str]:
+    arguments = [name, "--ros-args", "--log-level", "warn"]
     for key, value in parameters.items():
-        command += ["-p", f"{key}:={_as_yaml(value)}"]
-    # A session of its own keeps the terminal's Ctrl-C from the nodes, which are to be stopped in
-    # order. The parent's death signal keeps them from outliving a killed parent.
-    return subprocess.Popen(
-        command, stdout=sys.stderr, start_new_session=True, preexec_fn=die_with_parent
-    )
+        arguments += ["-p", f"{key}:={_as_yaml(value)}"]
+    return arguments
 
 
 def _as_yaml(value: str | int | float | tuple[float, ...]) -> str:
@@ -107,12 +107,6 @@ def _as_yaml(value: str | int | float | tuple[float, ...]) -> str:
         return f"[{', '.join(map(_as_yaml, value))}]"
     text = str(value)
     return text if "." in text else text.replace("e", ".0e")  # 1e-12 is a text in YAML
-
-
-def die_with_parent() -> None:
-    """Let a process that is being started die with the thread that starts it."""
-    if sys.platform == "linux":
-        LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def _died(name: str, code: int) -> NodeDiedError:

@@ -37,6 +37,8 @@ ROBOT_STATE_TIMEOUT = 8.0
 # moved take it 3 to 10 s, and the robot's controllers wait for each.
 SLOW_CAMERA_TIMEOUT = 15.0
 WAITING = ("detection_timeout", "controller_timeout", "joint_timeout", "settle_time")
+HIDDEN_AFTER = 5  # pictures without an object: the arm hides what is behind it
+BEFORE_CAMERA = {**dict.fromkeys(WAITING, SLOW_CAMERA_TIMEOUT), "hidden_after": HIDDEN_AFTER}
 
 
 def node_class(name: str) -> Any:
@@ -124,14 +126,11 @@ def _world_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int
     bridge = {"robot_bridge": task | scene | dict(settings.bridge)}
     if settings.world == MOCK:
         return {"robot_bridge.mock": task | dict(settings.mock)} | bridge
-    if settings.world == MUJOCO and settings.mujoco.get("camera"):
-        detector = {name: task[name] for name in ("domain", "preset", "skills")}
-        return {
-            "robot_bridge.mujoco": task | scene | dict(settings.mujoco),
-            "robot_bridge.tag_detector": detector | scene,
-            "robot_bridge": dict.fromkeys(WAITING, SLOW_CAMERA_TIMEOUT) | bridge["robot_bridge"],
-        }
     if settings.world == MUJOCO:
-        bridge["robot_bridge"] = dict(BEFORE_MUJOCO) | bridge["robot_bridge"]
-        return {"robot_bridge.mujoco": task | dict(settings.mujoco)} | bridge
+        camera = bool(settings.mujoco.get("camera"))
+        before = dict(BEFORE_MUJOCO) | (BEFORE_CAMERA if camera else {})
+        bridge["robot_bridge"] = before | bridge["robot_bridge"]
+        robot = {"robot_bridge.mujoco": task | (scene if camera else {}) | dict(settings.mujoco)}
+        detector = {name: task[name] for name in ("domain", "preset", "skills")} | scene
+        return robot | ({"robot_bridge.tag_detector": detector} if camera else {}) | bridge
     return bridge

@@ -21,7 +21,7 @@ TRAJECTORY_ACTION = "ARM_arm_controller/follow_joint_trajectory"
 GRIPPER_ACTION = "franka_gripper/gripper_action"
 # Of the bridge to a robot in MuJoCo, where tables, which are as high as domains want, stop the arm.
 BEFORE_MUJOCO: Mapping[str, float | tuple[float, ...]] = MappingProxyType(
-    {"workspace": (-0.9, -0.9, -0.4, 0.9, 0.9, 1.2), "gripper_effort": 40.0}
+    {"workspace": (-0.9, -0.9, -0.4, 0.9, 0.9, 1.2), "gripper_effort": 70.0}
 )
 WORKSPACE = (*Workspace().low, *Workspace().high)
 GIVEN_WITH_THE_RUN = frozenset(item.name for item in fields(WorldParameters)) | {"scene"}
@@ -63,6 +63,9 @@ class RobotParameters:
     gripper_effort: float = parameter(20.0, "N")
     position_noise: float = parameter(0.002, "m, of detections, along each axis")
     turn_noise: float = parameter(0.01, "rad, of detections, about each axis")
+    hidden_after: int = parameter(
+        0, "pictures in a row without an object after which it is where it was; 0: never", high=64
+    )
     joint_timeout: float = parameter(0.5, "s without joint positions until the robot holds")
     controller_timeout: float = parameter(0.5, "s that a controller may take longer than it should")
     gripper_timeout: float = parameter(5.0, "s that the gripper may take")
@@ -85,7 +88,9 @@ class RobotParameters:
     @property
     def tracking(self) -> TrackingSettings:
         """How well detections can be trusted."""
-        return TrackingSettings(self.position_noise, self.turn_noise)
+        return TrackingSettings(
+            self.position_noise, self.turn_noise, hidden_after=self.hidden_after
+        )
 
 
 @dataclass(frozen=True)

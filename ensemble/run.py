@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from time import monotonic
 from typing import Any
@@ -14,7 +15,8 @@ from rclpy.task import Future
 
 from ensemble.client import OnMessage, RunClient
 from ensemble.interfaces import Topic
-from ensemble.launcher import InProcessLauncher, NodeLauncher, ProcessLauncher
+from ensemble.launcher import InProcessLauncher, NodeLauncher, NodeParameters, ProcessLauncher
+from ensemble.node_process import ForkServer
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.patience import load_advice
 from ensemble.skill_request import LACKING, SkillRequest, SkillRequester
@@ -72,15 +74,19 @@ def run(request: RunRequest, on_message: OnMessage) -> RunMetrics:
         SlapError: The planner refused the task; the code says why.
         KeyboardInterrupt: After the robot holds and the bag is closed.
     """
-    with temporary_node(lambda: RunClient(on_message, request.shown)) as (client, spinner):
+    nodes = node_parameters(request.settings)
+    with (
+        # What nodes need is imported while others are looked for.
+        nullcontext() if request.in_process else ForkServer(nodes) as server,
+        temporary_node(lambda: RunClient(on_message, request.shown)) as (client, spinner),
+    ):
         _require_alone(client, spinner)
-        with _launcher(request, spinner.executor) as launcher:
+        with _launcher(nodes, server, spinner.executor) as launcher:
             return _drive(request, client, spinner, launcher)
 
 
-def _launcher(request: RunRequest, executor: Executor) -> NodeLauncher:
-    nodes = node_parameters(request.settings)
-    return InProcessLauncher(nodes, executor) if request.in_process else ProcessLauncher(nodes)
+def _launcher(nodes: NodeParameters, server: ForkServer | None, executor: Executor) -> NodeLauncher:
+    return ProcessLauncher(nodes, server) if server else InProcessLauncher(nodes, executor)
 
 
 def _require_alone(client: RunClient, spinner: Spinner) -> None:

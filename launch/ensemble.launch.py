@@ -3,7 +3,8 @@
 """The whole ensemble: ``ros2 launch slap_ros ensemble.launch.py domain:=obstacle2d seed:=3``.
 
 On a robot: ``domain:=obstacle_tower world:=robot scene:=FILE``. Without one: ``world:=mock``, or
-``world:=mujoco`` for a robot in another engine than the planner's.
+``world:=mujoco`` for a robot in another engine than the planner's; there, ``camera:=true
+scene:=FILE`` has a camera see tagged objects.
 
 ``params_file:=FILE`` sets any other parameter of any node, in a copy of ``config/ensemble.yaml``.
 
@@ -41,11 +42,15 @@ ARGUMENTS = {
         "false",
         "run acquisition_node too: it proposes operators and acquires skills",
     ),
+    "camera": (
+        "false",
+        "start tag_detector, for the tags of the scene file; a robot in MuJoCo has a camera then",
+    ),
     "record": ("", "folder of the bag to record; empty: none"),
     "rviz": ("false", "open RViz as well"),
     "namespace": ("", "namespace of every node: /robot1 gives /robot1/slap/state"),
 }
-CHOICES = {"world": ["sim", "robot", "mock", "mujoco"]}
+CHOICES = {"world": ["sim", "robot", "mock", "mujoco"], "camera": ["true", "false"]}
 SIMULATED = {"mock": "mock_robot", "mujoco": "mujoco_robot"}  # robots, by world
 # Arguments that are parameters of nodes. They have no defaults here: a node's parameter that is not
 # given is what the parameter files say.
@@ -75,7 +80,8 @@ TAKEN = {  # arguments that each node takes as its parameters
     "sim_node": (*TASK, "pace"),
     "robot_bridge": (*TASK, "arm", "scene"),
     "mock_robot": (*TASK, "arm", "latency", "pose_noise", "dropout"),
-    "mujoco_robot": (*TASK, "arm", "latency", "pose_noise", "dropout"),
+    "mujoco_robot": (*TASK, "arm", "latency", "pose_noise", "dropout", "scene"),
+    "tag_detector": ("domain", "preset", "skills", "scene"),
     "perception_node": COMMON,
     "skill_server": (*COMMON, *SHORTCUTS),
     "planner_node": (*COMMON, *SHORTCUTS, "planner"),
@@ -115,6 +121,7 @@ def _nodes(context: LaunchContext) -> list[Node]:
     given = {name: value for name, value in context.launch_configurations.items() if value}
     names = ["sim_node"] if given["world"] == "sim" else ["robot_bridge"]
     names += [SIMULATED[given["world"]]] if given["world"] in SIMULATED else []
+    names += ["tag_detector"] if given["camera"] == "true" else []
     names += ["perception_node", "skill_server", "planner_node"]
     names += ["recorder_node"] if "record" in given else []
     acquires = IfCondition(LaunchConfiguration("acquisition"))
@@ -129,6 +136,8 @@ def _node(name: str, given: Mapping[str, str], **options: object) -> Node:
     taken = {key: _value(key, given[key]) for key in TAKEN[name] if key in given}
     if name == "recorder_node":
         taken["bag"] = ParameterValue(given["record"], value_type=str)
+    if name == "mujoco_robot" and given["camera"] == "true":
+        taken["camera"] = ParameterValue(True, value_type=bool)
     return Node(
         package="slap_ros",
         executable=name,
@@ -164,6 +173,7 @@ def _parameter_files(given: Mapping[str, str]) -> list[str]:
         files.append(_config() / "robot.yaml")
     if given["world"] == "mujoco":
         files.append(_config() / "mujoco.yaml")
+        files += [_config() / "camera.yaml"] if given["camera"] == "true" else []
     if "params_file" in given:
         files.append(Path(given["params_file"]).expanduser())
         if not files[-1].is_file():

@@ -29,6 +29,8 @@ ROS Parameters:
     gripper_effort (double, 20.0): N.
     position_noise (double, 0.002), turn_noise (double, 0.01): standard deviation of detections
         along each axis in m, about each axis in rad.
+    hidden_after (int, 0): pictures in a row that show others but not an object, after which it is
+        taken to be where it was at rest; 0: never.
     settle_time (double, 1.5): s to wait for what moves to come to rest.
     joint_timeout (double, 0.5): s without joint positions after which the robot holds.
     detection_timeout (double, 2.0): s without a complete measurement after which it holds.

@@ -159,8 +159,15 @@ class SkillServer(Node):
     def _start(self, request: ExecuteSkill.Goal, start: Observation) -> OptionExecution:
         option, target = requested_option(request, start, self._shortcuts)
         episode, hold_steps = start.episode, self._settings.hold_steps
-        actions = episode.domain.action_space
-        return OptionExecution(option, target, episode.space, actions, start.state, hold_steps)
+        return OptionExecution(
+            option,
+            target,
+            episode.space,
+            episode.domain.action_space,
+            start.state,
+            hold_steps,
+            expected_steps=request.edge.predicted_steps,
+        )
 
     def _on_observation(self, observation: Observation) -> None:
         if self._execution is not None:

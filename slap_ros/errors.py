@@ -379,7 +379,7 @@ class AlreadyRunningError(SlapError):
 
 
 class SkillsChangedError(SlapError):
-    """A node that was given other skills than the world announces."""
+    """Other skills than the world announces, or than shortcuts were learned over."""
 
     code = ErrorCode.SKILLS_CHANGED
 

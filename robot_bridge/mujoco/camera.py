@@ -4,13 +4,10 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Future as Job
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from rclpy.node import Node
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
@@ -25,14 +22,14 @@ from robot_bridge.transforms import transform
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.relational import State
-from slap_ros.robot.mujoco.camera import MujocoCamera, add_camera, add_tags
+from slap_ros.robot.mujoco.camera import add_camera, add_tags
 from slap_ros.robot.mujoco.model import compiled, scene_around, scene_spec
 from slap_ros.robot.mujoco.plant import MujocoPlant
+from slap_ros.robot.mujoco.rendering_process import Picture, RenderingProcess, Shot
 from slap_ros.robot.scene_config import read_scene_config
 from slap_ros.robot.tagged_scene import placed_tags
-from slap_ros.vision.image_encoding import RGB8, compressed
+from slap_ros.vision.image_encoding import RGB8
 
-Picture = NDArray[np.uint8]
 LOOK = 0.01  # s, between two looks at whether a picture is rendered
 
 
@@ -67,7 +64,7 @@ def plant_with_camera(
 class CameraPublisher:
     """Publishes pictures, the camera's intrinsics, and where it is.
 
-    One thread renders, with its own copy of the positions: physics goes on meanwhile.
+    Another process renders, from a copy of the positions: physics goes on meanwhile.
     """
 
     def __init__(
@@ -85,11 +82,8 @@ class CameraPublisher:
             InvalidParameterError: There is no OpenGL; says what to install.
         """
         self._node, self._plant, self._camera = node, plant, settings.pinhole
-        self._noise = settings.picture_noise
-        self._rng = np.random.default_rng(settings.noise_seed)
-        self._thread = ThreadPoolExecutor(1)
-        self._renderer = self._thread.submit(MujocoCamera, model).result()
-        self._job: tuple[Header, Job[tuple[Picture, bytes] | None]] | None = None
+        self._renderer = RenderingProcess(model, settings.picture_noise, settings.noise_seed)
+        self._header = Header()  # of the picture that is being taken
         self._pictures = node.create_publisher(PICTURES.type, PICTURES.name, PICTURES.qos)
         self._compressed = node.create_publisher(
             COMPRESSED_PICTURES.type, COMPRESSED_PICTURES.name, COMPRESSED_PICTURES.qos
@@ -100,9 +94,8 @@ class CameraPublisher:
         create_timer(node, LOOK, self._deliver)
 
     def close(self) -> None:
-        """End the picture that is being rendered, and release what OpenGL holds."""
-        self._thread.submit(self._renderer.close).result()
-        self._thread.shutdown()
+        """End the picture that is being taken, and the process."""
+        self._renderer.close()
 
     def _publish_pose(self, settings: MujocoRobotParameters) -> None:
         frames = self._node.create_publisher(TF_STATIC.type, TF_STATIC.name, TF_STATIC.qos)
@@ -112,42 +105,26 @@ class CameraPublisher:
         frames.publish(TFMessage(transforms=[item]))
 
     def _take(self) -> None:
-        """Take a picture of now, unless the last one is still being rendered."""
-        if self._job is not None:
+        """Take a picture of now, unless the last one is still being taken."""
+        if self._renderer.busy:
             return
         stamp = self._node.get_clock().now().to_msg()
-        header = Header(stamp=stamp, frame_id=OPTICAL_FRAME)
-        positions = self._plant.positions
-        self._job = header, self._thread.submit(self._picture, positions)
+        self._header = Header(stamp=stamp, frame_id=OPTICAL_FRAME)
+        wanted = self._compressed.get_subscription_count() > 0
+        self._renderer.take(self._plant.positions, wanted)
 
     def _deliver(self) -> None:
         """Publish the picture that is done, from the node's thread."""
-        if self._job is not None and self._job[1].done():
-            (header, job), self._job = self._job, None
-            taken = job.result()
-            if taken is not None:
-                self._publish(header, *taken)
+        if self._renderer.ready:
+            shot = self._renderer.receive()
+            if shot is not None:
+                self._publish(self._header, shot)
 
-    def _picture(self, positions: NDArray[np.float64]) -> tuple[Picture, bytes] | None:
-        """What the camera gives, compressed as well; runs in the renderer's thread."""
-        picture = self._noise.taken(self._renderer.picture(positions), self._rng)
-        return None if picture is None else (picture, compressed(picture))
-
-    def _publish(self, header: Header, picture: Picture, jpeg: bytes) -> None:
-        height, width, channels = picture.shape
+    def _publish(self, header: Header, shot: Shot) -> None:
         self._infos.publish(self._info(header))
-        self._compressed.publish(CompressedImage(header=header, format="jpeg", data=jpeg))
-        self._pictures.publish(
-            Image(
-                header=header,
-                height=height,
-                width=width,
-                encoding=RGB8,
-                is_bigendian=0,
-                step=width * channels,
-                data=picture.tobytes(),
-            )
-        )
+        if shot.jpeg:
+            self._compressed.publish(CompressedImage(header=header, format="jpeg", data=shot.jpeg))
+        self._pictures.publish(_image(header, shot.picture))
 
     def _info(self, header: Header) -> CameraInfo:
         camera = self._camera
@@ -163,3 +140,16 @@ class CameraPublisher:
             r=[float(value) for value in np.eye(3).ravel()],
             p=projection,
         )
+
+
+def _image(header: Header, picture: Picture) -> Image:
+    height, width, channels = picture.shape
+    return Image(
+        header=header,
+        height=height,
+        width=width,
+        encoding=RGB8,
+        is_bigendian=0,
+        step=width * channels,
+        data=picture.tobytes(),
+    )

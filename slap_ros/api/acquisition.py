@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -26,6 +26,7 @@ from slap_ros.api.acquisition_request import AcquisitionRequest
 from slap_ros.api.jobs import require_torch, some_workers
 from slap_ros.api.left_out import Tell, warn_caller
 from slap_ros.api.proposers import Proposers
+from slap_ros.api.revisions import Revisions
 from slap_ros.api.setting_texts import Changes, change_texts
 from slap_ros.api.training import training_folder
 from slap_ros.core import Domain
@@ -176,7 +177,8 @@ def carry_out(
         The library.
     """
     settings = request.chosen_settings()
-    _require_budget(settings, settings.segment_steps(horizon_of(request.domain)))
+    least = settings.segment_steps(horizon_of(request.domain))
+    _require_budget(settings, least)
     encoder = request.skill_encoder()
     known = _known(request.begin_with, watch.tell)
     there = _library_to_keep(request.keep, request.domain)
@@ -187,22 +189,38 @@ def carry_out(
         proposed = _proposed(request, watch)
         proposal = proposed.proposal
         watch.on_proposal(proposal)
-        source = TaskSource.of(
-            request.domain,
-            request.goal_or_first,
-            request.seed,
-            proposal.operators,
-            proposal.rewards,
-        )
         kept = _kept(request.keep, there, proposal, watch.tell)
         with some_workers(jobs, ray) as workers, watch.curriculum() as callback:
-            folder = request.work_folder
-            library = Curriculum(
-                source, settings, folder, workers, callback, known, encoder, kept
-            ).run()
+
+            def learn(
+                proposal: Proposal,
+                folder: Path,
+                settings: AcquisitionSettings,
+                kept: Mapping[str, AcquiredSkill],
+            ) -> SkillLibrary:
+                source = _source(request, proposal)
+                return Curriculum(
+                    source, settings, folder, workers, callback, known, encoder, dict(kept)
+                ).run()
+
+            library = learn(proposal, request.work_folder, settings, kept)
+            if request.revise:
+                revisions = Revisions(request, settings, least, learn, watch.on_attempt, watch.tell)
+                library = revisions.carry_out(proposal, library)
     library = replace(library, record={**_made_by(request, proposed, encoder), **library.record})
     save_skill_library(request.library_folder, library)
     return library
+
+
+def _source(request: AcquisitionRequest, proposal: Proposal) -> TaskSource:
+    """The tasks to learn from, and what to learn in them."""
+    return TaskSource.of(
+        request.domain,
+        request.goal_or_first,
+        request.seed,
+        proposal.operators,
+        proposal.rewards,
+    )
 
 
 @dataclass(frozen=True)

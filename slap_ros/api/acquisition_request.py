@@ -8,7 +8,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from slap_ros.acquisition.proposals.proposer_names import MANUAL, REWARDERS, require_known
+from slap_ros.acquisition.proposals.proposer_names import (
+    LANGUAGE,
+    MANUAL,
+    REWARDERS,
+    require_known,
+)
 from slap_ros.acquisition.training.embedding_encoder import EmbeddingEncoder
 from slap_ros.acquisition.training.retrieval import MetricSignatureEncoder, SkillEncoder
 from slap_ros.acquisition.training.settings import ACQUISITION_SETTINGS, AcquisitionSettings
@@ -39,6 +44,7 @@ class AcquisitionRequest:
         begin_with: Libraries whose skills new ones may begin with.
         encoder: Embedding model that says which skills are alike; None for metrics alone.
         keep: Library whose skills are there already.
+        revise: Whether a model may change what it has proposed for skills that are given up.
 
     Raises:
         InvalidParameterError: They do not fit together.
@@ -57,11 +63,16 @@ class AcquisitionRequest:
     begin_with: Sequence[Path] = ()
     encoder: str | None = None
     keep: Path | None = None
+    revise: bool = False
 
     def __post_init__(self) -> None:
         require_known("--rewarder", self.rewarder, REWARDERS)
         if self.encoder is not None and not self.begin_with:
             raise InvalidParameterError("--encoder is for --from: without, nothing is retrieved")
+        if self.revise and LANGUAGE not in (self.proposers.proposer, self.rewarder):
+            raise InvalidParameterError(
+                "--revise is for --proposer language or --rewarder language: nobody else is asked"
+            )
 
     @property
     def goal_or_first(self) -> str:
@@ -82,6 +93,7 @@ class AcquisitionRequest:
             **{"from": [_shareable(folder) for folder in self.begin_with]},
             encoder=self.encoder,
             keep=_shareable(self.keep) if self.keep else None,
+            revise=self.revise or None,
             settings=self.settings,
             steps=self.steps,
             set=list(self.changes) or None,

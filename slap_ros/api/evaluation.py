@@ -5,10 +5,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 from slap_ros.api.jobs import some_workers
 from slap_ros.api.left_out import warn_caller
+from slap_ros.api.library_descriptions import describe_skills
 from slap_ros.api.shortcut_choice import SAMPLES, Shortcuts, choose_library, sampling
 from slap_ros.core import Domain
 from slap_ros.errors import ErrorCode, InvalidParameterError
@@ -19,6 +20,7 @@ from slap_ros.planning.planner_choice import DEFAULT_PLANNER
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 from slap_ros.skills.domain_choice import DomainChoice
 
+SKILLS_ALONE = "skills"  # name of planning without shortcuts, where skills were acquired
 OnTrial = Callable[[Approach, Trial], None]
 
 
@@ -155,6 +157,25 @@ def compared_approaches(
             )
         compared.insert(1, shooting(library, domain, sampling(samples)))
     return compared
+
+
+def against_skills(compared: Sequence[Approach], domain: Domain) -> list[Approach]:
+    """What is compared, the first being called the acquired skills alone.
+
+    Args:
+        compared: Ways to plan, without shortcuts first.
+        domain: Domain with the skills.
+
+    Raises:
+        InvalidParameterError: There is nothing to compare.
+    """
+    without, *others = compared
+    if not describe_skills(domain) or not others:
+        raise InvalidParameterError(
+            f"--against {SKILLS_ALONE} compares shortcuts with the acquired skills that they were "
+            "learned over: give --skills and --shortcuts, the folders of both libraries"
+        )
+    return [replace(without, name=SKILLS_ALONE), *others]
 
 
 def run_approaches(

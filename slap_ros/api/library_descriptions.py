@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from slap_ros.core import Domain
@@ -30,3 +31,16 @@ def describe_skills(domain: Domain) -> dict[str, Any]:
         return {}
     name, skills = domain.configuration[SKILLS_KEY], list(domain.skills)
     return {"name": name, "digest": digest, "skills": skills}
+
+
+def both_in_words(described: Mapping[str, Any]) -> str:
+    """The libraries of an evaluation in words: their names, digests and what they offer.
+
+    Args:
+        described: Descriptions of the libraries, ``skills`` and ``library``, as results have them.
+    """
+    skills, shortcuts = described["skills"], described["library"]
+    return (
+        f"skills {skills['name']} {skills['digest']}: {', '.join(skills['skills'])}\n"
+        f"shortcuts {shortcuts['name']} {shortcuts['digest']}: {', '.join(shortcuts['shortcuts'])}"
+    )

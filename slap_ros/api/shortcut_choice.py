@@ -13,7 +13,7 @@ from slap_ros.core import Domain
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError
 from slap_ros.planning.planner import require_planner
 from slap_ros.planning.planner_choice import WITH_SHORTCUTS
-from slap_ros.shortcuts.shipped import NONE, chosen_library
+from slap_ros.shortcuts.shipped import NONE, chosen_library, require_same_skills
 from slap_ros.shortcuts.shortcut import DEFAULT, Sampling
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 
@@ -35,6 +35,7 @@ def choose_library(
     Raises:
         InvalidLibraryError: The library cannot be used as a whole, or is another domain's.
         InvalidParameterError: The planner cannot use the library that was chosen.
+        SkillsChangedError: The library that was chosen was learned over other skills.
     """
     if isinstance(shortcuts, ShortcutLibrary):
         return _fitting(shortcuts, domain, planner)
@@ -58,6 +59,7 @@ def _fitting(library: ShortcutLibrary, domain: Domain, planner: str) -> Shortcut
     """The library, which must be the domain's and of use to the planner."""
     if library.domain != domain.name:
         raise InvalidLibraryError(f"shortcuts of domain {library.domain!r}, not of {domain.name!r}")
+    require_same_skills(library, domain, "this library")
     if require_planner(planner).name not in WITH_SHORTCUTS:
         raise InvalidParameterError(
             f"the planner {planner} plans without shortcuts: give shortcuts=None, or use "

@@ -66,8 +66,8 @@ def train(
         domain: Domain to train in, as :func:`make` makes it.
         folder: Folder that the library is saved to.
         seed: Seed of all random numbers.
-        settings: Name of the hyper-parameters: ours, ours_short, ours_several, paper, or the
-            domain's own.
+        settings: Name of the hyper-parameters: ours, ours_short, ours_several, ours_near,
+            paper, or the domain's own.
         changes: Settings to change, by dotted name, as ``{"exploration.rollouts": 16}``; or texts
             as on the command line.
         steps: Environment steps per shortcut; None for those of the settings.

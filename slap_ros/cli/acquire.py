@@ -74,6 +74,14 @@ class AcquireOptions:
             "that fail."
         ),
     ] = None
+    revise: Annotated[
+        bool,
+        typer.Option(
+            "--revise",
+            help="Tell the language model how skills failed that are given up, and learn them "
+            "again with what it changes, at most three times.",
+        ),
+    ] = False
     settings: Annotated[
         str, typer.Option(help=f"Networks and SAC: {', '.join(ACQUISITION_SETTINGS)}.")
     ] = "small"
@@ -121,6 +129,7 @@ class AcquireOptions:
             begin_with=self.begin or (),
             encoder=self.encoder,
             keep=self.keep,
+            revise=self.revise,
         )
 
 

@@ -13,8 +13,13 @@ from rich.table import Table
 
 from slap_ros.api.command_line import command_line
 from slap_ros.api.command_options import DomainName, Jobs, Preset, Samples, ShortcutFolder
-from slap_ros.api.evaluation import compared_approaches, run_approaches
-from slap_ros.api.library_descriptions import describe_library, describe_skills
+from slap_ros.api.evaluation import (
+    SKILLS_ALONE,
+    against_skills,
+    compared_approaches,
+    run_approaches,
+)
+from slap_ros.api.library_descriptions import both_in_words, describe_library, describe_skills
 from slap_ros.cli.bars import counting_bars
 from slap_ros.cli.console import console, print_json
 from slap_ros.cli.options import EffortFactor, Goal, Json, Planner, Within, at_most
@@ -34,6 +39,12 @@ from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 from slap_ros.skills.domain_choice import SHIPPED
 from slap_ros.versions import versions
 
+FirstSeed = Annotated[
+    int,
+    typer.Option(
+        min=0, help="First seed of the tasks. Training samples its tasks from seed 1000000 on."
+    ),
+]
 Tasks = Annotated[int, typer.Option(min=1, callback=at_most(10**6), help="Tasks per seed.")]
 Seeds = Annotated[int, typer.Option(min=1, callback=at_most(10**6), help="Number of seeds.")]
 
@@ -42,13 +53,7 @@ def evaluate(
     domain: DomainName,
     tasks: Tasks = 10,
     seeds: Seeds = 5,
-    first_seed: Annotated[
-        int,
-        typer.Option(
-            min=0,
-            help="First seed of the tasks. Training samples its tasks from seed 1000000 on.",
-        ),
-    ] = 0,
+    first_seed: FirstSeed = 0,
     preset: Preset = None,
     goal: Goal = None,
     skills: Skills = SHIPPED,
@@ -75,7 +80,9 @@ def evaluate(
     """Plan and execute many tasks; print success, plan length and planning time.
 
     A library adds two rows for the same tasks: SLAP with one sample, as the paper evaluates it, and
-    with --samples. Spreads are mean ± sample standard deviation over all tasks.
+    with --samples. With --against skills, the first row is named after the acquired skills, and the
+    digests of skills and shortcuts are printed. Spreads are mean ± sample standard deviation over
+    all tasks.
     """
     planner = with_settings(planner, within, effort)
     chosen = open_chosen(domain, preset, skills)
@@ -90,12 +97,16 @@ def evaluate(
         require_replaceable(output, command)
     library = choose(shortcuts, chosen, planner)
     compared = compared_approaches(library, chosen, samples, with_shooting)
+    libraries = _libraries(chosen, shortcuts, library)
+    folders = [Path(one) for one in against or () if one != SKILLS_ALONE]
+    if len(folders) < len(against or ()):
+        compared = against_skills(compared, chosen)
+        console.print(both_in_words(libraries))
     experiment = Experiment(chosen, tasks, seeds, first_seed, planner, goal=goal, skills=skills)
     results = _run(experiment, compared, jobs)
-    rivals = run_rivals(experiment, against, results[0][1], jobs)
+    rivals = run_rivals(experiment, folders, results[0][1], jobs)
     if output is not None:
-        made = _libraries(chosen, shortcuts, library) | rivals.described
-        origin = {"command": command, "domain": domain} | settings | made
+        origin = {"command": command, "domain": domain} | settings | libraries | rivals.described
         write_evaluation(output, origin, results + rivals.results)
     return _show(experiment, results, rivals, json)
 

@@ -24,7 +24,16 @@ PANELS: Mapping[str, str] = {
         PLANNING,
     ),
     **dict.fromkeys(
-        ("skills", "acquire", "acquisition", "proposer", "rewarder", "demonstrations", "operators"),
+        (
+            "skills",
+            "acquire",
+            "acquisition",
+            "proposer",
+            "rewarder",
+            "demonstrations",
+            "operators",
+            "revise",
+        ),
         SKILLS,
     ),
     **dict.fromkeys(

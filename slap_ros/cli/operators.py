@@ -9,8 +9,12 @@ from slap_ros.relational import LiftedOperator, RewardTemplate
 
 
 def print_operator(operator: LiftedOperator, reward: RewardTemplate | None) -> None:
-    """Print an operator's preconditions and effects, and its reward if it has one."""
-    console.print(f"{operator}")
+    """Print an operator's preconditions and effects, and its reward if it has one.
+
+    ``--operators`` reads what this prints.
+    """
+    parameters = ", ".join(f"{variable}: {variable.type}" for variable in operator.parameters)
+    console.print(f"{operator.name}({parameters})")
     different = [f"{one} != {other}" for one, other in operator.inequalities]
     for label, atoms, more in (
         ("PRE", operator.preconditions, different),

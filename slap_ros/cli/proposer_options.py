@@ -45,15 +45,16 @@ class ProposerOptions(Proposers):
     model: Annotated[
         str | None,
         typer.Option(
-            help="Name of the language model. Default: SLAP_LANGUAGE_MODEL, "
-            "else as in the settings."
+            help="Name of the language model; ask:NAME to carry questions to it by hand. "
+            "Default: SLAP_LANGUAGE_MODEL, else as in the settings."
         ),
     ] = None
     base_url: Annotated[
         str | None,
         typer.Option(
             help="URL of a server with the OpenAI-compatible interface. Its key is in "
-            "OPENAI_API_KEY. Default: SLAP_LANGUAGE_BASE_URL, else as in the settings."
+            "OPENAI_API_KEY. With ask:NAME, folder:PATH for files instead of the terminal. "
+            "Default: SLAP_LANGUAGE_BASE_URL, else as in the settings."
         ),
     ] = None
     language_settings: LanguageFile = None

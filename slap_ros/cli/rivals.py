@@ -18,10 +18,11 @@ from slap_ros.evaluation.experiment import Experiment, Trial
 from slap_ros.evaluation.summary import Summary
 
 Against = Annotated[
-    list[Path] | None,
+    list[str] | None,
     typer.Option(
-        metavar="FOLDER",
-        help="Folder of a baseline that `slap baseline train` made, to compare with. May be "
+        metavar="skills|FOLDER",
+        help="What to compare with: skills, for the acquired skills that the shortcuts were "
+        "learned over, alone; or the folder of a baseline that `slap baseline train` made. May be "
         "repeated.",
     ),
 ]
@@ -53,13 +54,13 @@ class RivalResults:
 
 
 def run_rivals(
-    experiment: Experiment, folders: Sequence[Path] | None, yardstick: Sequence[Trial], jobs: int
+    experiment: Experiment, folders: Sequence[Path], yardstick: Sequence[Trial], jobs: int
 ) -> RivalResults:
     """Let each baseline act in every task.
 
     Args:
         experiment: Tasks to solve.
-        folders: Folders of baselines, if any.
+        folders: Folders of baselines.
         yardstick: Trials of pure planning on the same tasks.
         jobs: Number of processes.
 

@@ -49,8 +49,9 @@ class TrainOptions:
         str,
         typer.Option(
             help="Hyper-parameters: ours, ours_short (ends as soon as plans get no shorter), "
-            "ours_several (more shortcuts, also for random goals), paper (the paper's), or the "
-            "name of the domain's own."
+            "ours_several (more shortcuts, also for random goals), ours_near (explores with pushes "
+            "at objects, and beyond what operators reach), paper (the paper's), or the name of the "
+            "domain's own."
         ),
     ] = "ours"
     set: Annotated[list[str] | None, setting_changes("exploration.rollouts=16")] = None

@@ -95,8 +95,9 @@ class Learning:
         make_vector_world: Function that makes worlds that are stepped together, where that is
             faster than one after the other.
         settings: Training settings of this domain where they differ from the usual ones: by the
-            name of ``slap train --settings`` (``ours``, ``ours_several``, which differs from
-            ``ours``, ``paper``, or a new one), then by dotted name, as ``slap train --set`` has it.
+            name of ``slap train --settings`` (``ours``; ``ours_several`` and ``ours_near``, which
+            differ from ``ours``; ``paper``, or a new one), then by dotted name, as ``slap train
+            --set`` has it.
         ablations: Interfaces that each lack one of the terms that were made by hand for this
             domain, by the name of what is left out, and a plain one. ``slap study ablation``
             compares them.

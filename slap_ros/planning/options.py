@@ -14,6 +14,9 @@ from slap_ros.core import Action, ActionSpace, DemandingSkill, Domain, Policy, S
 from slap_ros.errors import ErrorCode, InvalidCommandError, UnknownSkillError
 from slap_ros.relational import AtomSpace, Object, State, Target
 
+PATIENCE = 2  # times as many steps as in the model, after which a shortcut has led elsewhere
+LEAST_PATIENCE = 10  # steps
+
 
 class OptionKind(Enum):
     """Where an option comes from; the values are ``slap_msgs/PlanEdge.kind``."""
@@ -170,6 +173,9 @@ class OptionExecution:
         hold_steps: Environment steps for which to hold at its end where the target is not perceived
             yet, as debounced atoms are late.
         steps: Environment steps commanded so far.
+        expected_steps: Environment steps that the option takes in the planner's model; 0 where that
+            is not known. A shortcut that takes far longer is over: it has led elsewhere, and its
+            policy was never trained there.
 
     Raises:
         SkillNotApplicableError: The skill cannot start in this state.
@@ -182,6 +188,7 @@ class OptionExecution:
     state: State
     hold_steps: int = 0
     steps: int = 0
+    expected_steps: int = 0
     _policy: Policy = field(init=False, repr=False)
     _held_steps: int = field(default=0, init=False)  # at its end
     _start: int | None = field(default=None, init=False)  # the abstract state in which it begins
@@ -213,7 +220,7 @@ class OptionExecution:
             )
         if self.target.reached(abstract) and self.steps > 0 and self.option.accepts(state):
             return OptionResult(ErrorCode.NONE)
-        if self.steps >= self.option.skill.step_limit:
+        if self.steps >= self._step_limit:
             return self._missed(ErrorCode.SKILL_STEP_LIMIT, self._start, abstract)
         action = self._next(state)
         if action is None:
@@ -224,6 +231,14 @@ class OptionExecution:
             return OptionResult(error.code, f"{self.option}: {error}")
         self.steps += 1
         return action
+
+    @property
+    def _step_limit(self) -> int:
+        """Environment steps after which the option has failed."""
+        longest = self.option.skill.step_limit
+        if self.option.kind is not OptionKind.SHORTCUT or self.expected_steps == 0:
+            return longest
+        return min(longest, max(LEAST_PATIENCE, PATIENCE * self.expected_steps))
 
     def _missed(self, code: ErrorCode, start: int, abstract: int) -> OptionResult:
         """The result of an option that has ended elsewhere.

@@ -111,18 +111,21 @@ class Metric:
 
     @cached_property
     def definition(self) -> str:
-        """The source text of the scalar definition.
+        """The source text of the scalar definition, under the metric's own name.
+
+        Metrics may share a function, and differ in what is best.
 
         Raises:
             InvalidDomainError: There is none to be had, as for a function made at run time.
         """
         try:
-            return textwrap.dedent(inspect.getsource(self.scalar)).strip()
+            source = textwrap.dedent(inspect.getsource(self.scalar)).strip()
         except (OSError, TypeError) as error:
             raise InvalidDomainError(
                 f"metric {self.name}: the source of its scalar definition cannot be read "
                 f"({error}); define it as a function in a module"
             ) from error
+        return source.replace(f"def {self.scalar.__name__}(", f"def {self.name}(", 1)
 
     @cached_property
     def signature(self) -> str:

@@ -10,6 +10,7 @@ becomes a state only if that world accepts it, because the planner's model then 
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
@@ -26,22 +27,30 @@ from slap_ros.errors import (
 )
 from slap_ros.geometry.pose import Pose
 from slap_ros.relational import Object, State
+from slap_ros.robot.grasp_tracking import GRASPED, expected_pose, grasp_as_seen, is_lost
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.limits import STEP_TOLERANCE, JointMotion, Limits
 from slap_ros.robot.scene_config import SceneConfig
 from slap_ros.robot.state_assembly import Grasp, StateAssembler, feature_values
-from slap_ros.robot.tracking import Detection, PoseEstimate, Track, TrackingSettings, measured_pose
+from slap_ros.robot.tracking import (
+    LONGEST,
+    Detection,
+    PoseEstimate,
+    Track,
+    TrackingSettings,
+    measured_pose,
+)
 from slap_ros.worlds.contact.features import ROBOT as HAND_OF_FORCES
 from slap_ros.worlds.features import JOINT_FEATURES
 from slap_ros.worlds.joint_space.features import GRASP_FEATURES, ROBOT
 from slap_ros.worlds.joint_space.world import PandaWorld
-from slap_ros.worlds.panda import FINGER_OPEN, hand_pose
+from slap_ros.worlds.panda import FINGER_OPEN
 
 GAP_OPEN = 2.0 * FINGER_OPEN  # m, between the fingers
 GAP_SHUT = 0.0  # m
-GRASPED = 0.5  # of the expected gap; with less there is nothing between the fingers
-FOLLOWS = 0.03  # m, between a held object and where the hand has it; further away it was lost
 FARTHEST = 10.0  # m, from the base; what is detected further away is in another unit
+PRESSED = 0.002  # m, by which the arm may be told to be inside a table: it cannot be
+HIGHEST = 0.03  # m, by which it is raised for that
 DRIFT = 0.02  # rad, of a joint of an arm that is taken to stand
 
 
@@ -98,6 +107,7 @@ class RobotWorld:
             for obj, frames in self.scene_config.detected.items()
             for how in frames
         }
+        self._pictures: deque[float] = deque(maxlen=LONGEST)  # stamps of detections, each once
         self._reading: JointReading | None = None
         self._grasp: Grasp | None = None
         self._candidate: Grasp | None = None  # what the gripper is to close around
@@ -129,6 +139,8 @@ class RobotWorld:
                 "are positions in m?"
             )
         self._tracks[obj].add(Detection(stamp_s, pose, frame))
+        if not self._pictures or stamp_s > self._pictures[-1]:
+            self._pictures.append(stamp_s)
 
     def add_joint_reading(self, reading: JointReading) -> None:
         """Take joint positions.
@@ -175,14 +187,15 @@ class RobotWorld:
         reading = self._reading
         if reading is None or reading.stamp_s <= since_s or not reading.at_rest:
             return None
-        estimates = {obj: track.estimate(since_s) for obj, track in self._tracks.items()}
-        self._detect_grasp_loss(reading, estimates)
+        estimates = self._estimates(reading, since_s)
         held = self._grasp.obj if self._grasp is not None else None
         known = {o: s for o, s in estimates.items() if s is not None and o != held}
         if len(known) < len(self._tracks) - (held is not None):
             return None
-        if not moving and not all(s.at_rest for s in known.values()):
+        if not moving and not self._settled(estimates, since_s):
             return None
+        if self._grasp is not None:
+            self._grasp = grasp_as_seen(self._grasp, reading, estimates.get(self._grasp.obj))
         state = self._assembler.assemble(reading, known, self._grasp)
         self._model.reset(state)
         for obj, estimate in known.items():
@@ -190,19 +203,32 @@ class RobotWorld:
         self._state = state
         return state
 
-    def _detect_grasp_loss(
-        self, reading: JointReading, estimates: Mapping[Object, PoseEstimate | None]
-    ) -> None:
-        """Take the hand as empty if what it held does not follow it, or the fingers are shut."""
+    def _estimates(
+        self, reading: JointReading, since_s: float
+    ) -> dict[Object, PoseEstimate | None]:
+        """What is known of each object; the hand is empty from now on if it lost what it held."""
         grasp = self._grasp
-        if grasp is None:
-            return
-        expected = hand_pose(reading.joints).compose(grasp.pose).position
-        seen = estimates.get(grasp.obj)
-        strayed = seen is not None and math.dist(seen.pose.position, expected) > FOLLOWS
-        shut = reading.gap is not None and reading.gap < GRASPED * 2.0 * grasp.finger
-        if strayed or shut:
+        if grasp is not None and grasp.obj in self._tracks:
+            self._tracks[grasp.obj].expect(expected_pose(grasp, reading))
+        estimates = {
+            obj: track.last_at_rest if self._is_hidden(track, since_s) else track.estimate(since_s)
+            for obj, track in self._tracks.items()
+        }
+        if grasp is not None and is_lost(grasp, reading, estimates.get(grasp.obj)):
             self._grasp, self._lost = None, True
+        return estimates
+
+    def _is_hidden(self, track: Track, since_s: float) -> bool:
+        """Whether pictures since then, and since it was seen last, show others but not this one."""
+        enough, unseen_s = self.tracking.hidden_after, max(since_s, track.newest_s)
+        return 0 < enough <= sum(stamp_s > unseen_s for stamp_s in self._pictures)
+
+    def _settled(self, estimates: Mapping[Object, PoseEstimate | None], since_s: float) -> bool:
+        """Whether everything that is seen has come to rest: what is hidden in the hand has."""
+        return all(
+            seen.at_rest if seen is not None else self._tracks[obj].newest_s <= since_s
+            for obj, seen in estimates.items()
+        )
 
     # -- commands -------------------------------------------------------------------------------
 
@@ -219,9 +245,8 @@ class RobotWorld:
             raise InvalidStateError("nothing is measured yet")
         self._model.reset(self._state)
         after = self._model.step(action)
-        start, target = (
-            feature_values(s, self._robot, JOINT_FEATURES) for s in (self._state, after)
-        )
+        start = feature_values(self._state, self._robot, JOINT_FEATURES)
+        target = self._model.joints_off_fixed_bodies(tuple(start), PRESSED, HIGHEST)
         moved = self.joint_distance(start)
         if moved > DRIFT:
             raise UnsafeCommandError(
@@ -260,8 +285,9 @@ class RobotWorld:
 
     def confirm_release(self) -> None:
         """Take the hand as empty."""
-        if self._grasp is not None:
-            self._tracks[self._grasp.obj].forget()
+        if self._grasp is not None and self._reading is not None:
+            let_go_at = expected_pose(self._grasp, self._reading)
+            self._tracks[self._grasp.obj].let_go(let_go_at)
         self._grasp, self._lost = None, False
 
     def close(self) -> None:

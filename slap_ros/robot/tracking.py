@@ -39,6 +39,8 @@ class TrackingSettings:
     turn_noise_rad: float = 0.01  # standard deviation about each axis
     confirmations: int = 3  # detections that confirm a place that is known
     initial_detections: int = 10  # detections that make a place known
+    # Pictures in a row without an object after which it is hidden: where it was at rest. 0: never.
+    hidden_after: int = 0
 
     def __post_init__(self) -> None:
         if min(self.position_noise_m, self.turn_noise_rad) <= 0.0:
@@ -47,6 +49,10 @@ class TrackingSettings:
             raise InvalidParameterError(
                 f"2 <= confirmations <= initial_detections <= {LONGEST}, not "
                 f"{self.confirmations}, {self.initial_detections}"
+            )
+        if not 0 <= self.hidden_after <= LONGEST:
+            raise InvalidParameterError(
+                f"an object is hidden after 0 to {LONGEST} pictures, not {self.hidden_after}"
             )
 
 
@@ -83,6 +89,7 @@ class Track:
         self._settings = settings
         self._detections: deque[Detection] = deque(maxlen=LONGEST)
         self._known: PoseEstimate | None = None  # its pose at rest
+        self.last_at_rest: PoseEstimate | None = None  # where it is, as long as it is hidden
         self._together: dict[str, Pose] = {}  # of the newest picture, by frame
 
     def add(self, detection: Detection) -> None:
@@ -126,11 +133,19 @@ class Track:
 
     def remember(self, estimate: PoseEstimate) -> None:
         """Keep a pose at rest, against which later detections are compared."""
-        self._known = estimate if estimate.at_rest else None
+        self._known = self.last_at_rest = estimate if estimate.at_rest else None
+
+    def expect(self, pose: Pose) -> None:
+        """Take a pose as well known: few detections that agree with it confirm it to the bit."""
+        self._known = _still(pose, self._settings.initial_detections)
 
     def forget(self) -> None:
         """Drop the pose at rest: the object was moved on purpose."""
-        self._known = None
+        self._known = self.last_at_rest = None
+
+    def let_go(self, pose: Pose) -> None:
+        """Drop the pose at rest: the object was moved on purpose, and let go at a pose."""
+        self._known, self.last_at_rest = None, _still(pose, self._settings.confirmations)
 
     def _agree(self, detections: Sequence[Detection]) -> bool:
         """Whether one place explains all of them."""

@@ -12,36 +12,41 @@ each operator.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import count
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slap_ros.core import Domain, Task
 from slap_ros.learning.stored_keys import restored, stored
-from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
+from slap_ros.planning.abstract_graph import Edge, build_abstract_graph
 from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.plan import Plan
 from slap_ros.planning.problem import Problem
 from slap_ros.planning.search import Vertex
-from slap_ros.policies.action_map import ActionMap
 from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.relational import State
+from slap_ros.shortcuts.exploration_policies import (
+    RANDOM,
+    ExplorationPolicy,
+    PushAim,
+    RandomExploration,
+)
+from slap_ros.shortcuts.rollout_origins import OptionRetracer, RolloutOrigin
 from slap_ros.shortcuts.settings import ExplorationSettings
 from slap_ros.shortcuts.signature import Change, Signature, context_of
+from slap_ros.shortcuts.way_on import WayOn, steps_to_goal
 
 OperatorPath = tuple[str, ...]  # operators by which a shortcut's source was reached
 ABSORBED_MOTION = 0.5  # share of a motion's steps that remain where it is part of a shortcut
 UNBATCHED_WORLDS = 4  # worlds where a domain's cannot be stepped together
-KEEPS = 3  # times that a gripper stays as it is, for each that it closes and each that it opens
 
 
 @dataclass(frozen=True)
 class ShortcutCandidate:
-    """A pair of abstract states, up to objects, that random rollouts joined.
+    """A pair of abstract states, up to objects, that rollouts joined.
 
     Args:
         signature: Lifted change from the first abstract state to the second.
@@ -51,6 +56,9 @@ class ShortcutCandidate:
             that the shortcut would replace.
         plan_steps: Environment steps of the plan without the shortcut.
         expected_saving: Environment steps by which the shortcut is expected to shorten the plan.
+        beyond: Whether operators alone reach the second abstract state in no plan, so that it is
+            no node of the abstract planning graph.
+        found_by: Names of the exploration policies whose rollouts reached the target.
     """
 
     signature: Signature
@@ -59,10 +67,21 @@ class ShortcutCandidate:
     steps: int
     plan_steps: int
     expected_saving: float
+    beyond: bool = False
+    found_by: tuple[str, ...] = (RANDOM,)
 
     def as_json(self) -> dict[str, Any]:
-        """A JSON object, under the keys of :mod:`slap_ros.learning.stored_keys`."""
-        return stored(self)
+        """A JSON object, under the keys of :mod:`slap_ros.learning.stored_keys`.
+
+        What random actions found within the graph says no more than in work folders from when
+        there was nothing else.
+        """
+        data = stored(self)
+        if not self.beyond:
+            del data["beyond"]
+        if self.found_by == (RANDOM,):
+            del data["found_by"]
+        return data
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> ShortcutCandidate:
@@ -77,7 +96,9 @@ class ShortcutCandidate:
         if not all(isinstance(value, int | float) for value in numbers.values()):
             raise TypeError(f"{numbers} are not all numbers")
         operator_path = tuple(str(name) for name in values["operator_path"])
-        return cls(Signature.from_json(values["signature"]), operator_path, **numbers)
+        found_by = tuple(str(name) for name in values.get("found_by", (RANDOM,)))
+        signature, beyond = Signature.from_json(values["signature"]), bool(values.get("beyond"))
+        return cls(signature, operator_path, **numbers, beyond=beyond, found_by=found_by)
 
 
 @dataclass(frozen=True)
@@ -116,8 +137,45 @@ class ExplorationResult:
         )
 
 
+@dataclass
+class _Reached:
+    """Rollouts that reached an abstract state.
+
+    Args:
+        shortest: State in which the shortest of them was there.
+        lengths: Environment steps of each rollout until it was there.
+        found_by: Names of the exploration policies of the rollouts, without repetitions.
+    """
+
+    shortest: State
+    lengths: list[int] = field(default_factory=list)
+    found_by: dict[str, None] = field(default_factory=dict)  # a set that keeps its order
+
+    def add(self, steps: int, state: State, policy: ExplorationPolicy) -> None:
+        """Take note of one more rollout, which was there after so many steps, in a state."""
+        if steps < min(self.lengths, default=steps + 1):
+            self.shortest = state
+        self.lengths.append(steps)
+        self.found_by[policy.name] = None
+
+
+@dataclass(frozen=True)
+class _Destination:
+    """Where a shortcut would lead.
+
+    Args:
+        node: Abstract state, a mask.
+        to_go: Estimated environment steps from there to a goal.
+        beyond: Whether the abstract planning graph does not have it.
+    """
+
+    node: int
+    to_go: float
+    beyond: bool
+
+
 class Explorer:
-    """Explores one task: collects states, makes random rollouts, values what they reached."""
+    """Explores one task: collects states, makes rollouts, values what they reached."""
 
     def __init__(
         self,
@@ -151,9 +209,17 @@ class Explorer:
         self.graph = build_abstract_graph(
             self.space.abstract(task.initial_state), self.space.mask(task.goal), problem.operators
         )
+        nodes = self.graph.nodes
+        self._joined = {(nodes[edge.source], nodes[edge.target]) for edge in self.graph.edges}
         worlds = settings.rollouts if domain.steps_together else UNBATCHED_WORLDS
+        self._count = worlds
         self._worlds = domain.make_vector_world([task.initial_state] * worlds)
-        self._grips = np.arange(worlds) % 2 == 1  # whether the gripper acts in a world
+        self._aim = PushAim(domain, self._worlds, worlds, rng)
+        self._retracer = OptionRetracer(
+            domain.model_world(task.initial_state), self.space, domain.action_space
+        )
+        self._indexed: tuple[Vertex, Mapping[int, int]] | None = None  # of the latest vertex
+        self._way_on = WayOn(problem, self.graph.goal)
         self._steps = 0
 
     @classmethod
@@ -189,30 +255,85 @@ class Explorer:
         """Collect states, roll out from them, value what was reached."""
         vertices, operator_steps = self._collect()
         to_go = steps_to_goal(self.graph, operator_steps)
-        joined = {(edge.source, edge.target) for edge in self.graph.edges}
-        candidates = []
-        for vertex in vertices:
-            for j, lengths in self._roll_out(vertex).items():
-                if len(lengths) < self._settings.hits:
+        candidates: list[ShortcutCandidate] = []
+        for origin in self._origins(vertices):
+            for abstract, reached in self._roll_out(origin).items():
+                if len(reached.lengths) < self._settings.hits:
                     continue
-                candidates += [
-                    self._candidate(source, vertex, j, lengths, to_go[j])
-                    for source in self._sources(vertex)
-                    if (source.node, j) not in joined
-                ]
+                target = self._destination(origin, abstract, reached, to_go, operator_steps)
+                if target is not None:
+                    candidates += self._candidates(origin, target, reached)
         return ExplorationResult(
             tuple(candidate for candidate in candidates if candidate.expected_saving > 0.0),
             len(self.graph.candidates()),
-            self._steps,
+            self._steps + self._aim.steps + self._retracer.steps + self._way_on.steps,
             operator_steps,
         )
 
-    def _sources(self, vertex: Vertex) -> Iterator[Vertex]:
-        """Yield the vertices where a shortcut may begin that does what rollouts from a vertex did.
+    def _origins(self, vertices: Sequence[Vertex]) -> Iterator[RolloutOrigin]:
+        """Yield where rollouts begin: in vertices, and inside the options that led there.
 
-        At the vertex itself, or before the options that led there as far as they change nothing
-        in what is held: a shortcut may well learn to move there by itself.
+        A shortcut from inside an option begins where the option does. So what is held must be what
+        was held there.
         """
+        for vertex in vertices:
+            yield RolloutOrigin(vertex, vertex.state)
+            if self._settings.inside and vertex.edge is not None:
+                target = vertex.edge.option.target(self.graph.nodes[vertex.node])
+                for origin in self._retracer.inside(vertex, target, self._settings.inside):
+                    before = self.space.abstract(origin.vertex.state)
+                    if not (before ^ self.space.abstract(origin.state)) & self._grasping:
+                        yield origin
+
+    def _destination(
+        self,
+        origin: RolloutOrigin,
+        abstract: int,
+        reached: _Reached,
+        to_go: Sequence[float],
+        operator_steps: Mapping[str, float],
+    ) -> _Destination | None:
+        """Where a shortcut would lead that does what rollouts did; None where it is of no use.
+
+        Where more atoms hold in the vertex than in its node, they have to stay.
+
+        Args:
+            origin: Origin of the rollouts.
+            abstract: Abstract state that the rollouts reached, a mask.
+            reached: Rollouts that reached it.
+            to_go: Estimated environment steps from each node to a goal.
+            operator_steps: Mean environment steps of each operator, by name.
+        """
+        vertex, nodes = origin.vertex, self.graph.nodes
+        before = self.space.abstract(vertex.state)
+        target = Change.between(before, abstract).apply(nodes[vertex.node])
+        index = self._index_after(vertex)
+        if abstract in index:
+            j = index[abstract]
+            return _Destination(nodes[j], to_go[j], beyond=False) if j > vertex.node else None
+        if not self._settings.beyond or target in nodes:
+            return None
+        to_go_beyond = self._way_on.measure(reached.shortest, target, operator_steps)
+        return _Destination(target, to_go_beyond, beyond=True)
+
+    def _index_after(self, vertex: Vertex) -> Mapping[int, int]:
+        """The nodes by the abstract states that are reached in them from a vertex."""
+        if self._indexed is None or self._indexed[0] is not vertex:
+            abstract, node = self.space.abstract(vertex.state), self.graph.nodes[vertex.node]
+            index = {
+                Change.between(node, target).apply(abstract): j
+                for j, target in enumerate(self.graph.nodes)
+            }
+            self._indexed = vertex, index
+        return self._indexed[1]
+
+    def _sources(self, origin: RolloutOrigin) -> Iterator[Vertex]:
+        """Yield the vertices where a shortcut may begin that does what rollouts did.
+
+        At the vertex of the origin, or before the options that led there as far as they change
+        nothing in what is held: a shortcut may well learn to move there by itself.
+        """
+        vertex = origin.vertex
         yield vertex
         while vertex.parent is not None:
             nodes = self.graph.nodes[vertex.parent.node], self.graph.nodes[vertex.node]
@@ -221,35 +342,48 @@ class Explorer:
             vertex = vertex.parent
             yield vertex
 
-    def _candidate(
-        self, source: Vertex, vertex: Vertex, j: int, lengths: list[int], to_go: float
-    ) -> ShortcutCandidate:
-        """The candidate: a shortcut from ``source`` to what rollouts from a vertex reached.
+    def _candidates(
+        self, origin: RolloutOrigin, target: _Destination, reached: _Reached
+    ) -> Iterator[ShortcutCandidate]:
+        """Yield the candidates from wherever a shortcut to a destination may begin.
 
         Args:
-            source: Vertex in which the shortcut begins: ``vertex`` or one before it; see
-                :meth:`_sources`.
-            vertex: Vertex from which the rollouts were made.
-            j: Index of the node that the rollouts reached.
-            lengths: Environment steps of each rollout until it reached the node.
-            to_go: Estimated environment steps from the node to a goal.
+            origin: Origin of the rollouts.
+            target: Destination that the rollouts reached.
+            reached: Rollouts that reached it.
+        """
+        for source in self._sources(origin):
+            if (self.graph.nodes[source.node], target.node) not in self._joined:
+                yield self._candidate(source, origin, target, reached)
+
+    def _candidate(
+        self, source: Vertex, origin: RolloutOrigin, target: _Destination, reached: _Reached
+    ) -> ShortcutCandidate:
+        """The candidate: a shortcut from ``source`` to what rollouts reached.
+
+        Args:
+            source: Vertex in which the shortcut begins; see :meth:`_sources`.
+            origin: Origin of the rollouts.
+            target: Destination of the shortcut.
+            reached: Rollouts that reached the destination.
 
         Returns:
             The candidate, whose expected saving may be negative.
         """
         node = self.graph.nodes[source.node]
-        change = Change.between(node, self.graph.nodes[j])
+        change = Change.between(node, target.node)
         context = context_of(node, learner_interface(self._domain).grasping, self.space)
-        motions = vertex.g - source.g
-        steps = min(lengths)
+        motions, steps = origin.g - source.g, min(reached.lengths)
         expected = source.g + ABSORBED_MOTION * motions + steps
         return ShortcutCandidate(
             Signature.of(change, self.space, context),
             operator_path_to(source),
-            len(lengths),
+            len(reached.lengths),
             motions + steps,
             self._plan.predicted_steps,
-            self._plan.predicted_steps - (expected + to_go),
+            self._plan.predicted_steps - (expected + target.to_go),
+            target.beyond,
+            tuple(reached.found_by),
         )
 
     def _collect(self) -> tuple[list[Vertex], dict[str, float]]:
@@ -293,58 +427,48 @@ class Explorer:
             return None
         return Vertex(edge.target, rollout.final, vertex.g + rollout.steps, vertex, edge)
 
-    def _roll_out(self, vertex: Vertex) -> dict[int, list[int]]:
-        """Random rollouts, for all targets at once: steps to each node reached, by node.
-
-        Where more atoms hold in the vertex than in its node, they have to stay.
-        """
-        abstract, node = self.space.abstract(vertex.state), self.graph.nodes[vertex.node]
-        index = {
-            Change.between(node, target).apply(abstract): j
-            for j, target in enumerate(self.graph.nodes)
-        }
-        reached: dict[int, list[int]] = {}
-        for _ in range(0, self._settings.rollouts, len(self._grips)):
-            for first in self._roll_out_batch(vertex.state, index):
-                for j, steps in first.items():
-                    if j > vertex.node:
-                        reached.setdefault(j, []).append(steps)
+    def _roll_out(self, origin: RolloutOrigin) -> dict[int, _Reached]:
+        """Rollouts, for all targets at once: those that reached each abstract state, a mask."""
+        reached: dict[int, _Reached] = {}
+        for policy in self._policies(origin.state):
+            for first in self._roll_out_batch(origin.state, policy):
+                for abstract, (steps, state) in first.items():
+                    reached.setdefault(abstract, _Reached(state)).add(steps, state, policy)
         return reached
 
-    def _roll_out_batch(self, state: State, index: Mapping[int, int]) -> list[dict[int, int]]:
-        """The first step at which each node was reached, with all at rest, in every world."""
-        learner, to_action = learner_interface(self._domain), ActionMap(self._domain, gripper=True)
-        worlds = len(self._grips)
-        for world in range(worlds):
+    def _policies(self, state: State) -> Iterator[ExplorationPolicy]:
+        """Yield a policy for each batch of rollouts from a state."""
+        settings = self._settings
+        for _ in range(0, settings.rollouts, self._count):
+            for repeat in filter(None, (settings.action_repeat, settings.also_repeat)):
+                yield RandomExploration(self._domain, self._count, repeat, self._rng)
+        for _ in range(settings.pushes):
+            yield from self._aim.pushes(state)
+
+    def _roll_out_batch(
+        self, state: State, policy: ExplorationPolicy
+    ) -> list[dict[int, tuple[int, State]]]:
+        """When and where each abstract state was first reached, at rest, in every world."""
+        learner = learner_interface(self._domain)
+        for world in range(self._count):
             self._worlds.reset(world, state)
-        first: list[dict[int, int]] = [{} for _ in range(worlds)]
-        alive = np.ones(worlds, dtype=bool)
+        first: list[dict[int, tuple[int, State]]] = [{} for _ in range(self._count)]
+        alive = np.ones(self._count, dtype=bool)
         for step in range(self._settings.length):
-            if step % self._settings.action_repeat == 0:
-                actions = self._random_actions(to_action)
-            states = self._worlds.step(actions)
+            states = self._worlds.step(policy.actions(step))
             alive &= ~learner.failed(states)
             self._steps += int(alive.sum())
             at_rest = np.flatnonzero(alive & learner.at_rest(states))
-            abstracts = []
+            abstracts: list[int] = []
             if at_rest.size:
                 abstracts = self.space.abstract_each(State(states.layout, states.data[at_rest]))
             for number, abstract in zip(at_rest.tolist(), abstracts, strict=True):
-                if abstract in index:
-                    first[number].setdefault(index[abstract], step + 1)
+                if abstract not in first[number]:
+                    there = State(states.layout, states.data[number].copy())
+                    first[number][abstract] = step + 1, there
             if not alive.any():
                 break
         return first
-
-    def _random_actions(self, to_action: ActionMap) -> NDArray[np.float64]:
-        """Random actions, shape (worlds, axes); in every second world the gripper acts too."""
-        actions = to_action(self._rng.uniform(-1.0, 1.0, (len(self._grips), to_action.size)))
-        space = self._domain.learned_actions
-        if space.gripper is not None:
-            choices = np.array([*(0.0,) * KEEPS, space.gripper.closes, space.gripper.opens])
-            commands = self._rng.choice(choices, len(self._grips))
-            actions[:, space.gripper_index] = np.where(self._grips, commands, 0.0)
-        return actions
 
 
 def operator_path_to(vertex: Vertex) -> OperatorPath:
@@ -355,28 +479,3 @@ def operator_path_to(vertex: Vertex) -> OperatorPath:
         names.append(at.edge.option.skill.name)
         at = at.parent
     return tuple(reversed(names))
-
-
-def steps_to_goal(graph: AbstractGraph, operator_steps: Mapping[str, float]) -> list[float]:
-    """Estimated environment steps from each node to a goal; infinite where there is no way.
-
-    Operators count with their mean, and those without one with the mean of the others.
-    """
-    usual = float(np.mean(list(operator_steps.values()) or [1.0]))
-    incoming: list[list[Edge]] = [[] for _ in graph.nodes]
-    for edge in graph.edges:
-        incoming[edge.target].append(edge)
-    to_go = [float("inf")] * len(graph.nodes)
-    queue = [(0.0, goal) for goal in graph.goal_nodes]
-    for _, goal in queue:
-        to_go[goal] = 0.0
-    while queue:
-        rest, node = heapq.heappop(queue)
-        if rest > to_go[node]:
-            continue
-        for edge in incoming[node]:
-            longer = rest + operator_steps.get(edge.option.skill.name, usual)
-            if longer < to_go[edge.source]:
-                to_go[edge.source] = longer
-                heapq.heappush(queue, (longer, edge.source))
-    return to_go

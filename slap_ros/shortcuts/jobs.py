@@ -89,6 +89,7 @@ def start(
     signature: Signature,
     operator_path: OperatorPath,
     operator_steps: Mapping[str, float],
+    beyond: bool = False,
 ) -> dict[str, Any] | None:
     """The start of a shortcut in one task; see :func:`~slap_ros.shortcuts.starts.find_start`.
 
@@ -98,6 +99,7 @@ def start(
         signature: Signature of the shortcut.
         operator_path: Names of the operators that lead to the start.
         operator_steps: Mean environment steps of each operator, by name.
+        beyond: Whether the shortcut leads to abstract states that operators alone do not reach.
 
     Returns:
         A :class:`~slap_ros.shortcuts.starts.StartRecord` as JSON; None where there is no start.
@@ -109,6 +111,7 @@ def start(
         signature,
         operator_path,
         operator_steps,
+        beyond,
     )
     return None if found is None else found.as_json()
 

@@ -21,7 +21,7 @@ from slap_ros.core import Domain
 from slap_ros.policies.action_map import ActionMap
 from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.portable_math import on_grid
-from slap_ros.relational import AtomSpace, Column, GroundAtom, Object, State
+from slap_ros.relational import AtomSpace, Column, GroundAtom, Object, State, Target
 from slap_ros.relational.predicates import Bools, Predicate
 from slap_ros.relational.state import Array
 from slap_ros.shortcuts.signature import Change, Kind, Signature, concerned, kinds
@@ -197,6 +197,9 @@ class ObservationEncoder:
     def success(self, state: State, encoding: Encoding, targets: Sequence[int]) -> Bools:
         """Whether each state is one in which the shortcut ends.
 
+        Where options are not exact, more atoms may hold than those of the target, but none that
+        the shortcut deletes.
+
         Args:
             state: Batch of n states.
             encoding: Encoding of these states.
@@ -208,8 +211,14 @@ class ObservationEncoder:
         success = encoding.achieved.copy()
         for i in np.flatnonzero(success):
             abstract = self.space.abstract(State(state.layout, state.data[i]))
-            success[i] = abstract == targets[int(i)]
+            success[i] = self._target(targets[int(i)]).reached(abstract)
         return success
+
+    def _target(self, abstract: int) -> Target:
+        """The target that stands for an abstract state, a mask."""
+        if self.domain.exact:
+            return Target.exactly(abstract)
+        return Target(abstract, self.change.delete & ~abstract)
 
     def _grasp_atoms(self) -> int:
         """The atoms about what is held, a mask."""

@@ -31,6 +31,12 @@ class ExplorationSettings:
         action_repeat: Environment steps for which a random action is repeated: 1 jitters on the
             spot.
         nodes: Number of abstract states explored in a task, the cheapest to reach first.
+        also_repeat: Environment steps for which a random action is repeated in as many rollouts
+            again; 0 for no such rollouts.
+        pushes: Number of batches of straight pushes from each state, at every object.
+        inside: Environment steps between the states inside a skill's execution in which rollouts
+            begin as well; 0 for none.
+        beyond: Whether abstract states count that operators reach in no plan.
     """
 
     tasks: int = 4
@@ -39,10 +45,22 @@ class ExplorationSettings:
     hits: int = 1
     action_repeat: int = 8
     nodes: int = 6
+    also_repeat: int = 0
+    pushes: int = 0
+    inside: int = 0
+    beyond: bool = False
 
     def as_json(self) -> dict[str, Any]:
-        """A JSON object, under the keys of :mod:`slap_ros.learning.stored_keys`."""
-        return stored(self)
+        """A JSON object, under the keys of :mod:`slap_ros.learning.stored_keys`.
+
+        What else there is than random rollouts from where skills end is left out where there is
+        none, as work folders have it from when there was no other way.
+        """
+        data = stored(self)
+        for name in ("also_repeat", "pushes", "inside", "beyond"):
+            if not data[name]:
+                del data[name]
+        return data
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> ExplorationSettings:
@@ -188,7 +206,15 @@ _SEVERAL: Mapping[str, SettingValue] = {
 }
 SHORT = "ours_short"  # settings that end learning as soon as plans get no shorter
 _SHORT: Mapping[str, SettingValue] = {"stopping.every": Stopping().every}
-_VARIANTS = {SEVERAL: _SEVERAL, SHORT: _SHORT}  # of a domain's "ours"
+NEAR = "ours_near"  # settings that explore near objects, and beyond what operators reach
+_NEAR: Mapping[str, SettingValue] = {
+    "exploration.rollouts": 16,
+    "exploration.also_repeat": 4,
+    "exploration.pushes": 1,
+    "exploration.inside": 8,
+    "exploration.beyond": True,
+}
+_VARIANTS = {SEVERAL: _SEVERAL, SHORT: _SHORT, NEAR: _NEAR}  # of a domain's "ours"
 GENERAL: Mapping[str, TrainingSettings] = {
     "ours": OURS,
     **{name: changed(OURS, changes) for name, changes in _VARIANTS.items()},

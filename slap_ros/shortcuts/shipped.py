@@ -8,7 +8,7 @@ from pathlib import Path
 
 from slap_ros.core import Domain
 from slap_ros.domains import get_domain
-from slap_ros.errors import InvalidLibraryError, InvalidParameterError
+from slap_ros.errors import InvalidLibraryError, InvalidParameterError, SkillsChangedError
 from slap_ros.files import parse_json, read_text
 from slap_ros.planning.planner_choice import (
     DEFAULT_PLANNER,
@@ -19,6 +19,7 @@ from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.policies.library_files import ABOUT
 from slap_ros.policies.shipped_models import shipped_folder, shipped_with_siblings
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary, load_library
+from slap_ros.skills.domain_choice import DIGEST_KEY
 
 NONE = "none"  # the choice of no library
 
@@ -40,8 +41,8 @@ def chosen_library(
 
     Args:
         choice: Folder of a library; or ``none``; or nothing, for the shipped library, if there is
-            one and the planner can use it.
-        domain: Domain for which the library was learned.
+            one over the domain's skills and the planner can use it.
+        domain: Domain for which the library was learned, with the skills to plan with.
         planner: Name of the planner.
 
     Returns:
@@ -51,7 +52,47 @@ def chosen_library(
         InvalidLibraryError: It cannot be used as a whole.
         InvalidParameterError: The planner cannot use the library that was chosen.
         InvalidDomainError: Nothing can be learned in the domain, so it has no use for one.
+        SkillsChangedError: The library that was chosen was learned over other skills.
     """
+    library = _load_chosen(choice, domain, planner)
+    if library is None or library.skills_digest == skills_digest(domain):
+        return library
+    if not choice:  # what ships is for other skills
+        return None
+    require_same_skills(library, domain, choice)
+    return library
+
+
+def require_same_skills(library: ShortcutLibrary, domain: Domain, where: str) -> None:
+    """Refuse shortcuts that were learned over other skills than a domain has.
+
+    Args:
+        library: Library of shortcuts.
+        domain: Domain with the skills to plan with.
+        where: Name of the library in the message.
+
+    Raises:
+        SkillsChangedError: They were learned over others.
+    """
+    if library.skills_digest != skills_digest(domain):
+        raise SkillsChangedError(
+            f"{where}: its shortcuts were learned over {_in_words(library.skills_digest)}, but "
+            f"{domain.name} has {_in_words(skills_digest(domain))}: give --skills as they were "
+            f"then, train again over these with `slap train`, or plan without shortcuts ({NONE})"
+        )
+
+
+def skills_digest(domain: Domain) -> str:
+    """The digest of the acquired skills of a domain; empty where its skills are its own."""
+    return str(domain.configuration.get(DIGEST_KEY, ""))
+
+
+def _in_words(digest: str) -> str:
+    return f"the library of skills {digest}" if digest else "skills that were not acquired"
+
+
+def _load_chosen(choice: str | None, domain: Domain, planner: str) -> ShortcutLibrary | None:
+    """The library that was chosen, over whichever skills it was learned."""
     path = _chosen_path(choice, domain.name, planner)
     if path is None:
         return None
@@ -82,7 +123,7 @@ def require_usable(choice: str, planner: str = DEFAULT_PLANNER) -> None:
         UnknownDomainError: It is a library of a domain that is not installed here.
     """
     if choice not in ("", NONE):
-        chosen_library(choice, get_domain(_domain_of(Path(choice))), planner)
+        _load_chosen(choice, get_domain(_domain_of(Path(choice))), planner)
 
 
 def _domain_of(path: Path) -> str:

@@ -77,6 +77,12 @@ class ShortcutLibrary:
             whole.update(shortcut.name.encode() + save(policy_tensors(_learned(shortcut))))
         return whole.hexdigest()[:16]
 
+    @property
+    def skills_digest(self) -> str:
+        """The digest of the skills that it was learned over; empty where none were acquired."""
+        skills = self.record.get("skills")
+        return str(skills.get("digest", "")) if isinstance(skills, Mapping) else ""
+
 
 def save_library(path: Path, library: ShortcutLibrary) -> None:
     """Write a library as a folder, in place of the one that may be there."""

@@ -10,19 +10,29 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from slap_ros.core import Domain
 from slap_ros.errors import SlapError
-from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
+from slap_ros.planning.abstract_graph import (
+    AbstractGraph,
+    Edge,
+    EdgeBeyond,
+    add_beyond,
+    build_abstract_graph,
+)
+from slap_ros.planning.options import Option, hold_option
 from slap_ros.planning.problem import Problem
 from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.relational import AtomSpace, State
-from slap_ros.shortcuts.explore import OperatorPath, steps_to_goal
+from slap_ros.shortcuts.explore import OperatorPath
 from slap_ros.shortcuts.signature import Change, Signature
+from slap_ros.shortcuts.signature_grounder import SignatureGrounder
 from slap_ros.shortcuts.signature_matcher import SignatureMatcher
+from slap_ros.shortcuts.way_on import steps_to_goal
 
 
 @dataclass(frozen=True)
@@ -91,6 +101,7 @@ def find_start(
     signature: Signature,
     operator_path: OperatorPath,
     operator_steps: Mapping[str, float],
+    beyond: bool = False,
 ) -> StartRecord | None:
     """The start of a shortcut of this signature in a task.
 
@@ -104,6 +115,7 @@ def find_start(
         signature: Signature of the shortcut.
         operator_path: Names of the operators that lead from the initial state to the start.
         operator_steps: Mean environment steps of each operator, by name.
+        beyond: Whether the shortcut leads to abstract states that operators alone do not reach.
 
     Returns:
         The start; None where the task has none, or cannot be solved at all.
@@ -117,7 +129,10 @@ def find_start(
         )
     except SlapError:  # a task that cannot be solved teaches nothing here
         return None
-    matcher = SignatureMatcher(signature, space, learner_interface(domain).grasping)
+    about = (signature, space, learner_interface(domain).grasping)
+    matcher = SignatureMatcher(*about)
+    if beyond:
+        _extend(graph, SignatureGrounder(*about), problem, hold_option(domain.action_space))
     to_go = steps_to_goal(graph, operator_steps)
     for path, i, j in _nearest_to_goal_first(graph, operator_path, matcher, to_go):
         state = _execute(problem, graph, path, task.initial_state)
@@ -125,6 +140,29 @@ def find_start(
             change = Change.between(graph.nodes[i], graph.nodes[j])
             return StartRecord(seed, index, tuple(state.data), change.add, change.delete)
     return None
+
+
+def _extend(
+    graph: AbstractGraph, grounder: SignatureGrounder, problem: Problem, standing: Option
+) -> None:
+    """Add to a graph what a shortcut alone leads to, and its own edges, as planning does.
+
+    Args:
+        graph: Graph of given options.
+        grounder: Grounder of the shortcut's signature.
+        problem: Operators that may follow the shortcut.
+        standing: Option that stands for the shortcut, which is still to be learned.
+    """
+    leaving = [
+        EdgeBeyond(i, change.apply(node), partial(_made, standing))
+        for i, node in enumerate(graph.nodes)
+        for change in grounder.changes(node)
+    ]
+    add_beyond(graph, leaving, problem.operators)
+
+
+def _made(option: Option) -> Option:
+    return option
 
 
 def _nearest_to_goal_first(

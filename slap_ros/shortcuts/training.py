@@ -21,6 +21,7 @@ from slap_ros.learning.task_range import TaskRange
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.learning.workers import Workers, run_in_order
 from slap_ros.shortcuts import jobs
+from slap_ros.shortcuts.exploration_policies import RANDOM
 from slap_ros.shortcuts.explore import ExplorationResult, OperatorPath, ShortcutCandidate
 from slap_ros.shortcuts.progress import Progress
 from slap_ros.shortcuts.settings import ENOUGH_SUCCESS, TrainingSettings
@@ -85,11 +86,15 @@ class CandidateGroup:
         operator_path: Names of the operators by which the candidates' sources were reached.
         savings: Share of the plan's length that the candidate is expected to save in each explored
             task; 0 where there was none.
+        beyond: Whether a candidate leads to an abstract state that operators alone do not reach.
+        found_by: Names of the exploration policies that found candidates.
     """
 
     signature: Signature
     operator_path: OperatorPath
     savings: tuple[float, ...]
+    beyond: bool = False
+    found_by: tuple[str, ...] = (RANDOM,)
 
     @property
     def tasks(self) -> int:
@@ -132,6 +137,8 @@ def rank(explored: Sequence[ExplorationResult]) -> list[CandidateGroup]:
             max(group.values(), key=lambda c: (c.expected_saving, c.signature.name)).signature,
             operator_path,
             tuple(_saving(group.get(task)) for task in range(len(explored))),
+            any(candidate.beyond for candidate in group.values()),
+            tuple(dict.fromkeys(name for c in group.values() for name in c.found_by)),
         )
         for (_, operator_path), group in groups.items()
     ]
@@ -239,7 +246,7 @@ class Training:
         starts = self._starts(group, operator_steps)
         if not starts:  # it can begin in no task
             return length
-        shortcut = self._learn(group.signature, starts)
+        shortcut = _with_origin(self._learn(group.signature, starts), group)
         with_it = self._plan_length((*self._shortcuts, shortcut))
         kept = self._shorter(with_it, length)
         self.callback.on_validated(shortcut.name, length, with_it, kept)
@@ -314,7 +321,14 @@ class Training:
     ) -> tuple[StartRecord, ...]:
         name = group.signature.name
         work = [
-            (self.distribution, i, group.signature, group.operator_path, operator_steps)
+            (
+                self.distribution,
+                i,
+                group.signature,
+                group.operator_path,
+                operator_steps,
+                group.beyond,
+            )
             for i in range(self.settings.starts)
         ]
         return self._work.cached(
@@ -417,6 +431,13 @@ def _decode_lengths(data: Any, count: int) -> list[int | str]:
         if isinstance(length, bool) or not isinstance(length, int | str):
             raise TypeError(f"{length!r} is no plan length")
     return lengths
+
+
+def _with_origin(shortcut: Shortcut, group: CandidateGroup) -> Shortcut:
+    """The shortcut, whose record says what found it; random actions do where it says nothing."""
+    if group.found_by == (RANDOM,):
+        return shortcut
+    return replace(shortcut, record={**shortcut.record, "found_by": list(group.found_by)})
 
 
 def mean_steps(explored: Sequence[ExplorationResult]) -> dict[str, float]:

@@ -68,7 +68,7 @@ def test_operators_and_rewards_come_from_whoever_is_named(tmp_path, in_this_proc
     other = slap(*asked)
     assert "has another training, of `slap acquire points" in " ".join(other.stderr.split())
     shown = slap("skills", tmp_path / "library").stderr
-    assert "AchieveHolding(?thing)" in shown
+    assert "AchieveHolding(?thing: thing)" in shown
     assert "proposer and rewarder: induced and composed" in shown
 
 

@@ -84,6 +84,7 @@ def slap(*arguments):
     return subprocess.run(command, capture_output=True, text=True, timeout=300)
 
 
+@pytest.mark.slow
 @pytest.mark.training
 @pytest.mark.timeout(300)  # starts an ensemble, learns with it, and starts it again
 def test_a_run_acquires_what_it_lacks_and_one_bag_tells_it_all(network, tmp_path):

@@ -117,6 +117,7 @@ EXAMPLES: list[tuple[ComplaintClass, Example]] = [
     (C.CONTRADICTORY_EFFECT, lambda: of_operator("?peg", "", "Holding(?peg)", "Holding(?peg)")),
     (C.NO_EFFECT, lambda: of_operator("?peg", "Holding(?peg)", "", "")),
     (C.NO_EFFECT, lambda: of_operator("?peg", "Holding(?peg)", "", "Holding(?peg)")),
+    (C.NO_EFFECT, lambda: of_operator("?peg", "OnTable(?peg)", "OnTable(?peg)", "")),
     (C.DELETED_NOT_REQUIRED, lambda: of_operator("?peg", "", "OnTable(?peg)", "Holding(?peg)")),
     (C.IMPOSSIBLE_CHANGE, lambda: block("?hole", "", "", "IsClear(?hole)", STATIC)),
     (C.IMPOSSIBLE_CHANGE, lambda: block("?lid", "", "", "IsLidOpen(?lid)", NO_LID)),
@@ -138,7 +139,8 @@ EXAMPLES: list[tuple[ComplaintClass, Example]] = [
     (C.AMBIGUOUS_BINDING, lambda: of_reward('{"parallel_dis": 0.2}')),
     (C.IRRELEVANT_METRICS, lambda: of_reward("R = 0.1 * joint_dis(?peg)")),
 ]  # fmt: skip
-BY_THE_LOOP = {C.REFUSAL}  # no draft comes of it: test/language/test_scripts.py
+# No draft comes of them: test/language/test_scripts.py, test_revisions.py.
+BY_THE_LOOP = {C.REFUSAL, C.NOT_LEARNED}
 
 
 @pytest.mark.parametrize(("kind", "example"), EXAMPLES, ids=[kind.value for kind, _ in EXAMPLES])

@@ -11,8 +11,10 @@ import pytest
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
+from slap_ros.api.shortcut_choice import choose_library
 from slap_ros.domains import get_domain
-from slap_ros.errors import ErrorCode
+from slap_ros.errors import ErrorCode, SkillsChangedError
+from slap_ros.shortcuts.shipped import chosen_library, require_usable
 from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from support.steady_skills import PICKING, PUTTING, write_library
@@ -74,6 +76,45 @@ def test_a_plan_has_acquired_skills_and_shortcuts(trained):
     (shortcut,) = load_library(trained.folder / "library", get_domain("points", "line")).shortcuts
     options = [edge["option"] for edge in json.loads(answer.stdout)["plan"]]
     assert [option.split("(")[0] for option in options] == ["Pick", "Put", shortcut.name]
+
+
+def test_shortcuts_over_other_skills_are_refused_with_both_digests(trained, tmp_path):
+    """Skills that act alike are the same wherever they are; others are not, nor are none."""
+    library = trained.folder / "library"
+    elsewhere = shutil.copytree(trained.folder / "steady", tmp_path / "elsewhere")
+    slower = write_library(tmp_path / "slower", PICKING, replace(PUTTING, horizon=20))
+    domains = [open_domain(DomainChoice("points", "line", str(at))) for at in (elsewhere, slower)]
+    same, other = (domain.configuration["skills_digest"] for domain in domains)
+    assert chosen_library(str(library), domains[0]).skills_digest == same
+    require_usable(str(library))  # before any skills are known
+    for use in ("plan", "evaluate"):
+        answer = slap(
+            use, "points", "--preset", "line", "--skills", slower, "--shortcuts", library
+        )  # fmt: skip
+        assert answer.exit_code == ErrorCode.SKILLS_CHANGED, answer.output
+        assert same in answer.stderr and other in answer.stderr
+    with pytest.raises(SkillsChangedError, match=f"{same}.*not acquired"):
+        chosen_library(str(library), get_domain("points", "line"))
+    with pytest.raises(SkillsChangedError, match=f"{same}.*{other}"):
+        choose_library(load_library(library, domains[1]), domains[1], "lazy", print)
+
+
+def test_an_evaluation_against_skills_names_them_and_both_digests(trained, tmp_path):
+    skills, library = trained.folder / "steady", trained.folder / "library"
+    given = ["--preset", "line", "--skills", skills, "--tasks", 2, "--seeds", 1]
+    against = [*given, "--shortcuts", library, "--against", "skills"]
+    answer = slap("evaluate", "points", *against, "--json", "--output", tmp_path / "all.json")
+    assert answer.exit_code == 0, answer.output
+    rows = json.loads(answer.stdout)["approaches"]
+    assert [row["approach"] for row in rows] == ["skills", "slap_1_sample", "slap"]
+    assert rows[0]["relative_length"] == 1.0 > rows[2]["relative_length"]
+    made_of = json.loads((tmp_path / "all.json").read_text())
+    assert made_of["skills"]["digest"] in answer.stderr
+    assert made_of["library"]["digest"] in answer.stderr
+    assert " --against skills " in made_of["command"]
+    refused = slap("evaluate", "points", *given, "--against", "skills")
+    assert refused.exit_code == ErrorCode.INVALID_PARAMETER
+    assert "give --skills and --shortcuts" in " ".join(refused.stderr.split())
 
 
 def test_the_same_training_goes_on_with_the_same_skills_alone(trained, tmp_path):

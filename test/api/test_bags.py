@@ -23,6 +23,7 @@ def recorded(folder, *arguments):
     return folder
 
 
+@pytest.mark.slow
 def test_it_has_the_digest_of_the_ensembles_own(bag, network, tmp_path):
     by_nodes = recorded(tmp_path / "by_nodes", "obstacle2d", "--seed", "1")
     assert bag_digest(bag) == bag_digest(by_nodes)

@@ -67,6 +67,7 @@ def test_evaluate_prints_the_agreed_json_and_nothing_else():
     assert set(numbers["plan_length"]) == set(numbers["planning_seconds"]) == {"mean", "sd"}
 
 
+@pytest.mark.slow
 def test_evaluate_solves_everything_and_depends_on_the_seed_alone():
     arguments = ["evaluate", "obstacle2d", "--tasks", 10, "--seeds", 5, "--jobs", 1, "--json"]
     arguments += ["--shortcuts", "none"]

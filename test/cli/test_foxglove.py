@@ -125,6 +125,7 @@ def test_a_viewer_gets_the_whole_run_as_ros_has_it(network: int) -> None:
     assert [e.name for e in late.heard["/slap/plan"][-1].edges][-1] == "PlaceInTarget"
 
 
+@pytest.mark.slow
 def test_nobody_need_watch(network: int) -> None:
     with live_run() as (process, _):
         assert process.wait(WAIT) == 0

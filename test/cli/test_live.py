@@ -91,6 +91,7 @@ def test_on_a_terminal_it_is_drawn_in_place(network: int) -> None:
     assert "solved" in text
 
 
+@pytest.mark.slow
 def test_without_a_terminal_there_are_plain_lines(network: int) -> None:
     command = [sys.executable, "-m", "ensemble.cli", *RUN]
     ran = subprocess.run(command, capture_output=True, text=True, timeout=200)

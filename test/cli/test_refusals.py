@@ -70,7 +70,7 @@ def test_what_is_within_the_limits_is_a_task_or_an_error(name, monkeypatch):
     for module in (f"{name}.tasks", "benchtop.tasks"):
         tasks = import_module(f"slap_ros.domains.{module}")
         if hasattr(tasks, "TRIES"):
-            monkeypatch.setattr(tasks, "TRIES", 50)
+            monkeypatch.setattr(tasks, "TRIES", 5)
     for setting, limits in settings_of(name)["fair"].limits.items():
         for number in limits:
             try:

@@ -135,6 +135,7 @@ def hanoi(folder):
       (:goal (and {" ".join(tower)} (on d13 p3))))""")
 
 
+@pytest.mark.slow
 def test_a_run_closes_its_bag(network, tmp_path):
     arguments = ("run", "obstacle2d", "--record", "bag", "--pace", "20", "--shortcuts", "none")
     arguments += ("--patience", "10")  # for a loaded machine

@@ -152,6 +152,7 @@ def test_every_bowl_stands_on_the_table_or_on_furniture_at_first():
             assert all(abs(float(state.get(bowl, "y"))) < 0.5 - OUTSIDE for bowl in bowls_of(state))
 
 
+@pytest.mark.slow
 def test_constant_motions_do_nothing_useful():
     done = dict.fromkeys(CONSTANT, 0)
     for number in (2, 7):

@@ -241,7 +241,9 @@ def test_a_block_in_the_bin_is_on_nothing_until_it_has_landed_or_while_it_is_hel
 # -- skills and plans -----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("domain", [FAIR, PAPER], ids=["fair", "paper"])
+@pytest.mark.parametrize(
+    "domain", [pytest.param(FAIR, marks=pytest.mark.slow), PAPER], ids=["fair", "paper"]
+)
 def test_tables_are_cleared(domain):
     task = domain.task(0)
     episode = solve(task, domain)

@@ -15,8 +15,9 @@ from slap_ros.domains.obstacle_tower.tasks import (
     RandomTowerTasks,
     TowerArrangement,
 )
-from slap_ros.domains.tabletop.state_access import pose_of
+from slap_ros.domains.tabletop.state_access import joints_of, pose_of
 from slap_ros.errors import ErrorCode, InvalidStateError, UnsolvableError
+from slap_ros.geometry.pose import Pose, from_rotation_vector, rotate
 from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.lazy_search import search_lazily
 from slap_ros.planning.model import Model
@@ -25,8 +26,10 @@ from slap_ros.planning.problem import Problem
 from slap_ros.planning.search import search_exhaustively
 from slap_ros.relational import State
 from slap_ros.worlds.bodies import Material
+from slap_ros.worlds.features import POSE_FEATURES
+from slap_ros.worlds.joint_space.features import GRASP_FEATURES
 from slap_ros.worlds.joint_space.scene import CUBE_EDGE
-from slap_ros.worlds.panda import MAX_STEP
+from slap_ros.worlds.panda import MAX_STEP, hand_pose
 from support.executed import executed, fluent_atoms
 from support.random_states import random_states
 
@@ -252,3 +255,36 @@ def test_a_target_off_the_table_makes_the_task_unsolvable(place, planner):
         make_planner(planner, FAIR, task.initial_state).plan(
             task.initial_state, space.mask(task.goal)
         )
+
+
+def run(world, skill, objects):
+    policy = skill.start(world.state, objects)
+    while (action := policy(world.state)) is not None:
+        world.step(action)
+
+
+def features(obj, group, pose):
+    values = (*pose.position, *pose.quaternion)
+    return {(obj, item.name): value for item, value in zip(group, values, strict=True)}
+
+
+@pytest.mark.parametrize("turn", [(0.0, 0.3, 0.0), (0.05, -0.35, 0.1)])
+def test_a_block_that_turned_in_the_hand_is_put_down_flat(turn):
+    """Fingers of a robot hold by friction: what they push against others turns between them."""
+    task = FAIR.task(1)
+    with FAIR.make_world(task.initial_state) as world:
+        robot, block, table = map(task.initial_state.layout.object, ("robot", "block1", "table"))
+        run(world, FAIR.skills["Pick"], (robot, block, table))
+        held = world.state
+        hand = hand_pose(joints_of(held))
+        grasp = hand.inverse().compose(pose_of(held, block))
+        x, y, z = grasp.position
+        slid = Pose((x, y, z - 0.008), grasp.quaternion)
+        turned = slid.compose(Pose(quaternion=from_rotation_vector(turn)))
+        changes = features(robot, GRASP_FEATURES, turned)
+        changes |= features(block, POSE_FEATURES, hand.compose(turned))
+        world.reset(held.replace(changes))
+        run(world, FAIR.skills["Place"], (robot, block, table))
+        assert {"On(block1, table)", "GripperEmpty(robot)"} <= atoms(world.state)
+        up = rotate(pose_of(world.state, block).quaternion, (0.0, 0.0, 1.0))
+        assert sorted(map(abs, up))[2] == pytest.approx(1.0, abs=1e-3)

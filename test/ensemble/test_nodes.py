@@ -343,8 +343,8 @@ def victim_of(runner, victim, bag):
 
     end = time.monotonic() + 3 * LIMIT
     while time.monotonic() < end:
-        children = psutil.Process(runner).children()
-        pids = [child.pid for child in children if victim in child.cmdline()]
+        children = psutil.Process(runner).children(recursive=True)
+        pids = [child.pid for child in children if child.name() == victim]
         recorded = sum(f.stat().st_size for f in bag.glob("*.mcap")) if bag.exists() else 0
         if pids and recorded > 40_000:  # of some 90,000: long before the end
             return pids[0]

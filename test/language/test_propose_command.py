@@ -54,7 +54,8 @@ def test_operators_of_anyone_in_each_format(tmp_path: Path) -> None:
     text = (EXAMPLE / "printed.txt").read_text()
     repaired = text.replace("{In(?peg, ?hole)}", "{In(?peg, ?hole), HandEmpty()}")
     (tmp_path / "repaired.txt").write_text(repaired)
-    for name in ("domain.pddl", "proposal.json", "repaired.txt"):
+    (tmp_path / "shown.txt").write_text(made.stderr)
+    for name in ("domain.pddl", "proposal.json", "repaired.txt", "shown.txt"):
         result = slap("propose", *TASK, "--operators", tmp_path / name, "--json")
         assert result.exit_code == 0, result.stderr
         proposal = json.loads(result.stdout)["proposal"]

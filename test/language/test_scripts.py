@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -451,12 +452,16 @@ def test_tokens_are_a_limit_too() -> None:
 
 
 def test_no_prompt_gives_the_answer_away() -> None:
-    """No atom of a hand-written operator is in a question about actions or operators."""
+    """No atom of a hand-written operator is asked with, but for what the model said itself."""
     for printed in (make() for make in ALL):
         with serving(good_script(printed)) as server:
             assert run(printed, server.url).error is None
-        asked = [r["messages"][1]["content"] for r in server.requests]
+        questions = [r["messages"][1]["content"] for r in server.requests]
+        asked = [re.sub(r"(?s)Described so far:.*(?=\nThe skill: )", "", q) for q in questions]
         assert len(asked) == len(printed.operators) + 1
+        assert sum(text != whole for text, whole in zip(asked, questions, strict=True)) == (
+            len(printed.operators) - 1
+        )
         for operator in printed.operators:
             parts = operator.preconditions, operator.add_effects, operator.delete_effects
             atoms = {str(atom) for part in parts for atom in part if atom.variables}

@@ -37,6 +37,7 @@ def solve(approach, seed):
     return episode, space.abstract(world.state) & goal == goal
 
 
+@pytest.mark.slow
 def test_a_shortcut_moves_a_tower_of_which_a_block_is_hidden_and_planning_alone_fails_at_first():
     """One slap moves the tower whoever sees it; taken apart it must be seen block by block."""
     shortcuts = chosen_library(None, DOMAIN, "lazy").shortcuts

@@ -215,6 +215,7 @@ def test_what_nothing_is_about_stops_nothing_when_it_is_hidden():
     assert ended.count(ErrorCode.NONE) >= 3
 
 
+@pytest.mark.slow
 def test_with_noise_it_replans_and_goes_on():
     episodes = [solve(Quality(position_noise_m=0.002), s, task=DOMAIN.task(s)) for s in range(10)]
     solved = [(episode, holds) for episode, holds in episodes if episode.success]

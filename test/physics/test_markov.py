@@ -20,7 +20,7 @@ from support.marks import slow
 from support.programs import environment, program
 from support.transitions import Transitions, record
 
-COUNTS = {"alike": 1000, "mixed": 1000, "toys": 400}  # toys have many pieces
+COUNTS = {"alike": 400, "mixed": 400, "toys": 160}  # toys have many pieces
 
 
 @pytest.fixture(scope="module", params=["alike", *slow("mixed", "toys")])

@@ -201,6 +201,36 @@ def test_failures_tell_apart_what_was_not_reached_and_what_was_disturbed(
         assert ended.reason.endswith(f"steps with {words}" if words else "")
 
 
+@dataclass(frozen=True)
+class Endless(Sloppy):
+    """A policy that goes on and on."""
+
+    def start(self, state, objects):
+        return lambda _: np.zeros(len(DOMAIN.action_space.low))
+
+
+@pytest.mark.parametrize(
+    ("kind", "expected", "steps"),
+    [
+        (OptionKind.SHORTCUT, 8, 16),
+        (OptionKind.SHORTCUT, 2, 10),  # few steps say little
+        (OptionKind.SHORTCUT, 0, 40),  # nothing is known
+        (OptionKind.SHORTCUT, 30, 40),
+        (OptionKind.OPERATOR, 8, 40),
+    ],
+)
+def test_a_shortcut_that_takes_far_longer_than_in_the_model_is_given_up(kind, expected, steps):
+    """It has led elsewhere, where its policy was never trained: planning again is better."""
+    option = Option(kind, Endless("Endless", 0, 0.5, step_limit=40), ())
+    state, start = TASK.initial_state, SPACE.abstract(TASK.initial_state)
+    execution = OptionExecution(
+        option, Target.exactly(0), SPACE, DOMAIN.action_space, state, expected_steps=expected
+    )
+    for _ in range(steps):
+        assert not isinstance(execution.advance(state, start), OptionResult)
+    assert execution.advance(state, start).code is ErrorCode.SKILL_STEP_LIMIT
+
+
 # -- where everything fails -----------------------------------------------------------------------
 
 AT_START, ON_WAY, BROKEN = 1, 2, 8  # abstract states; the goal is out of reach from BROKEN

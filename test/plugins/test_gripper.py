@@ -16,6 +16,7 @@ from slap_ros.messages.decode import decode_command
 from slap_ros.messages.interfaces import COMMAND, DOMAIN_INFO
 from slap_ros.policies.action_map import ActionMap
 from slap_ros.relational import Feature
+from slap_ros.shortcuts.exploration_policies import RandomExploration
 from slap_ros.shortcuts.explore import Explorer
 from slap_ros.shortcuts.settings import ExplorationSettings
 from slap_ros.skills.domain_choice import DomainChoice
@@ -107,10 +108,8 @@ def explorer(domain):
 
 
 def test_random_rollouts_close_and_open_the_axis_that_is_the_gripper():
-    exploring = explorer(FIRST)
-    drawn = np.concatenate(
-        [exploring._random_actions(ActionMap(FIRST, gripper=True)) for _ in range(100)]
-    )
+    drawing = RandomExploration(FIRST, 64, 1, np.random.default_rng(0))
+    drawn = np.concatenate([drawing.actions(step) for step in range(100)])
     commands, counts = np.unique(drawn[:, 0], return_counts=True)
     assert commands.tolist() == [-gripper_first.WIDTH, 0.0, gripper_first.WIDTH]
     assert counts / len(drawn) == pytest.approx([0.1, 0.8, 0.1], abs=0.05)
@@ -119,7 +118,7 @@ def test_random_rollouts_close_and_open_the_axis_that_is_the_gripper():
 
 
 def test_without_a_gripper_every_axis_explores():
-    drawn = explorer(SWEEPING)._random_actions(ActionMap(SWEEPING, gripper=True))
+    drawn = RandomExploration(SWEEPING, 64, 1, np.random.default_rng(0)).actions(0)
     assert len(np.unique(drawn)) == drawn.size
     found = explorer(SWEEPING).explore()
     assert any(candidate.expected_saving > 0.0 for candidate in found.candidates)

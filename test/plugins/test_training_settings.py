@@ -115,7 +115,9 @@ def test_a_domains_own_settings_are_used_and_changed():
     assert (several.polish, several.shortcuts, several.random_goals) == (None, 8, 0.5)
     short = training_settings("ours_short", PATCHY)
     assert replace(short, stopping=None) == training_settings("ours", PATCHY) != short
-    with pytest.raises(InvalidParameterError, match="ours_several, ours_short, paper, quick"):
+    with pytest.raises(
+        InvalidParameterError, match="ours_several, ours_short, ours_near, paper, quick"
+    ):
         training_settings("slow", PATCHY)
 
 

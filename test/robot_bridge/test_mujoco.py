@@ -27,7 +27,7 @@ from slap_ros.robot.mujoco.model import compiled, scene_around, scene_spec  # no
 from slap_ros.robot.mujoco.plant import MujocoPlant  # noqa: E402
 
 SHIFT = 0.002  # m, by which bodies may settle
-FORCE = 20.0  # N, which the bridge asks for
+FORCE = 60.0  # N, which the bridge asks for
 LIFT = 0.1  # m
 
 
@@ -55,6 +55,18 @@ def moved(plant, target, seconds):
         plant.step()
     plant.command(target)
     passed(plant, 0.5)
+
+
+def pressed(plant, name):
+    """By how much each finger presses, N."""
+    model, data = plant._model, plant._data
+    force, total = np.zeros(6), dict.fromkeys(("panda_leftfinger", "panda_rightfinger"), 0.0)
+    for i in range(data.ncon):
+        touching = {model.body(model.geom_bodyid[geom]).name for geom in data.contact[i].geom}
+        if name in touching and (finger := touching & set(total)):
+            mujoco.mj_contactForce(model, data, i, force)
+            total[finger.pop()] += force[0]
+    return list(total.values())
 
 
 @pytest.mark.parametrize("name", ["obstacle_tower", "cluttered_drawer", "cleanup_table"])
@@ -111,6 +123,7 @@ def test_a_block_is_lifted_by_friction_alone_and_falls_when_it_is_let_go(tower):
     plant.command_fingers(0.0, FORCE)
     passed(plant, 0.5)
     assert plant.gap == pytest.approx(0.05, abs=SHIFT)
+    assert pressed(plant, "block1") == pytest.approx([FORCE, FORCE], rel=0.05)
     moved(plant, over, 1.0)
     held = plant.poses()["block1"].position
     assert math.dist(held, (x, y, z + LIFT)) < 0.005

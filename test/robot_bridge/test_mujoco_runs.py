@@ -18,6 +18,7 @@ QUICK = {"pace": 5.0, "rate": 100.0}
 GOAL = "(Holding robot block4)"  # the top block: 15 steps
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(600)  # 8 s of the robot's time, in the same process as everything else
 def test_the_ensemble_grasps_a_block_on_a_robot_in_mujoco(network, tmp_path):
     chosen = RunSettings(

@@ -16,14 +16,16 @@ from slap_ros.errors import (
     InvalidStateError,
     UnsafeCommandError,
 )
+from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import IDENTITY, Pose
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.limits import PANDA, Workspace
 from slap_ros.robot.robot_world import GripperAction, RobotWorld
 from slap_ros.robot.scene_config import read_scene_config, sampled_scene_config
 from slap_ros.robot.state_assembly import possible_joints
+from slap_ros.robot.tracking import TrackingSettings
 from slap_ros.worlds.features import JOINT_FEATURES, POSE_FEATURES
-from slap_ros.worlds.panda import HOME, JOINT_HIGH, JOINT_LOW
+from slap_ros.worlds.panda import HOME, JOINT_HIGH, JOINT_LOW, hand_pose
 
 DOMAIN = get_domain("obstacle_tower", "fair")
 TASK = DOMAIN.task(1)
@@ -34,9 +36,10 @@ STEPS = np.zeros(8)
 class Bench:
     """A RobotWorld, and measurements of a simulated world for it."""
 
-    def __init__(self, noise=0.002, limits=LIMITS):
+    def __init__(self, noise=0.002, limits=LIMITS, tracking=None):
         self.world = DOMAIN.make_world(TASK.initial_state)
-        self.robot_world = RobotWorld(DOMAIN, sampled_scene_config(TASK.initial_state), limits)
+        scene = sampled_scene_config(TASK.initial_state)
+        self.robot_world = RobotWorld(DOMAIN, scene, limits, tracking or TrackingSettings())
         self.rng, self.noise, self.now = np.random.default_rng(0), noise, 0.0
 
     def pose(self, obj):
@@ -141,6 +144,47 @@ def test_a_block_that_does_not_follow_the_hand_was_lost(lifted):
         bench.robot_world._grasp, bench.robot_world._lost = grasp, False
 
 
+def test_a_block_is_not_pressed_into_the_table_that_stops_it(lifted):
+    """In the model it would sink in by up to 2 cm; in the hand of a robot it would slip."""
+    bench, before, _ = lifted
+    block, down = before.layout.object("block1"), np.array([0.0, 0.053, *[0.0] * 6])
+    motion = bench.robot_world.plan_command(down).motion
+    grasp = bench.robot_world._grasp.pose
+    reached = hand_pose(motion.target).compose(grasp)
+    edge = OrientedBox(reached, (0.025, 0.025, 0.025))
+    table = before.layout.object("table")
+    top = float(before.get(table, "z")) + float(before.get(table, "half_z"))
+    lowest = min(corner[2] for corner in edge.corners())
+    assert before.get(block, "z") - 0.025 > top + 0.01  # it was well over it
+    assert -0.0025 < lowest - top < 0.005
+
+
+@pytest.mark.parametrize("slip", [(0.0, 0.0, 0.02), (0.004, -0.012, 0.008)])
+def test_a_block_that_slips_in_the_hand_is_held_where_it_is_seen(lifted, slip):
+    """Fingers hold by friction: what was pushed is no longer where it was gripped."""
+    bench, before, _ = lifted
+    block, held, grasp = before.layout.object("block1"), bench.world.state, bench.robot_world._grasp
+    seen = [float(held.get(block, axis)) + d for axis, d in zip("xyz", slip, strict=True)]
+    try:
+        bench.world._state = held.replace(
+            {(block, axis): value for axis, value in zip("xyz", seen, strict=True)}
+        )
+        since = bench.now
+        bench.measure()
+        state = bench.robot_world.measure(since)
+        assert state.get(block, "held") == 1.0
+        assert state[block][:3] == pytest.approx(seen, abs=0.003)
+        assert bench.robot_world.plan_command(STEPS).gripper is GripperAction.KEEP
+        since = bench.now
+        bench.measure(times=3)
+        assert bench.robot_world.measure(since) == state  # noise alone changes nothing
+        since = bench.now
+        bench.measure(without=("block1",))
+        assert bench.robot_world.measure(since) == state  # nor does what hides it
+    finally:
+        bench.world._state, bench.robot_world._grasp = held, grasp
+
+
 def test_fingers_that_close_on_nothing_hold_nothing():
     bench = Bench()
     bench.measure()
@@ -157,6 +201,41 @@ def test_a_missing_frame_is_missed_by_name():
     bench.measure(without=("block2",))
     assert bench.robot_world.measure(0.0) is None
     assert bench.robot_world.undetected(0.0) == ["block2"]
+
+
+def test_what_pictures_do_not_show_is_where_it_was_where_that_is_asked_for():
+    """An arm between camera and table hides what is behind it, while it works on something else."""
+    bench = Bench(tracking=TrackingSettings(hidden_after=5))
+    bench.measure(without=("block2",))
+    assert bench.robot_world.measure(0.0) is None  # it was never seen
+    bench.measure()
+    seen = bench.robot_world.measure(0.0)
+    since = bench.now
+    bench.measure(times=4, without=("block2",))
+    assert bench.robot_world.measure(since) is None  # it may only have been missed
+    bench.measure(times=1, without=("block2",))
+    assert bench.robot_world.measure(since) == seen
+    block = bench.world.state.layout.object("block2")
+    bench.world._state = bench.world.state.replace({(block, "x"): 0.3, (block, "y"): -0.3})
+    since = bench.now
+    bench.measure()
+    assert bench.robot_world.measure(since)[block][:2] == pytest.approx((0.3, -0.3), abs=0.003)
+
+
+def test_a_block_that_is_let_go_and_hidden_is_where_the_hand_had_it(lifted):
+    bench, _, _ = lifted
+    robot_world, held = bench.robot_world, bench.world.state
+    grasp, robot_world.tracking = robot_world._grasp, TrackingSettings(hidden_after=5)
+    block = held.layout.object("block1")
+    try:
+        robot_world.confirm_release()
+        since = bench.now
+        bench.measure(without=("block1",))
+        state = robot_world.measure(since)
+        assert state.get(block, "held") == 0.0
+        assert state[block][:2] == pytest.approx(held[block][:2], abs=0.003)
+    finally:
+        robot_world._grasp, robot_world.tracking = grasp, TrackingSettings()
 
 
 def test_a_nan_pose_moves_nothing():

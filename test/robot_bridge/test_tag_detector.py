@@ -114,3 +114,17 @@ def test_options_of_the_camera_have_types():
     for wrong in ("camera=maybe", "camera=", "scene=x.yaml", "camera_eye=a b c"):
         with pytest.raises(InvalidParameterError):
             parse_mujoco_robot(wrong)
+
+
+def test_the_bridge_before_a_camera_has_what_it_has_without_one_and_more():
+    """The arm reaches as far and grips as firmly, and it hides what is behind it."""
+    choice = DomainChoice("obstacle_tower", "fair")
+    bridges = [
+        node_parameters(
+            RunSettings(choice, 1, 0, "lazy", None, world="mujoco", mujoco=robot, scene="x.yaml")
+        )["robot_bridge"]
+        for robot in ({}, {"camera": True})
+    ]
+    without, before = bridges
+    assert without.items() <= before.items()
+    assert before["hidden_after"] > 0 < before["detection_timeout"]

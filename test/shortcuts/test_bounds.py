@@ -15,13 +15,12 @@ from support.marks import slow
     ("domain", "tasks"),
     [
         ("obstacle2d", 2),
-        *slow(("obstacle2d", 8), ("obstacle_tower", 2)),
-        *slow(("cleanup_table", 2), ("cluttered_drawer", 1)),
+        *slow(("obstacle_tower", 2), ("cleanup_table", 2), ("cluttered_drawer", 1)),
     ],
 )
 def test_no_rollout_of_a_shipped_shortcut_is_shorter_than_its_bound(domain, tasks):
     figures = measure(domain, tasks)
-    assert figures["states"] >= min(tasks, 8)  # else nothing was measured
+    assert figures["states"] >= tasks  # else nothing was measured
     assert figures["below_bound"] == 0
     # Far from it: every rollout takes at least three quarters of the shortest success.
     assert figures["least_ratio"] >= 0.75

@@ -115,7 +115,7 @@ class Run:
             self._seen |= set(children)
             if self.case.victim == RUNNER:
                 return runner.pid if len(children) >= len(NODES) else None
-            named = [child.pid for child in children if self.case.victim in child.cmdline()]
+            named = [child.pid for child in children if child.name() == self.case.victim]
         except psutil.Error:
             return None
         return named[0] if named else None

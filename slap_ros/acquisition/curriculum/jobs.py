@@ -90,7 +90,8 @@ def carry_out(source: TaskSource, index: int, skills: Mapping[str, str]) -> dict
     domain = source.make_domain()
     learned = {name: _skill(folder, domain) for name, folder in skills.items()}
     task = source.task(index)
-    return roll_out(domain, task, index, source.operators(), learned).as_json()
+    found = roll_out(domain, task, index, source.operators(), learned, source.rewards())
+    return found.as_json()
 
 
 def learn(job: LearningJob, cores: int = 1) -> dict[str, Any]:

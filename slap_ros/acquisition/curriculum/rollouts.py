@@ -9,7 +9,7 @@ Eq. 4). Nothing is planned again, and the stages after a failed one are not run.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
 from enum import Enum
 from typing import Any
 
@@ -18,8 +18,11 @@ from slap_ros.errors import PlanningLimitError, UnsolvableError
 from slap_ros.planning.astar import find_shortest_sequence
 from slap_ros.relational import (
     AtomSpace,
+    Column,
     GroundOperator,
     LiftedOperator,
+    RewardTemplate,
+    State,
     Target,
     ground_operators,
 )
@@ -49,6 +52,8 @@ class Stage:
         steps: Environment steps of the skill, approach not counted.
         atoms: Atoms that are wrong in the end of a failed stage: required ones that do not hold,
             and forbidden ones that do.
+        metrics: Normalised metrics of the skill's reward in the end of a failed stage, by their
+            text.
     """
 
     operator: str
@@ -57,6 +62,7 @@ class Stage:
     end: str
     steps: int
     atoms: tuple[str, ...] = ()
+    metrics: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def done(self) -> bool:
@@ -111,6 +117,7 @@ class PlanRollout:
                 StageEnd(stage["end"]).value,
                 int(stage["steps"]),
                 tuple(map(str, stage["atoms"])),
+                {str(name): float(value) for name, value in stage.get("metrics", {}).items()},
             )
             for stage in data["stages"]
         )
@@ -152,6 +159,7 @@ def roll_out(
     index: int,
     operators: Sequence[LiftedOperator],
     skills: Mapping[str, LearnedSkill],
+    rewards: Mapping[str, RewardTemplate] | None = None,
 ) -> PlanRollout:
     """Plan for a task, and carry the plan out until a stage fails.
 
@@ -161,6 +169,7 @@ def roll_out(
         index: Index of the task.
         operators: Operators to plan with.
         skills: Skills that were learned, by operator name.
+        rewards: Rewards by operator name, whose metrics are told of a failed stage.
 
     Returns:
         How far it went.
@@ -171,7 +180,10 @@ def roll_out(
         return PlanRollout(index, (), (), str(error))
     world, stages = domain.make_world(task.initial_state), []
     for operator in plan:
-        stage = _carry_out(domain, world, space, operator, skills.get(operator.operator.name))
+        name = operator.operator.name
+        stage = _carry_out(domain, world, space, operator, skills.get(name))
+        if not stage.done and rewards:
+            stage = replace(stage, metrics=_metrics(rewards[name], operator, world.state))
         stages.append(stage)
         if not stage.done:
             break
@@ -216,6 +228,17 @@ def _carry_out(
     end = StageEnd.DISTURBED if effects else StageEnd.NO_EFFECT
     wrong = tuple(map(str, space.decode(target.difference(abstract))))
     return Stage(name, names, began, end.value, skill.horizon, wrong)
+
+
+def _metrics(template: RewardTemplate, operator: GroundOperator, state: State) -> dict[str, float]:
+    """The normalised metrics of a reward in a state, by their text."""
+    objects = dict(zip(operator.operator.parameters, operator.objects, strict=True))
+    values = {}
+    for term in template.terms:
+        columns = [Column((objects[variable],)) for variable in term.arguments]
+        value = term.metric.normalised(state, *columns)
+        values[f"{term.metric}({', '.join(v.name for v in term.arguments)})"] = float(value[0])
+    return values
 
 
 def _approach(domain: Domain, world: World, operator: GroundOperator) -> bool:

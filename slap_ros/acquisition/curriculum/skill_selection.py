@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from statistics import fmean
 from typing import Any
 
 from slap_ros.acquisition.curriculum.curriculum_state import CurriculumState
@@ -107,9 +108,11 @@ def _why_not(
         return None
     failed = [stage for stage in failed_stages(rollouts) if stage.operator == name]
     atoms = Counter(atom for stage in failed for atom in stage.atoms)
+    metrics = {name: fmean(s.metrics[name] for s in failed) for name in failed[0].metrics}
     return {
         "why": NO_PROGRESS,
         "states": len(initiations.failed),
         "ends": dict(Counter(stage.end for stage in failed)),
         "atoms": dict(atoms.most_common(3)),
+        "metrics": {name: round(value, 3) for name, value in metrics.items()},
     }

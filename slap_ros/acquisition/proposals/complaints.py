@@ -38,6 +38,8 @@ class ComplaintClass(StrEnum):
     CIRCULAR_PRECONDITIONS = "circular_preconditions"
     GOAL_UNREACHABLE = "goal_unreachable"
     GOALS_NEVER_TOGETHER = "goals_never_together"
+    # what came of them
+    NOT_LEARNED = "not_learned"
     # a plan of the model's own
     IMPOSSIBLE_STEP = "impossible_step"
     GOAL_NOT_REACHED = "goal_not_reached"
@@ -120,6 +122,7 @@ _REMEDIES = {
     ComplaintClass.GOALS_NEVER_TOGETHER: (
         "What an action takes away and others need must be given back in the EFF+ of an action."
     ),
+    ComplaintClass.NOT_LEARNED: "Change what may have kept it from being learned.",
     ComplaintClass.IMPOSSIBLE_STEP: "Before each step its PRE must hold.",
     ComplaintClass.GOAL_NOT_REACHED: "After the last step all of the goal must hold.",
     ComplaintClass.UNKNOWN_METRIC: "Use the listed metrics only.",

@@ -241,8 +241,8 @@ def _check_use(checker: _Checker, draft: OperatorDraft) -> None:
         if parameter not in used:
             fact = f"no atom is about the parameter {shown(parameter)}"
             checker.complain(ComplaintClass.UNUSED_VARIABLE, fact)
-    if not draft.delete_effects and not draft.add_effects:
-        checker.complain(ComplaintClass.NO_EFFECT, "both EFF- and EFF+ are empty")
+    if not draft.add_effects:
+        checker.complain(ComplaintClass.NO_EFFECT, "EFF+ is empty")
 
 
 def _check_effects(
@@ -255,9 +255,8 @@ def _check_effects(
         fact = f"{atom} is both added and deleted"
         checker.complain(ComplaintClass.CONTRADICTORY_EFFECT, fact)
     if added and added <= before:
-        fact = f"{_listed(added)} in EFF+ holds before already, as PRE says"
-        if not deleted:
-            checker.complain(ComplaintClass.NO_EFFECT, fact)
+        fact = f"all that EFF+ has, {_listed(added)}, holds before already, as PRE says"
+        checker.complain(ComplaintClass.NO_EFFECT, fact)
     for atom in _ordered(deleted | added):
         if fact := _cannot_change(atom, checker.problem):
             checker.complain(ComplaintClass.IMPOSSIBLE_CHANGE, fact)

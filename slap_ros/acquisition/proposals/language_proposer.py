@@ -59,17 +59,23 @@ class LanguageProposer:
         self, actions: Actions, problem: AcquisitionProblem
     ) -> tuple[Operators, Verification]:
         """Ask for a decomposition's operators; there is no plan if the actions may be wrong."""
-        questions = {
-            action_name(action): about_operator(action, actions, problem) for action in actions
-        }
-        answers = {name: self._inquiry.ask(question) for name, question in questions.items()}
+        answers: Operators = {}
+
+        def ask(action: str, rejected: Rejected | None = None) -> None:
+            name = action_name(action)
+            described = [answer.value for other, answer in answers.items() if other != name]
+            question = about_operator(action, actions, problem, described)
+            answers[name] = self._inquiry.ask(question, rejected)
+
+        for action in actions:
+            ask(action)
         verification = self._verify(answers, problem)
         for _ in range(ROUNDS - 1):
             if verification.plan is not None:
                 break
             for name in verification.culprits:
                 rejected = Rejected(answers[name].text, verification.complaints)
-                answers[name] = self._inquiry.ask(questions[name], rejected)
+                ask(next(a for a in actions if action_name(a) == name), rejected)
             verification = self._verify(answers, problem)
         return answers, verification
 

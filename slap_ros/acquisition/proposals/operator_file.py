@@ -1,12 +1,13 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Operators from a file, checked as a model's are: PDDL, JSON, plain text."""
+"""Operators from a file, checked as a model's are: PDDL, JSON, what is printed, plain text."""
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from slap_ros.acquisition.proposals.complaints import Complaint, serious
@@ -25,21 +26,23 @@ from slap_ros.relational import LiftedAtom, LiftedOperator
 from slap_ros.relational.pddl import parse_domain
 from slap_ros.relational.pddl.tokens import decode
 
-_TITLE = re.compile(r"([A-Za-z][\w-]*)(\([^()]*\))?:?")  # Pick, Pick: or Pick(?peg):
+_TITLE = re.compile(r"([A-Za-z][\w-]*)(?:\(([^()]*)\))?:?")  # Pick, Pick: or Pick(?peg):
+_PRINTED = re.compile(r"\s*(PRE|EFF-|EFF\+) +(?![:=])(.*)")  # a line of `slap propose`
+_DIFFERENT = re.compile(r",? *(\?[\w-]+) != (\?[\w-]+)")
 
 
 def read_operators(path: Path, problem: AcquisitionProblem) -> tuple[LiftedOperator, ...]:
     """Read the operators of a file, each sound by itself.
 
     Args:
-        path: Path of the file: a PDDL domain, the JSON of a proposal, or blocks of PAR, PRE, EFF-
-            and EFF+, each below a line with the operator's name.
+        path: Path of the file: a PDDL domain, the JSON of a proposal, what ``slap propose`` prints,
+            or blocks of PAR, PRE, EFF- and EFF+, each below a line with the operator's name.
         problem: Problem whose predicates and types the operators use.
 
     Raises:
         InvalidParameterError: The file cannot be read.
         MalformedPddlError: It begins as PDDL and is none.
-        MalformedAnswerError: It is none of the three.
+        MalformedAnswerError: It is none of them.
         ProposalRejectedError: An operator is wrong by itself, with all complaints.
     """
     try:
@@ -65,8 +68,9 @@ def _drafts(text: str, source: str) -> list[OperatorDraft]:
     drafts = list(_from_text(text, source))
     if not drafts:
         raise MalformedAnswerError(
-            f"{source} has no operators: give a PDDL domain, the JSON of a proposal, or blocks of "
-            "PAR, PRE, EFF- and EFF+, each below a line with the operator's name"
+            f"{source} has no operators: give a PDDL domain, the JSON of a proposal, what `slap "
+            "propose` prints, or blocks of PAR, PRE, EFF- and EFF+, each below a line with the "
+            "operator's name"
         )
     return drafts
 
@@ -82,22 +86,34 @@ def _from_json(text: str, source: str) -> Iterator[OperatorDraft]:
 
 
 def _from_text(text: str, source: str) -> Iterator[OperatorDraft]:
-    blocks: list[tuple[str, list[str]]] = []
+    blocks: list[tuple[re.Match[str], list[str]]] = []
     for line in text.splitlines():
         title = _TITLE.fullmatch(line.strip())
         if title is not None and title.group(1) not in LABELS:
-            blocks.append((title.group(1), []))
+            blocks.append((title, []))
         elif blocks:
             blocks[-1][1].append(line)
-    for name, lines in blocks:
-        draft = _parse("\n".join(lines), f"{source}, {name}")
-        yield OperatorDraft(
-            name,
-            draft.parameters,
-            draft.preconditions,
-            draft.delete_effects,
-            draft.add_effects,
-        )
+    for title, lines in blocks:
+        block = _block(title.group(2) or "", lines)
+        draft = _parse(_DIFFERENT.sub("", block), f"{source}, {title.group(1)}")
+        yield replace(draft, name=title.group(1), inequalities=tuple(_DIFFERENT.findall(block)))
+
+
+def _block(parameters: str, lines: Sequence[str]) -> str:
+    """The text of one operator; where it was printed, the title has its parameters.
+
+    Args:
+        parameters: Parameters in the title.
+        lines: Lines below the title.
+    """
+    printed = [part.groups() for line in lines if (part := _PRINTED.fullmatch(line))]
+    if not printed:
+        return "\n".join(lines)
+    parts = [
+        ("PAR", parameters),
+        *((label, "" if atoms == "-" else atoms) for label, atoms in printed),
+    ]
+    return "\n".join(f"{label}: {{{content}}}" for label, content in parts)
 
 
 def _parse(text: str, where: str) -> OperatorDraft:

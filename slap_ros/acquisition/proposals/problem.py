@@ -111,6 +111,12 @@ class AcquisitionProblem:
         return self.space.mask(self.goal)
 
     @cached_property
+    def usable_types(self) -> tuple[Type, ...]:
+        """The types whose objects some predicate can be about."""
+        taken = [kind for predicate in self.predicates for kind in predicate.types]
+        return tuple(kind for kind in self.types if any(kind.is_a(one) for one in taken))
+
+    @cached_property
     def types_by_name(self) -> dict[str, Type]:
         """The types, as drafts name them."""
         return {kind.name: kind for kind in self.types}

@@ -135,6 +135,22 @@ class ProposalRequest:
         """
         return propose(self.problem, self._proposer(inquiry), self._rewarder(inquiry))
 
+    def make_rewards(
+        self, operators: Sequence[LiftedOperator], inquiry: Inquiry | None = None
+    ) -> Templates:
+        """Rewards alone, for operators that are there already.
+
+        Args:
+            operators: Operators to reward.
+            inquiry: Conversation with a model, where a model has to be asked.
+
+        Raises:
+            InvalidDomainError: Nothing was written by hand, or no reward can be composed.
+            SlapError: Why no model could be asked.
+        """
+        rewarder = self._rewarder(inquiry)
+        return {} if rewarder is None else rewarder.rewards(operators, self.problem)
+
     def _proposer(self, inquiry: Inquiry | None) -> Proposer:
         if self.proposer == LANGUAGE:
             return LanguageProposer(_asked(inquiry))

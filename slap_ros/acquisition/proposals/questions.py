@@ -52,20 +52,25 @@ def about_decomposition(
     problem: AcquisitionProblem,
 ) -> Question[tuple[ActionDraft, ...], Actions]:
     """The question which actions a task is made of."""
-    text = decomposition_question(problem.types, problem.predicates, problem.init, problem.goal)
+    text = decomposition_question(
+        problem.usable_types, problem.predicates, problem.init, problem.goal
+    )
     return Question(
         DECOMPOSITION,
         "decomposition",
         DECOMPOSITION,
         text,
-        decomposition_schema(problem.types),
+        decomposition_schema(problem.usable_types),
         parse_decomposition,
         partial(check_decomposition, problem=problem),
     )
 
 
 def about_operator(
-    action: str, actions: Actions, problem: AcquisitionProblem
+    action: str,
+    actions: Actions,
+    problem: AcquisitionProblem,
+    described: Sequence[LiftedOperator] = (),
 ) -> Question[OperatorDraft, LiftedOperator]:
     """The question what an action needs and changes.
 
@@ -73,15 +78,24 @@ def about_operator(
         action: Action in question, as in ``Insert(?peg: peg, ?hole: hole)``.
         actions: All actions of the decomposition.
         problem: Problem that the actions are for.
+        described: Operators of other actions, as far as they are described.
     """
     name = action_name(action)
-    text = operator_question(action, actions, problem.types, problem.predicates, problem.goal)
+    text = operator_question(
+        action,
+        actions,
+        problem.usable_types,
+        problem.predicates,
+        problem.init,
+        problem.goal,
+        described,
+    )
     return Question(
         f"operator {name}",
         "operator",
         name,
         text,
-        operator_schema(name, problem.types, problem.predicates),
+        operator_schema(name, problem.usable_types, problem.predicates),
         parse_operator,
         partial(check_operator, name=name, problem=problem),
     )

@@ -143,10 +143,12 @@ def _separations(state: State, obj: Object, column: Column) -> Array:
 
 
 def _all_at_rest(state: State) -> Bools:
+    """Whether nothing moves by itself: what is held moves with the hand, wherever that goes."""
     things = state.layout.column_of(THING)
-    speeds = np.linalg.norm(state.gather(things, LINEAR), axis=-1).max(axis=-1)
-    spins = np.linalg.norm(state.gather(things, ANGULAR), axis=-1).max(axis=-1)
-    still: Bools = (speeds <= REST_SPEED) & (spins <= REST_SPIN)
+    speeds = np.linalg.norm(state.gather(things, LINEAR), axis=-1)
+    spins = np.linalg.norm(state.gather(things, ANGULAR), axis=-1)
+    held = state.gather(things, ("held",))[..., 0] > 0.5
+    still: Bools = (held | ((speeds <= REST_SPEED) & (spins <= REST_SPIN))).all(axis=-1)
     return still
 
 

@@ -25,6 +25,17 @@ from slap_ros.worlds.viewpoint import Viewpoint
 
 STEP_LIMIT = 1_000  # environment steps of a task
 HORIZON = 50  # environment steps of a learned skill, approach not counted
+PUSH_S = 2.0  # s, in which a hand crosses the table twice
+# Shortcuts here are pushes: near what they push they need few rollouts, and a short time.
+NEAR_SETTINGS = {
+    "exploration.length": round(PUSH_S / CONTROL_PERIOD_S),
+    "exploration.nodes": 4,
+    "exploration.rollouts": 4,
+    "horizon": round(PUSH_S / CONTROL_PERIOD_S),
+    "polish": None,
+    "ppo.total_steps": 60_000,
+    "starts": 100,
+}
 
 
 class BenchtopTasks(Protocol):
@@ -107,7 +118,10 @@ def benchtop_domain(
         static=model.static,
         goals=model.goals,
         robot_types=frozenset({ROBOT}),
-        learning=Learning(interface=learner_interface(model.holding, scene_of)),
+        learning=Learning(
+            interface=learner_interface(model.holding, scene_of),
+            settings={"ours_near": NEAR_SETTINGS},
+        ),
         acquisition=model.acquisition,
         configuration=settings.as_configuration(),
     )

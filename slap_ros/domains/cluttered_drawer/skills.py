@@ -11,7 +11,13 @@ from slap_ros.core import Skill
 from slap_ros.domains.cluttered_drawer.blocking import SIDES
 from slap_ros.domains.cluttered_drawer.features import BLOCK, DRAWER, TABLE, TARGET, WALL
 from slap_ros.domains.cluttered_drawer.tasks import APART, PLACE_MARGIN, PLACE_SPACING
-from slap_ros.domains.tabletop.grasps import from_above, grasps_to_stand, quarter_turns
+from slap_ros.domains.tabletop.grasps import (
+    PutDown,
+    from_above,
+    grasps_to_stand,
+    quarter_turns,
+    ways_to_put_down,
+)
 from slap_ros.domains.tabletop.placements import GAP, free_placements
 from slap_ros.domains.tabletop.planning_scene import PlanningScene
 from slap_ros.domains.tabletop.skills import GRIP, RELEASE, ReachSkill, Transits, TransitSkill
@@ -73,13 +79,15 @@ def _over_block(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:
 
 
 @memoized
-def _transit_to_placement(state: State, place: tuple[float, float], surface: Object) -> Transit:
+def _transit_to_placement(
+    state: State, place: tuple[float, float], surface: Object, how: PutDown
+) -> Transit:
     """The transit after which the held block stands on a surface at a place, turned as it is."""
     block = held_body(state)
     if block is None:
         raise SkillNotApplicableError("nothing is held")
     top, yaws = box_of(state, surface).top, quarter_turns(yaw_of(pose_of(state, block)))
-    goals = grasps_to_stand(state, box_of(state, block), place, top, yaws)
+    goals = grasps_to_stand(state, box_of(state, block), place, top, yaws, how)
     return Transit(PLANNING_SCENE, state, goals, touched=(surface,))
 
 
@@ -94,7 +102,8 @@ def _onto_surface(state: State, block: Object, surface: Object, margin: float) -
     half_x, half_y, _ = board.half
     halves = (half_x - margin, half_y - margin)
     for place in free_placements(near, board.pose.position[:2], halves, taken, PLACE_SPACING):
-        yield _transit_to_placement(state, place, surface)
+        for how in ways_to_put_down(state):
+            yield _transit_to_placement(state, place, surface, how)
 
 
 def _into_drawer(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:

@@ -12,7 +12,13 @@ from collections.abc import Iterator
 
 from slap_ros.core import Skill
 from slap_ros.domains.obstacle_tower.features import BLOCK, SURFACE
-from slap_ros.domains.tabletop.grasps import grasps_along_faces, grasps_to_stand, quarter_turns
+from slap_ros.domains.tabletop.grasps import (
+    PutDown,
+    grasps_along_faces,
+    grasps_to_stand,
+    quarter_turns,
+    ways_to_put_down,
+)
 from slap_ros.domains.tabletop.placements import GAP, Placement, free_placements
 from slap_ros.domains.tabletop.planning_scene import PlanningScene
 from slap_ros.domains.tabletop.skills import GRIP, RELEASE, TransitSkill
@@ -48,15 +54,19 @@ def _transit_to_grasp(state: State, block: Object) -> Transit:
 
 
 @memoized
-def _transit_to_placement(state: State, place: Placement, yaw: float, thing: Object) -> Transit:
+def _transit_to_placement(
+    state: State, place: Placement, yaw: float, thing: Object, how: PutDown
+) -> Transit:
     """The transit after which the held block stands on a thing at a place."""
     block = held_body(state)
     if block is None:
         raise SkillNotApplicableError("nothing is held")
     top = box_of(state, thing).top
     yaws = quarter_turns(yaw)
-    goals = grasps_to_stand(state, box_of(state, block), place, top, yaws)
-    return Transit(PLANNING_SCENE, state, goals, touched=(thing,))
+    goals = grasps_to_stand(state, box_of(state, block), place, top, yaws, how)
+    # Fingers that reach below a levelled block stay just over the table, around a target as well.
+    touched = state.layout.of_type(SURFACE) if how is PutDown.LEVELLED else ()
+    return Transit(PLANNING_SCENE, state, goals, touched=(thing, *touched))
 
 
 def _to_block(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:
@@ -69,7 +79,9 @@ def _onto_middle(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]
     """Onto the middle of the target or of another block."""
     _, _, thing = objects
     x, y, _ = pose_of(state, thing).position
-    yield _transit_to_placement(state, (x, y), yaw_of(pose_of(state, thing)), thing)
+    yaw = yaw_of(pose_of(state, thing))
+    for how in ways_to_put_down(state):
+        yield _transit_to_placement(state, (x, y), yaw, thing, how)
 
 
 def _onto_table(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:
@@ -82,7 +94,8 @@ def _onto_table(state: State, objects: tuple[Object, ...]) -> Iterator[Transit]:
     half_x, half_y, _ = board.half
     margins = half_x - TABLE_MARGIN, half_y - TABLE_MARGIN
     for place in free_placements(pose.position[:2], board.pose.position[:2], margins, taken):
-        yield _transit_to_placement(state, place, yaw_of(pose), table)
+        for how in ways_to_put_down(state):
+            yield _transit_to_placement(state, place, yaw_of(pose), table, how)
 
 
 def skills(timing: Timing) -> dict[str, Skill]:

@@ -53,7 +53,9 @@ def operator_question(
     actions: Sequence[str],
     types: Sequence[Type],
     predicates: Sequence[Predicate],
+    init: Iterable[GroundAtom],
     goal: Iterable[GroundAtom],
+    described: Sequence[LiftedOperator] = (),
 ) -> str:
     """What an action needs and changes (LG-SAIL B.2).
 
@@ -65,7 +67,9 @@ def operator_question(
         actions: All of the decomposition.
         types: The task's.
         predicates: The task's.
+        init: What holds at first.
         goal: What the plan is for.
+        described: Operators of other actions, as far as they are described.
     """
     return _render(
         "operator",
@@ -75,7 +79,9 @@ def operator_question(
         types=types,
         predicates=predicates,
         metrics=_metrics_behind(predicates),
+        init=init,
         goal=goal,
+        described=described,
     )
 
 
@@ -90,16 +96,19 @@ def reward_question(
     Args:
         operator: In question.
         metrics: To choose among.
-        predicates: The task's; those that the operator adds are explained.
+        predicates: The task's; those that the operator needs or changes are explained.
         with_definitions: Whether the metrics' source is quoted, or their signatures alone.
     """
-    used = {atom.predicate for atom in operator.add_effects | operator.delete_effects}
+    atoms = operator.preconditions | operator.add_effects | operator.delete_effects
+    used = {atom.predicate for atom in atoms}
+    added = {atom.predicate for atom in operator.add_effects}
     return _render(
         "reward",
         "question",
         operator=operator,
         metrics=metrics,
         predicates=[predicate for predicate in predicates if predicate in used],
+        unmeasured=[p.name for p in predicates if p in added and not p.conditions],
         with_definitions=with_definitions,
     )
 
@@ -171,7 +180,7 @@ def _template(name: str) -> Template:
         lstrip_blocks=True,
         keep_trailing_newline=False,
     )
-    environment.filters |= {"plain": plain, "atoms": _atoms, "lifted": _lifted}
+    environment.filters |= {"plain": plain, "atoms": _atoms, "lifted": _lifted, "kinds": _kinds}
     return environment.get_template(f"{name}.jinja")
 
 
@@ -191,6 +200,20 @@ def _atoms(atoms: Iterable[GroundAtom]) -> str:
 
 def _lifted(atoms: Iterable[object]) -> str:
     return ", ".join(sorted(map(str, atoms)))
+
+
+def _kinds(types: Iterable[Type]) -> str:
+    """Types, each once, with what they are besides: ``hammer (a thing, a place)``."""
+    return ", ".join(dict.fromkeys(map(_kind, types)))
+
+
+def _kind(kind: Type) -> str:
+    wider = kind.parent
+    names = []
+    while wider is not None:
+        names.append(f"a {wider}")
+        wider = wider.parent
+    return f"{kind} ({', '.join(names)})" if names else str(kind)
 
 
 def _metrics_behind(predicates: Sequence[Predicate]) -> list[Metric]:

@@ -28,10 +28,10 @@ TORQUE = (87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0)  # Nm, Franka's data sheet
 ARMATURE = 0.1  # kg m², of a motor, seen from the joint
 JOINT_DAMPING = 1.0  # Nm s/rad
 
-FINGER_STIFFNESS = 2000.0  # N/m
-FINGER_DAMPING = 40.0  # N s/m
+FINGER_STIFFNESS = 4000.0  # N/m
+FINGER_DAMPING = 80.0  # N s/m
 FINGER_ARMATURE = 0.1  # kg
-FINGER_FORCE = 40.0  # N, of each finger
+FINGER_FORCE = 70.0  # N, of each finger
 LARGEST_FINGER_FORCE = 70.0  # N, Franka's data sheet
 
 # Who touches whom: the arm touches everything but itself.
@@ -55,6 +55,7 @@ def arm_spec() -> Any:
         finger = joint.name in FINGER_JOINTS
         joint.armature = FINGER_ARMATURE if finger else ARMATURE
         joint.damping = [0.0 if finger else JOINT_DAMPING, 0.0, 0.0]
+        joint.actfrclimited = False  # the URDF's efforts: 20 N of each finger; motors have theirs
     for name, stiffness, torque in zip(ARM_JOINTS, STIFFNESS, TORQUE, strict=True):
         _add_motor(spec, name, stiffness, LAG_S * stiffness, torque)
     for name in FINGER_JOINTS:

@@ -23,7 +23,7 @@ from slap_ros.robot.finger_tracking import FingerTracker
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.joint_trajectory import TrajectoryPoint
 from slap_ros.robot.limits import PANDA, JointMotion, Limits, Workspace
-from slap_ros.robot.mujoco.arm import PERIOD_S
+from slap_ros.robot.mujoco.arm import FINGER_FORCE, PERIOD_S
 from slap_ros.robot.mujoco.plant import MujocoPlant
 from slap_ros.robot.robot_world import GAP_OPEN, GAP_SHUT, GripperAction, RobotWorld
 from slap_ros.robot.scene_config import DETECTED, sampled_scene_config
@@ -57,7 +57,7 @@ class ClosedLoopSettings:
     limits: Limits = field(default_factory=lambda: PANDA.scaled(0.5, REACH))
     tracking: TrackingSettings = field(default_factory=TrackingSettings)
     tolerances: TrajectoryTolerances = TOLERANCES
-    finger_force: float = 40.0
+    finger_force: float = FINGER_FORCE
     detection_period_s: float = 1.0 / 30.0
     settle_time_s: float = 1.5
     detection_timeout_s: float = 2.0

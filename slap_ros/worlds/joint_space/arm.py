@@ -168,19 +168,31 @@ class Sweep:
         ):
             reach = radius + travel
             for box, top in obstacles:
-                if centre[2] - reach < top and box.near(centre, reach) and self._enters(link, box):
+                if (
+                    centre[2] - reach < top
+                    and box.near(centre, reach)
+                    and self._enters(link, box, _depth(link))
+                ):
                     return True
         return False
 
-    def deepest_penetration(self, obstacles: Sequence[Obstacle]) -> Penetration | None:
-        """Where the arm would be deepest in an obstacle, seen from above; None if in none."""
+    def deepest_penetration(
+        self, obstacles: Sequence[Obstacle], allowed: float | None = None
+    ) -> Penetration | None:
+        """Where the arm would be deepest in an obstacle, seen from above; None if in none.
+
+        Args:
+            obstacles: Fixed bodies.
+            allowed: Depth, m, up to which it may be in one; None for that of our physics.
+        """
         found = None
         for link, travel in enumerate(self.travel):
             reach = self.end.radii[link] + travel
+            core = _depth(link) if allowed is None else allowed
             for box, top in obstacles:
-                if box.near(self.end.centres[link], reach) and self._enters(link, box):
+                if box.near(self.end.centres[link], reach) and self._enters(link, box, core):
                     point = min(self.end.box(link).corners(), key=lambda corner: corner[2])
-                    depth = top - _depth(link) - point[2]
+                    depth = top - core - point[2]
                     if depth > 0.0 and (found is None or depth > found.depth):
                         found = Penetration(self._carrier(link), point, depth)
         return found
@@ -189,8 +201,8 @@ class Sweep:
         """Which of the robot's links a link is, or is held by."""
         return LINK_SHAPES[link].link if link < len(LINK_SHAPES) else HAND
 
-    def _enters(self, link: int, box: OrientedBox) -> bool:
-        core = box.shrunk(_depth(link))
+    def _enters(self, link: int, box: OrientedBox, depth: float) -> bool:
+        core = box.shrunk(depth)
         samples = math.ceil(self.travel[link] / max(2.0 * min(box.half), SAMPLING)) or 1
         return any(core.overlaps(self._at(link, k / samples)) for k in range(1, samples + 1))
 

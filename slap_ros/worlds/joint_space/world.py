@@ -134,6 +134,33 @@ class PandaWorld(SimulatedWorld[Scene]):
         self._state = self._index.write(self._state, self._snapshot)
         return self._state
 
+    def joints_off_fixed_bodies(
+        self, start: tuple[float, ...], depth: float, highest: float
+    ) -> tuple[float, ...]:
+        """Where a robot's arm is to go, whose joints are in this state where our physics has them.
+
+        Here a link and what is held may sink into a table by a centimetre or two. There, the arm
+        would press on it as hard as it is stiff, and what is held would turn or slip in the hand.
+
+        Args:
+            start: Joint positions before the step, rad.
+            depth: How far the arm may reach into a fixed body, m.
+            highest: How far it may be raised, m; a wall beside it is no reason to climb over it.
+
+        Returns:
+            Joint positions within a step of the start, raised where that is needed and possible.
+        """
+        goal = self._snapshot
+        for _ in range(MAX_RAISES):
+            arm = self._arm(goal)
+            penetration = Sweep(arm, arm).deepest_penetration(self._obstacles, depth)
+            if penetration is None:
+                return goal.joints
+            if penetration.depth > highest:
+                break
+            goal = replace(goal, joints=_raised(start, goal.joints, penetration))
+        return self._snapshot.joints
+
     def _gripped(self, command: float) -> Snapshot:
         """How things are once the gripper acted, if it can."""
         gripped = grip(self._scene, self._snapshot, command)

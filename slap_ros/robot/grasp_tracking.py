@@ -1,0 +1,53 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the hand holds, as it is seen: fingers hold by friction, and what pushes others slips.
+
+Where nothing sees it, it counts as held where it was before.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from slap_ros.geometry.pose import Pose, normalised
+from slap_ros.robot.joint_reading import JointReading
+from slap_ros.robot.state_assembly import Grasp, possible_joints
+from slap_ros.robot.tracking import PoseEstimate
+from slap_ros.worlds.panda import hand_pose
+
+GRASPED = 0.5  # of the expected gap; with less there is nothing between the fingers
+FOLLOWS = 0.03  # m, by which what is held may slip in a step; what is further away was lost
+
+
+def expected_pose(grasp: Grasp, reading: JointReading) -> Pose:
+    """Where the hand has what it holds, in the base's frame, if it has not slipped."""
+    return hand_pose(possible_joints(reading.joints)).compose(grasp.pose)
+
+
+def is_lost(grasp: Grasp, reading: JointReading, seen: PoseEstimate | None) -> bool:
+    """Whether what was held does not follow the hand, or the fingers are shut.
+
+    Args:
+        grasp: Grasp as it was measured last.
+        reading: Joints and fingers, measured now.
+        seen: Pose of the held object, if anything sees it.
+    """
+    expected = expected_pose(grasp, reading).position
+    strayed = seen is not None and math.dist(seen.pose.position, expected) > FOLLOWS
+    shut = reading.gap is not None and reading.gap < GRASPED * 2.0 * grasp.finger
+    return strayed or shut
+
+
+def grasp_as_seen(grasp: Grasp, reading: JointReading, seen: PoseEstimate | None) -> Grasp:
+    """The grasp with its pose measured again; the same to the bit where nothing slipped.
+
+    Args:
+        grasp: Grasp as it was measured last.
+        reading: Joints, measured now.
+        seen: Pose of the held object: the expected one where detections agree with it.
+    """
+    if seen is None or not seen.at_rest or seen.pose == expected_pose(grasp, reading):
+        return grasp
+    pose = hand_pose(possible_joints(reading.joints)).inverse().compose(seen.pose)
+    return replace(grasp, pose=Pose(pose.position, normalised(pose.quaternion)))

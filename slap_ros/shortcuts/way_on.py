@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What it takes from a state that no operator leads to, on to a goal: executed in the model.
+
+Within the graph, the mean cost of each operator tells enough. A hand that has just pushed something
+off its place is already where the next skill acts, and that saves as much as the push. Or things
+lie so that the next skill fails. So one way on is tried, the one that looks cheapest.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Mapping
+
+import numpy as np
+
+from slap_ros.errors import PlanningLimitError, UnsolvableError
+from slap_ros.planning.abstract_graph import AbstractGraph, Edge, build_abstract_graph
+from slap_ros.planning.problem import Problem
+from slap_ros.relational import State
+
+MAX_NODES = 2_000  # abstract states after which a way on is given up
+NO_WAY = float("inf")
+
+
+class WayOn:
+    """Measures the way on to a task's goal, from any state of the task."""
+
+    def __init__(self, problem: Problem, goal: int) -> None:
+        """Know no way yet.
+
+        Args:
+            problem: Operators and model over the task's objects.
+            goal: Atoms of the goal, a mask.
+        """
+        self._problem, self._goal = problem, goal
+        self._graphs: dict[int, AbstractGraph | None] = {}
+        self.steps = 0  # environment steps so far
+
+    def measure(self, state: State, node: int, operator_steps: Mapping[str, float]) -> float:
+        """Execute the way on that looks cheapest.
+
+        Args:
+            state: State in which the way begins.
+            node: Abstract state that stands for the state, a mask; more atoms may hold.
+            operator_steps: Mean environment steps of each operator, by name.
+
+        Returns:
+            Environment steps; infinite where there is no way, or a skill on it fails.
+        """
+        graph = self._graph(node)
+        if graph is None:
+            return NO_WAY
+        to_go, forward = steps_to_goal(graph, operator_steps), graph.forward_edges()
+        goals, at, total = set(graph.goal_nodes), 0, 0
+        while at not in goals:
+            edge = min(forward[at], key=lambda e: _through(e, to_go, operator_steps), default=None)
+            if edge is None:
+                return NO_WAY
+            target = edge.option.target(graph.nodes[edge.target])
+            rollout = self._problem.model.roll_out(edge.option, state, target)
+            self.steps += rollout.steps
+            if not rollout.reached:
+                return NO_WAY
+            state, at, total = rollout.final, edge.target, total + rollout.steps
+        return float(total)
+
+    def _graph(self, node: int) -> AbstractGraph | None:
+        """The graph from an abstract state to the goal; None where operators do not lead there."""
+        if node not in self._graphs:
+            try:
+                graph = build_abstract_graph(
+                    node, self._goal, self._problem.operators, max_nodes=MAX_NODES
+                )
+            except (UnsolvableError, PlanningLimitError):
+                graph = None
+            self._graphs[node] = graph
+        return self._graphs[node]
+
+
+def _through(edge: Edge, to_go: list[float], operator_steps: Mapping[str, float]) -> float:
+    """Estimated environment steps to a goal by an edge."""
+    return operator_steps.get(edge.option.skill.name, 0.0) + to_go[edge.target]
+
+
+def steps_to_goal(graph: AbstractGraph, operator_steps: Mapping[str, float]) -> list[float]:
+    """Estimated environment steps from each node to a goal; infinite where there is no way.
+
+    Operators count with their mean, and those without one with the mean of the others.
+    """
+    usual = float(np.mean(list(operator_steps.values()) or [1.0]))
+    incoming: list[list[Edge]] = [[] for _ in graph.nodes]
+    for edge in graph.edges:
+        incoming[edge.target].append(edge)
+    to_go = [float("inf")] * len(graph.nodes)
+    queue = [(0.0, goal) for goal in graph.goal_nodes]
+    for _, goal in queue:
+        to_go[goal] = 0.0
+    while queue:
+        rest, node = heapq.heappop(queue)
+        if rest > to_go[node]:
+            continue
+        for edge in incoming[node]:
+            longer = rest + operator_steps.get(edge.option.skill.name, usual)
+            if longer < to_go[edge.source]:
+                to_go[edge.source] = longer
+                heapq.heappush(queue, (longer, edge.source))
+    return to_go
