@@ -83,7 +83,7 @@ class Figure:
     @property
     def training_minutes(self) -> int:
         """Minutes of one core that the missing trainings take."""
-        seconds = sum(one["cpu_s"] for one in self.baselines)
+        seconds = sum(float(one["cpu_s"]) for one in self.baselines)
         known = sum(TRAINING_MINUTES.get(training[2], 0) for training in self.trainings)
         return known + round(seconds / 60)
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from safetensors.numpy import save
 
 from slap_ros.core import Domain
-from slap_ros.errors import InvalidLibraryError
+from slap_ros.errors import InvalidLibraryError, InvalidStateError
 from slap_ros.policies.library_files import (
     load_policy,
     policy_tensors,
@@ -93,6 +93,22 @@ class TrainedBaseline:
         batch = in_a_row(observation)[None]
         action: NDArray[np.float32] = self.policy.sample(batch, rng, self.noise)[0].clip(-1.0, 1.0)
         return action
+
+    def require_fit(self, features: int, actions: int) -> None:
+        """Refuse an environment with other observations or actions.
+
+        Args:
+            features: Number of features in its observations.
+            actions: Number of values in its actions.
+
+        Raises:
+            InvalidStateError: Says how many there are, and how many the baseline has.
+        """
+        if (features, actions) != (self.features, self.actions):
+            raise InvalidStateError(
+                f"{self.method} was learned on {self.features} features and {self.actions} "
+                f"actions; here are {features} and {actions}"
+            )
 
 
 def in_a_row(observation: Any) -> NDArray[np.float32]:
