@@ -90,7 +90,7 @@ WITHOUT_STUDY = (
         "LG-SAIL Fig. 4",
         "learning curves beside other learners",
         "curves",
-        "none of these learners is part of this project",
+        "no such learner was trained in these domains",
     ),
     not_made(
         "LG-SAIL Fig. 5", "a sequence of tasks", "curves", "no sequence of ten tasks was trained"

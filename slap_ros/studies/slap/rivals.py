@@ -41,10 +41,11 @@ if TYPE_CHECKING:
 MEASURED = """\
 Each baseline acts in the tasks of the preset that it was trained on, until the goal holds or the
 domain's step limit is reached. It does not plan. Tasks, step limits and lengths are those of
-[Table 1](README.md). A task that equals an earlier one is left out, as well as what a policy has no
-room for: that counts as failed. Success has Wilson's 95 % interval, length is the mean over solved
-tasks with the sample standard deviation. Relative length is over tasks that pure planning solved
-too. Steps and core-hours are those of one training, with all that PPO and SAC compute."""
+[Table 1](README.md). A task that equals an earlier one is left out; one with more objects than a
+policy has room for counts as failed. Success has Wilson's 95 % interval, and length is the mean
+over solved tasks with the sample standard deviation. Relative length is over tasks that pure
+planning solved too. Steps are environment steps of one training, and core-hours its time of one
+core, on a machine that did other work as well."""
 BASELINES = "runs/baselines"
 
 
