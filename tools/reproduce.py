@@ -25,6 +25,7 @@ from slap_ros.domains import get_domain
 from slap_ros.shortcuts.shipped import shipped_library
 from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.studies.reproducing import NOT_MEASURED, TRAINING_MINUTES, published
+from slap_ros.studies.slap.rivals import BASELINES
 from tools.imports import ROOT
 
 PUBLISHED = ROOT / "docs" / "results"
@@ -66,23 +67,38 @@ class Figure:
 
     @property
     def trainings(self) -> list[tuple[str, ...]]:
-        """Commands that make the work folders that the figure reads, where they are missing."""
+        """Commands that make the folders that the figure reads, where they are missing."""
         words = shlex.split(self.command)
         folders = [Path(after) for word, after in pairwise(words) if word == "--work"]
-        return [self.training for folder in folders if not folder.is_dir()]
+        own = [self.training for folder in folders if not folder.is_dir()]
+        return own + [tuple(shlex.split(one["command"])) for one in self.baselines]
+
+    @property
+    def baselines(self) -> list[dict[str, Any]]:
+        """What the figure says of the baselines that it compares with, where they are missing."""
+        rows = self.found.get("rows", ()) if isinstance(self.found, dict) else ()
+        trained = [one for row in rows for one in row.get("trained", ())]
+        return [one for one in trained if not (Path(BASELINES) / one["name"]).is_dir()]
+
+    @property
+    def training_minutes(self) -> int:
+        """Minutes of one core that the missing trainings take."""
+        seconds = sum(float(one["cpu_s"]) for one in self.baselines)
+        known = sum(TRAINING_MINUTES.get(training[2], 0) for training in self.trainings)
+        return known + round(seconds / 60)
 
     @property
     def minutes(self) -> float | None:
         """Minutes of one core, trainings included; None where nothing of it was measured."""
         known = [self.measured[0] / 60.0] if self.measured[0] is not None else []
-        known += [TRAINING_MINUTES.get(training[2], 0) for training in self.trainings]
+        known += [self.training_minutes] if self.trainings else []
         return sum(known) if known else None
 
     def duration(self) -> str:
         """The minutes in words."""
         seconds, what = self.measured
         words = NOT_MEASURED if seconds is None else f"{seconds / 60:.0f} min{what}"
-        extra = sum(TRAINING_MINUTES.get(training[2], 0) for training in self.trainings)
+        extra = self.training_minutes
         return f"{words}, and {extra} min of training" if extra else words
 
 

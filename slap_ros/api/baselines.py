@@ -8,12 +8,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from slap_ros.api.command_line import command_line
 from slap_ros.api.jobs import require_torch, some_workers
 from slap_ros.api.setting_texts import Changes, change_texts
 from slap_ros.api.training import training_folder
+from slap_ros.baselines.imported_policy import ImportedPolicy
 from slap_ros.baselines.method import BaselineProgress, Method, MethodSettings, Report
 from slap_ros.baselines.methods import METHODS
 from slap_ros.baselines.trained_baseline import TrainedBaseline, load_baseline, save_baseline
@@ -24,6 +25,9 @@ from slap_ros.files import require_writable, sole_use
 from slap_ros.learning.setting_changes import changed, parse_changes
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.skills.domain_choice import DomainChoice
+
+if TYPE_CHECKING:
+    from slap_ros.baselines.trials import Rival
 
 
 def train_baseline(
@@ -139,28 +143,45 @@ def require_gymnasium() -> None:
         )
 
 
-def open_baselines(
-    folders: Sequence[Path], domain: Domain, refused: Callable[[str], None]
-) -> dict[str, TrainedBaseline]:
-    """The baselines in some folders, by what they are called in tables.
+def open_rivals(
+    sources: Sequence[str], domain: Domain, refused: Callable[[str], None]
+) -> dict[str, Rival]:
+    """Policies for whole tasks, by what they are called in tables.
 
     Args:
-        folders: Folders that ``slap baseline train`` made.
+        sources: Folders that ``slap baseline train`` made, and functions that return policies with
+            ``predict(observation)``, as ``module:function``.
         domain: Domain that they must be of.
-        refused: Function that receives why a folder cannot be used; the others are.
+        refused: Function that receives why one cannot be used; the others are.
+
+    Returns:
+        The policies that can be used.
     """
-    if folders:
-        require_gymnasium()
-    found: dict[str, TrainedBaseline] = {}
-    for folder in folders:
+    require_gymnasium()
+    found: dict[str, Rival] = {}
+    for source in sources:
         try:
-            baseline = load_baseline(folder, domain)
+            rival = _open_rival(source, domain)
         except InvalidLibraryError as error:
             refused(str(error))
             continue
-        name = baseline.name
-        found[name if name not in found else f"{name} {folder.name}"] = baseline
+        name = rival.name
+        found[name if name not in found else f"{name} {Path(source).name}"] = rival
     return found
+
+
+def _open_rival(source: str, domain: Domain) -> Rival:
+    """The baseline in a folder, or the policy of a function."""
+    if ":" in source and not Path(source).exists():
+        return ImportedPolicy.of(source, domain.name, domain.preset)
+    return load_baseline(Path(source), domain)
+
+
+def describe_rival(rival: Rival) -> dict[str, Any]:
+    """What results say of a policy for whole tasks."""
+    if isinstance(rival, TrainedBaseline):
+        return describe_baseline(rival)
+    return {"method": rival.name, "environment": dict(rival.environment)}
 
 
 def describe_baseline(baseline: TrainedBaseline) -> dict[str, Any]:
@@ -179,7 +200,7 @@ def describe_baseline(baseline: TrainedBaseline) -> dict[str, Any]:
 
 def run_baseline(
     experiment: Experiment,
-    baseline: TrainedBaseline,
+    baseline: Rival,
     jobs: int | None,
     on_trial: Callable[[Trial], None] = lambda _: None,
 ) -> list[Trial]:

@@ -13,16 +13,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from safetensors.numpy import save
 
 from slap_ros.core import Domain
-from slap_ros.errors import InvalidLibraryError
+from slap_ros.errors import InvalidLibraryError, InvalidStateError
 from slap_ros.policies.library_files import (
     load_policy,
+    policy_tensors,
     read_object,
     replace_folder,
     save_policy,
@@ -66,6 +69,11 @@ class TrainedBaseline:
         return self.method.replace("-", "_")
 
     @property
+    def digest(self) -> str:
+        """A hash of what was learned, 16 hexadecimal digits."""
+        return sha256(save(policy_tensors(self.policy))).hexdigest()[:16]
+
+    @property
     def features(self) -> int:
         """Number of features that the policy sees."""
         return int(self.policy.normalisation.mean.size)
@@ -85,6 +93,22 @@ class TrainedBaseline:
         batch = in_a_row(observation)[None]
         action: NDArray[np.float32] = self.policy.sample(batch, rng, self.noise)[0].clip(-1.0, 1.0)
         return action
+
+    def require_fit(self, features: int, actions: int) -> None:
+        """Refuse an environment with other observations or actions.
+
+        Args:
+            features: Number of features in its observations.
+            actions: Number of values in its actions.
+
+        Raises:
+            InvalidStateError: Says how many there are, and how many the baseline has.
+        """
+        if (features, actions) != (self.features, self.actions):
+            raise InvalidStateError(
+                f"{self.method} was learned on {self.features} features and {self.actions} "
+                f"actions; here are {features} and {actions}"
+            )
 
 
 def in_a_row(observation: Any) -> NDArray[np.float32]:

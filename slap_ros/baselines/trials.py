@@ -4,23 +4,58 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import lru_cache
+from typing import Any, Protocol
 
 import numpy as np
 
-from slap_ros.baselines.trained_baseline import TrainedBaseline
 from slap_ros.environments.registration import make_task_env
 from slap_ros.environments.task_env import TaskEnv
-from slap_ros.errors import ErrorCode, InvalidStateError
+from slap_ros.errors import ErrorCode, InvalidCommandError, InvalidStateError
 from slap_ros.evaluation.experiment import Trial
 
 OUT_OF_STEPS = "the goal was not reached within the task's step limit"
 MOST_OPEN = 8  # environments that a process keeps
 
 
-def try_baseline(
-    baseline: TrainedBaseline, preset: str, goal: str | None, seed: int, index: int
-) -> Trial:
+class Rival(Protocol):
+    """A policy for whole tasks: a trained baseline, or anybody's."""
+
+    @property
+    def name(self) -> str:
+        """What the rows of tables are called."""
+        ...
+
+    @property
+    def domain(self) -> str:
+        """Name of the domain."""
+        ...
+
+    @property
+    def preset(self) -> str:
+        """Preset as whose tasks it observes others."""
+        ...
+
+    @property
+    def environment(self) -> Mapping[str, str]:
+        """Arguments of the environment that it acts in, beside domain and preset."""
+        ...
+
+    def act(self, observation: Any, rng: np.random.Generator) -> Any:
+        """The action for an observation of the environment."""
+        ...
+
+    def require_fit(self, features: int, actions: int) -> None:
+        """Refuse an environment with other observations or actions than those of learning.
+
+        Raises:
+            InvalidStateError: Says how many there are, and how many there were.
+        """
+        ...
+
+
+def try_baseline(baseline: Rival, preset: str, goal: str | None, seed: int, index: int) -> Trial:
     """Let a baseline act in one task until its goal holds, or its steps are used up.
 
     Args:
@@ -36,15 +71,15 @@ def try_baseline(
     env = _environment(
         baseline.domain, preset, baseline.preset, goal, tuple(baseline.environment.items())
     )
+    rng = np.random.default_rng([seed, index])
     try:
         observation, info = env.reset(seed=seed, options={"index": index})
-        _require_fit(baseline, env)
-    except InvalidStateError as error:
-        return _trial(seed, index, False, 0, ErrorCode.INVALID_STATE, str(error))
-    rng = np.random.default_rng([seed, index])
-    solved, cut = bool(info["success"]), False
-    while not (solved or cut):
-        observation, _, solved, cut, info = env.step(baseline.act(observation, rng))
+        baseline.require_fit(env.observed_features, int(np.prod(env.action_space.shape or (1,))))
+        solved, cut = bool(info["success"]), False
+        while not (solved or cut):
+            observation, _, solved, cut, info = env.step(baseline.act(observation, rng))
+    except (InvalidStateError, InvalidCommandError) as error:
+        return _trial(seed, index, False, 0, error.code, str(error))
     if solved:
         return _trial(seed, index, True, info["steps"], ErrorCode.NONE, "")
     return _trial(seed, index, False, info["steps"], ErrorCode.STEP_LIMIT, OUT_OF_STEPS)
@@ -56,21 +91,6 @@ def _environment(
 ) -> TaskEnv:
     """The environment of a preset's tasks, which are observed as those of another."""
     return make_task_env(domain, preset, like=like, goal=goal, **dict(options))
-
-
-def _require_fit(baseline: TrainedBaseline, env: TaskEnv) -> None:
-    """Refuse an environment with other observations or actions than the baseline has.
-
-    Raises:
-        InvalidStateError: Says how many there are, and how many the baseline has.
-    """
-    features = env.observed_features
-    actions = int(np.prod(env.action_space.shape or (1,)))
-    if (features, actions) != (baseline.features, baseline.actions):
-        raise InvalidStateError(
-            f"{baseline.method} was learned on {baseline.features} features and "
-            f"{baseline.actions} actions; here are {features} and {actions}"
-        )
 
 
 def _trial(seed: int, index: int, success: bool, steps: int, code: ErrorCode, reason: str) -> Trial:

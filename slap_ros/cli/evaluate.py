@@ -98,13 +98,13 @@ def evaluate(
     library = choose(shortcuts, chosen, planner)
     compared = compared_approaches(library, chosen, samples, with_shooting)
     libraries = _libraries(chosen, shortcuts, library)
-    folders = [Path(one) for one in against or () if one != SKILLS_ALONE]
-    if len(folders) < len(against or ()):
+    others = [one for one in against or () if one != SKILLS_ALONE]
+    if len(others) < len(against or ()):
         compared = against_skills(compared, chosen)
         console.print(both_in_words(libraries))
     experiment = Experiment(chosen, tasks, seeds, first_seed, planner, goal=goal, skills=skills)
     results = _run(experiment, compared, jobs)
-    rivals = run_rivals(experiment, folders, results[0][1], jobs)
+    rivals = run_rivals(experiment, others, results[0][1], jobs)
     if output is not None:
         origin = {"command": command, "domain": domain} | settings | libraries | rivals.described
         write_evaluation(output, origin, results + rivals.results)

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -20,10 +19,10 @@ from slap_ros.evaluation.summary import Summary
 Against = Annotated[
     list[str] | None,
     typer.Option(
-        metavar="skills|FOLDER",
+        metavar="skills|FOLDER|MODULE:FUNCTION",
         help="What to compare with: skills, for the acquired skills that the shortcuts were "
-        "learned over, alone; or the folder of a baseline that `slap baseline train` made. May be "
-        "repeated.",
+        "learned over, alone; the folder of a baseline that `slap baseline train` made; or a "
+        "function that returns a policy with predict(observation). May be repeated.",
     ),
 ]
 
@@ -54,13 +53,13 @@ class RivalResults:
 
 
 def run_rivals(
-    experiment: Experiment, folders: Sequence[Path], yardstick: Sequence[Trial], jobs: int
+    experiment: Experiment, rivals: Sequence[str], yardstick: Sequence[Trial], jobs: int
 ) -> RivalResults:
-    """Let each baseline act in every task.
+    """Let each rival act in every task.
 
     Args:
         experiment: Tasks to solve.
-        folders: Folders of baselines.
+        rivals: Folders of baselines, and policies as ``module:function``.
         yardstick: Trials of pure planning on the same tasks.
         jobs: Number of processes.
 
@@ -68,18 +67,18 @@ def run_rivals(
         What came of those that can be used, and how many cannot.
     """
     found = RivalResults()
-    if not folders:
+    if not rivals:
         return found
-    from slap_ros.api.baselines import describe_baseline, open_baselines, run_baseline
+    from slap_ros.api.baselines import describe_rival, open_rivals, run_baseline
 
-    baselines = open_baselines(folders, experiment.domain, found.complain)
+    baselines = open_rivals(rivals, experiment.domain, found.complain)
     with counting_bars() as bar:
         total = len(experiment) * len(baselines)
         watched = bar.add_task("baselines", total=total)
         for name, baseline in baselines.items():
             trials = run_baseline(experiment, baseline, jobs, lambda _: bar.advance(watched))
             found.results.append((Summary.of(experiment, name, trials, yardstick), trials))
-            found.described.setdefault("against", {})[name] = describe_baseline(baseline)
+            found.described.setdefault("against", {})[name] = describe_rival(baseline)
             for reason, count in _reasons(trials).items():
                 console.print(f"{name}: {count} of {len(trials)} tasks not solved: {reason}")
     return found

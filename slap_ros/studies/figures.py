@@ -58,6 +58,9 @@ APPROACH_STYLES = {
     "slap_1_sample": ApproachStyle("SLAP, 1 sample", MUTED, "^"),
     "shooting": ApproachStyle("search without learning", "#e69f00", "D"),
     "slap": ApproachStyle("SLAP", SHORTCUT, "s"),
+    "ppo": ApproachStyle("PPO", "#cc79a7", "P"),
+    "sac_her": ApproachStyle("SAC+HER", "#56b4e9", "X"),
+    "hierarchical": ApproachStyle("hierarchical RL", "#009e73", "d"),
     "slap_trained_perturbed": ApproachStyle("SLAP, trained perturbed", "#009e73", "v"),
 }
 

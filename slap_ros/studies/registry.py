@@ -27,6 +27,7 @@ from slap_ros.studies.slap import (
     perturbed,
     planning_time,
     pruning,
+    rivals,
     stochastic,
     table1,
     transfer,
@@ -55,15 +56,16 @@ STUDIES: Mapping[str, Study[Any]] = {
         planning_ablation.MODELS_STUDY,
         reward_ablation.STUDY,
         table1.STUDY,
+        rivals.STUDY,
         ablation.STUDY,
     )
 }
 WITHOUT_STUDY = (
     not_made(
         "SLAP Table 1",
-        "other learners: PPO, SAC+HER, hierarchical RL, SOL",
-        "0%; hierarchical RL and SOL 100% in Obstacle 2D, 25.3 and 24.9 steps",
-        "none of them is part of this project",
+        "options within one network: SOL",
+        "100% in Obstacle 2D, 24.9 steps; else 0%",
+        "not part of this project",
     ),
     PaperFigure(
         "SLAP Table 3",
@@ -88,7 +90,7 @@ WITHOUT_STUDY = (
         "LG-SAIL Fig. 4",
         "learning curves beside other learners",
         "curves",
-        "none of these learners is part of this project",
+        "no such learner was trained in these domains",
     ),
     not_made(
         "LG-SAIL Fig. 5", "a sequence of tasks", "curves", "no sequence of ten tasks was trained"

@@ -200,6 +200,30 @@ def test_what_cannot_be_used_is_named_and_the_rest_is_computed(tmp_path, trained
     assert [row["approach"] for row in json.loads(said)["approaches"]] == ["pure_planning", "ppo"]
 
 
+CODE = """
+class Holding:
+    environment = {"control": "skills"}
+    def predict(self, observation):
+        return 0, None
+
+make = Holding
+class Nothing: pass
+"""
+
+
+def test_anybodys_policy_is_named_by_its_function(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my_policies.py").write_text(CODE)
+    sources = ("my_policies:make", "my_policies:Nothing", "nowhere:make")
+    against = [part for source in sources for part in ("--against", source)]
+    code, said, complaints = slap(*EVALUATE, "--tasks", 1, "--json", *against)
+    rows = json.loads(said)["approaches"]
+    assert [row["approach"] for row in rows] == ["pure_planning", "my_policies:make"]
+    assert (code, rows[1]["at_step_limit"]) == (ErrorCode.INVALID_LIBRARY, 1)
+    assert "my_policies:Nothing: Nothing has no predict(observation)" in complaints
+    assert "nowhere:make: cannot be made: ModuleNotFoundError" in complaints
+
+
 def test_a_baseline_of_another_domain_is_refused(trained):
     with pytest.raises(InvalidLibraryError, match="of domain 'obstacle2d', not of 'stow_hammer'"):
         load_baseline(trained, get_domain("stow_hammer"))
