@@ -22,6 +22,7 @@ from ensemble.robot_parameters import parse_franka
 from slap_ros.api.execution import execute
 from slap_ros.api.planning import plan
 from slap_ros.core import task_with_goal
+from slap_ros.doctor.franka import examine
 from slap_ros.domains import get_domain
 from slap_ros.errors import (
     AlreadyRunningError,
@@ -34,7 +35,7 @@ from slap_ros.errors import (
     RobotVersionError,
 )
 from slap_ros.robot.blending import ORDERS, blend
-from slap_ros.robot.franka.arm import FrankaArm, FrankaSettings
+from slap_ros.robot.franka.arm import ArmProbe, FrankaArm, FrankaSettings
 from slap_ros.robot.franka.limits import FRANKA
 from slap_ros.robot.franka.simulation import SimulatedFr3
 from slap_ros.skills.domain_choice import DomainChoice
@@ -197,6 +198,34 @@ def test_a_gripper_that_fails_and_a_robot_that_is_gone_are_named():
         assert isinstance(ended(outcome), RobotUnreachableError)
         with pytest.raises(RobotUnreachableError):
             arm.follow(way(arm, 0.1))
+
+
+def test_the_doctor_looks_at_an_arm_and_moves_nothing(arm, simulation):
+    before = arm.reading.joints
+    arm_says = examine(arm.settings, arm.reading, arm.probe(5))
+    assert {c.name: c.status for c in arm_says if c.name != "Network"} == {
+        "Robot": "ok",
+        "Protocol": "ok",
+        "Gripper": "ok",
+        "Joint limits": "ok",
+        "Collision thresholds": "ok",
+    }
+    np.testing.assert_allclose(arm.reading.joints, before, atol=1e-3)
+    bent = replace(arm.reading, joints=(*before[:6], 3.0))
+    unhomed = ArmProbe("Reflex", (0.02, 0.03), 3, 0.0)
+    found = {c.name: c.status for c in examine(arm.settings, bent, unhomed)}
+    assert found["Robot"] == found["Gripper"] == found["Network"] == "problem"
+    assert found["Joint limits"] == "warning"
+
+
+def test_the_doctor_names_what_keeps_it_from_a_robot(simulation):
+    told = CliRunner().invoke(app, ["doctor", "--robot", "ip=127.78.0.5", "--json"])
+    assert told.exit_code == 1
+    (robot,) = [check for check in json.loads(told.stdout) if check["name"] == "Robot"]
+    assert robot["status"] == "problem"
+    assert "ROBOT_UNREACHABLE" in robot["found"]
+    wrong = CliRunner().invoke(app, ["doctor", "--robot", "172.16.0.2"])
+    assert wrong.exit_code == ErrorCode.INVALID_PARAMETER
 
 
 @pytest.fixture(scope="module")

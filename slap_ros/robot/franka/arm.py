@@ -123,6 +123,23 @@ class MotionResult:
     ended_s: float = 0.0
 
 
+@dataclass(frozen=True)
+class ArmProbe:
+    """What an arm that stands says of itself.
+
+    Args:
+        mode: Name of the mode of the robot's control.
+        answers_s: Times that it took to answer commands which move nothing, s.
+        gripper_version: Version of the gripper's protocol.
+        widest_gap: Largest distance between the fingers, m; 0 before the gripper was homed.
+    """
+
+    mode: str
+    answers_s: tuple[float, ...]
+    gripper_version: int
+    widest_gap: float
+
+
 class FrankaArm:
     """A connected arm."""
 
@@ -268,6 +285,28 @@ class FrankaArm:
                 self.reading = self._read()
             self.fault = None
 
+    def probe(self, times: int) -> ArmProbe:
+        """Ask the robot what it says of itself; nothing moves.
+
+        Args:
+            times: How often to have it answer a command. The command sets its thresholds again.
+        """
+        with self._lock, translated():
+            answers = []
+            for _ in range(times):
+                began_s = monotonic()
+                self._set_thresholds(self._robot)
+                answers.append(monotonic() - began_s)
+            return ArmProbe(
+                str(self._robot.state.robot_mode).rpartition(".")[2],
+                tuple(answers),
+                int(self._gripper.server_version),
+                float(self._gripper.max_width),
+            )
+
+    def _set_thresholds(self, robot: Any) -> None:
+        robot.set_collision_behavior(self.settings.collision_torque, self.settings.collision_force)
+
     # -- the robot ------------------------------------------------------------------------------
 
     def _require_alone(self) -> None:
@@ -314,7 +353,7 @@ class FrankaArm:
         robot.joint_velocity_limit.set(settings.limits.velocity)
         robot.joint_acceleration_limit.set(settings.limits.acceleration)
         robot.joint_jerk_limit.set(settings.motion_limits.jerk)
-        robot.set_collision_behavior(settings.collision_torque, settings.collision_force)
+        self._set_thresholds(robot)
         return robot, franky.Gripper(settings.ip)
 
     def _watch(self) -> None:
