@@ -28,11 +28,7 @@ RANDOM, PUSH = "random actions", "straight pushes"
 
 
 class ExplorationPolicy(Protocol):
-    """Gives the actions of many worlds, step by step.
-
-    Args:
-        name: Name of the policy in the records of what it found.
-    """
+    """Gives the actions of many worlds, step by step."""
 
     @property
     def name(self) -> str:
