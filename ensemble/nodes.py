@@ -45,8 +45,13 @@ WAITING = ("detection_timeout", "controller_timeout", "joint_timeout", "settle_t
 SLOW_CLOCK: Mapping[str, float] = MappingProxyType(
     dict.fromkeys(("gripper_timeout", "controller_timeout", "joint_timeout"), SLOW_CLOCK_TIMEOUT)
 )
-BEFORE_FRANKA_SIM: Mapping[str, str | float] = MappingProxyType(
-    {"arm": "fr3", "detection_timeout": SLOW_CLOCK_TIMEOUT, **SLOW_CLOCK}
+BEFORE_FRANKA_SIM: Mapping[str, str | float | tuple[float, ...]] = MappingProxyType(
+    {
+        "arm": "fr3",
+        "workspace": BEFORE_MUJOCO["workspace"],  # nothing is around it
+        "detection_timeout": SLOW_CLOCK_TIMEOUT,
+        **SLOW_CLOCK,
+    }
 )
 
 
