@@ -130,7 +130,12 @@ def stretches(recorded: RecordedMotion, speed: float, mode: str) -> Sequence[Str
         return run.stretches
     moving = {step for stretch in run.stretches for step in stretch.steps}
     pairs = zip(recorded.waypoints, DryRun.of(recorded, limits).motions, strict=True)
-    return [Stretch.of(w, m) for w, m in pairs if w.step in moving or w.gripper.value != "keep"]
+    return [
+        Stretch.of(waypoint, motion)
+        if waypoint.step in moving
+        else Stretch((waypoint,), motion.start, (), ())
+        for waypoint, motion in pairs
+    ]
 
 
 def replay(recorded: RecordedMotion, speed: float, mode: str) -> FrankaReplay:
