@@ -47,8 +47,13 @@ BEFORE_CAMERA = {**dict.fromkeys(WAITING, SLOW_CAMERA_TIMEOUT), "hidden_after": 
 SLOW_CLOCK: Mapping[str, float] = MappingProxyType(
     dict.fromkeys(("gripper_timeout", "controller_timeout", "joint_timeout"), SLOW_CLOCK_TIMEOUT)
 )
-BEFORE_FRANKA_SIM: Mapping[str, str | float] = MappingProxyType(
-    {"arm": "fr3", "detection_timeout": SLOW_CLOCK_TIMEOUT, **SLOW_CLOCK}
+BEFORE_FRANKA_SIM: Mapping[str, str | float | tuple[float, ...]] = MappingProxyType(
+    {
+        "arm": "fr3",
+        "workspace": BEFORE_MUJOCO["workspace"],  # nothing is around it
+        "detection_timeout": SLOW_CLOCK_TIMEOUT,
+        **SLOW_CLOCK,
+    }
 )
 
 

@@ -13,6 +13,7 @@ from ensemble.nodes import SLOW_CLOCK
 from ensemble.parameters import parse_parameters
 from ensemble.replay import RobotDriver
 from ensemble.robot_parameters import (
+    BEFORE_MUJOCO,
     TOLD_THE_DRIVER,
     FrankaPlayerParameters,
     PlayerParameters,
@@ -26,7 +27,8 @@ from slap_ros.robot.franka.installed import require_franky, simulator_python
 from slap_ros.robot.recorded_motion import RecordedMotion, read_recorded_motion
 from slap_ros.robot.worlds import FRANKA, FRANKA_SIM, MOCK
 
-SLOW_START = {"start_timeout": 120.0}  # s, in which a simulated FR3 has imported what it needs
+# Of a simulated FR3: s in which it has imported what it needs; and nothing is around it.
+SIMULATED = {"start_timeout": 120.0, "workspace": BEFORE_MUJOCO["workspace"]}
 REACHED = {
     None: "nothing was measured at the end",
     True: "the goal holds",
@@ -58,7 +60,7 @@ def _parameters(options: ReplayOptions) -> PlayerParameters:
     if options.to not in (FRANKA, FRANKA_SIM):
         return PlayerParameters(**parse_parameters(options.robot, PlayerParameters, "robot"))
     given = parse_parameters(options.robot, FrankaPlayerParameters, "robot")
-    waiting = {**SLOW_CLOCK, **SLOW_START} if options.to == FRANKA_SIM else {}
+    waiting = {**SLOW_CLOCK, **SIMULATED} if options.to == FRANKA_SIM else {}
     return FrankaPlayerParameters(**{**waiting, **given})
 
 

@@ -70,7 +70,6 @@ from robot_bridge.franka.objects import ModelledObjects
 from robot_bridge.simulated.noise_model import NoiseModel
 from robot_bridge.simulated.sensors import DetectionPublisher
 from robot_bridge.transforms import transform
-from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError, SlapError
 from slap_ros.relational import State
 from slap_ros.robot.franka.arm import ArmReading, FrankaArm
@@ -100,17 +99,17 @@ class FrankaDriver(Node):
         super().__init__("franka_driver", **kwargs)
         settings = read_parameters(self, FrankaDriverParameters)
         require_franky()
-        self._settings, self._simulation = settings, None
+        self._settings = settings
+        self._simulation: SimulatedFr3 | None = None
         self._objects: ModelledObjects | None = None
         if settings.simulated == bool(settings.ip):
             raise InvalidParameterError(
                 "franka_driver needs the address of a robot, ip=172.16.0.2, or simulated=true"
             )
-        domain = open_domain(settings.choice)
-        initial = settings.first_task(domain).initial_state
-        self._connect(initial)
         if settings.simulated:
-            self._surround(domain, initial)
+            self._simulate()
+        else:
+            self._arm = FrankaArm(settings.franka)
         self._counts = Counter(motions=0, grips=0, refused=0, aborted=0, canceled=0, recoveries=0)
         self._motions = FrankaArmController(self, self._arm, settings, self._counts)
         self._grips = FrankaGripperController(
@@ -133,23 +132,20 @@ class FrankaDriver(Node):
             self._simulation.close()
         super().destroy_node()
 
-    def _connect(self, initial: State) -> None:
-        chosen = self._settings.franka
-        if self._settings.simulated:
-            self._simulation = SimulatedFr3(_joints(initial))
-            chosen = replace(chosen, ip=self._simulation.ip, realtime=False)
+    def _simulate(self) -> None:
+        """Start a simulated arm, and put the objects of the planner's model around it."""
+        settings = self._settings
+        domain = open_domain(settings.choice)
+        initial = settings.first_task(domain).initial_state
+        self._simulation = SimulatedFr3(_joints(initial))
         try:
-            self._arm = FrankaArm(chosen)
+            self._arm = FrankaArm(replace(settings.franka, ip=self._simulation.ip, realtime=False))
         except SlapError:
-            if self._simulation is not None:
-                self._simulation.close()
+            self._simulation.close()
             raise
-
-    def _surround(self, domain: Domain, initial: State) -> None:
-        """Put the objects of the planner's model around a simulated arm."""
         self._objects = ModelledObjects(domain, initial, self._arm)
-        noise = NoiseModel.of(self._settings)
-        self._detections = DetectionPublisher(self, self._objects, noise, self._settings)
+        noise = NoiseModel.of(settings)
+        self._detections = DetectionPublisher(self, self._objects, noise, settings)
         create_timer(self, domain.execution.control_period_s, self._objects.follow)
 
     def _look_for_clients(self) -> None:

@@ -185,6 +185,7 @@ def test_a_robot_that_is_not_there_is_named(simulation):
         FrankaArm(settings("127.78.0.2"))
 
 
+@pytest.mark.slow  # starts a simulation of its own
 def test_a_gripper_that_fails_and_a_robot_that_is_gone_are_named():
     pytest.importorskip("franky_sim", reason=NO_WHEEL)
     with SimulatedFr3(HOME) as own, connected(own.ip) as arm:

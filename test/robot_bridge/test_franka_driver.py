@@ -80,7 +80,7 @@ def laboratory(module_network):
     from robot_bridge.franka.node import FrankaDriver
 
     overrides = [Parameter("simulated", value=True), Parameter("realtime", value=False)]
-    overrides.append(Parameter("clients", value="laboratory"))
+    overrides.append(Parameter("clients", value="visitor"))
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("ROS_DOMAIN_ID", str(module_network))
         with temporary_node(lambda: Node("laboratory")) as (node, spinner):
@@ -129,6 +129,7 @@ def test_goals_that_a_driver_refuses_move_nothing(laboratory):
     assert math.dist(laboratory.at(), before) < 0.01
 
 
+@pytest.mark.slow  # the arm without its node shows the same
 def test_a_motion_that_is_canceled_stops_where_it_is(laboratory):
     start = laboratory.at()
     handle = laboratory.sent(laboratory.arm, motion(start, -0.9, seconds=3.0))
@@ -137,6 +138,17 @@ def test_a_motion_that_is_canceled_stops_where_it_is(laboratory):
     laboratory.until(canceling.done)
     laboratory.ended(handle)
     assert abs(laboratory.at()[0] - start[0] + 0.9) > 0.2
+
+
+def test_an_arm_holds_when_whoever_sends_goals_is_gone(laboratory):
+    visitor = Node("visitor")
+    laboratory.until(lambda: laboratory.driver._clients == {"visitor"})
+    start = laboratory.at()
+    handle = laboratory.sent(laboratory.arm, motion(start, 1.0, points=20, seconds=8.0))
+    laboratory.until(lambda: abs(laboratory.at()[0] - start[0]) > 0.02)
+    visitor.destroy_node()
+    laboratory.ended(handle)
+    assert abs(laboratory.at()[0] - start[0]) < 0.9
 
 
 def test_a_reflex_has_its_code_and_only_a_person_lets_the_arm_move_again(laboratory):
@@ -156,6 +168,7 @@ def test_a_reflex_has_its_code_and_only_a_person_lets_the_arm_move_again(laborat
     assert result.error_code == FollowJointTrajectory.Result.SUCCESSFUL
 
 
+@pytest.mark.slow  # the arm without its node shows the same
 def test_fingers_that_meet_nothing_reach_their_goal(laboratory):
     goal = GripperCommand.Goal()
     goal.command.position, goal.command.max_effort = 0.01, 20.0
