@@ -62,6 +62,9 @@ KINDER = ["kindergarden>=0.2.5,<0.3"]
 # Some other engines are GPL: whoever wants them installs them.
 UP = ["unified-planning>=1.1", "up-aries>=0.4"]
 MUJOCO = ["mujoco>=3.3"]  # `slap run --world mujoco`: a robot in another engine; Apache-2.0
+FRANKA = ["franky-control>=2"]  # drives a Franka arm by its own protocol; MIT since 2.0
+# `--world franka-sim`: an FR3 in MuJoCo that speaks that protocol; Apache-2.0. It brings pinocchio.
+FRANKA_SIM = [*FRANKA, "franky-sim>=1.0.4"]
 CAMERA = [  # tags: pictures and poses, and `slap scene --tags`
     "pupil-apriltags>=1.0.4.post10",  # the AprilTag library itself; MIT, and BSD-2-Clause
     "opencv-python-headless>=4.9",  # has the tags' patterns in its ArUco module; Apache-2.0
@@ -96,6 +99,7 @@ TEST = [
     "websocket-client>=1.8",  # watches a live run as Foxglove does
     *UP,
     *MUJOCO,
+    *FRANKA_SIM,
     *CAMERA,
     "pypdfium2>=4",  # looks at PDFs of tags; BSD-3-Clause, Apache-2.0
     "colcon-common-extensions>=0.3",
@@ -189,6 +193,8 @@ setup(
         "meshes": MESHES,
         "up": UP,
         "mujoco": MUJOCO,
+        "franka": FRANKA,
+        "franka-sim": FRANKA_SIM,
         "camera": CAMERA,
         "test": TEST,
     },
@@ -198,6 +204,7 @@ setup(
             *(f"{node} = {node}.__main__:main" for node in NODES),
             "mock_robot = robot_bridge.mock.__main__:main",
             "mujoco_robot = robot_bridge.mujoco.__main__:main",
+            "franka_driver = robot_bridge.franka.__main__:main",
             "tag_detector = robot_bridge.tag_detector.__main__:main",
         ],
         "embedded_ros.interfaces": ["slap_msgs = msg_schemas"],

@@ -8,10 +8,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from pkgutil import resolve_name
+from types import MappingProxyType
 from typing import Any
 
 from ensemble.robot_parameters import BEFORE_MUJOCO
-from slap_ros.robot.worlds import MOCK, MUJOCO, SIM
+from slap_ros.robot.worlds import FRANKA, FRANKA_SIM, MOCK, MUJOCO, SIM
 from slap_ros.shortcuts.shortcut import DEFAULT
 from slap_ros.skills.domain_choice import DomainChoice
 
@@ -21,6 +22,7 @@ NODE_CLASSES: Mapping[str, str] = {  # by the name of the module that is run as 
     "robot_bridge": "robot_bridge.node:RobotBridge",
     "robot_bridge.mock": "robot_bridge.mock.node:MockRobot",
     "robot_bridge.mujoco": "robot_bridge.mujoco.node:MujocoRobot",
+    "robot_bridge.franka": "robot_bridge.franka.node:FrankaDriver",
     "robot_bridge.tag_detector": "robot_bridge.tag_detector.node:TagDetectorNode",
     "robot_bridge.player": "robot_bridge.player:Player",
     "perception_node": "perception_node.node:PerceptionNode",
@@ -36,9 +38,18 @@ ROBOT_STATE_TIMEOUT = 8.0
 # s until the robot holds, with a camera that is rendered by a processor: ten pictures of what was
 # moved take it 3 to 10 s, and the robot's controllers wait for each.
 SLOW_CAMERA_TIMEOUT = 15.0
+# s until the robot holds, where the clock of a simulated FR3 waits for a busy machine.
+SLOW_CLOCK_TIMEOUT = 60.0
 WAITING = ("detection_timeout", "controller_timeout", "joint_timeout", "settle_time")
 HIDDEN_AFTER = 5  # pictures without an object: the arm hides what is behind it
 BEFORE_CAMERA = {**dict.fromkeys(WAITING, SLOW_CAMERA_TIMEOUT), "hidden_after": HIDDEN_AFTER}
+# Of whoever sends goals to a simulated FR3, whose clock may be slow.
+SLOW_CLOCK: Mapping[str, float] = MappingProxyType(
+    dict.fromkeys(("gripper_timeout", "controller_timeout", "joint_timeout"), SLOW_CLOCK_TIMEOUT)
+)
+BEFORE_FRANKA_SIM: Mapping[str, str | float] = MappingProxyType(
+    {"arm": "fr3", "detection_timeout": SLOW_CLOCK_TIMEOUT, **SLOW_CLOCK}
+)
 
 
 def node_class(name: str) -> Any:
@@ -62,10 +73,12 @@ class RunSettings:
     patience: float = 1.0  # factor of all deadlines
     world: str = SIM  # the simulator, a robot, or the bridge with a simulated robot behind it
     scene: str = ""  # a robot's scene file; empty: the objects of the sampled task
-    # Parameters of the simulated robots, of the bridge and of perception that are not the default.
+    # Parameters of the simulated robots, of the bridge, of a Franka arm's driver and of perception
+    # that are not the default.
     mock: Mapping[str, str | int | float] = field(default_factory=dict)
     mujoco: Mapping[str, str | int | float] = field(default_factory=dict)
     bridge: Mapping[str, str | int | float] = field(default_factory=dict)
+    franka: Mapping[str, str | int | float] = field(default_factory=dict)
     perception: Mapping[str, str | int | float] = field(default_factory=dict)
     # Parameters of the acquisition node that are not the default; None: it does not run.
     acquisition: Mapping[str, str | int | float] | None = None
@@ -79,6 +92,8 @@ def node_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int |
     waiting: dict[str, str | int | float] = {}
     if settings.world != SIM:
         waiting["state_timeout"] = ROBOT_STATE_TIMEOUT
+    if settings.world == FRANKA_SIM:
+        waiting["state_timeout"] = ROBOT_STATE_TIMEOUT + SLOW_CLOCK_TIMEOUT
     if settings.mujoco.get("camera"):
         waiting["state_timeout"] = ROBOT_STATE_TIMEOUT + SLOW_CAMERA_TIMEOUT
     if "debounce" in settings.perception:  # what is debounced is late
@@ -124,6 +139,13 @@ def _world_parameters(settings: RunSettings) -> dict[str, Mapping[str, str | int
         return {"sim_node": task | {"pace": settings.pace}}
     scene = {"scene": settings.scene} if settings.scene else {}
     bridge = {"robot_bridge": task | scene | dict(settings.bridge)}
+    if settings.world == FRANKA:
+        bridge["robot_bridge"] = {"arm": "fr3"} | bridge["robot_bridge"]
+        return {"robot_bridge.franka": task | dict(settings.franka)} | bridge
+    if settings.world == FRANKA_SIM:
+        bridge["robot_bridge"] = dict(BEFORE_FRANKA_SIM) | bridge["robot_bridge"]
+        simulated = {"simulated": True, "realtime": False}
+        return {"robot_bridge.franka": task | dict(settings.franka) | simulated} | bridge
     if settings.world == MOCK:
         return {"robot_bridge.mock": task | dict(settings.mock)} | bridge
     if settings.world == MUJOCO:

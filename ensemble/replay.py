@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A recording executed on a robot from start to end: node, mock robot if wanted, executor."""
+"""A recording executed on a robot from start to end: node, driver if wanted, executor."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ from slap_ros.relational import State
 from slap_ros.robot.dry_run import DryRun
 from slap_ros.robot.recorded_motion import RecordedMotion
 
-BRIDGE, MOCK_ROBOT, PLAYER = "robot_bridge", "robot_bridge.mock", "robot_bridge.player"
+BRIDGE, PLAYER = "robot_bridge", "robot_bridge.player"
+MOCK_ROBOT, FRANKA_DRIVER = "robot_bridge.mock", "robot_bridge.franka"
 
 
 class MotionPlayer(Protocol):
@@ -50,6 +51,21 @@ class MotionPlayer(Protocol):
 
 
 @dataclass(frozen=True)
+class RobotDriver:
+    """A node that drives a robot, or is one.
+
+    Args:
+        name: Name of the module that is run as a process.
+        parameters: Parameters of the node.
+        simulates: Whether it begins in the state in which the recording does.
+    """
+
+    name: str
+    parameters: Mapping[str, str | int | float | tuple[float, ...]]
+    simulates: bool = True
+
+
+@dataclass(frozen=True)
 class RobotReplayResult:
     """The result of a replay that got to its end.
 
@@ -73,7 +89,7 @@ def replay_on_robot(
     recorded: RecordedMotion,
     dry_run: DryRun,
     parameters: PlayerParameters,
-    mock: Mapping[str, str | int | float] | None,
+    driver: RobotDriver | None,
     on_step: Callable[[int], None],
 ) -> RobotReplayResult:
     """Execute a recording on a robot.
@@ -82,7 +98,7 @@ def replay_on_robot(
         recorded: What to execute.
         dry_run: Dry run of ``recorded``, within the limits of this robot.
         parameters: Parameters of the robot.
-        mock: Parameters of a mock robot to start; None where there is a real one.
+        driver: Node to start for the robot; None where its own controllers run.
         on_step: Called with the number of steps executed, often.
 
     Returns:
@@ -104,8 +120,9 @@ def replay_on_robot(
         spinner = made[1]
         if spinner.spin_until(lambda: BRIDGE in player.get_node_names(), DISCOVERY):
             raise AlreadyRunningError("a robot_bridge commands this robot: stop it first")
-        if mock is not None:
-            nodes = {MOCK_ROBOT: _sampled_task(recorded) | mock}
+        if driver is not None:
+            task = _sampled_task(recorded) if driver.simulates else {}
+            nodes = {driver.name: task | driver.parameters}
             launcher = stack.enter_context(ProcessLauncher(nodes))
             spinner.check = launcher.check
         _play(player, spinner, on_step)
@@ -129,14 +146,16 @@ def _play(player: MotionPlayer, spinner: Spinner, on_step: Callable[[int], None]
         raise
 
 
-def _sampled_task(recorded: RecordedMotion) -> dict[str, str | int | float]:
-    """The task in whose initial state the mock robot is to be.
+def _sampled_task(recorded: RecordedMotion) -> dict[str, str | int | float | tuple[float, ...]]:
+    """The task in whose initial state a simulated robot is to be.
 
     Raises:
-        InvalidParameterError: That task was not sampled, so the mock robot cannot have it.
+        InvalidParameterError: That task was not sampled, so a simulated robot cannot have it.
     """
     if recorded.seed < 0:
-        raise InvalidParameterError("a mock robot has sampled tasks only, and this one was not")
+        raise InvalidParameterError(
+            "a simulated robot has sampled tasks only, and this one was not"
+        )
     return {
         "domain": recorded.domain.name,
         "preset": recorded.domain.preset,

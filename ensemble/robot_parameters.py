@@ -12,7 +12,9 @@ from ensemble.camera_parameters import CameraParameters
 from ensemble.parameters import MAX_SEED, parameter, parse_parameters
 from ensemble.world_parameters import WorldParameters
 from slap_ros.errors import InvalidParameterError
-from slap_ros.robot.limits import Limits, Workspace, arm_limits
+from slap_ros.robot.franka.arm import COLLISION_FORCE, COLLISION_TORQUE, FrankaSettings
+from slap_ros.robot.franka.limits import franka_limits
+from slap_ros.robot.limits import FR3, Limits, Workspace, arm_limits
 from slap_ros.robot.tracking import TrackingSettings
 from slap_ros.worlds.panda import JOINTS
 
@@ -23,6 +25,7 @@ GRIPPER_ACTION = "franka_gripper/gripper_action"
 BEFORE_MUJOCO: Mapping[str, float | tuple[float, ...]] = MappingProxyType(
     {"workspace": (-0.9, -0.9, -0.4, 0.9, 0.9, 1.2), "gripper_effort": 70.0}
 )
+Parameters = Mapping[str, str | int | float | tuple[float, ...]]
 WORKSPACE = (*Workspace().low, *Workspace().high)
 GIVEN_WITH_THE_RUN = frozenset(item.name for item in fields(WorldParameters)) | {"scene"}
 
@@ -159,6 +162,75 @@ class MujocoRobotParameters(CameraParameters, SimulatedRobotParameters):
     goal_time: float = parameter(1.0, "s, by which the arm may arrive late; 0: any time")
 
 
+@dataclass(frozen=True)
+class FrankaConnectionParameters:
+    """How a Franka arm is reached, and where its control stops it."""
+
+    ip: str = parameter("", "address of the robot")
+    collision_torque: float = parameter(COLLISION_TORQUE, "Nm about a joint: a collision", high=87)
+    collision_force: float = parameter(COLLISION_FORCE, "N on the hand: a collision", high=150)
+    realtime: bool = parameter(True, "whether a real-time kernel is demanded")
+
+
+@dataclass(frozen=True)
+class FrankaBridgeParameters(FrankaConnectionParameters, RobotBridgeParameters):
+    """Those of robot_bridge in front of a Franka arm, and of the arm's driver."""
+
+    arm: str = parameter("fr3", "fr3")
+
+
+@dataclass(frozen=True)
+class FrankaPlayerParameters(FrankaConnectionParameters, PlayerParameters):
+    """Those of a replay on a Franka arm, and of the arm's driver."""
+
+    arm: str = parameter("fr3", "fr3")
+
+    @property
+    def limits(self) -> Limits:
+        """What the arm may do when it is driven by its own protocol; see the base class."""
+        return franka_limits(super().limits, self.speed)
+
+
+@dataclass(frozen=True)
+class FrankaDriverParameters(FrankaConnectionParameters, SimulatedRobotParameters):
+    """How a Franka arm is driven: see the docstring of ``robot_bridge.franka.node``."""
+
+    simulated: bool = parameter(False, "whether to start a simulated FR3")
+    arm: str = parameter("fr3", "prefix of joints and frames")
+    speed: float = parameter(1.0, "fraction of the limits of velocity, acceleration and jerk")
+    goal_tolerance: float = parameter(0.05, "rad, by which a joint may be off at the end")
+    clients: str = parameter("robot_bridge robot_player", "nodes without which the arm holds")
+    pose_noise: float = parameter(0.0, "m, of detections along each axis")
+    turn_noise: float = parameter(0.0, "rad, of detections about each axis")
+
+    @property
+    def franka(self) -> FrankaSettings:
+        """What the arm is connected by.
+
+        Raises:
+            InvalidParameterError: A speed that there is not.
+        """
+        limits = franka_limits(FR3.scaled(self.speed, Workspace()), self.speed)
+        return FrankaSettings(
+            self.ip,
+            limits,
+            self.speed,
+            self.collision_torque,
+            self.collision_force,
+            self.realtime,
+        )
+
+
+CONNECTION = frozenset(item.name for item in fields(FrankaConnectionParameters))
+TOLD_THE_DRIVER = CONNECTION | {
+    "arm",
+    "speed",
+    "trajectory_action",
+    "gripper_action",
+    "gripper_scale",
+}
+
+
 def parse_mock_robot(text: str) -> dict[str, str | int | float]:
     """The mock robot's parameters as a command line has them: ``latency=0.05,dropout=0.1``.
 
@@ -181,6 +253,27 @@ def parse_mujoco_robot(text: str) -> dict[str, str | int | float]:
         InvalidParameterError: An unknown parameter, or a value that it cannot have.
     """
     return parse_parameters(text, MujocoRobotParameters, "MuJoCo robot", GIVEN_WITH_THE_RUN)
+
+
+def parse_franka(text: str) -> tuple[Parameters, Parameters]:
+    """The parameters of a Franka arm as a command line has them: ``ip=172.16.0.2,speed=0.1``.
+
+    Returns:
+        Parameters of the bridge, and those of the driver, by name.
+
+    Raises:
+        InvalidParameterError: An unknown parameter, or a value that it cannot have.
+    """
+    given = GIVEN_WITH_THE_RUN - {"scene"}
+    found = parse_parameters(text, FrankaBridgeParameters, "robot", given)
+    return franka_parts(found)
+
+
+def franka_parts(found: Parameters) -> tuple[Parameters, Parameters]:
+    """Parameters by name as those of whoever sends goals, and those of the arm's driver."""
+    driver = {name: value for name, value in found.items() if name in TOLD_THE_DRIVER}
+    own = {name: value for name, value in found.items() if name not in CONNECTION}
+    return own, driver
 
 
 def parse_robot_bridge(text: str) -> dict[str, str | int | float | tuple[float, ...]]:

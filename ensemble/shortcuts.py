@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from rclpy.node import Node
@@ -11,11 +12,11 @@ from rclpy.node import Node
 from ensemble.observation import Episode
 from ensemble.parameters import parameter
 from slap_ros.core import Domain
-from slap_ros.errors import InvalidParameterError
+from slap_ros.errors import InvalidParameterError, SkillsChangedError
 from slap_ros.planning.planner_choice import DEFAULT_PLANNER
 from slap_ros.relational import Layout, State
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
-from slap_ros.shortcuts.shipped import chosen_library, require_usable
+from slap_ros.shortcuts.shipped import chosen_library, require_usable, skills_digest
 from slap_ros.shortcuts.shortcut import DEFAULT, Shortcut
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 
@@ -53,34 +54,47 @@ class ShortcutProvider:
         require_usable(settings.shortcuts, planner)
         self.sampling = replace(DEFAULT, samples=settings.samples)
         self._node, self._choice, self._planner = node, settings.shortcuts, planner
-        self._libraries: dict[str, ShortcutLibrary | None] = {}  # by domain
+        self._libraries: dict[tuple[str, str], ShortcutLibrary | None] = {}  # by _key
         self._made: dict[Layout, GroundedShortcuts] = {}  # of one episode
         self._made_for: Episode | None = None
 
     def prepare_episode(self, episode: Episode) -> None:
-        """See :meth:`prepare`."""
-        self.prepare(episode.domain)
+        """See :meth:`prepare`; the episode's skills are those that count.
+
+        Raises:
+            InvalidLibraryError: See :meth:`prepare`.
+            SkillsChangedError: The shortcuts were learned over other skills.
+        """
+        self._load(episode.domain)
 
     def prepare(self, domain: Domain | None) -> None:
         """Load the library of a domain, once; does nothing where there is no domain yet.
 
+        Other skills than the domain has here may be announced before there is an episode.
+
         Raises:
             InvalidLibraryError: It cannot be used as a whole, or is another domain's.
         """
-        if domain is not None and domain.name not in self._libraries:
+        if domain is not None:
+            with suppress(SkillsChangedError):
+                self._load(domain)
+
+    def _load(self, domain: Domain) -> None:
+        key = _key(domain)
+        if key not in self._libraries:
             library = chosen_library(self._choice, domain, self._planner)
-            self._libraries[domain.name] = library
+            self._libraries[key] = library
             for reason in library.refused if library is not None else ():
                 self._node.get_logger().warning(f"a shortcut is left out: {reason}")
 
     def shortcuts(self, domain: Domain) -> tuple[Shortcut, ...]:
         """Those of a domain that was opened."""
-        library = self._libraries.get(domain.name)
+        library = self._libraries.get(_key(domain))
         return library.shortcuts if library is not None else ()
 
     def provenance(self, domain: Domain) -> dict[str, str | int]:
         """Which library is used and how, as a plan's message has it."""
-        library = self._libraries.get(domain.name)
+        library = self._libraries.get(_key(domain))
         digest = library.digest if library is not None else ""
         return {"library": digest, "samples": self.sampling.samples}
 
@@ -101,3 +115,8 @@ class ShortcutProvider:
                 episode.domain, shortcuts, start, self.sampling
             )
         return self._made[known.layout]
+
+
+def _key(domain: Domain) -> tuple[str, str]:
+    """The domain's name, and the digest of its acquired skills: shortcuts are tied to both."""
+    return domain.name, skills_digest(domain)

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from time import monotonic
 from typing import Any
 
@@ -21,7 +22,10 @@ from slap_ros.errors import (
     ControllerAbortedError,
     ControllerRejectedError,
     ControllerTimeoutError,
+    ErrorCode,
+    error_from,
 )
+from slap_ros.robot.joint_trajectory import TrajectoryPoint
 from slap_ros.robot.limits import JointMotion
 
 TRAJECTORY_CODES = {  # control_msgs' names of what a trajectory's result says
@@ -35,6 +39,9 @@ TRAJECTORY_CODES = {  # control_msgs' names of what a trajectory's result says
         "GOAL_TOLERANCE_VIOLATED",
     )
 }
+OWN_CODES = frozenset(  # of ours, which our driver gives a trajectory's result: above control_msgs'
+    int(code) for code in ErrorCode if code > ErrorCode.UNKNOWN
+)
 STATUSES = {  # of a goal that did not succeed
     GoalStatus.STATUS_CANCELED: "canceled",
     GoalStatus.STATUS_ABORTED: "gave up",
@@ -78,10 +85,27 @@ class Controllers:
             ControllerAbortedError: It was given up, or canceled.
             ControllerTimeoutError: No controller, or no answer in time; the goal is canceled.
         """
-        goal = FollowJointTrajectory.Goal(trajectory=trajectory(motion, self._joints))
-        outcome = await self._run(self._arm, goal, motion.duration_s + self._grace_s)
+        still = (0.0,) * len(self._joints)
+        await self.follow([TrajectoryPoint(motion.duration_s, motion.target, still, still)])
+
+    async def follow(self, points: Sequence[TrajectoryPoint]) -> None:
+        """Move the arm through points; their limits were checked when they were made.
+
+        Args:
+            points: Points of a trajectory that ends at rest.
+
+        Raises:
+            ControllerRejectedError: The goal was not accepted.
+            ControllerAbortedError: It was given up, or canceled.
+            ControllerTimeoutError: No controller, or no answer in time; the goal is canceled.
+            SlapError: The cause that a driver of ours gives.
+        """
+        goal = FollowJointTrajectory.Goal(trajectory=trajectory(points, self._joints))
+        outcome = await self._run(self._arm, goal, points[-1].time_s + self._grace_s)
         if outcome.status != GoalStatus.STATUS_SUCCEEDED:
             code, reason = outcome.result.error_code, outcome.result.error_string
+            if code in OWN_CODES:
+                raise error_from(code, f"{self._names[self._arm]}: {reason}")
             raise ControllerAbortedError(
                 f"{self._names[self._arm]} {_ending(outcome.status)} a motion: "
                 f"{TRAJECTORY_CODES.get(code, f'unknown code {code}')}, "
@@ -154,17 +178,22 @@ def _cancel(sent: Future) -> None:
         sent.result().cancel_goal_async()
 
 
-def trajectory(motion: JointMotion, joints: list[str]) -> JointTrajectory:
-    """From wherever the arm stands to the target, at rest there: a quintic to a controller."""
-    whole = int(motion.duration_s)
+def trajectory(points: Sequence[TrajectoryPoint], joints: list[str]) -> JointTrajectory:
+    """From wherever the arm stands through points: quintics to a controller."""
     return JointTrajectory(
         joint_names=joints,
         points=[
             JointTrajectoryPoint(
-                positions=list(motion.target),
-                velocities=[0.0] * len(joints),
-                accelerations=[0.0] * len(joints),
-                time_from_start=Duration(sec=whole, nanosec=int((motion.duration_s - whole) * 1e9)),
+                positions=list(point.positions),
+                velocities=list(point.velocities),
+                accelerations=list(point.accelerations),
+                time_from_start=_duration(point.time_s),
             )
+            for point in points
         ],
     )
+
+
+def _duration(time_s: float) -> Duration:
+    whole = int(time_s)
+    return Duration(sec=whole, nanosec=int((time_s - whole) * 1e9))

@@ -37,10 +37,11 @@ from slap_ros.errors import (
     StartMismatchError,
 )
 from slap_ros.relational import State
+from slap_ros.robot.blended_run import BlendedRun
 from slap_ros.robot.dry_run import DryRun
-from slap_ros.robot.limits import JointMotion
 from slap_ros.robot.recorded_motion import RecordedMotion, RecordedWaypoint
 from slap_ros.robot.robot_world import GAP_OPEN, GAP_SHUT, GRASPED, GripperAction
+from slap_ros.robot.stretches import Stretch
 from slap_ros.worlds.features import POSE_FEATURES
 
 POSITION = tuple(feature.name for feature in POSE_FEATURES[:3])
@@ -65,7 +66,8 @@ class Player(Node):
         """
         dry_run.require_safe()
         super().__init__("robot_player", **kwargs)
-        self._recorded, self._motions, self._settings = recorded, dry_run.motions, settings
+        self._recorded, self._settings = recorded, settings
+        self._stretches = stretches_of(recorded, dry_run)
         self._robot = Robot(self, recorded.domain, lambda: recorded.states[0], settings)
         self.failure: SlapError | None = None
         self.done = 0  # steps
@@ -84,9 +86,9 @@ class Player(Node):
         """Execute the recording; why it ended early, if it did, is in ``failure``."""
         try:
             await self._begin()
-            for waypoint, motion in zip(self._recorded.waypoints, self._motions, strict=True):
-                await self._step(waypoint, motion)
-                self.done += 1
+            for stretch in self._stretches:
+                await self._execute(stretch)
+                self.done += len(stretch.waypoints)
             if not any(_held(self._recorded.states[-1], name) for name in self._names):
                 self.final = await self._measure("at the end")
         except SlapError as error:
@@ -160,11 +162,13 @@ class Player(Node):
 
     # -- motions --------------------------------------------------------------------------------
 
-    async def _step(self, waypoint: RecordedWaypoint, motion: JointMotion) -> None:
-        await self._require_at(motion.start, f"before step {waypoint.step}")
-        if waypoint.gripper is not GripperAction.KEEP:
-            await self._grip(waypoint)
-        await self._robot.controllers.move(motion)
+    async def _execute(self, stretch: Stretch) -> None:
+        first = stretch.waypoints[0]
+        await self._require_at(stretch.start, f"before step {first.step}")
+        if first.gripper is not GripperAction.KEEP:
+            await self._grip(first)
+        if stretch.points:
+            await self._robot.controllers.follow(stretch.points)
 
     async def _grip(self, waypoint: RecordedWaypoint) -> None:
         closing = waypoint.gripper is GripperAction.CLOSE
@@ -197,6 +201,14 @@ class Player(Node):
             raise ControllerAbortedError(
                 f"the arm is {off:.3f} rad off the recording {when}: it was held up, or moved"
             )
+
+
+def stretches_of(recorded: RecordedMotion, dry_run: DryRun) -> tuple[Stretch, ...]:
+    """The parts of a recording that are executed without a stop: each waypoint, or more of them."""
+    if isinstance(dry_run, BlendedRun):
+        return dry_run.stretches
+    pairs = zip(recorded.waypoints, dry_run.motions, strict=True)
+    return tuple(Stretch.of(waypoint, motion) for waypoint, motion in pairs)
 
 
 def _held(state: State, name: str) -> bool:

@@ -88,8 +88,10 @@ class Robot:
 
     def no_detection(self, since_s: float, when: str) -> NoDetectionError:
         """The error that names what was not detected since then."""
-        missing = ", ".join(self.world.undetected(since_s)) or "none at all, but too few times"
-        return NoDetectionError(f"not detected {when}: {missing}")
+        missing = ", ".join(self.world.undetected(since_s)) or "none at all"
+        seldom = ", ".join(self.world.seldom_detected(since_s))
+        too_few = f"; too few times: {seldom}" if seldom else ""
+        return NoDetectionError(f"not detected {when}: {missing}{too_few}")
 
     async def actuate_gripper(self, action: GripperAction) -> None:
         """Close the fingers around what the world expects there, or open them.

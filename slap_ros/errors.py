@@ -68,6 +68,10 @@ class ErrorCode(IntEnum):
     INVALID_MEASUREMENT = 78
     INVALID_SCENE = 79
     OPEN_LOOP_ONLY = 80
+    ROBOT_REFLEX = 81
+    ROBOT_UNREACHABLE = 82
+    ROBOT_VERSION = 83
+    GRIPPER_FAILED = 84
 
     # 90-109: bags
     DAMAGED_BAG = 90
@@ -318,6 +322,30 @@ class OpenLoopOnlyError(SlapError):
     """A domain whose states cannot be measured on a robot, to be run on one in closed loop."""
 
     code = ErrorCode.OPEN_LOOP_ONLY
+
+
+class RobotReflexError(SlapError):
+    """The robot's own control stopped the arm: a collision, a limit, or commands that came late."""
+
+    code = ErrorCode.ROBOT_REFLEX
+
+
+class RobotUnreachableError(SlapError):
+    """The robot does not answer, or no longer does."""
+
+    code = ErrorCode.ROBOT_UNREACHABLE
+
+
+class RobotVersionError(SlapError):
+    """The robot speaks another version of its protocol than the library here."""
+
+    code = ErrorCode.ROBOT_VERSION
+
+
+class GripperFailedError(SlapError):
+    """The robot's gripper reported that a motion of its fingers failed."""
+
+    code = ErrorCode.GRIPPER_FAILED
 
 
 class DamagedBagError(SlapError):

@@ -12,7 +12,7 @@ import typer
 from slap_ros.cli.bag import BagPath
 from slap_ros.cli.options import Json
 from slap_ros.errors import InvalidParameterError
-from slap_ros.robot.worlds import MOCK, ROBOT
+from slap_ros.robot.worlds import FRANKA, FRANKA_SIM, MOCK, ROBOT
 
 WORLD = "world"  # a fresh one, rather than a robot
 
@@ -30,7 +30,8 @@ class ReplayOptions:
         str,
         typer.Option(
             help="Where to replay: world (a new simulated one), robot (see "
-            "docs/real-robot.md), or mock (a simulated robot)."
+            "docs/real-robot.md), franka (an arm by its own protocol, without stops), "
+            "franka-sim (a simulated FR3 that speaks it), or mock (a simulated robot)."
         ),
     ] = WORLD
     dry_run: Annotated[
@@ -57,9 +58,11 @@ class ReplayOptions:
 
     def __post_init__(self) -> None:
         """Refuse what does not fit; see the class."""
-        if self.to not in (WORLD, ROBOT, MOCK):
-            raise InvalidParameterError(f"--to must be world, robot or mock, not {self.to!r}")
+        if self.to not in (WORLD, ROBOT, MOCK, FRANKA, FRANKA_SIM):
+            raise InvalidParameterError(
+                f"--to must be world, robot, franka, franka-sim or mock, not {self.to!r}"
+            )
         if self.to == WORLD and (self.dry_run or self.robot or self.mock):
-            raise InvalidParameterError("--dry-run, --robot and --mock are for --to robot or mock")
+            raise InvalidParameterError("--dry-run, --robot and --mock are for --to a robot")
         if self.mock and self.to != MOCK:
             raise InvalidParameterError("--mock is for --to mock")

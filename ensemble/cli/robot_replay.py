@@ -4,25 +4,29 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import asdict
-from typing import Any
-
-import typer
-from rich.table import Table
 
 from ensemble import replay as ensemble_replay
+from ensemble.cli.motion_check import as_data, blended_run, require_yes, show_check
 from ensemble.cli.replay_options import ReplayOptions
+from ensemble.nodes import SLOW_CLOCK
 from ensemble.parameters import parse_parameters
-from ensemble.robot_parameters import PlayerParameters, parse_mock_robot
+from ensemble.replay import RobotDriver
+from ensemble.robot_parameters import (
+    TOLD_THE_DRIVER,
+    FrankaPlayerParameters,
+    PlayerParameters,
+    parse_mock_robot,
+)
 from slap_ros.cli.bars import counting_bars
 from slap_ros.cli.console import console, print_json
-from slap_ros.errors import ErrorCode, TaskCanceledError
+from slap_ros.errors import ErrorCode, InvalidParameterError
 from slap_ros.robot.dry_run import DryRun
+from slap_ros.robot.franka.installed import require_franky, simulator_python
 from slap_ros.robot.recorded_motion import RecordedMotion, read_recorded_motion
-from slap_ros.robot.robot_world import GripperAction
-from slap_ros.robot.worlds import MOCK
+from slap_ros.robot.worlds import FRANKA, FRANKA_SIM, MOCK
 
+SLOW_START = {"start_timeout": 120.0}  # s, in which a simulated FR3 has imported what it needs
 REACHED = {
     None: "nothing was measured at the end",
     True: "the goal holds",
@@ -37,87 +41,71 @@ def replay_on_robot(options: ReplayOptions) -> int:
         TaskCanceledError: The person at the terminal did not let the arm move.
         SlapError: The motion must not be executed, or failed; a robot then holds.
     """
-    parameters = PlayerParameters(**parse_parameters(options.robot, PlayerParameters, "robot"))
+    parameters = _parameters(options)
     recorded = read_recorded_motion(options.bag, options.namespace)
-    checked = DryRun.of(recorded, recorded.limits_of(parameters.limits))
-    if options.json and options.dry_run:
-        print_json(_as_json(recorded, checked))
-    else:
-        console.print(_table(recorded, checked, parameters.arm))
-    for step, reason in checked.violations:
-        console.print(f"step {step}: {reason}")
+    checked = _checked(recorded, parameters)
+    code = show_check(recorded, checked, parameters.arm, options.json and options.dry_run)
     if options.dry_run:
-        return int(ErrorCode.UNSAFE_COMMAND) if checked.violations else 0
+        return code
     checked.require_safe()
-    if not (options.yes or options.to == MOCK or _agreed()):
-        raise TaskCanceledError("nothing moved: it needs a yes on the terminal, or --yes")
-    return _execute(options, recorded, checked, parameters)
+    driver = _driver(options, parameters)
+    require_yes(options.yes or options.to in (MOCK, FRANKA_SIM))
+    return _execute(options, recorded, checked, parameters, driver)
+
+
+def _parameters(options: ReplayOptions) -> PlayerParameters:
+    """Parameters of the robot."""
+    if options.to not in (FRANKA, FRANKA_SIM):
+        return PlayerParameters(**parse_parameters(options.robot, PlayerParameters, "robot"))
+    given = parse_parameters(options.robot, FrankaPlayerParameters, "robot")
+    waiting = {**SLOW_CLOCK, **SLOW_START} if options.to == FRANKA_SIM else {}
+    return FrankaPlayerParameters(**{**waiting, **given})
+
+
+def _checked(recorded: RecordedMotion, parameters: PlayerParameters) -> DryRun:
+    """The dry run: of a Franka arm by its own protocol, without stops."""
+    limits = recorded.limits_of(parameters.limits)
+    if not isinstance(parameters, FrankaPlayerParameters):
+        return DryRun.of(recorded, limits)
+    return blended_run(recorded, limits, parameters.speed)
+
+
+def _driver(options: ReplayOptions, parameters: PlayerParameters) -> RobotDriver | None:
+    """The node to start for the robot; None where its own controllers run.
+
+    Raises:
+        InvalidParameterError: A library that it needs is not installed, or the address is missing.
+    """
+    if options.to == MOCK:
+        return RobotDriver(ensemble_replay.MOCK_ROBOT, parse_mock_robot(options.mock))
+    if not isinstance(parameters, FrankaPlayerParameters):
+        return None
+    require_franky()
+    told = {name: value for name, value in asdict(parameters).items() if name in TOLD_THE_DRIVER}
+    if options.to == FRANKA_SIM:
+        simulator_python()
+        simulated = {"simulated": True, "realtime": False, "ip": ""}
+        return RobotDriver(ensemble_replay.FRANKA_DRIVER, told | simulated)
+    if not parameters.ip:
+        raise InvalidParameterError("--to franka needs the robot's address: --robot ip=172.16.0.2")
+    return RobotDriver(ensemble_replay.FRANKA_DRIVER, told, simulates=False)
 
 
 def _execute(
-    options: ReplayOptions, recorded: RecordedMotion, checked: DryRun, parameters: PlayerParameters
+    options: ReplayOptions,
+    recorded: RecordedMotion,
+    checked: DryRun,
+    parameters: PlayerParameters,
+    driver: RobotDriver | None,
 ) -> int:
     """Execute the motion; the exit code."""
-    mock = parse_mock_robot(options.mock) if options.to == MOCK else None
     with counting_bars() as bar:
         watched = bar.add_task("replaying", total=len(recorded.waypoints))
         played = ensemble_replay.replay_on_robot(
-            recorded, checked, parameters, mock, lambda done: bar.update(watched, completed=done)
+            recorded, checked, parameters, driver, lambda done: bar.update(watched, completed=done)
         )
     reached = played.reached(recorded)
     if options.json:
-        print_json(_as_json(recorded, checked) | {"played": played.steps, "reached": reached})
+        print_json(as_data(recorded, checked) | {"played": played.steps, "reached": reached})
     console.print(f"{played.steps} steps executed; {REACHED[reached]}")
     return int(ErrorCode.REPLAY_MISMATCH) if reached is False else 0
-
-
-def _agreed() -> bool:
-    """Whether the person at the terminal lets the arm move; False without a terminal."""
-    if not sys.stdin.isatty():
-        return False
-    return typer.confirm("The arm is going to move. Is everybody out of its reach?", err=True)
-
-
-def _table(recorded: RecordedMotion, checked: DryRun, arm: str) -> Table:
-    steps = len(recorded.waypoints)
-    grips = sum(waypoint.gripper is not GripperAction.KEEP for waypoint in recorded.waypoints)
-    verdict = (
-        f"{len(checked.violations)} steps beyond its limits"
-        if checked.violations
-        else f"{checked.duration_s:.1f} s of motion"
-    )
-    period_s = recorded.domain.execution.control_period_s
-    table = Table(
-        "closest to a limit",
-        "value",
-        "allowed",
-        "share",
-        "step",
-        title=(
-            f"{recorded.domain.name}, seed {recorded.seed}, on {arm}: {steps} steps "
-            f"({steps * period_s:.1f} s as recorded), {grips} grips, {verdict}"
-        ),
-    )
-    for extreme in checked.extremes:
-        style = "bold red" if extreme.share > 1.0 else None
-        table.add_row(
-            extreme.quantity,
-            f"{extreme.value:.3f} {extreme.unit}",
-            f"{extreme.low:.3f} to {extreme.high:.3f}",
-            f"{extreme.share:.0%}",
-            str(extreme.step),
-            style=style,
-        )
-    return table
-
-
-def _as_json(recorded: RecordedMotion, checked: DryRun) -> dict[str, Any]:
-    return {
-        "domain": recorded.domain.name,
-        "seed": recorded.seed,
-        "index": recorded.index,
-        "steps": len(recorded.waypoints),
-        "duration_s": checked.duration_s,
-        "extremes": [{**asdict(extreme), "share": extreme.share} for extreme in checked.extremes],
-        "violations": [{"step": step, "reason": reason} for step, reason in checked.violations],
-    }

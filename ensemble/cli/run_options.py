@@ -38,7 +38,7 @@ from slap_ros.files import require_writable
 from slap_ros.planning.execution import MAX_REPLANS
 from slap_ros.planning.planner import require_planner
 from slap_ros.planning.planner_choice import DEFAULT_PLANNER, with_settings
-from slap_ros.robot.worlds import MOCK, MUJOCO, ROBOT, SIM, WORLDS
+from slap_ros.robot.worlds import FRANKA, FRANKA_SIM, MOCK, MUJOCO, ROBOT, SIM, WORLDS
 from slap_ros.skills.domain_choice import SHIPPED
 
 
@@ -128,7 +128,8 @@ class RunOptions:
         str,
         typer.Option(
             help="World to act in: sim, robot (see docs/real-robot.md), mock (a simulated robot "
-            "in the planner's own physics), or mujoco (one in MuJoCo)."
+            "in the planner's own physics), mujoco (one in MuJoCo), franka (an arm by its own "
+            "protocol), or franka-sim (a simulated FR3 that speaks it)."
         ),
     ] = SIM
     scene: Annotated[
@@ -145,6 +146,17 @@ class RunOptions:
         str,
         typer.Option(help="Parameters of the robot in MuJoCo, such as pace=5,dropout=0.1."),
     ] = ""
+    dry_run: Annotated[
+        bool,
+        typer.Option(
+            "--dry-run",
+            help="With --world franka: solve the task in simulation, and check the arm's motion "
+            "against its limits; move nothing.",
+        ),
+    ] = False
+    yes: Annotated[
+        bool, typer.Option("--yes", help="With --world franka: move the arm without asking.")
+    ] = False
     acquire: Annotated[
         bool,
         typer.Option(
@@ -195,7 +207,7 @@ class RunOptions:
         if world not in WORLDS:
             known = ", ".join(WORLDS)
             raise InvalidParameterError(f"--world must be one of {known}, not {world!r}")
-        if self.scene is not None and world not in (ROBOT, MUJOCO):
+        if self.scene is not None and world not in (ROBOT, MUJOCO, FRANKA):
             raise InvalidParameterError(
                 f"--scene is what is around a robot, not for --world {world}"
             )
@@ -203,6 +215,8 @@ class RunOptions:
             raise InvalidParameterError(f"--mock is for --world mock, not for --world {world}")
         if self.robot and world == SIM:
             raise InvalidParameterError("--robot is for a robot, not for --world sim")
+        if (self.dry_run or self.yes) and world not in (FRANKA, FRANKA_SIM):
+            raise InvalidParameterError(f"--dry-run and --yes are for --world franka, not {world}")
         if self.mujoco and world != MUJOCO:
             raise InvalidParameterError(f"--mujoco is for --world mujoco, not for --world {world}")
 

@@ -15,6 +15,7 @@ from typing import Any
 from ensemble.acquisition_parameters import AcquisitionParameters
 from ensemble.cli.event_printer import EventPrinter
 from ensemble.cli.live import Dashboard
+from ensemble.cli.motion_check import dry_run, require_yes
 from ensemble.cli.run_options import RunOptions
 from ensemble.client import OnMessage
 from ensemble.foxglove_server import SHOWN_TOPICS, FoxgloveServer, foxglove_installed
@@ -24,6 +25,8 @@ from ensemble.parameters import parse_parameters
 from ensemble.patience import grown_patience
 from ensemble.perception_parameters import PerceptionParameters
 from ensemble.robot_parameters import (
+    Parameters,
+    parse_franka,
     parse_mock_robot,
     parse_mujoco_robot,
     parse_robot_bridge,
@@ -45,8 +48,9 @@ from slap_ros.messages.interfaces import STATE
 from slap_ros.messages.protocols import StateMessage
 from slap_ros.planning.planner import make_planner
 from slap_ros.relational import GroundAtom
+from slap_ros.robot.franka.installed import require_franky, simulator_python
 from slap_ros.robot.mujoco.installed import require_mujoco
-from slap_ros.robot.worlds import MUJOCO, SIM
+from slap_ros.robot.worlds import FRANKA, FRANKA_SIM, MUJOCO, SIM
 from slap_ros.shortcuts.shipped import chosen_library
 from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.vision.installed import require_camera_libraries
@@ -66,6 +70,10 @@ def run_task(options: RunOptions) -> int:
     imported_s = monotonic() - began
     task = task_with_goal(domain, options.task_seed, options.index, options.goal)
     request = _request(options, domain, task, imported_s)
+    if options.dry_run:
+        return dry_run(options, domain, task)
+    if options.world == FRANKA:
+        require_yes(options.yes)
     states: list[StateMessage] = []
 
     def keep_states(type_name: str, message: Any) -> None:
@@ -111,6 +119,7 @@ def _request(options: RunOptions, domain: Domain, task: Task, import_s: float) -
     if options.world == MUJOCO:
         require_mujoco()
         _require_camera(options, domain)
+    bridge, franka = _robot(options)
     perception = parse_parameters(options.perception, PerceptionParameters, "perception")
     quality = PerceptionParameters(**perception).quality
     quality.require_known(task.initial_state.layout.by_name.keys())
@@ -126,10 +135,11 @@ def _request(options: RunOptions, domain: Domain, task: Task, import_s: float) -
         shortcuts=options.shortcuts or "",
         samples=options.samples,
         world=options.world,
-        scene=str(options.scene or ""),
+        scene=str(options.scene or bridge.get("scene", "")),
         mock=parse_mock_robot(options.mock),
         mujoco=parse_mujoco_robot(options.mujoco),
-        bridge=parse_robot_bridge(options.robot),
+        bridge=bridge,
+        franka=franka,
         perception=perception,
         acquisition=_acquisition(options),
     )
@@ -143,6 +153,29 @@ def _request(options: RunOptions, domain: Domain, task: Task, import_s: float) -
         skills=SkillRequest(options.proposer, options.rewarder) if options.acquire else None,
         shown=(ACQUISITION_EVENTS,) if options.acquire else (),
     )
+
+
+def _robot(options: RunOptions) -> tuple[Parameters, Parameters]:
+    """Parameters of the bridge, and of a Franka arm's driver.
+
+    Raises:
+        InvalidParameterError: One is unknown or missing, or a library is not installed.
+    """
+    if options.world not in (FRANKA, FRANKA_SIM):
+        return parse_robot_bridge(options.robot), {}
+    bridge, driver = parse_franka(options.robot)
+    if options.dry_run:
+        return bridge, driver
+    require_franky()
+    if options.world == FRANKA_SIM:
+        simulator_python()
+        if "ip" in driver:
+            raise InvalidParameterError("--world franka-sim starts its own robot: leave out ip")
+    elif not driver.get("ip"):
+        raise InvalidParameterError(
+            "--world franka needs the robot's address: --robot ip=172.16.0.2"
+        )
+    return bridge, driver
 
 
 def _require_camera(options: RunOptions, domain: Domain) -> None:

@@ -17,15 +17,15 @@ from control_msgs.msg import JointTolerance
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.node import Node
-from rclpy.task import Future
 
 from ensemble.robot_parameters import MujocoRobotParameters, action_name, arm_joints
+from robot_bridge.goals import GoalUnderWay, in_order, trajectory_points
 from robot_bridge.simulated.noise_model import NoiseModel
 from robot_bridge.simulated.waiting import pause
 from slap_ros.errors import InvalidCommandError
 from slap_ros.messages.decode import stamp_ns
 from slap_ros.robot.finger_tracking import FingerTracker, GripOutcome
-from slap_ros.robot.joint_trajectory import TrajectoryPoint, require_followable
+from slap_ros.robot.joint_trajectory import require_followable
 from slap_ros.robot.mujoco.arm import FINGER_FORCE
 from slap_ros.robot.mujoco.plant import MujocoPlant
 from slap_ros.robot.trajectory_tracking import (
@@ -38,30 +38,6 @@ from slap_ros.robot.trajectory_tracking import (
 UNCHECKED = -1.0  # of a goal's tolerance: any
 PREEMPTED = TrajectoryOutcome(TrajectoryCode.INVALID_GOAL, "another goal came")
 CANCELED = TrajectoryOutcome(TrajectoryCode.SUCCESSFUL, "canceled")
-
-
-class GoalUnderWay:
-    """The goal that a controller carries out, until something ends it."""
-
-    def __init__(self) -> None:
-        self._handle: ServerGoalHandle | None = None
-        self._ended: Future | None = None
-
-    @property
-    def is_cancel_requested(self) -> bool:
-        """Whether there is one, and its end is asked for."""
-        return self._handle is not None and self._handle.is_cancel_requested
-
-    def begin(self, handle: ServerGoalHandle) -> Future:
-        """A goal is under way from now on; the future that is done at its end, with the outcome."""
-        self._handle, self._ended = handle, Future()
-        return self._ended
-
-    def end(self, outcome: TrajectoryOutcome | GripOutcome | None) -> None:
-        """End the goal that is under way, if there is one."""
-        if self._ended is not None and not self._ended.done():
-            self._ended.set_result(outcome)
-        self._ended = self._handle = None
 
 
 class MujocoArmController:
@@ -122,7 +98,7 @@ class MujocoArmController:
 
     def _on_goal(self, goal: FollowJointTrajectory.Goal) -> GoalResponse:
         try:
-            require_followable(goal.trajectory.joint_names, self._joints, _points(goal))
+            require_followable(goal.trajectory.joint_names, self._joints, trajectory_points(goal))
             self._require_to_come(goal)
         except InvalidCommandError as error:
             self._counts["refused"] += 1
@@ -132,7 +108,7 @@ class MujocoArmController:
 
     def _require_to_come(self, goal: FollowJointTrajectory.Goal) -> None:
         """Refuse a trajectory that was to end in the past."""
-        if self._late_s(goal) > _points(goal)[-1].time_s:
+        if self._late_s(goal) > trajectory_points(goal)[-1].time_s:
             raise InvalidCommandError("the trajectory was to end in the past")
 
     def _late_s(self, goal: FollowJointTrajectory.Goal) -> float:
@@ -148,7 +124,7 @@ class MujocoArmController:
         goal, plant = handle.request, self._plant
         order = [list(goal.trajectory.joint_names).index(name) for name in self._joints]
         self._tracker.start(
-            [_sorted(point, order) for point in _points(goal)],
+            [in_order(point, order) for point in trajectory_points(goal)],
             self._tolerances(goal),
             plant.time_s - self._late_s(goal),
             plant.joints,
@@ -281,25 +257,3 @@ class MujocoGripperController:
             stalled=outcome is GripOutcome.STALLED,
             reached_goal=outcome is GripOutcome.REACHED,
         )
-
-
-def _points(goal: FollowJointTrajectory.Goal) -> list[TrajectoryPoint]:
-    return [
-        TrajectoryPoint(
-            point.time_from_start.sec + point.time_from_start.nanosec * 1e-9,
-            tuple(point.positions),
-            tuple(point.velocities),
-            tuple(point.accelerations),
-        )
-        for point in goal.trajectory.points
-    ]
-
-
-def _sorted(point: TrajectoryPoint, order: Sequence[int]) -> TrajectoryPoint:
-    """The point with its joints in the controller's order."""
-    return TrajectoryPoint(
-        point.time_s,
-        tuple(point.positions[i] for i in order),
-        tuple(point.velocities[i] for i in order) if point.velocities else (),
-        tuple(point.accelerations[i] for i in order) if point.accelerations else (),
-    )

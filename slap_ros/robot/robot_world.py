@@ -168,6 +168,15 @@ class RobotWorld:
         held = self._grasp.obj if self._grasp is not None else None
         return [o.name for o, t in self._tracks.items() if o != held and t.newest_s <= since_s]
 
+    def seldom_detected(self, since_s: float) -> list[str]:
+        """Names of those that were detected since then, but too few times to be known."""
+        held = self._grasp.obj if self._grasp is not None else None
+        return [
+            o.name
+            for o, t in self._tracks.items()
+            if o != held and t.newest_s > since_s and t.estimate(since_s) is None
+        ]
+
     # -- the state ------------------------------------------------------------------------------
 
     def measure(self, since_s: float, moving: bool = False) -> State | None:

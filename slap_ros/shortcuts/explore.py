@@ -251,6 +251,11 @@ class Explorer:
         plan = GraphPlanner(problem).plan(task.initial_state, goal).plan
         return cls(domain, problem, task, plan, settings, rng)
 
+    @property
+    def plan_steps(self) -> int:
+        """Environment steps of the plan without shortcuts."""
+        return self._plan.predicted_steps
+
     def explore(self) -> ExplorationResult:
         """Collect states, roll out from them, value what was reached."""
         vertices, operator_steps = self._collect()

@@ -11,6 +11,8 @@ import pytest
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
+from ensemble.observation import Episode
+from ensemble.shortcuts import ShortcutParameters, ShortcutProvider
 from slap_ros.api.shortcut_choice import choose_library
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode, SkillsChangedError
@@ -97,6 +99,40 @@ def test_shortcuts_over_other_skills_are_refused_with_both_digests(trained, tmp_
         chosen_library(str(library), get_domain("points", "line"))
     with pytest.raises(SkillsChangedError, match=f"{same}.*{other}"):
         choose_library(load_library(library, domains[1]), domains[1], "lazy", print)
+
+
+def test_shortcuts_that_ship_are_used_with_their_skills_alone(trained, tmp_path, monkeypatch):
+    shutil.copytree(
+        trained.folder / "library", tmp_path / "share/slap_ros/models/shortcuts/points"
+    )  # fmt: skip
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
+    steady = open_domain(DomainChoice("points", "line", str(trained.folder / "steady")))
+    assert chosen_library("", steady).shortcuts
+    slower = write_library(tmp_path / "slower", PICKING, replace(PUTTING, horizon=20))
+    assert chosen_library("", open_domain(DomainChoice("points", "line", str(slower)))) is None
+
+
+def test_a_node_takes_shortcuts_up_with_the_skills_of_the_episode(trained, tmp_path):
+    """Skills may be announced later, and others again: what was loaded before does not count."""
+    slower = write_library(tmp_path / "slower", PICKING, replace(PUTTING, horizon=20))
+    steady, other = (
+        open_domain(DomainChoice("points", "line", str(at)))
+        for at in (trained.folder / "steady", slower)
+    )
+    parameters = ShortcutParameters(shortcuts=str(trained.folder / "library"))
+    provider = ShortcutProvider(None, parameters)  # a node is told what is left out: nothing is
+    provider.prepare(get_domain("points", "line"))
+    for _ in range(2):
+        provider.prepare_episode(episode_of(steady))
+        assert provider.shortcuts(steady) and provider.provenance(steady)["library"]
+        with pytest.raises(SkillsChangedError):
+            provider.prepare_episode(episode_of(other))
+        assert not provider.shortcuts(other) and not provider.provenance(other)["library"]
+
+
+def episode_of(domain):
+    task = domain.task(0)
+    return Episode(1, 0, domain, task, domain.atom_space(task.initial_state))
 
 
 def test_an_evaluation_against_skills_names_them_and_both_digests(trained, tmp_path):

@@ -19,10 +19,12 @@ from slap_ros.relational import Column, State
 from slap_ros.shortcuts.exploration_policies import PUSH, PushAim
 from slap_ros.shortcuts.explore import Explorer, ShortcutCandidate
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
+from slap_ros.shortcuts.rewards import Rewards
 from slap_ros.shortcuts.rollout_origins import OptionRetracer
 from slap_ros.shortcuts.settings import ExplorationSettings
+from slap_ros.shortcuts.shortcut_vec_env import ShortcutVecEnv
 from slap_ros.shortcuts.signature import Change, Signature
-from slap_ros.shortcuts.starts import find_start
+from slap_ros.shortcuts.starts import find_start, restore_starts
 from slap_ros.shortcuts.way_on import NO_WAY, WayOn
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.skills.scripted_skill import ScriptedSkill
@@ -178,3 +180,34 @@ def test_more_atoms_may_hold_where_a_shortcut_over_acquired_skills_ends(blocked)
         domain = replace(blocked, exact=exact)
         encoder = ObservationEncoder(domain, space, Signature.of(change, space), change)
         assert encoder.success(aside, encoder.encode(aside), [target]).tolist() == [not exact]
+
+
+@pytest.mark.parametrize(("path", "context"), [((), ()), (("Pick",), ("Holding",))])
+def test_pushes_succeed_where_a_policy_is_to_learn_them_and_standing_still_does_not(
+    blocked, path, context
+):
+    """With the hand empty, and with a cube in it that moves all the while."""
+    space = blocked.atom_space(blocked.task(SEED, 0).initial_state)
+    atoms = {str(atom): space.mask([atom]) for atom in space.atoms}
+    change = Change(atoms["IsClear(target0)"], atoms["On(cube2, target0)"])
+    signature = Signature.of(change, space, frozenset(context))
+    steps = dict.fromkeys(blocked.skills, 20.0)
+    record = find_start(blocked, SEED, 10_001, signature, path, steps, beyond=True)
+    starts = restore_starts(blocked, [record])
+    rng, count = np.random.default_rng(0), 4
+    worlds = SyncVectorWorld(blocked.make_world, [starts[0].state] * count)
+    limits = np.array(blocked.action_space.high)
+
+    def succeeded(actions):
+        env = ShortcutVecEnv(blocked, signature, starts, count, 30, Rewards(), rng)
+        return any(env.step(actions).success.any() for _ in range(29))
+
+    pushes = PushAim(blocked, worlds, count, rng).pushes(starts[0].state)
+    tried = [(push.directions / limits)[:, : env_axes(blocked)] for push in pushes]
+    assert any(succeeded(actions) for actions in tried)
+    assert not succeeded(np.zeros_like(tried[0]))
+
+
+def env_axes(domain):
+    """The number of axes of a policy that leaves the gripper alone, which is the last one."""
+    return len(domain.action_space.displacement_indices)
