@@ -71,7 +71,10 @@ class Figure:
         words = shlex.split(self.command)
         folders = [Path(after) for word, after in pairwise(words) if word == "--work"]
         own = [self.training for folder in folders if not folder.is_dir()]
-        return own + [tuple(shlex.split(one["command"])) for one in self.baselines]
+        return own + [
+            (*shlex.split(one["command"]), "--output", str(Path(BASELINES) / one["name"]))
+            for one in self.baselines
+        ]
 
     @property
     def baselines(self) -> list[dict[str, Any]]:

@@ -39,7 +39,7 @@ def test_ppo_takes_a_block(tmp_path):
 
 @pytest.mark.slow  # 2,000 updates of actor and critics
 @pytest.mark.training
-@pytest.mark.timeout(180)
+@pytest.mark.timeout(300)
 def test_sac_with_hindsight_takes_a_block(tmp_path):
     assert success("sac-her", EASY, HOLDING, 5_000, QUICK_SAC, tmp_path) >= 0.8
 
