@@ -45,6 +45,7 @@ def test_a_parameter_file_goes_before_defaults_and_arguments_before_the_file(cli
     [
         ("params_file:=nowhere.yaml", "nowhere.yaml"),
         ("world:=moon", "moon"),
+        ("camera:=perhaps", "perhaps"),
         ("seed:=x", "seed is a number"),
     ],
 )
