@@ -49,7 +49,7 @@ from slap_ros.worlds.panda import FINGER_OPEN
 GAP_OPEN = 2.0 * FINGER_OPEN  # m, between the fingers
 GAP_SHUT = 0.0  # m
 FARTHEST = 10.0  # m, from the base; what is detected further away is in another unit
-PRESSED = 0.002  # m, by which the arm may be told to be inside a table: it cannot be
+PRESSED = 0.002  # m, by which what is held may be told to be inside a table: it cannot be
 HIGHEST = 0.03  # m, by which it is raised for that
 DRIFT = 0.02  # rad, of a joint of an arm that is taken to stand
 

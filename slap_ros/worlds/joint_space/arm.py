@@ -177,18 +177,18 @@ class Sweep:
         return False
 
     def deepest_penetration(
-        self, obstacles: Sequence[Obstacle], allowed: float | None = None
+        self, obstacles: Sequence[Obstacle], held_depth: float = HELD_DEPTH
     ) -> Penetration | None:
         """Where the arm would be deepest in an obstacle, seen from above; None if in none.
 
         Args:
             obstacles: Fixed bodies.
-            allowed: Depth, m, up to which it may be in one; None for that of our physics.
+            held_depth: How far a held body may reach into one, m.
         """
         found = None
         for link, travel in enumerate(self.travel):
             reach = self.end.radii[link] + travel
-            core = _depth(link) if allowed is None else allowed
+            core = _depth(link) if link < len(LINK_SHAPES) else held_depth
             for box, top in obstacles:
                 if box.near(self.end.centres[link], reach) and self._enters(link, box, core):
                     point = min(self.end.box(link).corners(), key=lambda corner: corner[2])

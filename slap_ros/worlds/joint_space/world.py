@@ -139,12 +139,12 @@ class PandaWorld(SimulatedWorld[Scene]):
     ) -> tuple[float, ...]:
         """Where a robot's arm is to go, whose joints are in this state where our physics has them.
 
-        Here a link and what is held may sink into a table by a centimetre or two. There, the arm
-        would press on it as hard as it is stiff, and what is held would turn or slip in the hand.
+        Here what is held may sink into a table by two centimetres. There, the arm would press on it
+        as hard as it is stiff, and what is held would turn or slip in the hand.
 
         Args:
             start: Joint positions before the step, rad.
-            depth: How far the arm may reach into a fixed body, m.
+            depth: How far what is held may reach into a fixed body, m.
             highest: How far it may be raised, m; a wall beside it is no reason to climb over it.
 
         Returns:
