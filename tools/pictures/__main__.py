@@ -15,6 +15,7 @@ from tools.pictures import (
     architecture,
     contact,
     growth,
+    join,
     proposal,
     two_levels,
 )
@@ -31,6 +32,7 @@ PICTURES: Mapping[str, Callable[[Path], None]] = {
     "contact_lid.gif": contact.make_lid,
     "contact_peg.gif": contact.make_peg,
     "growth.svg": growth.make,
+    "join.gif": join.make,
     "proposal.svg": proposal.make,
     "side_by_side.gif": animations.make_side_by_side,
     "two_levels.svg": two_levels.make,

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from slap_ros.domains import cleanup_table, cluttered_drawer, get_domain
+from slap_ros.core import Domain
+from slap_ros.domains import cleanup_table, cluttered_drawer
 from slap_ros.domains.cleanup_table.scene import scene_of as scene_of_table
 from slap_ros.domains.cleanup_table.shapes import shipped
 from slap_ros.domains.cluttered_drawer.scene import scene_of as scene_of_drawer
@@ -24,6 +25,7 @@ from slap_ros.planning.options import OptionKind
 from slap_ros.relational import State
 from slap_ros.shortcuts.shipped import chosen_library
 from slap_ros.shortcuts.shortcut import DEFAULT
+from slap_ros.skills.domain_choice import SHIPPED, DomainChoice, open_domain
 from slap_ros.worlds.joint_space.visuals import SceneVisuals
 from slap_ros.worlds.panda import CONTROL_PERIOD_S
 from slap_ros.worlds.rendering import Camera
@@ -52,6 +54,7 @@ class Subject:
         visuals_of: Function from a first state to what there is to see.
         viewpoint: Viewpoint of the camera; its size does not matter.
         prepared: Function from a state to the state that is drawn.
+        skills: Choice of skills; empty for those that ship.
     """
 
     domain: str
@@ -60,6 +63,11 @@ class Subject:
     visuals_of: Callable[[State], Visuals]
     viewpoint: Viewpoint
     prepared: Callable[[State], State] = lambda state: state
+    skills: str = SHIPPED
+
+    def domain_with_skills(self) -> Domain:
+        """The domain, with the skills to plan with."""
+        return open_domain(DomainChoice(self.domain, self.preset, self.skills))
 
 
 @dataclass(frozen=True)
@@ -141,7 +149,7 @@ def _make_alone(path: Path, subject: Subject, title: str) -> None:
 
 
 def _given_and_slap(subject: Subject) -> tuple[Approach, Approach]:
-    library = chosen_library(None, get_domain(subject.domain, subject.preset))
+    library = chosen_library(None, subject.domain_with_skills())
     given, _, slap = approaches(library, DEFAULT)
     return given, slap
 
@@ -158,7 +166,7 @@ def record(subject: Subject, title: str, approach: Approach) -> Recording:
         RuntimeError: The plan was not executed as planned, so that nobody knows which option
             each step belongs to.
     """
-    domain = get_domain(subject.domain, subject.preset)
+    domain = subject.domain_with_skills()
     task = domain.task(subject.seed)
     goal = domain.atom_space(task.initial_state).mask(task.goal)
     planner = approach.planner("lazy", domain, task.initial_state)
