@@ -5,6 +5,7 @@
 import json
 import shutil
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -16,7 +17,10 @@ from ensemble.shortcuts import ShortcutParameters, ShortcutProvider
 from slap_ros.api.shortcut_choice import choose_library
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode, SkillsChangedError
+from slap_ros.evaluation.approaches import approaches
+from slap_ros.evaluation.experiment import solve
 from slap_ros.shortcuts.shipped import chosen_library, require_usable
+from slap_ros.shortcuts.shortcut import DEFAULT
 from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from support.steady_skills import PICKING, PUTTING, write_library
@@ -170,3 +174,15 @@ def test_skills_that_lack_an_operator_leave_nothing_to_shorten(tmp_path):
     answer = train(half, tmp_path / "library")
     assert answer.exit_code == ErrorCode.UNSOLVABLE
     assert "lacks a skill for Put(" in " ".join(answer.stderr.split())
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(180)  # plans in contact
+def test_the_join_that_ships_belongs_together_and_saves_steps():
+    join = Path(__file__).parents[2] / "models" / "join"
+    bench = open_domain(DomainChoice("stack_at_target", "fair:blocked=1", str(join / "skills")))
+    library = chosen_library(str(join / "shortcuts"), bench)
+    alone, one_sample, _ = approaches(library, DEFAULT)
+    solved = [solve(bench, bench.task(1), approach) for approach in (alone, one_sample)]
+    assert all(episode.success for episode in solved)
+    assert solved[1].plan_length < 0.9 * solved[0].plan_length
