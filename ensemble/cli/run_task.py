@@ -15,7 +15,6 @@ from typing import Any
 from ensemble.acquisition_parameters import AcquisitionParameters
 from ensemble.cli.event_printer import EventPrinter
 from ensemble.cli.live import Dashboard
-from ensemble.cli.motion_check import dry_run, require_yes
 from ensemble.cli.run_options import RunOptions
 from ensemble.client import OnMessage
 from ensemble.foxglove_server import SHOWN_TOPICS, FoxgloveServer, foxglove_installed
@@ -70,9 +69,12 @@ def run_task(options: RunOptions) -> int:
     imported_s = monotonic() - began
     task = task_with_goal(domain, options.task_seed, options.index, options.goal)
     request = _request(options, domain, task, imported_s)
-    if options.dry_run:
-        return dry_run(options, domain, task)
-    if options.world == FRANKA:
+    if options.dry_run or options.world == FRANKA:
+        # An arm's motions need physics to be imported, which a plane has no use for.
+        from ensemble.cli.motion_check import dry_run, require_yes
+
+        if options.dry_run:
+            return dry_run(options, domain, task)
         require_yes(options.yes)
     states: list[StateMessage] = []
 

@@ -12,6 +12,7 @@ from statistics import median
 
 from slap_ros.doctor.check import Check, Status
 from slap_ros.errors import InvalidParameterError, SlapError
+from slap_ros.files import read_text
 from slap_ros.robot.franka.arm import ArmProbe, ArmReading, FrankaArm, FrankaSettings
 from slap_ros.robot.franka.installed import INSTALL
 from slap_ros.robot.franka.limits import FRANKA
@@ -60,7 +61,7 @@ def realtime_kernel() -> Check:
     """Whether this machine can send a command each millisecond."""
     name, found = "Real-time kernel", f"{platform.system()} {platform.release()}"
     try:
-        there = REALTIME.read_text(encoding="utf-8").strip() == "1"
+        there = read_text(REALTIME).strip() == "1"
     except OSError:
         there = False
     if there or "PREEMPT_RT" in platform.version():

@@ -66,7 +66,7 @@ def test_both_definitions_of_a_metric_agree(name):
 @pytest.mark.parametrize("name", BENCHTOP)
 def test_what_prompts_quote_is_there(name):
     for metric in metrics_of(get_domain(name)):
-        assert metric.definition.startswith(f"def {metric.scalar.__name__}(state: State")
+        assert metric.definition.startswith(f"def {metric.name}(state: State")
         assert metric.description.endswith(".")
 
 

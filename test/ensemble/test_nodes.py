@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -344,7 +344,8 @@ def victim_of(runner, victim, bag):
     end = time.monotonic() + 3 * LIMIT
     while time.monotonic() < end:
         children = psutil.Process(runner).children(recursive=True)
-        pids = [child.pid for child in children if child.name() == victim]
+        with suppress(psutil.NoSuchProcess):  # what looks at the machine comes and goes
+            pids = [child.pid for child in children if child.name() == victim]
         recorded = sum(f.stat().st_size for f in bag.glob("*.mcap")) if bag.exists() else 0
         if pids and recorded > 40_000:  # of some 90,000: long before the end
             return pids[0]
