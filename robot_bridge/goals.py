@@ -50,6 +50,12 @@ def trajectory_points(goal: FollowJointTrajectory.Goal) -> list[TrajectoryPoint]
     ]
 
 
+def points_of(goal: FollowJointTrajectory.Goal, joints: Sequence[str]) -> list[TrajectoryPoint]:
+    """The points of a goal, in the order of the controller's joints."""
+    order = [list(goal.trajectory.joint_names).index(name) for name in joints]
+    return [in_order(point, order) for point in trajectory_points(goal)]
+
+
 def in_order(point: TrajectoryPoint, order: Sequence[int]) -> TrajectoryPoint:
     """The point with its joints in the controller's order."""
     return TrajectoryPoint(

@@ -21,11 +21,11 @@ from rclpy.node import Node
 from ensemble.futures import wait_until
 from ensemble.robot_parameters import FrankaDriverParameters, action_name, arm_joints
 from robot_bridge.franka.objects import ModelledObjects
-from robot_bridge.goals import in_order, trajectory_points
+from robot_bridge.goals import points_of, trajectory_points
 from slap_ros.errors import SlapError
 from slap_ros.robot.finger_tracking import REACHED
 from slap_ros.robot.franka.arm import FrankaArm, MotionResult
-from slap_ros.robot.joint_trajectory import TrajectoryPoint, require_followable
+from slap_ros.robot.joint_trajectory import require_followable
 from slap_ros.robot.trajectory_tracking import TrajectoryCode
 
 
@@ -63,19 +63,15 @@ class FrankaArmController:
         try:
             self._arm.require_ready()
             require_followable(goal.trajectory.joint_names, self._joints, trajectory_points(goal))
-            self._arm.require_possible(self._points(goal))
+            self._arm.require_possible(points_of(goal, self._joints))
         except SlapError as error:
             self._counts["refused"] += 1
             self._node.get_logger().warning(f"refused: {error}")
             return GoalResponse.REJECT
         return GoalResponse.ACCEPT
 
-    def _points(self, goal: FollowJointTrajectory.Goal) -> list[TrajectoryPoint]:
-        order = [list(goal.trajectory.joint_names).index(name) for name in self._joints]
-        return [in_order(point, order) for point in trajectory_points(goal)]
-
     async def _move(self, handle: ServerGoalHandle) -> FollowJointTrajectory.Result:
-        points = self._points(handle.request)
+        points = points_of(handle.request, self._joints)
         self.busy = True
         try:
             moved = self._arm.follow(points)

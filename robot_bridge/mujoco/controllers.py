@@ -19,7 +19,7 @@ from rclpy.action.server import ServerGoalHandle
 from rclpy.node import Node
 
 from ensemble.robot_parameters import MujocoRobotParameters, action_name, arm_joints
-from robot_bridge.goals import GoalUnderWay, in_order, trajectory_points
+from robot_bridge.goals import GoalUnderWay, points_of, trajectory_points
 from robot_bridge.simulated.noise_model import NoiseModel
 from robot_bridge.simulated.waiting import pause
 from slap_ros.errors import InvalidCommandError
@@ -122,9 +122,8 @@ class MujocoArmController:
         await pause(self._node, self._noise.delay_s())
         self._goal.end(PREEMPTED)
         goal, plant = handle.request, self._plant
-        order = [list(goal.trajectory.joint_names).index(name) for name in self._joints]
         self._tracker.start(
-            [in_order(point, order) for point in trajectory_points(goal)],
+            points_of(goal, self._joints),
             self._tolerances(goal),
             plant.time_s - self._late_s(goal),
             plant.joints,

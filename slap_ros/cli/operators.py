@@ -13,8 +13,7 @@ def print_operator(operator: LiftedOperator, reward: RewardTemplate | None) -> N
 
     ``--operators`` reads what this prints.
     """
-    parameters = ", ".join(f"{variable}: {variable.type}" for variable in operator.parameters)
-    console.print(f"{operator.name}({parameters})")
+    console.print(operator.signature)
     different = [f"{one} != {other}" for one, other in operator.inequalities]
     for label, atoms, more in (
         ("PRE", operator.preconditions, different),

@@ -17,6 +17,7 @@ from typing import Protocol, TextIO
 
 from slap_ros.errors import InvalidParameterError, LanguageUnavailableError
 from slap_ros.files import read_bytes, write_whole
+from slap_ros.language.client import CHARACTERS_PER_TOKEN  # nobody counts here
 from slap_ros.language.clipboard import copy_to_clipboard
 from slap_ros.language.request import OutputDegree, Reply, Request, replace_unprintable
 from slap_ros.language.settings import FOLDER_SCHEME, LanguageSettings, asked_by_hand
@@ -26,7 +27,6 @@ END = "."  # a line that ends a pasted answer
 FROM_FILE = "@"  # before the path of a file that has the answer
 MAX_LINE = 4095  # bytes; a terminal cuts longer ones without a word (termios, MAX_CANON)
 MAX_ANSWER_BYTES = 1_000_000
-CHARACTERS_PER_TOKEN = 4  # nobody counts here
 POLL = 0.5  # s; a file that has not changed for so long is whole
 
 

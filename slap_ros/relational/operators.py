@@ -95,6 +95,12 @@ class LiftedOperator:
                 f"operator {self.name} both adds and deletes {', '.join(sorted(map(str, clash)))}"
             )
 
+    @property
+    def signature(self) -> str:
+        """Name and typed parameters, as in ``Insert(?peg: peg, ?hole: hole)``."""
+        parameters = ", ".join(f"{variable}: {variable.type}" for variable in self.parameters)
+        return f"{self.name}({parameters})"
+
     def __str__(self) -> str:
         return f"{self.name}({', '.join(v.name for v in self.parameters)})"
 

@@ -21,7 +21,6 @@ from slap_ros.acquisition.proposals.proposal_request import ProposalRequest
 from slap_ros.acquisition.proposals.proposer_names import LANGUAGE
 from slap_ros.acquisition.proposals.questions import about_operator, about_reward
 from slap_ros.acquisition.proposals.verification import verify
-from slap_ros.relational import LiftedOperator
 from slap_ros.skills.operator_json import operator_data, template_data
 
 Failure = Mapping[str, Any]  # as the record of a library has it, of a skill that was given up
@@ -71,7 +70,7 @@ class Reviser:
         """The proposal with another operator, where there is still a plan with it."""
         problem = self.request.problem
         operators = {operator.name: operator for operator in proposal.operators}
-        actions = {name: _action(operator) for name, operator in operators.items()}
+        actions = {name: operator.signature for name, operator in operators.items()}
         others = [operator for operator in operators.values() if operator.name != name]
         question = about_operator(actions[name], tuple(actions.values()), problem, others)
         written = json.dumps(operator_data(operators[name]))
@@ -97,8 +96,3 @@ def _complaint(subject: str, failure: Failure) -> Complaint:
         told = ", ".join(f"{name} = {value:g}" for name, value in metrics.items())
         facts.append(f"mean of the normalised metrics in the end: {told}")
     return Complaint(ComplaintClass.NOT_LEARNED, subject, "; ".join(facts))
-
-
-def _action(operator: LiftedOperator) -> str:
-    parameters = ", ".join(f"{v.name}: {v.type}" for v in operator.parameters)
-    return f"{operator.name}({parameters})"
