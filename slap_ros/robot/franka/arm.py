@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from time import monotonic
+from time import monotonic, sleep
 from typing import Any
 
 import numpy as np
@@ -280,10 +280,18 @@ class FrankaArm:
             with suppress(self._franky.Exception):  # of the motion that the fault ended
                 self._robot.join_motion(STOP_S)
             with translated():
-                if not self._robot.recover_from_errors():
-                    raise reflex(error_names(self._robot.state.current_errors))
+                self._robot.recover_from_errors()
+                self._await_recovery()
                 self.reading = self._read()
             self.fault = None
+
+    def _await_recovery(self) -> None:
+        """Wait for a state without errors: the robot agrees before its next state says so."""
+        last_s = monotonic() + STOP_S
+        while (errors := self._errors()) is not None:
+            if monotonic() > last_s:
+                raise reflex(errors)
+            sleep(LOOK_S)
 
     def probe(self, times: int) -> ArmProbe:
         """Ask the robot what it says of itself; nothing moves.

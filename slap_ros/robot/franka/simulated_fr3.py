@@ -7,7 +7,8 @@ this robot waits for its driver: during a motion it stands still after each stat
 driver's command for the next millisecond is there. So a busy machine changes no motion, and
 durations are those of this clock.
 
-It writes the address at which it listens. Lines on its standard input raise faults:
+It writes the address at which it listens. Lines on its standard input raise faults, and each is
+written back when the fault is there:
 
 - ``reflex``: the arm collides, and the robot's control stops it;
 - ``delay S``: states arrive S seconds late; the control gives up after 20 ms without an answer;
@@ -169,6 +170,7 @@ def serve(server: Fr3Server, simulator: Any, lines: queue.Queue[str | None]) -> 
             if line is None:
                 return
             sending = inject(line, server) and sending
+            say(line.strip())
         if sending:
             server.process_commands()
             simulator.step()
@@ -176,6 +178,12 @@ def serve(server: Fr3Server, simulator: Any, lines: queue.Queue[str | None]) -> 
             server.wait_for_command()
         if not (sending and server.current_motion_id):
             time.sleep(max(0.0, PERIOD_S - (time.monotonic() - began)))
+
+
+def say(line: str) -> None:
+    """Tell a line to whoever started this program."""
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
 
 
 def read_lines(lines: queue.Queue[str | None]) -> None:
@@ -198,8 +206,7 @@ def main() -> None:
         server = Fr3Server(robot, LocalHostnames())
         server.init()
         simulator.start()
-        sys.stdout.write(f"{server.hostname}\n")
-        sys.stdout.flush()
+        say(server.hostname)
         serve(server, simulator, lines)
         server.cleanup()
 

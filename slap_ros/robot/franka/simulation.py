@@ -16,6 +16,7 @@ from slap_ros.robot.franka.installed import simulator_python
 
 PROGRAM = Path(__file__).with_name("simulated_fr3.py")
 START_S = 120.0  # s, for its imports on a busy machine
+ANSWER_S = 10.0  # s, for one turn of its loop on a busy machine
 STOP_S = 5.0
 
 
@@ -41,10 +42,19 @@ class SimulatedFr3:
         self.ip = self._address()
 
     def inject(self, fault: str) -> None:
-        """Raise a fault: see ``simulated_fr3.py``."""
+        """Raise a fault, and return when it is there: see ``simulated_fr3.py``.
+
+        Args:
+            fault: Line that names the fault.
+
+        Raises:
+            RobotUnreachableError: The simulated FR3 does not answer.
+        """
         assert self._process.stdin is not None
         self._process.stdin.write(f"{fault}\n")
         self._process.stdin.flush()
+        if self._answer(ANSWER_S) != fault:
+            raise RobotUnreachableError(f"the simulated FR3 did not take the fault {fault!r}")
 
     def kill(self) -> None:
         """End the process as a crash does."""
@@ -69,10 +79,14 @@ class SimulatedFr3:
 
     def _address(self) -> str:
         """The address that it prints."""
-        assert self._process.stdout is not None
-        ready, _, _ = select.select([self._process.stdout], [], [], START_S)
-        address = self._process.stdout.readline().strip() if ready else ""
+        address = self._answer(START_S)
         if not address:
             self.kill()
             raise RobotUnreachableError("the simulated FR3 did not start: see its messages above")
         return address
+
+    def _answer(self, patience_s: float) -> str:
+        """The next line that it prints; empty if there is none in time."""
+        assert self._process.stdout is not None
+        ready, _, _ = select.select([self._process.stdout], [], [], patience_s)
+        return self._process.stdout.readline().strip() if ready else ""
