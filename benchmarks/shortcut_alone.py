@@ -18,9 +18,10 @@ from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.shortcuts import jobs
 from slap_ros.shortcuts.explore import ExplorationResult
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
+from slap_ros.shortcuts.sampling import DEFAULT, PAPER
 from slap_ros.shortcuts.settings import training_settings
 from slap_ros.shortcuts.shipped import chosen_library
-from slap_ros.shortcuts.shortcut import DEFAULT, PAPER, Shortcut
+from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.starts import Start, find_start, restore_starts
 from slap_ros.shortcuts.training import mean_steps, rank
 from slap_ros.skills.domain_choice import DomainChoice

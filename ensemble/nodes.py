@@ -13,7 +13,7 @@ from typing import Any
 
 from ensemble.robot_parameters import BEFORE_MUJOCO
 from slap_ros.robot.worlds import FRANKA, FRANKA_SIM, MOCK, MUJOCO, SIM
-from slap_ros.shortcuts.shortcut import DEFAULT
+from slap_ros.shortcuts.sampling import DEFAULT
 from slap_ros.skills.domain_choice import DomainChoice
 
 # What shares a process with others is reached by name: nodes build on the ensemble, not it on them.

@@ -16,8 +16,9 @@ from slap_ros.errors import InvalidParameterError, SkillsChangedError
 from slap_ros.planning.planner_choice import DEFAULT_PLANNER
 from slap_ros.relational import Layout, State
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
+from slap_ros.shortcuts.sampling import DEFAULT
 from slap_ros.shortcuts.shipped import chosen_library, require_usable, skills_digest
-from slap_ros.shortcuts.shortcut import DEFAULT, Shortcut
+from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 
 

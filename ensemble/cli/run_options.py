@@ -31,7 +31,6 @@ from slap_ros.cli.options import (
     seed_or_default,
 )
 from slap_ros.cli.render import Size, picture_size
-from slap_ros.cli.shortcuts import SAMPLES
 from slap_ros.cli.skill_choice import Skills
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import require_writable
@@ -39,6 +38,7 @@ from slap_ros.planning.execution import MAX_REPLANS
 from slap_ros.planning.planner import require_planner
 from slap_ros.planning.planner_choice import DEFAULT_PLANNER, with_settings
 from slap_ros.robot.worlds import FRANKA, FRANKA_SIM, MOCK, MUJOCO, ROBOT, SIM, WORLDS
+from slap_ros.shortcuts.sampling import DEFAULT
 from slap_ros.skills.domain_choice import SHIPPED
 
 
@@ -58,7 +58,7 @@ class RunOptions:
     preset: Preset = None
     goal: Goal = None
     shortcuts: ShortcutFolder = None
-    samples: Samples = SAMPLES
+    samples: Samples = DEFAULT.samples
     planner: Planner = DEFAULT_PLANNER
     within: Within = None
     effort: EffortFactor = None

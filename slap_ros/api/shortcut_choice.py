@@ -13,8 +13,8 @@ from slap_ros.core import Domain
 from slap_ros.errors import InvalidLibraryError, InvalidParameterError
 from slap_ros.planning.planner import require_planner
 from slap_ros.planning.planner_choice import WITH_SHORTCUTS
+from slap_ros.shortcuts.sampling import DEFAULT, Sampling
 from slap_ros.shortcuts.shipped import NONE, chosen_library, require_same_skills
-from slap_ros.shortcuts.shortcut import DEFAULT, Sampling
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 
 SAMPLES = DEFAULT.samples

@@ -24,7 +24,7 @@ from slap_ros.cli.bars import counting_bars
 from slap_ros.cli.console import console, print_json
 from slap_ros.cli.options import EffortFactor, Goal, Json, Planner, Within, at_most
 from slap_ros.cli.rivals import Against, RivalResults, run_rivals
-from slap_ros.cli.shortcuts import SAMPLES, choose
+from slap_ros.cli.shortcuts import choose
 from slap_ros.cli.skill_choice import Skills, open_chosen
 from slap_ros.core import Domain
 from slap_ros.errors import ErrorCode
@@ -34,6 +34,7 @@ from slap_ros.evaluation.experiment import Experiment, Trial
 from slap_ros.evaluation.summary import Spread, Summary
 from slap_ros.files import require_writable
 from slap_ros.planning.planner_choice import DEFAULT_PLANNER, with_settings
+from slap_ros.shortcuts.sampling import DEFAULT
 from slap_ros.shortcuts.shipped import shipped_library
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 from slap_ros.skills.domain_choice import SHIPPED
@@ -58,7 +59,7 @@ def evaluate(
     goal: Goal = None,
     skills: Skills = SHIPPED,
     shortcuts: ShortcutFolder = None,
-    samples: Samples = SAMPLES,
+    samples: Samples = DEFAULT.samples,
     with_shooting: Annotated[
         bool,
         typer.Option(

@@ -22,11 +22,11 @@ from slap_ros.cli.options import (
     say_default_seed,
     seed_or_default,
 )
-from slap_ros.cli.shortcuts import SAMPLES
 from slap_ros.cli.skill_choice import Skills, open_chosen
 from slap_ros.errors import InvalidParameterError
 from slap_ros.files import require_writable
 from slap_ros.planning.planner_choice import DEFAULT_PLANNER, with_settings
+from slap_ros.shortcuts.sampling import DEFAULT
 from slap_ros.skills.domain_choice import SHIPPED
 
 
@@ -41,7 +41,7 @@ def plan(
     goal: Goal = None,
     skills: Skills = SHIPPED,
     shortcuts: ShortcutFolder = None,
-    samples: Samples = SAMPLES,
+    samples: Samples = DEFAULT.samples,
     planner: Planner = DEFAULT_PLANNER,
     within: Within = None,
     effort: EffortFactor = None,

@@ -7,13 +7,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from slap_ros.cli.console import warn
-from slap_ros.shortcuts.shortcut import DEFAULT
 
 if TYPE_CHECKING:
     from slap_ros.core import Domain
     from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
-
-SAMPLES = DEFAULT.samples
 
 
 def choose(choice: str | None, domain: Domain, planner: str) -> ShortcutLibrary | None:

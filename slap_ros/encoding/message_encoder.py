@@ -29,7 +29,8 @@ from slap_ros.planning.options import Option, OptionKind, OptionResult
 from slap_ros.planning.plan import PlanEdge, PlanningResult
 from slap_ros.relational import AtomSpace, GroundAtom, LiftedOperator, State
 from slap_ros.relational.pddl import write_domain
-from slap_ros.shortcuts.shortcut import Sampling, Shortcut
+from slap_ros.shortcuts.sampling import Sampling
+from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.versions import versions
 
 FRAME = "world"

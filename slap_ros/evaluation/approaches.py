@@ -10,8 +10,9 @@ from slap_ros.core import Domain
 from slap_ros.planning.planner import Planner, make_planner
 from slap_ros.relational import State
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
+from slap_ros.shortcuts.sampling import DEFAULT, PAPER, Sampling
 from slap_ros.shortcuts.shooting import exhaustive, unlearned
-from slap_ros.shortcuts.shortcut import DEFAULT, PAPER, Sampling, Shortcut
+from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 
 

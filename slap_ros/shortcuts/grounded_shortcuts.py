@@ -15,7 +15,8 @@ from slap_ros.policies.learner_interface import learner_interface
 from slap_ros.relational import State, Target
 from slap_ros.shortcuts.ground_shortcut import GroundShortcut, least_steps
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
-from slap_ros.shortcuts.shortcut import DEFAULT, Sampling, Shortcut
+from slap_ros.shortcuts.sampling import DEFAULT, Sampling
+from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.shortcut_rollouts import ShortcutRollout, ShortcutRollouts
 from slap_ros.shortcuts.signature import Change, concerned
 from slap_ros.shortcuts.signature_grounder import SignatureGrounder

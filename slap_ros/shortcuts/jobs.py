@@ -24,8 +24,9 @@ from slap_ros.planning.problem import Problem
 from slap_ros.shortcuts.explore import Explorer, OperatorPath
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
 from slap_ros.shortcuts.progress import Progress, ProgressRecorder, latest
+from slap_ros.shortcuts.sampling import Sampling
 from slap_ros.shortcuts.settings import ExplorationSettings, TrainingSettings
-from slap_ros.shortcuts.shortcut import Sampling, Shortcut
+from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.shortcut_env_spec import ShortcutEnvSpec
 from slap_ros.shortcuts.shortcut_library import load_shortcut, save_shortcut
 from slap_ros.shortcuts.signature import Signature

@@ -14,7 +14,7 @@ from slap_ros.learning.setting_changes import changed
 from slap_ros.learning.stored_keys import restored, stored
 from slap_ros.shortcuts.ppo_settings import PpoSettings
 from slap_ros.shortcuts.rewards import Rewards
-from slap_ros.shortcuts.shortcut import DEFAULT, PAPER, Sampling
+from slap_ros.shortcuts.sampling import DEFAULT, PAPER, Sampling
 from slap_ros.shortcuts.stopping import Stopping
 
 

@@ -16,7 +16,8 @@ from slap_ros.policies.mlp_policy import ActionSampler, SampledPolicy, Weights
 from slap_ros.portable_math import on_grid
 from slap_ros.relational import State
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
-from slap_ros.shortcuts.shortcut import Sampling, Shortcut
+from slap_ros.shortcuts.sampling import Sampling
+from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.signature import Change
 
 MAX_NET_FAILURES = 3  # failures, less as many for each success, before a shortcut is given up

@@ -19,8 +19,8 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode, SkillsChangedError
 from slap_ros.evaluation.approaches import approaches
 from slap_ros.evaluation.experiment import solve
+from slap_ros.shortcuts.sampling import DEFAULT
 from slap_ros.shortcuts.shipped import chosen_library, require_usable
-from slap_ros.shortcuts.shortcut import DEFAULT
 from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from support.steady_skills import PICKING, PUTTING, write_library

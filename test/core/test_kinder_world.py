@@ -20,7 +20,7 @@ from slap_ros.domain_check.experience import Transition  # noqa: E402
 from slap_ros.errors import InvalidDomainError, InvalidStateError  # noqa: E402
 from slap_ros.evaluation.approaches import approaches  # noqa: E402
 from slap_ros.relational import Feature  # noqa: E402
-from slap_ros.shortcuts.shortcut import Sampling  # noqa: E402
+from slap_ros.shortcuts.sampling import Sampling  # noqa: E402
 from slap_ros.shortcuts.shortcut_library import load_library  # noqa: E402
 from support.executed import executed  # noqa: E402
 

@@ -32,7 +32,7 @@ from slap_ros.planning.options import OptionExecution, OptionKind
 from slap_ros.planning.plan import PlanEdge
 from slap_ros.planning.problem import Problem
 from slap_ros.relational import Target
-from slap_ros.shortcuts.shortcut import DEFAULT
+from slap_ros.shortcuts.sampling import DEFAULT
 from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.skills.domain_choice import DomainChoice
 

@@ -29,8 +29,8 @@ from slap_ros.messages.interfaces import definition, typestore
 from slap_ros.relational.pddl import write_domain, write_problem
 from slap_ros.report import read_report, render
 from slap_ros.robot.scene_config import read_scene_config
+from slap_ros.shortcuts.sampling import Sampling
 from slap_ros.shortcuts.settings import ExplorationSettings, training_settings
-from slap_ros.shortcuts.shortcut import Sampling
 from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.shortcuts.training import Training
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder

@@ -14,7 +14,8 @@ from slap_ros.planning.abstract_graph import build_abstract_graph
 from slap_ros.planning.problem import Problem
 from slap_ros.policies.mlp_policy import MlpPolicy, ObservationNormalisation
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
-from slap_ros.shortcuts.shortcut import Sampling, Shortcut
+from slap_ros.shortcuts.sampling import Sampling
+from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.shortcuts.shortcut_rollouts import MAX_NET_FAILURES
 from slap_ros.shortcuts.signature import Change, Signature, context_of

@@ -18,8 +18,8 @@ from slap_ros.errors import InvalidLibraryError, InvalidParameterError
 from slap_ros.evaluation.approaches import PURE_PLANNING, approaches
 from slap_ros.evaluation.experiment import Experiment, run_all
 from slap_ros.shortcuts import shipped
+from slap_ros.shortcuts.sampling import DEFAULT, Sampling
 from slap_ros.shortcuts.shipped import chosen_library, require_usable, shipped_library
-from slap_ros.shortcuts.shortcut import DEFAULT, Sampling
 from slap_ros.shortcuts.shortcut_library import load_library
 
 DATA = Path(__file__).parent / "data" / "obstacle2d"

@@ -11,7 +11,7 @@ from slap_ros.domains import get_domain
 from slap_ros.evaluation.approaches import approaches
 from slap_ros.planning.model import Model
 from slap_ros.planning.options import OptionKind
-from slap_ros.shortcuts.shortcut import Sampling
+from slap_ros.shortcuts.sampling import Sampling
 from slap_ros.shortcuts.shortcut_library import load_library
 
 DATA = Path(__file__).parent / "data" / "obstacle2d"

@@ -11,8 +11,8 @@ from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidLibraryError
 from slap_ros.evaluation.approaches import approaches, shooting
 from slap_ros.evaluation.experiment import Experiment
+from slap_ros.shortcuts.sampling import Sampling
 from slap_ros.shortcuts.shooting import RandomActions
-from slap_ros.shortcuts.shortcut import Sampling
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary, load_library, save_library
 
 DOMAIN = get_domain("obstacle2d")

@@ -13,7 +13,7 @@ from slap_ros.domains.obstacle2d.dynamics import Obstacle2DVectorWorld
 from slap_ros.planning.problem import Problem
 from slap_ros.relational import Target
 from slap_ros.shortcuts.observation_encoder import ObservationEncoder
-from slap_ros.shortcuts.shortcut import DEFAULT, Sampling
+from slap_ros.shortcuts.sampling import DEFAULT, Sampling
 from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.shortcuts.shortcut_rollouts import ShortcutRollouts
 from slap_ros.shortcuts.signature import Change

@@ -11,7 +11,7 @@ from slap_ros.evaluation.approaches import approaches
 from slap_ros.planning.model import Model
 from slap_ros.relational import Target
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
-from slap_ros.shortcuts.shortcut import Sampling
+from slap_ros.shortcuts.sampling import Sampling
 from slap_ros.shortcuts.shortcut_library import load_library
 from support.pushing import DOMAIN, start_of
 

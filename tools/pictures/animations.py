@@ -23,8 +23,8 @@ from slap_ros.evaluation.approaches import Approach, approaches
 from slap_ros.evaluation.experiment import solve
 from slap_ros.planning.options import OptionKind
 from slap_ros.relational import State
+from slap_ros.shortcuts.sampling import DEFAULT
 from slap_ros.shortcuts.shipped import chosen_library
-from slap_ros.shortcuts.shortcut import DEFAULT
 from slap_ros.skills.domain_choice import SHIPPED, DomainChoice, open_domain
 from slap_ros.worlds.joint_space.visuals import SceneVisuals
 from slap_ros.worlds.panda import CONTROL_PERIOD_S

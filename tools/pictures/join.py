@@ -8,8 +8,8 @@ from pathlib import Path
 
 from slap_ros.evaluation.approaches import approaches
 from slap_ros.relational import State
+from slap_ros.shortcuts.sampling import DEFAULT
 from slap_ros.shortcuts.shipped import chosen_library
-from slap_ros.shortcuts.shortcut import DEFAULT
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.worlds.contact.arm import CONTROL_PERIOD_S
 from slap_ros.worlds.contact.visuals import ContactVisuals

@@ -42,8 +42,8 @@ from slap_ros.evaluation.approaches import Approach, approaches
 from slap_ros.evaluation.experiment import solve
 from slap_ros.planning.options import OptionKind
 from slap_ros.relational import AtomSpace, State
+from slap_ros.shortcuts.sampling import DEFAULT
 from slap_ros.shortcuts.shipped import chosen_library
-from slap_ros.shortcuts.shortcut import DEFAULT
 
 GROUND = "#f3f4f2"
 DOMAIN, SEED = "obstacle2d", 5

@@ -29,8 +29,8 @@ from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.policies.learner_interface import learner_interface, without
 from slap_ros.shortcuts import jobs
 from slap_ros.shortcuts.explore import ExplorationResult
+from slap_ros.shortcuts.sampling import Sampling
 from slap_ros.shortcuts.settings import OURS, TrainingSettings, training_settings
-from slap_ros.shortcuts.shortcut import Sampling
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 from slap_ros.shortcuts.signature import Signature
 from slap_ros.shortcuts.starts import StartRecord

@@ -24,8 +24,8 @@ from slap_ros.evaluation.approaches import PURE_PLANNING, Approach, approaches, 
 from slap_ros.evaluation.experiment import Experiment, Trial
 from slap_ros.evaluation.statistics import Interval, ratio_interval, wilson_interval
 from slap_ros.evaluation.summary import Spread, lengths_of_both
+from slap_ros.shortcuts.sampling import Sampling
 from slap_ros.shortcuts.shipped import shipped_libraries
-from slap_ros.shortcuts.shortcut import Sampling
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.comparison import (
