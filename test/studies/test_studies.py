@@ -154,6 +154,7 @@ def test_shortcuts_help_with_other_goals_and_never_harm(tmp_path):
 # -- planning time --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_planning_time_tells_of_the_graph_and_of_what_was_rolled_out(tmp_path):
     data = study(tmp_path, "planning_time", "obstacle2d", "--tasks", 2, "--seeds", 1, *PLANNING)
     costs = data["found"]["costs"]
