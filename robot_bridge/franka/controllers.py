@@ -9,7 +9,6 @@ the fault, every goal is refused.
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Callable
 
@@ -21,8 +20,8 @@ from rclpy.node import Node
 from ensemble.futures import wait_until
 from ensemble.robot_parameters import FrankaDriverParameters, action_name, arm_joints
 from robot_bridge.franka.objects import ModelledObjects
-from robot_bridge.goals import points_of, trajectory_points
-from slap_ros.errors import SlapError
+from robot_bridge.goals import is_finite, points_of, trajectory_points
+from slap_ros.errors import InvalidCommandError, SlapError
 from slap_ros.robot.finger_tracking import REACHED
 from slap_ros.robot.franka.arm import FrankaArm, MotionResult
 from slap_ros.robot.joint_trajectory import require_followable
@@ -144,14 +143,12 @@ class FrankaGripperController:
         self._server.destroy()
 
     def _on_goal(self, goal: GripperCommand.Goal) -> GoalResponse:
-        command = goal.command
         try:
             self._arm.require_ready()
+            if not is_finite(goal):
+                raise InvalidCommandError("a goal of the fingers is not finite")
         except SlapError as error:
             self._node.get_logger().warning(f"refused: {error}")
-            self._counts["refused"] += 1
-            return GoalResponse.REJECT
-        if not (math.isfinite(command.position) and math.isfinite(command.max_effort)):
             self._counts["refused"] += 1
             return GoalResponse.REJECT
         return GoalResponse.ACCEPT
