@@ -45,6 +45,7 @@ class FrankaArmController:
         self._node, self._arm, self._settings, self._counts = node, arm, settings, counts
         self._joints = arm_joints(settings.arm)
         self.busy = False  # whether a goal is under way
+        self.moved_s = 0.0  # by motions to their end, on the robot's clock
         self._server = ActionServer(
             node,
             FollowJointTrajectory,
@@ -103,6 +104,7 @@ class FrankaArmController:
                 error_string=f"a joint stands {off:.3f} rad off the goal",
             )
         self._counts["motions"] += 1
+        self.moved_s += moved.ended_s - moved.began_s
         handle.succeed()
         return FollowJointTrajectory.Result()
 
