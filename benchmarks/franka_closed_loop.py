@@ -41,6 +41,7 @@ PATIENCE = 5.0  # factor of all deadlines: all nodes share one process, planning
 TIMEOUT_S = 1800.0  # of this machine, for a task
 PURE, SLAP = APPROACHES
 SPEED = 0.5  # fraction of the arm's limits: the bridge's default
+JOINT_RATE = 40.0  # Hz, of joint positions: all nodes share one process
 MEASURED = """\
 All nodes together solve each task through the bridge and the driver of a Franka arm, on a simulated
 FR3 that speaks the robot's protocol (franky-sim, in MuJoCo), at half speed. No real arm was moved.
@@ -126,7 +127,7 @@ def solve(seed: int, approach: str, horizon: int) -> ClosedLoopTrial:
         patience=PATIENCE,
         world=FRANKA_SIM,
         bridge={"horizon": horizon, "speed": SPEED},
-        franka={"speed": SPEED},
+        franka={"speed": SPEED, "joint_rate": JOINT_RATE},
     )
     observer = Observer()
     request = RunRequest(settings, timeout_s=TIMEOUT_S, in_process=True, shown=(DIAGNOSTICS,))
