@@ -23,6 +23,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.pages import PageOutput
 from benchmarks.printing import show
 from ensemble.camera_parameters import CameraParameters
 from slap_ros.core import task_with_goal
@@ -36,14 +37,7 @@ from slap_ros.robot.mujoco.plant import MujocoPlant
 from slap_ros.robot.scene_config import read_scene_config
 from slap_ros.robot.tagged_scene import PlacedTag, placed_tags, tagged_scene
 from slap_ros.robot.tracking import mean_pose
-from slap_ros.studies.figures import require_matplotlib
-from slap_ros.studies.results import (
-    MarkdownTable,
-    Provenance,
-    StudyReport,
-    require_replaceable,
-    write,
-)
+from slap_ros.studies.results import MarkdownTable, Provenance, StudyReport
 from slap_ros.vision.tag_detection import TagDetector, tag_pose
 
 if TYPE_CHECKING:
@@ -382,13 +376,10 @@ def main() -> None:
     folder, as_json = given.pop("output"), given.pop("json")
     options = " ".join(f"--{name.replace('_', '-')} {value}" for name, value in given.items())
     source = Provenance(DOMAIN, f"python -m benchmarks.{STUDY} {options}", given)
-    if folder is not None:
-        require_matplotlib()
-        require_replaceable(folder, STUDY, source)
+    output = PageOutput(folder, STUDY, source)
     seeds = range(given["first_seed"], given["first_seed"] + given["tasks"])
     found = Detections(list(sightings(given["repeats"], 0)), list(tables(seeds)))
-    if folder is not None:
-        write(folder, report(found), source, process_time())
+    output.write(report(found), process_time())
     show(summary(found), as_json)
 
 

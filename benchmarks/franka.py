@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.pages import PageOutput
 from benchmarks.printing import show
 from slap_ros.api.execution import execute
 from slap_ros.api.planning import plan
@@ -36,14 +37,7 @@ from slap_ros.robot.recorded_motion import RecordedMotion, read_recorded_motion
 from slap_ros.robot.robot_world import GAP_OPEN, GripperAction
 from slap_ros.robot.stretches import Stretch
 from slap_ros.studies.comparison import format_spread, spread_of
-from slap_ros.studies.figures import require_matplotlib
-from slap_ros.studies.results import (
-    MarkdownTable,
-    Provenance,
-    StudyReport,
-    require_replaceable,
-    write,
-)
+from slap_ros.studies.results import MarkdownTable, Provenance, StudyReport
 from slap_ros.studies.study_log import StudyLog
 
 if TYPE_CHECKING:
@@ -338,14 +332,11 @@ def main() -> None:
     )
     tasks = {"tasks": given.tasks, "first_seed": given.first_seed, "compared": given.compared}
     source = Provenance(given.domain, command, tasks)
-    if given.output is not None:
-        require_matplotlib()
-        require_replaceable(given.output, STUDY, source)
+    output = PageOutput(given.output, STUDY, source)
     seeds = range(given.first_seed, given.first_seed + given.tasks)
     with StudyLog(Path(given.log), source) as log:
         found = measure(given.domain, seeds, given.compared, log)
-        if given.output is not None:
-            write(given.output, report(found, given.domain), source, log.cpu_seconds)
+        output.write(report(found, given.domain), log.cpu_seconds)
     show(summary(found), given.json)
 
 

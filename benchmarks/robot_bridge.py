@@ -19,6 +19,7 @@ from statistics import mean
 from time import process_time
 from typing import TYPE_CHECKING, Any
 
+from benchmarks.pages import PageOutput
 from benchmarks.printing import show
 from ensemble.nodes import RunSettings
 from ensemble.run import RunRequest, run
@@ -31,14 +32,8 @@ from slap_ros.shortcuts.shipped import NONE, shipped_library
 from slap_ros.shortcuts.shortcut_library import load_library
 from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.comparison import format_spread, spread_of
-from slap_ros.studies.figures import APPROACH_STYLES, label, require_matplotlib
-from slap_ros.studies.results import (
-    MarkdownTable,
-    Provenance,
-    StudyReport,
-    require_replaceable,
-    write,
-)
+from slap_ros.studies.figures import APPROACH_STYLES, label
+from slap_ros.studies.results import MarkdownTable, Provenance, StudyReport
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -219,10 +214,19 @@ def report(found: Found) -> StudyReport:
 
 def origin(conditions: Conditions) -> Provenance:
     """The inputs of the report: tasks, mock robot, and the shortcuts that ship."""
-    path = shipped_library(DOMAIN)
+    settings = {**asdict(conditions), "library": shipped_shortcuts(DOMAIN)}
+    return Provenance(DOMAIN, conditions.command, settings)
+
+
+def shipped_shortcuts(domain: str) -> Any:
+    """What a page says of the shortcuts that ship for a domain.
+
+    Args:
+        domain: Name of the domain.
+    """
+    path = shipped_library(domain)
     assert path is not None
-    library = describe_library(f"models/shortcuts/{DOMAIN}", load_library(path, get_domain(DOMAIN)))
-    return Provenance(DOMAIN, conditions.command, {**asdict(conditions), "library": library})
+    return describe_library(f"models/shortcuts/{domain}", load_library(path, get_domain(domain)))
 
 
 def main() -> None:
@@ -239,17 +243,13 @@ def main() -> None:
     given = vars(parser.parse_args())
     folder, as_json = given.pop("output"), given.pop("json")
     conditions = Conditions(**given)
-    source = origin(conditions)
-    if folder is not None:
-        require_matplotlib()
-        require_replaceable(folder, STUDY, source)
+    output = PageOutput(folder, STUDY, origin(conditions))
     seeds = range(conditions.first_seed, conditions.first_seed + conditions.tasks)
     found = {
         approach: [solve(seed, shortcuts, conditions) for seed in seeds]
         for approach, shortcuts in APPROACHES.items()
     }
-    if folder is not None:
-        write(folder, report(found), source, process_time())
+    output.write(report(found), process_time())
     show(summary(found), as_json)
 
 

@@ -11,6 +11,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from time import monotonic
 from typing import Any, Generic, TypeVar
@@ -135,9 +137,15 @@ class LockstepWorld(Node, ABC, Generic[P]):
     # -- commands and steps ---------------------------------------------------------------------
 
     def _on_command(self, message: RobotCommand) -> None:
-        try:
+        with self._refusing():
             self._require_current(message)
             self._apply(decode_command(message, self._domain.action_space))
+
+    @contextmanager
+    def _refusing(self) -> Iterator[None]:
+        """Refuse and count a command that cannot be executed; what a domain raises is a fault."""
+        try:
+            yield
         except tuple(REFUSALS) as error:
             self._refuse(error)
         except Exception as raised:  # of a domain's code

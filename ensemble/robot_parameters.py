@@ -12,8 +12,9 @@ from ensemble.camera_parameters import CameraParameters
 from ensemble.parameters import MAX_SEED, parameter, parse_parameters
 from ensemble.world_parameters import WorldParameters
 from slap_ros.errors import InvalidParameterError
+from slap_ros.robot.blending import MotionLimits
 from slap_ros.robot.franka.arm import COLLISION_FORCE, COLLISION_TORQUE, FrankaSettings
-from slap_ros.robot.franka.limits import franka_limits
+from slap_ros.robot.franka.limits import JERK, franka_limits
 from slap_ros.robot.limits import FR3, Limits, Workspace, arm_limits
 from slap_ros.robot.tracking import TrackingSettings
 from slap_ros.worlds.panda import JOINTS
@@ -102,9 +103,22 @@ class RobotBridgeParameters(RobotParameters, WorldParameters):
 
     domain: str = parameter("obstacle_tower", "which domain")
     preset: str = parameter("", "one that obeys the joints' speed limit")
+    horizon: int = parameter(
+        1, "commands that the arm executes without a stop between them, at most", low=1, high=8
+    )
     settle_time: float = parameter(1.5, "s to wait for what moves to come to rest")
     detection_timeout: float = parameter(2.0, "s without a measured state until the robot holds")
     hold_after: float = parameter(0.5, "s without a command after which it says that it holds")
+
+    @property
+    def motion_limits(self) -> MotionLimits:
+        """What a motion through several steps keeps to: of a Panda as of an FR3.
+
+        Raises:
+            InvalidParameterError: As ``limits``.
+        """
+        limits = franka_limits(self.limits, self.speed)
+        return MotionLimits.of(limits, tuple(self.speed * jerk for jerk in JERK))
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,8 @@
 
 On a robot: ``domain:=obstacle_tower world:=robot scene:=FILE``. Without one: ``world:=mock``, or
 ``world:=mujoco`` for a robot in another engine than the planner's; there, ``camera:=true
-scene:=FILE`` has a camera see tagged objects.
+scene:=FILE`` has a camera see tagged objects. On a Franka arm by its own protocol:
+``world:=franka ip:=172.16.0.2 scene:=FILE``; on a simulated one: ``world:=franka-sim``.
 
 ``params_file:=FILE`` sets any other parameter of any node, in a copy of ``config/ensemble.yaml``.
 
@@ -35,7 +36,7 @@ from slap_ros.errors import InvalidParameterError
 ARGUMENTS = {
     "world": (
         "sim",
-        "sim; robot: the bridge; mock, mujoco: the bridge with a simulated robot behind it",
+        "sim; the bridge to a robot: robot, franka; to a simulated one: mock, mujoco, franka-sim",
     ),
     "params_file": ("", "parameter file for all nodes, such as a changed copy of ensemble.yaml"),
     "acquisition": (
@@ -50,8 +51,19 @@ ARGUMENTS = {
     "rviz": ("false", "open RViz as well"),
     "namespace": ("", "namespace of every node: /robot1 gives /robot1/slap/state"),
 }
-CHOICES = {"world": ["sim", "robot", "mock", "mujoco"], "camera": ["true", "false"]}
-SIMULATED = {"mock": "mock_robot", "mujoco": "mujoco_robot"}  # robots, by world
+ROBOTS = {  # nodes that are a robot or drive one, by world
+    "mock": "mock_robot",
+    "mujoco": "mujoco_robot",
+    "franka": "franka_driver",
+    "franka-sim": "franka_driver",
+}
+CHOICES = {"world": ["sim", "robot", *ROBOTS], "camera": ["true", "false"]}
+# Parameter files that go before ensemble.yaml and robot.yaml, by world.
+CONFIGURED = {
+    "mujoco": ["mujoco.yaml"],
+    "franka": ["franka.yaml"],
+    "franka-sim": ["franka.yaml", "franka-sim.yaml"],
+}
 # Arguments that are parameters of nodes. They have no defaults here: a node's parameter that is not
 # given is what the parameter files say.
 PARAMETERS = {
@@ -66,6 +78,8 @@ PARAMETERS = {
     "samples": (int, "attempts of a shortcut in the model; the shortest is used"),
     "scene": (str, "scene file of a robot"),
     "arm": (str, "arm of a robot: panda or fr3"),
+    "speed": (float, "fraction of the arm's limits of velocity and acceleration"),
+    "ip": (str, "address of a Franka arm"),
     "latency": (float, "latency of a simulated robot, s"),
     "pose_noise": (float, "noise of a simulated robot's detections, m"),
     "dropout": (float, "share of detections that a simulated robot loses"),
@@ -78,9 +92,10 @@ COMMON = ("domain", "preset", "skills", "patience")
 SHORTCUTS = ("shortcuts", "samples")
 TAKEN = {  # arguments that each node takes as its parameters
     "sim_node": (*TASK, "pace"),
-    "robot_bridge": (*TASK, "arm", "scene"),
+    "robot_bridge": (*TASK, "arm", "scene", "speed"),
     "mock_robot": (*TASK, "arm", "latency", "pose_noise", "dropout"),
     "mujoco_robot": (*TASK, "arm", "latency", "pose_noise", "dropout", "scene"),
+    "franka_driver": (*TASK, "arm", "ip", "speed"),
     "tag_detector": ("domain", "preset", "skills", "scene"),
     "perception_node": COMMON,
     "skill_server": (*COMMON, *SHORTCUTS),
@@ -120,7 +135,7 @@ def _nodes(context: LaunchContext) -> list[Node]:
     """The nodes that the arguments ask for."""
     given = {name: value for name, value in context.launch_configurations.items() if value}
     names = ["sim_node"] if given["world"] == "sim" else ["robot_bridge"]
-    names += [SIMULATED[given["world"]]] if given["world"] in SIMULATED else []
+    names += [ROBOTS[given["world"]]] if given["world"] in ROBOTS else []
     names += ["tag_detector"] if given["camera"] == "true" else []
     names += ["perception_node", "skill_server", "planner_node"]
     names += ["recorder_node"] if "record" in given else []
@@ -171,9 +186,9 @@ def _parameter_files(given: Mapping[str, str]) -> list[str]:
     files = [_config() / "ensemble.yaml"]
     if given["world"] != "sim":
         files.append(_config() / "robot.yaml")
-    if given["world"] == "mujoco":
-        files.append(_config() / "mujoco.yaml")
-        files += [_config() / "camera.yaml"] if given["camera"] == "true" else []
+    files += [_config() / name for name in CONFIGURED.get(given["world"], ())]
+    if given["world"] == "mujoco" and given["camera"] == "true":
+        files.append(_config() / "camera.yaml")
     if "params_file" in given:
         files.append(Path(given["params_file"]).expanduser())
         if not files[-1].is_file():

@@ -26,7 +26,6 @@ from slap_ros.errors import (
     error_from,
 )
 from slap_ros.robot.joint_trajectory import TrajectoryPoint
-from slap_ros.robot.limits import JointMotion
 
 TRAJECTORY_CODES = {  # control_msgs' names of what a trajectory's result says
     getattr(FollowJointTrajectory.Result, name): name
@@ -76,17 +75,6 @@ class Controllers:
     def ready(self) -> bool:
         """Whether both controllers are there."""
         return bool(self._arm.server_is_ready() and self._gripper.server_is_ready())
-
-    async def move(self, motion: JointMotion) -> None:
-        """Move the arm; its limits were checked when the motion was made.
-
-        Raises:
-            ControllerRejectedError: The goal was not accepted.
-            ControllerAbortedError: It was given up, or canceled.
-            ControllerTimeoutError: No controller, or no answer in time; the goal is canceled.
-        """
-        still = (0.0,) * len(self._joints)
-        await self.follow([TrajectoryPoint(motion.duration_s, motion.target, still, still)])
 
     async def follow(self, points: Sequence[TrajectoryPoint]) -> None:
         """Move the arm through points; their limits were checked when they were made.

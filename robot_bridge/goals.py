@@ -4,9 +4,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
-from control_msgs.action import FollowJointTrajectory
+from control_msgs.action import FollowJointTrajectory, GripperCommand
 from rclpy.action.server import ServerGoalHandle
 from rclpy.task import Future
 
@@ -54,6 +55,11 @@ def points_of(goal: FollowJointTrajectory.Goal, joints: Sequence[str]) -> list[T
     """The points of a goal, in the order of the controller's joints."""
     order = [list(goal.trajectory.joint_names).index(name) for name in joints]
     return [in_order(point, order) for point in trajectory_points(goal)]
+
+
+def is_finite(goal: GripperCommand.Goal) -> bool:
+    """Whether a goal of the fingers is one at all."""
+    return math.isfinite(goal.command.position) and math.isfinite(goal.command.max_effort)
 
 
 def in_order(point: TrajectoryPoint, order: Sequence[int]) -> TrajectoryPoint:

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Runs a domain on a robot in lock-step: one short motion per command.
+"""Runs a domain on a robot in lock-step: one short motion per command, or per horizon of them.
 
 On the ensemble's side it is what sim_node is. On the robot's side every command becomes a goal of a
 joint trajectory controller, from rest to rest, after limits were checked here again; the gripper is
@@ -36,7 +36,11 @@ ROS Parameters:
     detection_timeout (double, 2.0): s without a complete measurement after which it holds.
     controller_timeout (double, 0.5): s that a controller may take longer than it should.
     gripper_timeout (double, 5.0): s that the gripper may take.
-    hold_after (double, 0.5): s without a command after which diagnostics report that it holds.
+    hold_after (double, 0.5): s without a command after which diagnostics report that it holds, and
+        commands of an unfinished horizon are executed.
+    horizon (int, 1): commands that the arm executes in one motion, without a stop between them, at
+        most. The arm waits until it has them. The states between them are those of the domain's own
+        world: only where nothing but the arm moves, with what it holds, and no atom changes.
     arrival_tolerance (double, 0.1): rad that a joint may be off after a motion.
 
 Publishers:
@@ -87,7 +91,9 @@ from slap_ros.errors import (
 )
 from slap_ros.messages.decode import decode_goal
 from slap_ros.relational import GroundAtom, State
-from slap_ros.robot.robot_world import SafeCommand
+from slap_ros.robot.horizon import Horizon
+from slap_ros.robot.joint_trajectory import TrajectoryPoint
+from slap_ros.robot.robot_world import GripperAction
 
 POLL_PERIOD = 0.02  # s, between two looks at what is measured
 
@@ -114,6 +120,10 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
         )  # when the phase, or the measurement of a state, began
         self._goal: Collection[GroundAtom] = ()
         self._measurement: StepMeasurement  # of the step under way
+        period_s = self._domain.execution.control_period_s
+        self._horizon = Horizon(self._settings.horizon, self._settings.motion_limits, period_s)
+        self._expected = False  # whether the state in which the motion ends is published already
+        self._next: Action | None = None  # which answers that state, and waits for its measurement
         self._markers = advertise(self, MARKERS)
         create_timer(self, POLL_PERIOD, self._poll)
         self._publish_domain()
@@ -127,8 +137,7 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
         return self._settings.first_task(self._domain).initial_state
 
     def _diagnostics(self) -> dict[str, object]:
-        idle = self._robot.clock.now_s() - self._since_s > self._settings.hold_after
-        holding = self._phase is Phase.FAULT or (self._phase is Phase.READY and idle)
+        holding = self._phase is Phase.FAULT or (self._phase is Phase.READY and self._is_idle)
         return {
             **super()._diagnostics(),
             **self._robot.sensors.counts,
@@ -136,8 +145,15 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
             "holding": holding,
         }
 
+    @property
+    def _is_idle(self) -> bool:
+        """Whether nothing has come for so long that the robot holds."""
+        return self._robot.clock.now_s() - self._since_s > self._settings.hold_after
+
     def _occupation(self) -> str:
-        return "" if self._phase is Phase.READY else self._phase.value
+        moving = self._phase in (Phase.MOVING, Phase.LOOKING)
+        waits = self._phase is Phase.READY or (moving and self._expected and self._next is None)
+        return "" if waits else self._phase.value
 
     def _enter(self, phase: Phase) -> None:
         self._phase = phase
@@ -145,6 +161,7 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
 
     def _fail(self, error: SlapError) -> None:
         """Hold until reset."""
+        self._forget_commands()
         self._robot.controllers.hold()
         self._enter(Phase.FAULT)
         super()._fail(error)
@@ -152,20 +169,42 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
     # -- commands and steps ---------------------------------------------------------------------
 
     def _apply(self, action: Action) -> None:
+        if self._phase is not Phase.READY:
+            self._next = action
+            return
         try:
             self._robot.require_joints()
         except NoJointStateError as error:
             self._fail(error)
             return
         command = self._robot.world.plan_command(action)
-        self._enter(Phase.MOVING)
-        self.executor.create_task(self._execute(command))
+        if self._horizon.commands and command.gripper is not GripperAction.KEEP:
+            self._next = action  # fingers act only from a state that was measured
+            self._move(expected=True)
+            return
+        self._horizon.add(command)
+        state = self._robot.world.expect(command) if self._horizon.has_room else None
+        if state is None:
+            self._move(expected=False)
+        else:
+            self._since_s = self._robot.clock.now_s()
+            self._publish_step(state)
 
-    async def _execute(self, command: SafeCommand) -> None:
+    def _move(self, expected: bool) -> None:
+        """Execute the commands that wait.
+
+        Args:
+            expected: Whether the state in which they end is published already.
+        """
+        self._expected = expected
+        self._enter(Phase.MOVING)
+        self.executor.create_task(self._execute(*self._horizon.take()))
+
+    async def _execute(self, gripper: GripperAction, points: tuple[TrajectoryPoint, ...]) -> None:
         try:
-            await self._robot.actuate_gripper(command.gripper)
+            await self._robot.actuate_gripper(gripper)
             if self._phase is Phase.MOVING:  # not failed meanwhile
-                await self._robot.controllers.move(command.motion)
+                await self._robot.controllers.follow(points)
         except SlapError as error:
             if self._phase is Phase.MOVING:
                 self._fail(error)
@@ -173,13 +212,15 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
             if self._phase is Phase.MOVING:
                 self._enter(Phase.LOOKING)
                 self._measurement = StepMeasurement(
-                    self._robot, self._settings, self._since_s, command.motion.target
+                    self._robot, self._settings, self._since_s, points[-1].positions
                 )
 
     def _poll(self) -> None:
         """Whatever time brings: a state, or a sensor that has become silent."""
         if self._phase is Phase.STARTING and self._robot.controllers.ready:
             self._start()
+        elif self._phase is Phase.READY and self._horizon.commands and self._is_idle:
+            self._move(expected=True)
         elif self._phase in (Phase.MOVING, Phase.LOOKING):
             try:
                 self._robot.require_joints(self._since_s)
@@ -190,9 +231,20 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
 
     def _measure(self) -> None:
         state = self._measurement.poll(self._robot.clock.now_s())
-        if state is not None:
-            self._enter(Phase.READY)
+        if state is None:
+            return
+        self._enter(Phase.READY)
+        if not self._expected:
             self._publish_step(state)
+        elif self._next is not None:
+            action, self._next = self._next, None
+            with self._refusing():
+                self._apply(action)
+
+    def _forget_commands(self) -> None:
+        """Execute none of the commands that wait."""
+        self._horizon.commands.clear()
+        self._next = None
 
     # -- episodes -------------------------------------------------------------------------------
 
@@ -223,6 +275,7 @@ class RobotBridge(LockstepWorld[RobotBridgeParameters]):
 
     def _begin(self, state: State) -> None:
         goal = frozenset(self._goal) or self._domain.default_goal(state)
+        self._forget_commands()
         self._enter(Phase.READY)
         self._open_episode(Task(state, goal, self._domain.step_limit))
 

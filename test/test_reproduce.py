@@ -14,8 +14,13 @@ from slap_ros.shortcuts.shipped import shipped_library
 from slap_ros.shortcuts.shortcut_library import load_library
 from tools.reproduce import PUBLISHED, differences, figures, main
 
-# Of a whole ensemble, or by OpenGL; pages name them.
-BY_A_BENCHMARK = {"soak", "robot_bridge_obstacle_tower", "detections_obstacle_tower"}
+# Of a whole ensemble, by OpenGL or a simulated FR3; pages name them.
+BY_A_BENCHMARK = {
+    "soak",
+    "robot_bridge_obstacle_tower",
+    "detections_obstacle_tower",
+    "franka_obstacle_tower",
+}
 
 
 def test_every_figure_has_its_command():

@@ -9,7 +9,6 @@ the fault, every goal is refused.
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Callable
 
@@ -21,8 +20,8 @@ from rclpy.node import Node
 from ensemble.futures import wait_until
 from ensemble.robot_parameters import FrankaDriverParameters, action_name, arm_joints
 from robot_bridge.franka.objects import ModelledObjects
-from robot_bridge.goals import points_of, trajectory_points
-from slap_ros.errors import SlapError
+from robot_bridge.goals import is_finite, points_of, trajectory_points
+from slap_ros.errors import InvalidCommandError, SlapError
 from slap_ros.robot.finger_tracking import REACHED
 from slap_ros.robot.franka.arm import FrankaArm, MotionResult
 from slap_ros.robot.joint_trajectory import require_followable
@@ -46,6 +45,7 @@ class FrankaArmController:
         self._node, self._arm, self._settings, self._counts = node, arm, settings, counts
         self._joints = arm_joints(settings.arm)
         self.busy = False  # whether a goal is under way
+        self.moved_s = 0.0  # by motions to their end, on the robot's clock
         self._server = ActionServer(
             node,
             FollowJointTrajectory,
@@ -104,6 +104,7 @@ class FrankaArmController:
                 error_string=f"a joint stands {off:.3f} rad off the goal",
             )
         self._counts["motions"] += 1
+        self.moved_s += moved.ended_s - moved.began_s
         handle.succeed()
         return FollowJointTrajectory.Result()
 
@@ -144,14 +145,12 @@ class FrankaGripperController:
         self._server.destroy()
 
     def _on_goal(self, goal: GripperCommand.Goal) -> GoalResponse:
-        command = goal.command
         try:
             self._arm.require_ready()
+            if not is_finite(goal):
+                raise InvalidCommandError("a goal of the fingers is not finite")
         except SlapError as error:
             self._node.get_logger().warning(f"refused: {error}")
-            self._counts["refused"] += 1
-            return GoalResponse.REJECT
-        if not (math.isfinite(command.position) and math.isfinite(command.max_effort)):
             self._counts["refused"] += 1
             return GoalResponse.REJECT
         return GoalResponse.ACCEPT

@@ -31,7 +31,8 @@ ROS Parameters:
 Publishers:
     joint_states (sensor_msgs/JointState): of arm and fingers, as long as the robot answers.
     tf (tf2_msgs/TFMessage): the hand, as frame ARM_hand; modelled objects as detected_NAME.
-    diagnostics (diagnostic_msgs/DiagnosticArray): goals by outcome, and the fault; 1 Hz.
+    diagnostics (diagnostic_msgs/DiagnosticArray): goals by outcome, seconds of motion on the
+        robot's clock, and the fault; 1 Hz.
 
 Services:
     ~/recover (std_srvs/Trigger): ends a fault. For a person who has looked at the arm.
@@ -168,7 +169,11 @@ class FrankaDriver(Node):
 
     def _diagnostics(self) -> dict[str, object]:
         fault = self._arm.fault
-        return {**self._counts, "fault": "" if fault is None else f"{fault.code.name}: {fault}"}
+        return {
+            **self._counts,
+            "moved_s": round(self._motions.moved_s, 3),
+            "fault": "" if fault is None else f"{fault.code.name}: {fault}",
+        }
 
 
 class ReadingPublisher:

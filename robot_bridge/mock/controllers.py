@@ -11,12 +11,13 @@ from control_msgs.action import FollowJointTrajectory, GripperCommand
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.node import Node
-from trajectory_msgs.msg import JointTrajectoryPoint
 
 from ensemble.robot_parameters import MockRobotParameters, action_name, arm_joints
+from robot_bridge.goals import is_finite, trajectory_points
 from robot_bridge.mock.plant import Plant
 from robot_bridge.simulated.noise_model import NoiseModel
 from robot_bridge.simulated.waiting import pause
+from slap_ros.robot.joint_trajectory import TrajectoryPoint
 from slap_ros.worlds.panda import JOINT_HIGH, JOINT_LOW, JOINTS
 
 LONGEST_PAUSE = 1.0  # s
@@ -86,7 +87,7 @@ class MockControllers:
         return GoalResponse.ACCEPT
 
     def _on_grip(self, goal: GripperCommand.Goal) -> GoalResponse:
-        if self.busy or not math.isfinite(goal.command.position):
+        if self.busy or not is_finite(goal):
             self._counts["refused"] += 1
             return GoalResponse.REJECT
         return GoalResponse.ACCEPT
@@ -97,7 +98,7 @@ class MockControllers:
             await pause(self._node, self._noise.delay_s())
             if self._fails("abort"):
                 return self._abort(goal)
-            return await self._follow(goal, goal.request.trajectory.points[-1])
+            return await self._follow(goal)
         finally:
             self.busy = False
 
@@ -109,10 +110,23 @@ class MockControllers:
             error_string="set up to fail",
         )
 
-    async def _follow(
-        self, goal: ServerGoalHandle, point: JointTrajectoryPoint
-    ) -> FollowJointTrajectory.Result:
-        lasts_s = point.time_from_start.sec + point.time_from_start.nanosec * 1e-9
+    async def _follow(self, goal: ServerGoalHandle) -> FollowJointTrajectory.Result:
+        """Go from point to point, however fast the arm may be at them."""
+        began_s = 0.0
+        for point in trajectory_points(goal.request):
+            if not await self._approach(goal, point, point.time_s - began_s):
+                self._counts["canceled"] += 1
+                goal.canceled()
+                return FollowJointTrajectory.Result()
+            began_s = point.time_s
+        self._counts["motions"] += 1
+        goal.succeed()
+        return FollowJointTrajectory.Result()
+
+    async def _approach(
+        self, goal: ServerGoalHandle, point: TrajectoryPoint, lasts_s: float
+    ) -> bool:
+        """Go to a point; whether the arm got there before the goal was canceled."""
         ignored = self._fails("ignore")
         # A cancel is noticed within LONGEST_PAUSE.
         periods = max(
@@ -123,15 +137,11 @@ class MockControllers:
         while ignored or done < periods:
             await pause(self._node, lasts_s / periods / self._settings.pace)
             if goal.is_cancel_requested:
-                self._counts["canceled"] += 1
-                goal.canceled()
-                return FollowJointTrajectory.Result()
+                return False
             if not ignored:
                 self._plant.approach(point.positions)
                 done += 1
-        self._counts["motions"] += 1
-        goal.succeed()
-        return FollowJointTrajectory.Result()
+        return True
 
     async def _grip(self, goal: ServerGoalHandle) -> GripperCommand.Result:
         self.busy = True

@@ -8,7 +8,6 @@ where its fingers stall, and says that they did.
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Sequence
 
@@ -19,7 +18,7 @@ from rclpy.action.server import ServerGoalHandle
 from rclpy.node import Node
 
 from ensemble.robot_parameters import MujocoRobotParameters, action_name, arm_joints
-from robot_bridge.goals import GoalUnderWay, points_of, trajectory_points
+from robot_bridge.goals import GoalUnderWay, is_finite, points_of, trajectory_points
 from robot_bridge.simulated.noise_model import NoiseModel
 from robot_bridge.simulated.waiting import pause
 from slap_ros.errors import InvalidCommandError
@@ -222,8 +221,7 @@ class MujocoGripperController:
             self._goal.end(outcome)
 
     def _on_goal(self, goal: GripperCommand.Goal) -> GoalResponse:
-        command = goal.command
-        if not (math.isfinite(command.position) and math.isfinite(command.max_effort)):
+        if not is_finite(goal):
             self._counts["refused"] += 1
             return GoalResponse.REJECT
         return GoalResponse.ACCEPT

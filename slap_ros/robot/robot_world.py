@@ -68,6 +68,7 @@ class SafeCommand:
 
     gripper: GripperAction
     motion: JointMotion
+    after: State  # of the domain's own world, which took the same step
 
 
 @dataclass
@@ -113,6 +114,8 @@ class RobotWorld:
         self._candidate: Grasp | None = None  # what the gripper is to close around
         self._lost = False  # what was held: the gripper is to be opened
         self._state: State | None = None
+        self._measured: State | None = None  # the state before those that are expected
+        self._space = self.domain.atom_space(template)
 
     # -- measurements ---------------------------------------------------------------------------
 
@@ -209,7 +212,7 @@ class RobotWorld:
         self._model.reset(state)
         for obj, estimate in known.items():
             self._tracks[obj].remember(estimate)
-        self._state = state
+        self._state = self._measured = state
         return state
 
     def _estimates(
@@ -242,7 +245,7 @@ class RobotWorld:
     # -- commands -------------------------------------------------------------------------------
 
     def plan_command(self, action: Action) -> SafeCommand:
-        """The motion that a command asks for, from the last state.
+        """The motion that a command asks for, from the last state, measured or expected.
 
         Raises:
             InvalidCommandError: It is not in the domain's action space.
@@ -250,19 +253,45 @@ class RobotWorld:
                 arm is no longer where it was measured.
             InvalidStateError: There is no state yet.
         """
-        if self._state is None:
+        if self._state is None or self._measured is None:
             raise InvalidStateError("nothing is measured yet")
         self._model.reset(self._state)
         after = self._model.step(action)
         start = feature_values(self._state, self._robot, JOINT_FEATURES)
         target = self._model.joints_off_fixed_bodies(tuple(start), PRESSED, HIGHEST)
-        moved = self.joint_distance(start)
+        moved = self.joint_distance(feature_values(self._measured, self._robot, JOINT_FEATURES))
         if moved > DRIFT:
             raise UnsafeCommandError(
                 f"the arm was moved by {moved:.3f} rad since it was measured: call reset_task"
             )
         motion = self.limits.motion(start, target, self.domain.execution.control_period_s)
-        return SafeCommand(self._grip(after), motion)
+        return SafeCommand(self._grip(after), motion, after)
+
+    def expect(self, command: SafeCommand) -> State | None:
+        """Go on from where a command leads, before the arm has moved.
+
+        Args:
+            command: Command that answers the last state.
+
+        Returns:
+            The state that is expected, which the next command is to answer. None where it has to be
+            measured: where more moves than the arm with what it holds, or an atom changes.
+        """
+        before, after = self._state, command.after
+        assert before is not None
+        moved = command.motion.target == tuple(feature_values(after, self._robot, JOINT_FEATURES))
+        if not moved or command.gripper is not GripperAction.KEEP or self._disturbs(before, after):
+            return None
+        if self._space.abstract(after) != self._space.abstract(before):
+            return None
+        self._state = after
+        return after
+
+    def _disturbs(self, before: State, after: State) -> bool:
+        """Whether an object moves, or begins to, that the arm does not carry."""
+        held = self._grasp.obj if self._grasp is not None else None
+        loose = (obj for obj in after.objects if obj not in (self._robot, held))
+        return any(tuple(before[obj]) != tuple(after[obj]) for obj in loose)
 
     def _grip(self, after: State) -> GripperAction:
         held = [obj for obj in self._bodies if after.get(obj, "held") > 0.5]

@@ -28,6 +28,7 @@ from slap_ros.errors import ErrorCode, InvalidParameterError
 from slap_ros.messages.interfaces import STATE
 from slap_ros.skills.domain_choice import DomainChoice
 from support.clocks import BY_THE_CLOCK, SettableClock
+from support.marks import slow
 
 LIMIT = 120.0  # s, far more than anything here takes: a loaded machine takes its time
 # All nodes share this process and a loaded machine's time: joint positions may be late.
@@ -199,6 +200,60 @@ def test_a_controller_that_fails_leaves_the_robot_holding(network, fault, code):
             bench.step(deltas=[0.05, *STILL[1:]])
         bench.command(deltas=[0.05, *STILL[1:]])
         bench.fault(code)
+
+
+def test_a_horizon_of_commands_is_one_motion_that_begins_with_the_last(network):
+    with lab(bridge={"horizon": 3, "hold_after": 60.0}) as bench:
+        bench.until(lambda: bench.joints)
+        before = bench.joints[-1][0]
+        for number in (1, 2):
+            bench.step(deltas=[0.04, *STILL[1:]])
+            assert bench.states[-1].step == number
+            assert bench.states[-1].objects[0].features[0] == pytest.approx(before + 0.04 * number)
+            bench.wait(0.3)
+            assert bench.joints[-1][0] == before
+        bench.step(deltas=[0.04, *STILL[1:]])
+        assert bench.states[-1].step == 3
+        bench.until(lambda: bench.joints[-1][0] == pytest.approx(before + 0.12, abs=1e-6))
+        assert max(joints[0] for joints in bench.joints) <= before + 0.12 + 1e-6
+        bench.until(lambda: bench.health.get("steps") == "3")
+        assert bench.health["stale_commands"] == "0"
+
+
+def test_what_was_commanded_is_executed_when_nothing_more_is(network):
+    with lab(bridge={"horizon": 4}) as bench:
+        bench.until(lambda: bench.joints)
+        before = bench.joints[-1][0]
+        bench.step(deltas=[0.04, *STILL[1:]])
+        bench.until(lambda: bench.joints[-1][0] == pytest.approx(before + 0.04, abs=1e-6))
+        for _ in range(4):  # whenever they come: it may be measuring
+            bench.step(deltas=[0.04, *STILL[1:]])
+        bench.until(lambda: bench.joints[-1][0] == pytest.approx(before + 0.2, abs=1e-3))
+        assert [state.step for state in bench.states] == [0, 1, 2, 3, 4, 5]
+        assert bench.health["stale_commands"] == "0"
+
+
+def test_a_reset_forgets_commands_that_have_not_been_executed(network):
+    with lab(bridge={"horizon": 3, "hold_after": 60.0}) as bench:
+        bench.until(lambda: bench.joints)
+        before = bench.joints[-1][0]
+        bench.step(deltas=[0.04, *STILL[1:]])
+        bench.until(lambda: bench.reset().error_code == 0)
+        bench.until(lambda: bench.states[-1].episode == 2)
+        for _ in range(3):
+            bench.step(deltas=[0.02, *STILL[1:]])
+        bench.until(lambda: bench.joints[-1][0] == pytest.approx(before + 0.06, abs=1e-3))
+
+
+@pytest.mark.parametrize("goal", ["(Holding robot block4)", *slow("")])
+def test_the_ensemble_solves_a_task_by_horizons(network, tmp_path, goal):
+    bag = tmp_path / "bag"
+    chosen = settings(bridge=PATIENT | {"horizon": 3}, record=bag, goal=goal)
+    metrics = run(RunRequest(chosen, timeout_s=600, in_process=True), lambda *_: None)
+    assert metrics.success, metrics.error_msg
+    assert metrics.replans == 0
+    found = evaluate_bag(bag)
+    assert found.states == metrics.plan_length + 1
 
 
 def test_an_object_that_is_never_seen_is_named(network):

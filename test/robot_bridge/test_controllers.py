@@ -23,7 +23,7 @@ from robot_bridge.robot import GAP_OPEN, GAP_SHUT, Robot
 from robot_bridge.simulated.waiting import pause
 from slap_ros.domains import get_domain
 from slap_ros.errors import ControllerAbortedError
-from slap_ros.robot.limits import JointMotion
+from slap_ros.robot.joint_trajectory import TrajectoryPoint
 
 LIMIT = 60.0  # s, far more than anything here takes
 HELD = 0.04  # m, a block between the fingers
@@ -140,6 +140,6 @@ def test_a_canceled_grip_is_none_whatever_the_fingers_hold(network):
 def test_a_trajectory_that_is_given_up_has_its_reason_by_name(network, code, words):
     with driven() as (robot, driver, spinner):
         driver.end, driver.result = "abort", {"error_code": code, "error_string": "blocked"}
-        motion = JointMotion((0.0,) * 7, (0.01,) * 7, 0.1)
-        found = outcome(spinner, robot.controllers.move(motion))
+        points = [TrajectoryPoint(0.1, (0.01,) * 7)]
+        found = outcome(spinner, robot.controllers.follow(points))
         assert f"follow_joint_trajectory gave up a motion: {words}" in str(found)

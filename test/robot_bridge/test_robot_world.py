@@ -185,6 +185,75 @@ def test_a_block_that_slips_in_the_hand_is_held_where_it_is_seen(lifted, slip):
         bench.world._state, bench.robot_world._grasp = held, grasp
 
 
+def approached():
+    """A bench whose arm went to where it can grasp, by steps of which none was measured."""
+    bench = Bench()
+    bench.measure()
+    state = bench.robot_world.measure(0.0)
+    robot, block, table = (state.layout.object(name) for name in ("robot", "block1", "table"))
+    policy = DOMAIN.skills["Pick"].start(state, (robot, block, table))
+    foreseen = 0
+    while True:
+        action = policy(state)
+        command = bench.robot_world.plan_command(action)
+        state = bench.robot_world.expect(command)
+        if state is None:
+            return bench, command, foreseen
+        bench.world.step(action)
+        foreseen += 1
+
+
+def test_steps_of_the_arm_alone_are_foreseen_as_they_are_measured_later():
+    bench, command, foreseen = approached()
+    expected = bench.robot_world._state
+    assert foreseen >= 3
+    assert command.gripper is GripperAction.CLOSE  # which acts only from a state that was measured
+    since = bench.now
+    bench.measure()
+    measured = bench.robot_world.measure(since)
+    assert np.abs(measured.data - expected.data).max() < 0.005
+    space = DOMAIN.atom_space(measured)
+    assert space.abstract(measured) == space.abstract(expected)
+
+
+def foreseen_from(bench, state, action):
+    """The steps of an action that are foreseen one after the other, and the one that is not."""
+    steps = 0
+    while True:
+        command = bench.robot_world.plan_command(action)
+        expected = bench.robot_world.expect(command)
+        if expected is None:
+            return steps, state, command
+        steps, state = steps + 1, expected
+
+
+def test_a_step_that_moves_more_than_the_arm_is_to_be_measured():
+    """The fingers are around a block, and go sideways until they push it."""
+    bench, _, _ = approached()
+    since, block = bench.now, bench.world.state.layout.object("block1")
+    bench.measure()
+    state = bench.robot_world.measure(since)
+    _, before, command = foreseen_from(bench, state, np.array([0.02, *[0.0] * 7]))
+    assert tuple(before[block]) == tuple(state[block])
+    assert command.gripper is GripperAction.KEEP
+    assert tuple(command.after[block]) != tuple(before[block])
+    assert bench.robot_world._state is before
+
+
+def test_a_step_that_changes_an_atom_is_to_be_measured(lifted):
+    """A skill ends by its atoms: nobody is told that it did before that is known."""
+    bench, state, _ = lifted
+    space = DOMAIN.atom_space(state)
+    lowered = np.array([0.0, 0.004, *[0.0] * 6])
+    try:
+        steps, before, command = foreseen_from(bench, state, lowered)
+    finally:
+        bench.robot_world._state = state
+    assert steps >= 2
+    assert space.abstract(before) == space.abstract(state)
+    assert space.abstract(command.after) != space.abstract(state)
+
+
 def test_fingers_that_close_on_nothing_hold_nothing():
     bench = Bench()
     bench.measure()

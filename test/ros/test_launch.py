@@ -3,6 +3,8 @@
 """What the launch file's arguments, a user's parameter file and the shipped one say, in order."""
 
 import subprocess
+import time
+from importlib.util import find_spec
 
 import pytest
 import yaml
@@ -66,3 +68,20 @@ def test_on_a_robot_a_skill_waits_longer_for_a_state(cli, tmp_path):
             == parameter("planner_node", "domain")
             == "obstacle_tower"
         )
+
+
+def test_a_simulated_fr3_is_launched_or_says_what_is_not_installed(cli, tmp_path):
+    output = tmp_path / "launch.txt"
+    launch = [*LAUNCH, "world:=franka-sim", "domain:=obstacle_tower", "speed:=0.2"]
+    with started(launch, output):
+        if find_spec("franky") is None or find_spec("franky_sim") is None:
+            end = time.monotonic() + LIMIT
+            while "is not installed: " not in output.read_text():
+                assert time.monotonic() < end
+                time.sleep(0.1)
+            return
+        wait_for_task()  # which robot_bridge publishes once it has measured arm and objects
+        assert parameter("robot_bridge", "arm") == "fr3"
+        assert parameter("franka_driver", "simulated") == "True"
+        assert parameter("robot_bridge", "speed") == parameter("franka_driver", "speed") == "0.2"
+        assert parameter("skill_server", "state_timeout") == "68.0"

@@ -38,7 +38,7 @@ NODES = EXECUTABLES[:4]
 def test_the_executables_of_the_page_are_there():
     listed = ros2("pkg", "executables", "slap_ros").split()
     page = (ROOT / "docs" / "ros2.md").read_text()
-    for name in (*EXECUTABLES, "mujoco_robot", "tag_detector", "slap"):
+    for name in (*EXECUTABLES, "mujoco_robot", "franka_driver", "tag_detector", "slap"):
         assert name in listed
         assert f"ros2 run slap_ros {name}" in page
 
