@@ -41,6 +41,9 @@ class PredictedMotion:
             actions: Its actions.
             before: State in which the command was given.
             after: State after the command.
+
+        Returns:
+            The motion from the command until nothing moves.
         """
         nothing = np.zeros(len(actions.axes))
         for _ in range(LONGEST):

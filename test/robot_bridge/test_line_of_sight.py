@@ -10,18 +10,21 @@ import yaml
 
 from slap_ros.domains import get_domain
 from slap_ros.geometry.pose import NO_ROTATION, Pose, from_rotation_vector, from_yaw
+from slap_ros.robot.grasp_tracking import expected_pose, grasp_as_seen
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.limits import PANDA, Workspace
 from slap_ros.robot.line_of_sight import across, is_slanted
 from slap_ros.robot.robot_world import RobotWorld
 from slap_ros.robot.scene_config import scene_config
+from slap_ros.robot.state_assembly import Grasp
 from slap_ros.robot.tagged_scene import placed_tags, tagged_scene
-from slap_ros.robot.tracking import Detection, Track, TrackingSettings
+from slap_ros.robot.tracking import Detection, Track, TrackingSettings, still
 from slap_ros.vision.pinhole_camera import looking_at
 from slap_ros.vision.tags import tag_frame
 from slap_ros.worlds.features import JOINT_FEATURES, POSE_FEATURES
 from slap_ros.worlds.joint_space.scene import TABLE, TABLE_TOP, cube
 from slap_ros.worlds.joint_space.settling import resting_poses
+from slap_ros.worlds.panda import HOME
 
 EYE = (1.05, -0.45, 0.75)  # m
 CAMERA = looking_at(EYE, (0.5, 0.0, 0.1))
@@ -162,6 +165,18 @@ def test_what_moves_where_nothing_sees_it_is_where_the_model_has_it():
     since = bench.now
     bench.look(without=("block2",))  # and hidden again, where it is
     assert bench.world.measure(since).get(dropped, "y") == pytest.approx(0.25, abs=1e-3)
+
+
+@pytest.mark.parametrize("error", [-0.01, 0.01])
+def test_a_slip_in_the_hand_is_known_but_for_how_far_away_it_is_seen(error):
+    reading = JointReading(1.0, tuple(HOME), gap=0.05)
+    grasp = Grasp(TASK.initial_state.layout.object("block1"), Pose((0.0, 0.0, 0.1)), 0.025)
+    held = expected_pose(grasp, reading)
+    beside = np.cross(np.subtract(held.position, EYE), (0.0, 0.0, 1.0))
+    slipped = np.array(held.position) + 0.012 * beside / np.linalg.norm(beside)
+    seen = Pose(farther(tuple(slipped.tolist()), error), held.quaternion)
+    found = expected_pose(grasp_as_seen(grasp, reading, still(seen, 10, EYE)), reading)
+    assert found.position == pytest.approx(tuple(slipped.tolist()), abs=3e-4)
 
 
 def test_turned_blocks_keep_their_turn():
