@@ -29,16 +29,39 @@ TASKS: Mapping[str, str] = {  # names within the namespace, and their domains
 }
 
 
+# Those for which a library of shortcuts ships, and those whose skills can be acquired.
+SHORTCUTS: Mapping[str, str] = {
+    "Obstacle2D-shortcut-v0": "obstacle2d",
+    "ObstacleTower-shortcut-v0": "obstacle_tower",
+    "ClutteredDrawer-shortcut-v0": "cluttered_drawer",
+    "CleanupTable-shortcut-v0": "cleanup_table",
+}
+SKILLS: Mapping[str, str] = {
+    "StackAtTarget-skill-v0": "stack_at_target",
+    "StowHammer-skill-v0": "stow_hammer",
+    "PegInHole-skill-v0": "peg_in_hole",
+    "MakeCoffee-skill-v0": "make_coffee",
+    "Groceries-skill-v0": "groceries",
+    "Bowls-skill-v0": "bowls",
+}
+MADE_BY: Mapping[str, Mapping[str, str]] = {  # by what in the package
+    "registration:make_task_env": TASKS,
+    "shortcut_env:ShortcutEnv": SHORTCUTS,
+    "skill_env:SkillEnv": SKILLS,
+}
+
+
 def register() -> None:
-    """Register an environment for each of our domains."""
+    """Register the environments of each of our domains."""
     import gymnasium
 
-    for name, domain in TASKS.items():
-        gymnasium.register(
-            f"{NAMESPACE}/{name}",
-            entry_point="slap_ros.environments.registration:make_task_env",
-            kwargs={"domain": domain},
-        )
+    for maker, names in MADE_BY.items():
+        for name, domain in names.items():
+            gymnasium.register(
+                f"{NAMESPACE}/{name}",
+                entry_point=f"slap_ros.environments.{maker}",
+                kwargs={"domain": domain},
+            )
 
 
 def make_task_env(domain: str, preset: str = "", *, obs: str = "state", **options: Any) -> TaskEnv:
