@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from slap_ros.environments.task_env import TaskEnv
 
-OBSERVATIONS = ("state", "view", "dict")
+OBSERVATIONS = ("state", "view", "dict", "options")
 NAMESPACE = "slap_ros"
 TASKS: Mapping[str, str] = {  # names within the namespace, and their domains
     "Obstacle2D-v0": "obstacle2d",
@@ -70,7 +70,8 @@ def make_task_env(domain: str, preset: str = "", *, obs: str = "state", **option
     Args:
         domain: Name of the domain.
         preset: Name of a preset, maybe with settings; empty for the domain's first.
-        obs: Observation: ``state``, ``view``, or ``dict`` for one with goals.
+        obs: Observation: ``state``, ``view``, ``dict`` for one with goals, or ``options`` for one
+            with the option that runs.
         options: Further arguments of :class:`~slap_ros.environments.task_env.TaskEnv`.
 
     Returns:
@@ -80,6 +81,7 @@ def make_task_env(domain: str, preset: str = "", *, obs: str = "state", **option
         InvalidParameterError: An argument has a value that it cannot have.
     """
     from slap_ros.environments.goal_task_env import GoalTaskEnv
+    from slap_ros.environments.option_task_env import OptionTaskEnv
     from slap_ros.environments.task_env import TaskEnv
     from slap_ros.errors import InvalidParameterError
 
@@ -87,4 +89,8 @@ def make_task_env(domain: str, preset: str = "", *, obs: str = "state", **option
         raise InvalidParameterError(f"unknown obs {obs!r}; there are {', '.join(OBSERVATIONS)}")
     if obs == "dict":
         return GoalTaskEnv(domain, preset, **options)
+    if obs == "options":
+        if options.setdefault("control", "both") != "both":
+            raise InvalidParameterError("obs='options' has control='both', and no other")
+        return OptionTaskEnv(domain, preset, **options)
     return TaskEnv(domain, preset, obs=obs, **options)
