@@ -30,8 +30,10 @@ BELOW_1 = math.nextafter(1.0, 0.0)
 RANGES: Mapping[str, tuple[float, float]] = {  # least and greatest value; all others are finite
     "gamma": (0.0, BELOW_1),
     "enough": (0.0, 1.0),
+    "ent_coef_init": (math.ulp(0.0), sys.float_info.max),
     "ent_coef": (0.0, sys.float_info.max),
     "gae_lambda": (0.0, 1.0),
+    "hindsight": (0.0, BELOW_1),
     "learning_rate": (math.ulp(0.0), 1.0),
     "least_saving": (0.0, BELOW_1),
     "least_similarity": (0.0, 1.0),

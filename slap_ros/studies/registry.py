@@ -22,6 +22,7 @@ from slap_ros.studies.slap import (
     dynamics,
     generalisation,
     goals,
+    learners,
     occluded,
     perception,
     perturbed,
@@ -57,29 +58,11 @@ STUDIES: Mapping[str, Study[Any]] = {
         reward_ablation.STUDY,
         table1.STUDY,
         rivals.STUDY,
+        learners.STUDY,
         ablation.STUDY,
     )
 }
 WITHOUT_STUDY = (
-    not_made(
-        "SLAP Table 1",
-        "options within one network: SOL",
-        "100% in Obstacle 2D, 24.9 steps; else 0%",
-        "not part of this project",
-    ),
-    PaperFigure(
-        "SLAP Table 3",
-        "other algorithms that learn shortcuts",
-        domains=("cleanup_table",),
-        found={"": "PPO 113.7, SAC 160.2, SAC+HER 131.0 steps; pure planning 446"},
-        not_run="only PPO learns shortcuts here",
-    ),
-    not_made(
-        "SLAP Fig. 6",
-        "independent policies against one for all",
-        "independent policies are better",
-        "this project has independent policies only",
-    ),
     not_made(
         "LG-SAIL Table 7",
         "imitation with and without planning",
