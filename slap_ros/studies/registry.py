@@ -15,6 +15,7 @@ from slap_ros.studies.lg_sail import (
     planning_ablation,
     replanning,
     reward_ablation,
+    sequence,
     vacuity,
     warm_start,
 )
@@ -53,6 +54,7 @@ STUDIES: Mapping[str, Study[Any]] = {
         acquisition.STUDY,
         replanning.STUDY,
         warm_start.STUDY,
+        sequence.STUDY,
         induction.STUDY,
         planning_ablation.STUDY,
         planning_ablation.MODELS_STUDY,
@@ -93,9 +95,6 @@ WITHOUT_STUDY = (
         "learning curves beside other learners",
         "curves",
         "no such learner was trained in these domains",
-    ),
-    not_made(
-        "LG-SAIL Fig. 5", "a sequence of tasks", "curves", "no sequence of ten tasks was trained"
     ),
     not_made(
         "LG-SAIL Fig. 8", "a real robot", "0.8 and 1.0 of 10 trials", "no robot was available"

@@ -1,32 +1,20 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Success over environment steps while skills are acquired: of whole plans, and of each skill."""
+"""Trainings of skills as jobs of studies: their success over environment steps."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from statistics import fmean
-from typing import Any, NamedTuple
+from typing import Any
 
 from slap_ros.acquisition.curriculum.curriculum import Curriculum
-from slap_ros.acquisition.curriculum.curriculum_callback import OngoingRound
-from slap_ros.acquisition.curriculum.rollouts import PlanRollout
 from slap_ros.acquisition.curriculum.task_source import TaskSource
 from slap_ros.acquisition.training.settings import AcquisitionSettings
-from slap_ros.acquisition.training.skill_training import Round
 from slap_ros.api.acquisition import UnwatchedCurriculum, acquirable, known_skills
+from slap_ros.api.learning_curves import CurveCallback, Point
 from slap_ros.learning.workers import SequentialWorkers
-
-PLAN = "whole plans"  # name of the curve of task progress
-
-
-class Point(NamedTuple):
-    """A measurement while skills are acquired."""
-
-    steps: int  # environment steps learned before: of all skills for plans, else of the skill
-    success: float  # task progress of plans, or success rate of a skill
 
 
 @dataclass(frozen=True)
@@ -82,39 +70,6 @@ class LearningCurves:
         return cls(curves, begun, str(data["ended"]), float(data["progress"]))
 
 
-@dataclass
-class CurveCallback(UnwatchedCurriculum):
-    """Takes note of every measurement of a curriculum.
-
-    Args:
-        curves: Measurements by name, in the order in which they were made.
-    """
-
-    curves: dict[str, list[Point]] = field(default_factory=dict)
-    _learned: int = 0
-    _segment_steps: int = 0
-
-    def on_learning(self, iteration: int, rounds: Sequence[OngoingRound], steps_left: int) -> None:
-        """Take note of how long segments are."""
-        del iteration, steps_left
-        self._segment_steps = rounds[0].segment_steps
-
-    def on_rollouts(self, iteration: int, rollouts: Sequence[PlanRollout]) -> None:
-        """Take note of task progress."""
-        del iteration
-        progress = fmean(rollout.progress for rollout in rollouts)
-        self.curves.setdefault(PLAN, []).append(Point(self._learned, progress))
-
-    def on_judged(self, iteration: int, skill: str, outcome: Round) -> None:
-        """Take note of the judgements of a round."""
-        del iteration
-        points = self.curves.setdefault(skill, [])
-        begun = points[-1].steps if points else 0
-        for number, success in enumerate((outcome.initial, *outcome.segments)):
-            points.append(Point(begun + number * self._segment_steps, success))
-        self._learned += len(outcome.segments) * self._segment_steps
-
-
 def learn_skills(
     setup: AcquisitionSetup, seed: int, known: Sequence[str], folder: str
 ) -> dict[str, Any]:
@@ -134,7 +89,8 @@ def learn_skills(
     source = TaskSource.of(
         domain, setup.goal, seed, domain.acquisition.operators, domain.acquisition.rewards
     )
-    callback = CurveCallback()
+    segment_steps = setup.settings.segment_steps(domain.acquisition.horizon)
+    callback = CurveCallback(UnwatchedCurriculum(), segment_steps)
     skills = known_skills([Path(path) for path in known], lambda _: None)
     workers = SequentialWorkers()
     curriculum = Curriculum(source, setup.settings, Path(folder), workers, callback, skills)

@@ -17,6 +17,7 @@ from slap_ros.api.acquisition import acquirable, known_skills, require_budget
 from slap_ros.api.acquisition_request import AcquisitionRequest
 from slap_ros.api.command_options import CommandOption, DomainName, Jobs, Preset
 from slap_ros.api.jobs import require_torch
+from slap_ros.api.learning_curves import PLAN, Point, steps_to
 from slap_ros.api.left_out import Tell
 from slap_ros.errors import InvalidParameterError
 from slap_ros.evaluation.statistics import Interval, ratio_interval
@@ -25,10 +26,8 @@ from slap_ros.studies.comparison import format_spread
 from slap_ros.studies.figures import LINES
 from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.lg_sail.learning_curves import (
-    PLAN,
     AcquisitionSetup,
     LearningCurves,
-    Point,
     learn_skills,
 )
 from slap_ros.studies.options import RESULTS, Output
@@ -55,7 +54,7 @@ FROM: Mapping[str, str] = {"make_coffee": "models/skills/stow_hammer"}  # as the
 
 
 @dataclass(frozen=True)
-class Comparison:
+class StartComparison:
     """Trainings from scratch and warm ones, by one measure.
 
     Args:
@@ -71,7 +70,9 @@ class Comparison:
     @property
     def ratio(self) -> tuple[float, Interval | None] | None:
         """Steps of warm trainings over steps of those from scratch; None where these have none."""
-        ours, theirs = ([steps_to(one)[0] for one in side] for side in (self.warm, self.scratch))
+        ours, theirs = (
+            [steps_to(one, LEVEL)[0] for one in side] for side in (self.warm, self.scratch)
+        )
         if not ours or not all(theirs):
             return None
         return sum(ours) / sum(theirs), ratio_interval(ours, theirs)
@@ -82,29 +83,16 @@ class Comparison:
         return {
             "of": self.name,
             "steps": {
-                SCRATCH: [steps_to(one)[0] for one in self.scratch],
-                WARM: [steps_to(one)[0] for one in self.warm],
+                SCRATCH: [steps_to(one, LEVEL)[0] for one in self.scratch],
+                WARM: [steps_to(one, LEVEL)[0] for one in self.warm],
             },
             "reached": {
-                SCRATCH: [steps_to(one)[1] for one in self.scratch],
-                WARM: [steps_to(one)[1] for one in self.warm],
+                SCRATCH: [steps_to(one, LEVEL)[1] for one in self.scratch],
+                WARM: [steps_to(one, LEVEL)[1] for one in self.warm],
             },
             "ratio": None if ratio is None else ratio[0],
             "ratio_interval": asdict(ratio[1]) if ratio is not None and ratio[1] else None,
         }
-
-
-def steps_to(points: Sequence[Point]) -> tuple[int, bool]:
-    """The environment steps after which the level was first measured, and whether it ever was.
-
-    Args:
-        points: Measurements of one training, at least one, in order.
-
-    Returns:
-        The steps; those of the whole training where the level was never measured.
-    """
-    reached = next((point.steps for point in points if point.success >= LEVEL), None)
-    return (points[-1].steps, False) if reached is None else (reached, True)
 
 
 def study(
@@ -158,7 +146,7 @@ def study(
 
 def compare(
     scratch: Sequence[LearningCurves], warm: Sequence[LearningCurves]
-) -> tuple[Comparison, ...]:
+) -> tuple[StartComparison, ...]:
     """Whole plans, then each skill that all trainings have learned.
 
     Args:
@@ -167,7 +155,7 @@ def compare(
     """
     names = dict.fromkeys(chain.from_iterable(one.curves for one in (*scratch, *warm)))
     return tuple(
-        Comparison(
+        StartComparison(
             name,
             tuple(one.curves[name] for one in scratch),
             tuple(one.curves[name] for one in warm),
@@ -177,7 +165,7 @@ def compare(
     )
 
 
-def _row(comparison: Comparison, warm: Sequence[LearningCurves]) -> list[str]:
+def _row(comparison: StartComparison, warm: Sequence[LearningCurves]) -> list[str]:
     ratio = comparison.ratio
     return [
         comparison.name,
@@ -189,7 +177,7 @@ def _row(comparison: Comparison, warm: Sequence[LearningCurves]) -> list[str]:
 
 
 def _steps(trainings: Sequence[Sequence[Point]]) -> str:
-    found = [steps_to(one) for one in trainings]
+    found = [steps_to(one, LEVEL) for one in trainings]
     reached = sum(done for _, done in found)
     spread = format_spread(Spread.of([float(steps) for steps, _ in found]), 0)
     return spread if reached == len(found) else f"≥ {spread} ({reached} of {len(found)} came there)"
@@ -207,7 +195,7 @@ def _begun_with(records: Sequence[Mapping[str, Any]]) -> str:
     return "; ".join([*begun, *([f"none was worth it: {nothing}"] if nothing else [])]) or "-"
 
 
-def draw(figure: Figure, comparisons: Sequence[Comparison]) -> None:
+def draw(figure: Figure, comparisons: Sequence[StartComparison]) -> None:
     """Draw the success of every training over environment steps, a panel per measure."""
     panels = figure.subplots(len(comparisons), 1, squeeze=False)[:, 0]
     for axes, one in zip(panels, comparisons, strict=True):
