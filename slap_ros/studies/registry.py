@@ -15,7 +15,9 @@ from slap_ros.studies.lg_sail import (
     planning_ablation,
     replanning,
     reward_ablation,
+    sequence,
     vacuity,
+    warm_start,
 )
 from slap_ros.studies.slap import (
     ablation,
@@ -52,6 +54,8 @@ STUDIES: Mapping[str, Study[Any]] = {
         vacuity.STUDY,
         acquisition.STUDY,
         replanning.STUDY,
+        warm_start.STUDY,
+        sequence.STUDY,
         induction.STUDY,
         planning_ablation.STUDY,
         planning_ablation.MODELS_STUDY,
@@ -74,15 +78,6 @@ WITHOUT_STUDY = (
         "learning curves beside other learners",
         "curves",
         "no such learner was trained in these domains",
-    ),
-    not_made(
-        "LG-SAIL Fig. 5", "a sequence of tasks", "curves", "no sequence of ten tasks was trained"
-    ),
-    not_made(
-        "LG-SAIL Fig. 6",
-        "skills of another domain to begin with",
-        "curves",
-        "no trainings with and without them were compared",
     ),
     not_made(
         "LG-SAIL Fig. 8", "a real robot", "0.8 and 1.0 of 10 trials", "no robot was available"
