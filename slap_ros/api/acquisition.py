@@ -33,7 +33,7 @@ from slap_ros.core import Domain
 from slap_ros.core.goals import task_with_goal
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
-from slap_ros.files import require_writable, sole_use
+from slap_ros.files import parse_json, read_text, require_writable, sole_use
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.skills.skill_library import (
     AcquiredSkill,
@@ -42,6 +42,8 @@ from slap_ros.skills.skill_library import (
     read_library_record,
     save_skill_library,
 )
+
+PROPOSAL = "proposal"  # result in a work folder: operators and rewards
 
 
 class UnwatchedCurriculum:
@@ -95,6 +97,8 @@ def acquire(
     changes: Changes = (),
     steps: int | None = None,
     begin_with: Sequence[Path | str] = (),
+    keep: Path | str | None = None,
+    shortcuts: Path | str | None = None,
     work: Path | str | None = None,
     jobs: int | None = None,
     watch: AcquisitionWatch = AcquisitionWatch(),
@@ -114,6 +118,10 @@ def acquire(
         changes: Settings to change, by dotted name; or texts as on the command line.
         steps: Environment steps for all skills together; None for those of the settings.
         begin_with: Folders of skill libraries that new skills may begin with.
+        keep: Folder of a skill library whose skills are there already, and are trained further
+            only where they fail; None for none.
+        shortcuts: Folder of a library of shortcuts over the skills to keep: skills that fail where
+            these shortcuts have led are learned from there; None for none.
         work: Folder for checkpoints; None for one beside the library's folder.
         jobs: Number of processes; None for this one. A script that uses processes needs
             ``if __name__ == "__main__"``.
@@ -140,6 +148,8 @@ def acquire(
         changes=change_texts(changes),
         steps=steps,
         begin_with=[Path(path) for path in begin_with],
+        keep=None if keep is None else Path(keep),
+        shortcuts=None if shortcuts is None else Path(shortcuts),
     )
     return carry_out(request, jobs, watch=watch)
 
@@ -182,6 +192,7 @@ def carry_out(
     encoder = request.skill_encoder()
     known = _known(request.begin_with, watch.tell)
     there = _library_to_keep(request.keep, request.domain)
+    shortcuts = request.shortcuts_over_kept()
     for folder in (request.library_folder, request.work_folder):
         require_writable(folder)
     require_torch()
@@ -200,7 +211,15 @@ def carry_out(
             ) -> SkillLibrary:
                 source = _source(request, proposal)
                 return Curriculum(
-                    source, settings, folder, workers, callback, known, encoder, dict(kept)
+                    source,
+                    settings,
+                    folder,
+                    workers,
+                    callback,
+                    known,
+                    encoder,
+                    dict(kept),
+                    shortcuts,
                 ).run()
 
             library = learn(proposal, request.work_folder, settings, kept)
@@ -252,6 +271,7 @@ def _made_by(
         "began_with": [path.name for path in request.begin_with],
         **({"encoder": encoder.name} if request.encoder else {}),
         **({"kept": request.keep.name} if request.keep else {}),
+        **({"shortcuts": request.shortcuts.name} if request.shortcuts else {}),
     }
 
 
@@ -271,6 +291,9 @@ def _proposed(request: AcquisitionRequest, watch: AcquisitionWatch) -> _Proposed
     work, domain = WorkFolder(request.work_folder), request.domain
 
     def propose() -> dict[str, Any]:
+        if request.proposal_of is not None:
+            earlier = parse_json(read_text(request.proposal_of / f"{PROPOSAL}.json"))
+            return {**earlier, "command": request.command}
         proposers = request.proposers
         task = task_with_goal(domain, request.seed, 0, request.goal_or_first)
         shown = proposers.demonstrations_in(domain)
@@ -288,7 +311,7 @@ def _proposed(request: AcquisitionRequest, watch: AcquisitionWatch) -> _Proposed
         proposal = read_proposal(data["proposal"], domain)
         return data["command"], _Proposed(proposal, dict(data["answered_by"]))
 
-    made_by, proposed = work.cached("proposal", propose, read)
+    made_by, proposed = work.cached(PROPOSAL, propose, read)
     if made_by != request.command:
         raise InvalidParameterError(
             f"{request.work_folder} has another training, of `{made_by}`; give another folder, or "
