@@ -97,8 +97,6 @@ def acquire(
     changes: Changes = (),
     steps: int | None = None,
     begin_with: Sequence[Path | str] = (),
-    keep: Path | str | None = None,
-    shortcuts: Path | str | None = None,
     work: Path | str | None = None,
     jobs: int | None = None,
     watch: AcquisitionWatch = AcquisitionWatch(),
@@ -118,10 +116,6 @@ def acquire(
         changes: Settings to change, by dotted name; or texts as on the command line.
         steps: Environment steps for all skills together; None for those of the settings.
         begin_with: Folders of skill libraries that new skills may begin with.
-        keep: Folder of a skill library whose skills are there already, and are trained further
-            only where they fail; None for none.
-        shortcuts: Folder of a library of shortcuts over the skills to keep: skills that fail where
-            these shortcuts have led are learned from there; None for none.
         work: Folder for checkpoints; None for one beside the library's folder.
         jobs: Number of processes; None for this one. A script that uses processes needs
             ``if __name__ == "__main__"``.
@@ -148,8 +142,6 @@ def acquire(
         changes=change_texts(changes),
         steps=steps,
         begin_with=[Path(path) for path in begin_with],
-        keep=None if keep is None else Path(keep),
-        shortcuts=None if shortcuts is None else Path(shortcuts),
     )
     return carry_out(request, jobs, watch=watch)
 
