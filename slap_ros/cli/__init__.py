@@ -43,6 +43,11 @@ COMMANDS = (
         "Acquire skills: execute plans, train each skill that fails from where it fails, repeat.",
     ),
     CommandEntry(
+        "grow",
+        "slap_ros.cli.grow:grow",
+        "Acquire skills, learn shortcuts over them, and again, until plans get no shorter.",
+    ),
+    CommandEntry(
         "skills",
         "slap_ros.cli.skills:skills",
         "Show a library of skills: operators, rewards, success, and which skills each began from.",
