@@ -17,7 +17,12 @@ from slap_ros.planning.planner_choice import DEFAULT_PLANNER
 from slap_ros.relational import Layout, State
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
 from slap_ros.shortcuts.sampling import DEFAULT
-from slap_ros.shortcuts.shipped import chosen_library, require_usable, skills_digest
+from slap_ros.shortcuts.shipped import (
+    chosen_library,
+    remark_on_skills,
+    require_usable,
+    skills_digest,
+)
 from slap_ros.shortcuts.shortcut import Shortcut
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 
@@ -87,6 +92,8 @@ class ShortcutProvider:
             self._libraries[key] = library
             for reason in library.refused if library is not None else ():
                 self._node.get_logger().warning(f"a shortcut is left out: {reason}")
+            if library is not None and (remark := remark_on_skills(library, domain)):
+                self._node.get_logger().info(remark)
 
     def shortcuts(self, domain: Domain) -> tuple[Shortcut, ...]:
         """Those of a domain that was opened."""

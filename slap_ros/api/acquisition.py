@@ -33,7 +33,7 @@ from slap_ros.core import Domain
 from slap_ros.core.goals import task_with_goal
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
-from slap_ros.files import require_writable, sole_use
+from slap_ros.files import parse_json, read_text, require_writable, sole_use
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.skills.skill_library import (
     AcquiredSkill,
@@ -42,6 +42,8 @@ from slap_ros.skills.skill_library import (
     read_library_record,
     save_skill_library,
 )
+
+PROPOSAL = "proposal"  # result in a work folder: operators and rewards
 
 
 class UnwatchedCurriculum:
@@ -182,6 +184,7 @@ def carry_out(
     encoder = request.skill_encoder()
     known = known_skills(request.begin_with, watch.tell)
     there = _library_to_keep(request.keep, request.domain)
+    shortcuts = request.shortcuts_over_kept()
     for folder in (request.library_folder, request.work_folder):
         require_writable(folder)
     require_torch()
@@ -200,7 +203,15 @@ def carry_out(
             ) -> SkillLibrary:
                 source = _source(request, proposal)
                 return Curriculum(
-                    source, settings, folder, workers, callback, known, encoder, dict(kept)
+                    source,
+                    settings,
+                    folder,
+                    workers,
+                    callback,
+                    known,
+                    encoder,
+                    dict(kept),
+                    shortcuts,
                 ).run()
 
             library = learn(proposal, request.work_folder, settings, kept)
@@ -252,6 +263,7 @@ def _made_by(
         "began_with": [path.name for path in request.begin_with],
         **({"encoder": encoder.name} if request.encoder else {}),
         **({"kept": request.keep.name} if request.keep else {}),
+        **({"shortcuts": request.shortcuts.name} if request.shortcuts else {}),
     }
 
 
@@ -271,6 +283,9 @@ def _proposed(request: AcquisitionRequest, watch: AcquisitionWatch) -> _Proposed
     work, domain = WorkFolder(request.work_folder), request.domain
 
     def propose() -> dict[str, Any]:
+        if request.proposal_of is not None:
+            earlier = parse_json(read_text(request.proposal_of / f"{PROPOSAL}.json"))
+            return {**earlier, "command": request.command}
         proposers = request.proposers
         task = task_with_goal(domain, request.seed, 0, request.goal_or_first)
         shown = proposers.demonstrations_in(domain)
@@ -288,7 +303,7 @@ def _proposed(request: AcquisitionRequest, watch: AcquisitionWatch) -> _Proposed
         proposal = read_proposal(data["proposal"], domain)
         return data["command"], _Proposed(proposal, dict(data["answered_by"]))
 
-    made_by, proposed = work.cached("proposal", propose, read)
+    made_by, proposed = work.cached(PROPOSAL, propose, read)
     if made_by != request.command:
         raise InvalidParameterError(
             f"{request.work_folder} has another training, of `{made_by}`; give another folder, or "

@@ -24,6 +24,10 @@ from slap_ros.errors import InvalidParameterError
 from slap_ros.language.settings import LOCAL_SCHEME, read_settings
 from slap_ros.learning.setting_changes import changed, parse_changes
 from slap_ros.learning.work_folder import WorkFolder
+from slap_ros.shortcuts.library_choice import LibraryChoice
+from slap_ros.shortcuts.shipped import require_same_skills
+from slap_ros.shortcuts.shortcut_library import load_library
+from slap_ros.skills.domain_choice import DomainChoice, open_domain
 
 
 @dataclass(frozen=True)
@@ -45,6 +49,10 @@ class AcquisitionRequest:
         encoder: Embedding model that says which skills are alike; None for metrics alone.
         keep: Library whose skills are there already.
         revise: Whether a model may change what it has proposed for skills that are given up.
+        shortcuts: Library of shortcuts over the skills to keep. Skills that fail where these
+            shortcuts have led are learned from there.
+        proposal_of: Work folder of an earlier acquisition whose operators and rewards are used
+            again; None to have some proposed.
 
     Raises:
         InvalidParameterError: They do not fit together.
@@ -64,11 +72,18 @@ class AcquisitionRequest:
     encoder: str | None = None
     keep: Path | None = None
     revise: bool = False
+    shortcuts: Path | None = None
+    proposal_of: Path | None = None
 
     def __post_init__(self) -> None:
         require_known("--rewarder", self.rewarder, REWARDERS)
         if self.encoder is not None and not self.begin_with:
             raise InvalidParameterError("--encoder is for --from: without, nothing is retrieved")
+        if self.shortcuts is not None and self.keep is None:
+            raise InvalidParameterError(
+                "--shortcuts is for --keep: plans with shortcuts need the skills that the "
+                "shortcuts were learned over"
+            )
         if self.revise and LANGUAGE not in (self.proposers.proposer, self.rewarder):
             raise InvalidParameterError(
                 "--revise is for --proposer language or --rewarder language: nobody else is asked"
@@ -94,6 +109,7 @@ class AcquisitionRequest:
             encoder=self.encoder,
             keep=_shareable(self.keep) if self.keep else None,
             revise=self.revise or None,
+            shortcuts=_shareable(self.shortcuts) if self.shortcuts else None,
             settings=self.settings,
             steps=self.steps,
             set=list(self.changes) or None,
@@ -131,6 +147,21 @@ class AcquisitionRequest:
                 f"--encoder asks a server; {settings.base_url} is not one: give another --base-url"
             )
         return EmbeddingEncoder(settings, WorkFolder(self.work_folder))
+
+    def shortcuts_over_kept(self) -> LibraryChoice | None:
+        """The shortcuts after which skills are tried; None for no shortcuts.
+
+        Raises:
+            InvalidLibraryError: It is no library of shortcuts of this domain.
+            SkillsChangedError: It was learned over other skills than those to keep.
+        """
+        if self.shortcuts is None:
+            return None
+        assert self.keep is not None  # see above
+        kept = open_domain(DomainChoice(self.domain.name, self.domain.preset, str(self.keep)))
+        library = load_library(self.shortcuts, kept)
+        require_same_skills(library, kept, str(self.shortcuts))
+        return LibraryChoice(self.shortcuts.resolve(), library.digest)
 
 
 def _shareable(folder: Path) -> str:

@@ -14,7 +14,12 @@ from slap_ros.errors import InvalidLibraryError, InvalidParameterError
 from slap_ros.planning.planner import require_planner
 from slap_ros.planning.planner_choice import WITH_SHORTCUTS
 from slap_ros.shortcuts.sampling import DEFAULT, Sampling
-from slap_ros.shortcuts.shipped import NONE, chosen_library, require_same_skills
+from slap_ros.shortcuts.shipped import (
+    NONE,
+    chosen_library,
+    remark_on_skills,
+    require_same_skills,
+)
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 
 SAMPLES = DEFAULT.samples
@@ -38,11 +43,15 @@ def choose_library(
         SkillsChangedError: The library that was chosen was learned over other skills.
     """
     if isinstance(shortcuts, ShortcutLibrary):
-        return _fitting(shortcuts, domain, planner)
-    choice = NONE if shortcuts is None else str(shortcuts)
-    library = chosen_library("" if choice == SHIPPED_WORD else choice, domain, planner)
-    for reason in library.refused if library is not None else ():
-        tell(f"a shortcut is left out: {reason}")
+        library: ShortcutLibrary | None = _fitting(shortcuts, domain, planner)
+    else:
+        choice = NONE if shortcuts is None else str(shortcuts)
+        library = chosen_library("" if choice == SHIPPED_WORD else choice, domain, planner)
+    if library is not None:
+        for reason in library.refused:
+            tell(f"a shortcut is left out: {reason}")
+        if remark := remark_on_skills(library, domain):
+            tell(remark)
     return library
 
 

@@ -48,6 +48,11 @@ COMMANDS = (
         "Acquire skills for one goal after another, with one library that grows.",
     ),
     CommandEntry(
+        "grow",
+        "slap_ros.cli.grow:grow",
+        "Acquire skills, learn shortcuts over them, and again, until plans get no shorter.",
+    ),
+    CommandEntry(
         "skills",
         "slap_ros.cli.skills:skills",
         "Show a library of skills: operators, rewards, success, and which skills each began from.",

@@ -74,6 +74,13 @@ class AcquireOptions:
             "that fail."
         ),
     ] = None
+    shortcuts: Annotated[
+        Path | None,
+        typer.Option(
+            help="Shortcut library over the skills to --keep: skills that fail where its shortcuts "
+            "have led are learned from there."
+        ),
+    ] = None
     revise: Annotated[
         bool,
         typer.Option(
@@ -130,6 +137,7 @@ class AcquireOptions:
             encoder=self.encoder,
             keep=self.keep,
             revise=self.revise,
+            shortcuts=self.shortcuts,
         )
 
 

@@ -41,7 +41,20 @@ PANELS: Mapping[str, str] = {
         MODEL,
     ),
     **dict.fromkeys(
-        ("settings", "set", "steps", "work", "ray", "begin", "encoder", "keep", "scratch"), LEARNING
+        (
+            "settings",
+            "set",
+            "skill_settings",
+            "set_skills",
+            "steps",
+            "work",
+            "ray",
+            "begin",
+            "encoder",
+            "keep",
+            "scratch",
+        ),
+        LEARNING,
     ),
     **dict.fromkeys(
         ("world", "scene", "mock", "mujoco", "perception", "to", "robot", "dry_run", "yes"), ROBOT
@@ -61,6 +74,7 @@ EXAMPLES: Mapping[str, str] = {  # those of studies are in their files
     "train": "slap train obstacle2d --output runs/models/obstacle2d",
     "acquire": "slap acquire stow_hammer --output runs/skills/stow_hammer",
     "acquire-sequence": "slap acquire-sequence groceries --seeds 5",
+    "grow": "slap grow stack_at_target --preset fair:blocked=1 --output runs/grown/blocked",
     "skills": "slap skills models/skills/stow_hammer",
     "check": "slap check obstacle2d",
     "scene": "slap scene obstacle_tower --seed 1 --tags runs/tags",

@@ -88,7 +88,7 @@ def train(options: TrainOptions) -> int:
     """
     domain = open_chosen(options.domain, options.preset, options.skills)
     began, folder = monotonic(), options.library_folder
-    with _TrainingBars() as bars:
+    with TrainingBars() as bars:
         library = train_library(
             domain,
             folder,
@@ -111,7 +111,7 @@ def train(options: TrainOptions) -> int:
     return 0
 
 
-class _TrainingBars(LearningBars):
+class TrainingBars(LearningBars):
     """How far a training is, and what came of its steps."""
 
     def __init__(self) -> None:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
 from slap_ros.core import ActionSpace, Domain, World
 from slap_ros.errors import ErrorCode, SkillNotApplicableError
@@ -61,7 +62,7 @@ class Model:
         self._cache: dict[tuple[Option, Target, bytes], Rollout] = {}
 
     @classmethod
-    def of(cls, domain: Domain, initial: State) -> Model:
+    def of(cls, domain: Domain, initial: State) -> Self:
         """A model for the tasks over these objects."""
         return cls(domain.model_world(initial), domain.atom_space(initial), domain.action_space)
 

@@ -236,4 +236,9 @@ def read_object(path: Path) -> dict[str, Any]:
 
 def write_object(path: Path, data: Mapping[str, Any]) -> None:
     """Write a JSON object; the same bytes for the same data."""
-    path.write_text(json.dumps(data, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    path.write_text(object_text(data), encoding="utf-8")
+
+
+def object_text(data: Mapping[str, Any]) -> str:
+    """The text of a JSON object; the same for the same data."""
+    return json.dumps(data, indent=2, allow_nan=False) + "\n"

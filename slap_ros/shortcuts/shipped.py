@@ -55,7 +55,7 @@ def chosen_library(
         SkillsChangedError: The library that was chosen was learned over other skills.
     """
     library = _load_chosen(choice, domain, planner)
-    if library is None or library.skills_digest == skills_digest(domain):
+    if library is None or library.usable_over(skills_digest(domain)):
         return library
     if not choice:  # what ships is for other skills
         return None
@@ -64,7 +64,7 @@ def chosen_library(
 
 
 def require_same_skills(library: ShortcutLibrary, domain: Domain, where: str) -> None:
-    """Refuse shortcuts that were learned over other skills than a domain has.
+    """Refuse shortcuts that were learned over other skills, and were not found to hold over these.
 
     Args:
         library: Library of shortcuts.
@@ -74,12 +74,29 @@ def require_same_skills(library: ShortcutLibrary, domain: Domain, where: str) ->
     Raises:
         SkillsChangedError: They were learned over others.
     """
-    if library.skills_digest != skills_digest(domain):
+    if not library.usable_over(skills_digest(domain)):
         raise SkillsChangedError(
-            f"{where}: its shortcuts were learned over {_in_words(library.skills_digest)}, but "
-            f"{domain.name} has {_in_words(skills_digest(domain))}: give --skills as they were "
-            f"then, train again over these with `slap train`, or plan without shortcuts ({NONE})"
+            f"{where}: its shortcuts were learned over {skills_in_words(library.skills_digest)}, "
+            f"but {domain.name} has {skills_in_words(skills_digest(domain))}: give --skills as "
+            "they were then, see with `slap check --shortcuts` whether they hold over these, train "
+            f"again over these with `slap train`, or plan without shortcuts ({NONE})"
         )
+
+
+def remark_on_skills(library: ShortcutLibrary, domain: Domain) -> str:
+    """A sentence on shortcuts that were learned over other skills; empty where they were not.
+
+    Args:
+        library: Library of shortcuts that can be used in the domain.
+        domain: Domain with the skills to plan with.
+    """
+    if library.skills_digest == skills_digest(domain):
+        return ""
+    return (
+        f"these shortcuts were learned over {skills_in_words(library.skills_digest)}; "
+        f"`slap check --shortcuts` found that they hold over "
+        f"{skills_in_words(skills_digest(domain))}"
+    )
 
 
 def skills_digest(domain: Domain) -> str:
@@ -87,7 +104,12 @@ def skills_digest(domain: Domain) -> str:
     return str(domain.configuration.get(DIGEST_KEY, ""))
 
 
-def _in_words(digest: str) -> str:
+def skills_in_words(digest: str) -> str:
+    """The skills with a digest, in words.
+
+    Args:
+        digest: Digest of a library of acquired skills; empty for a domain's own.
+    """
     return f"the library of skills {digest}" if digest else "skills that were not acquired"
 
 

@@ -18,7 +18,7 @@ a whole.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -27,9 +27,12 @@ from safetensors.numpy import save
 
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidLibraryError
+from slap_ros.files import write_whole
 from slap_ros.policies.library_files import (
+    ABOUT,
     SHORTCUT,
     load_policy,
+    object_text,
     policy_tensors,
     read_about,
     read_members,
@@ -47,6 +50,7 @@ from slap_ros.shortcuts.signature import Signature
 FORMAT = 1
 MAX_SHORTEST = 1_000_000  # environment steps; attempts are a multiple of them long
 POLICY = "policy.safetensors"
+CHECKED = "checked"  # key of a record: other skills over which the shortcuts were found to hold
 
 Record = Mapping[str, Any]
 
@@ -83,12 +87,54 @@ class ShortcutLibrary:
         skills = self.record.get("skills")
         return str(skills.get("digest", "")) if isinstance(skills, Mapping) else ""
 
+    def usable_over(self, skills_digest: str) -> bool:
+        """Whether it was learned over these skills, or was found to hold over them.
+
+        What was found counts for the shortcuts that were checked, and for no others.
+
+        Args:
+            skills_digest: Digest of acquired skills; empty for a domain's own.
+        """
+        return skills_digest == self.skills_digest or any(
+            check.get("skills_digest") == skills_digest and check.get("library") == self.digest
+            for check in self._checks
+        )
+
+    @property
+    def _checks(self) -> list[Mapping[str, Any]]:
+        checks = self.record.get(CHECKED)
+        if not isinstance(checks, list):
+            return []
+        return [check for check in checks if isinstance(check, Mapping)]
+
+    def checked(self, found: Mapping[str, Any]) -> ShortcutLibrary:
+        """The library, whose record says what a check found.
+
+        Args:
+            found: Findings of the check: ``skills_digest`` and ``library``, the digest of the
+                shortcuts that hold over these skills, and how that was found.
+        """
+        others = [c for c in self._checks if c.get("skills_digest") != found["skills_digest"]]
+        return replace(self, record={**self.record, CHECKED: [*others, dict(found)]})
+
 
 def save_library(path: Path, library: ShortcutLibrary) -> None:
     """Write a library as a folder, in place of the one that may be there."""
-    about = {"format": FORMAT, "domain": library.domain, **library.record}
     shortcuts = {shortcut.name: shortcut for shortcut in library.shortcuts}
-    write_library(path, about, shortcuts, save_shortcut)
+    write_library(path, _about(library), shortcuts, save_shortcut)
+
+
+def save_library_record(path: Path, library: ShortcutLibrary) -> None:
+    """Write the record of a library that is there; its shortcuts stay as they are.
+
+    Raises:
+        OSError: It cannot be written; the old record is untouched.
+    """
+    write_whole(path / ABOUT, object_text(_about(library)))
+
+
+def _about(library: ShortcutLibrary) -> dict[str, Any]:
+    return {"format": FORMAT, "domain": library.domain, **library.record}
 
 
 def load_library(path: Path, domain: Domain) -> ShortcutLibrary:

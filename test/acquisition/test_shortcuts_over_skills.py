@@ -4,26 +4,38 @@
 
 import json
 import shutil
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from ensemble.cli.application import app
 from ensemble.observation import Episode
 from ensemble.shortcuts import ShortcutParameters, ShortcutProvider
+from slap_ros.acquisition.curriculum.after_shortcuts import AfterShortcuts
+from slap_ros.acquisition.curriculum.initiation_states import InitiationStates
+from slap_ros.api.growing import GrowthWatch, grow_rounds
+from slap_ros.api.growth import GrowthRequest
 from slap_ros.api.shortcut_choice import choose_library
+from slap_ros.api.training import Unwatched
+from slap_ros.core.goals import task_with_goal
 from slap_ros.domains import get_domain
-from slap_ros.errors import ErrorCode, SkillsChangedError
+from slap_ros.errors import ErrorCode, InvalidParameterError, SkillsChangedError
 from slap_ros.evaluation.approaches import approaches
 from slap_ros.evaluation.experiment import solve
+from slap_ros.relational import State
+from slap_ros.relational.pddl import parse_goal
+from slap_ros.shortcuts.library_choice import LibraryChoice
 from slap_ros.shortcuts.sampling import DEFAULT
 from slap_ros.shortcuts.shipped import chosen_library, require_usable
-from slap_ros.shortcuts.shortcut_library import load_library
+from slap_ros.shortcuts.shortcut_library import load_library, save_library
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
-from support.steady_skills import PICKING, PUTTING, write_library
+from support.points import REWARDS
+from support.steady_skills import PICKING, PUTTING, towards, write_library
 
 pytestmark = pytest.mark.usefixtures("points_installed")
 SMALL = [
@@ -137,6 +149,193 @@ def test_a_node_takes_shortcuts_up_with_the_skills_of_the_episode(trained, tmp_p
 def episode_of(domain):
     task = domain.task(0)
     return Episode(1, 0, domain, task, domain.atom_space(task.initial_state))
+
+
+def check(library, skills, *more):
+    return slap(
+        "check", "points", "--shortcuts", library, "--skills", skills, "--tasks", 2, *more
+    )  # fmt: skip
+
+
+def contents(folder):
+    return {
+        path.relative_to(folder): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+def test_shortcuts_that_hold_over_other_skills_are_used_with_them(trained, tmp_path):
+    """And with no others; whoever uses them is told both digests."""
+    library = shutil.copytree(trained.folder / "library", tmp_path / "library")
+    slower = write_library(tmp_path / "slower", PICKING, replace(PUTTING, horizon=20))
+    before, first = contents(library), load_library(library, get_domain("points", "line"))
+    answer = check(library, slower)
+    assert answer.exit_code == 0, answer.output
+    domain = open_domain(DomainChoice("points", "line", str(slower)))
+    both = [first.skills_digest, domain.configuration["skills_digest"]]
+    assert all(digest in " ".join(answer.output.split()) for digest in both)
+    after = contents(library)
+    assert {name for name in after if after[name] != before.get(name)} == {Path("library.json")}
+    told = []
+    assert choose_library(str(library), domain, "lazy", told.append).shortcuts
+    assert all(digest in told[0] for digest in both)
+    with pytest.raises(SkillsChangedError):
+        chosen_library(str(library), get_domain("points", "line"))
+    again = check(library, slower, "--json")
+    assert json.loads(again.stdout)["holds"] and contents(library) == after
+
+
+def failing(library):
+    """The library with a policy that stays where it is."""
+
+    def lame(policy):
+        layers = tuple((weights * 0, bias * 0) for weights, bias in policy.layers)
+        return replace(policy, layers=layers, log_std=policy.log_std * 0 - 9)
+
+    shortcuts = tuple(replace(s, policy=lame(s.policy)) for s in library.shortcuts)
+    return replace(library, shortcuts=shortcuts)
+
+
+def test_shortcuts_that_fail_over_other_skills_stay_unused_and_untouched(trained, tmp_path):
+    library, points = tmp_path / "library", get_domain("points", "line")
+    save_library(library, failing(load_library(trained.folder / "library", points)))
+    slower = write_library(tmp_path / "slower", PICKING, replace(PUTTING, horizon=20))
+    before = contents(library)
+    answer = check(library, slower)
+    assert answer.exit_code == ErrorCode.SKILLS_CHANGED, answer.output
+    assert "does not hold over" in " ".join(answer.output.split()) and contents(library) == before
+    assert check(library, slower, "--json").exit_code == ErrorCode.SKILLS_CHANGED
+
+
+def test_what_was_checked_is_the_shortcuts_that_were_there(trained, tmp_path):
+    """Others in their place count as unchecked, and a record that is damaged as none."""
+    library, points = tmp_path / "library", get_domain("points", "line")
+    held = load_library(trained.folder / "library", points)
+    other = "0123456789abcdef"
+    checked = held.checked({"skills_digest": other, "library": held.digest})
+    assert checked.usable_over(other) and checked.usable_over(held.skills_digest)
+    assert not failing(checked).usable_over(other)
+    for damaged in (None, 3, [3], {"skills_digest": other}, [{"skills_digest": other}]):
+        save_library(library, replace(held, record={**held.record, "checked": damaged}))
+        assert not load_library(library, points).usable_over(other)
+
+
+def test_shortcuts_that_always_fail_leave_the_plans_of_the_skills(trained):
+    """To the step, in each of several tasks; and the paper's search finds the same lengths."""
+    domain = open_domain(DomainChoice("points", "line", str(trained.folder / "steady")))
+    library = load_library(trained.folder / "library", domain)
+    alone, _, with_shortcuts = approaches(library, DEFAULT)
+    _, _, lame = approaches(failing(library), DEFAULT)
+    for index in range(3):
+        task, lengths = domain.task(500, index), {}
+        for planner in ("lazy", "exhaustive"):
+            made = [solve(domain, task, each, planner) for each in (alone, with_shortcuts, lame)]
+            assert all(episode.success for episode in made)
+            lengths[planner] = [episode.plan_length for episode in made]
+        assert lengths["lazy"] == lengths["exhaustive"]
+        skills, shorter, same = lengths["lazy"]
+        assert skills == same > shorter
+
+
+THEN_PICK = "(and (At thing0 place0) (Holding thing1))"  # the shortcut first, and a skill then
+
+
+def after_shortcuts(trained, *skills):
+    """The skills that a search tries where the shortcut has led."""
+    points = get_domain("points", "long_line")
+    digest = load_library(trained.folder / "library", points).digest
+    shortcuts = LibraryChoice(trained.folder / "library", digest)
+    by_name = {skill.operator.name: skill for skill in skills}
+    task = task_with_goal(points, 0, 1, THEN_PICK)
+    return AfterShortcuts(shortcuts, by_name, REWARDS).roll_out(points, task, 1)
+
+
+def test_a_skill_that_fails_where_a_shortcut_has_led_is_learned_from_there(trained):
+    """Each is a plan of its own, of one stage; with skills that work, none of these fails."""
+    found = after_shortcuts(trained, PICKING, PUTTING)
+    assert found and all(rollout.progress == 1.0 for rollout in found)
+    assert {rollout.plan for rollout in found} == {("Pick(thing1)",)}
+    lame = replace(PICKING, policy=towards(0, False, gain=0.0))
+    failed = InitiationStates.of("Pick", after_shortcuts(trained, lame, PUTTING)).failed
+    assert {record.objects for record in failed} == {("thing1",)}
+    points = get_domain("points", "long_line")
+    initial = points.task(0, 1).initial_state
+    began = State(initial.layout, np.array(failed[0].state))
+    space = points.atom_space(initial)
+    at_place = space.mask(parse_goal("(At thing0 place0)", space))
+    assert space.abstract(began) & at_place and not space.abstract(initial) & at_place
+
+
+def test_without_skills_none_is_tried_after_shortcuts(trained):
+    """What plans need at all is learned first."""
+    assert after_shortcuts(trained) == []
+
+
+def test_skills_to_keep_are_tried_after_shortcuts(trained, tmp_path, in_this_process):
+    skills, library = trained.folder / "steady", trained.folder / "library"
+    asked = [
+        "acquire", "points", "--preset", "long_line", "--shortcuts", library, "--goal", THEN_PICK,
+        "--set", "rollouts=2", "--set", "validation=2", "--jobs", 1, "--json",
+    ]  # fmt: skip
+    answer = slap(*asked, "--keep", skills, "--output", tmp_path / "made")
+    assert answer.exit_code == 0, answer.output
+    record = json.loads(answer.stdout)
+    assert (record["ended"], record["shortcuts"]) == ("nothing fails", "library")
+    assert " --keep steady --shortcuts library" in record["command"]
+    plans = json.loads((tmp_path / "made-training/iteration0/rollouts.json").read_text())
+    assert len(plans) > 2 and {len(plan["plan"]) for plan in plans[2:]} == {1}
+    refused = slap(*asked, "--output", tmp_path / "other")
+    assert refused.exit_code == ErrorCode.INVALID_PARAMETER
+    assert "--shortcuts is for --keep" in " ".join(refused.stderr.split())
+    slower = write_library(tmp_path / "slower", PICKING, replace(PUTTING, horizon=20))
+    refused = slap(*asked, "--keep", slower, "--output", tmp_path / "other")
+    assert refused.exit_code == ErrorCode.SKILLS_CHANGED
+    assert not (tmp_path / "other").exists()
+
+
+class Interrupted(Unwatched):
+    """Ctrl-C when a shortcut was learned, before anything is known of it."""
+
+    def on_validated(self, name, before, after, kept):
+        raise KeyboardInterrupt
+
+
+def test_what_grows_is_what_the_other_commands_make_interrupted_or_not(trained, tmp_path):
+    """Skills that work are kept; so the second round finds nothing to learn, and is the last."""
+    folder = tmp_path / "grown"
+    request = GrowthRequest(
+        get_domain("points", "line"), folder, keep=trained.folder / "steady",
+        skill_changes=["rollouts=2", "validation=2"],
+        shortcut_settings="ours", shortcut_changes=SMALL, steps=100_000,
+    )  # fmt: skip
+    with pytest.raises(KeyboardInterrupt):
+        grow_rounds(request, watch=GrowthWatch(shortcuts=lambda: nullcontext(Interrupted())))
+    assert not (folder / "report.md").exists() and not (folder / "shortcuts").exists()
+    grown = grow_rounds(request)
+    assert grown.ended == "no skill learns from where shortcuts have led"
+    assert len(grown.rounds) == 2 and grown.best == 0
+    (tried,) = grown.rounds[0].tried
+    made = json.loads(trained.answer.stdout)["validation"]
+    assert (tried.before, tried.after) == (made["pure_planning"], made["slap"])
+    policy = f"{tried.name}/policy.safetensors"
+    grown_there, made_there = folder / "shortcuts" / policy, trained.folder / "library" / policy
+    assert grown_there.read_bytes() == made_there.read_bytes()
+    page = (folder / "report.md").read_text()
+    assert tried.name in page and str(tmp_path) not in page
+    before = contents(folder)
+    assert grow_rounds(request) == grown and contents(folder) == before
+    with pytest.raises(InvalidParameterError, match="has a training with other settings"):
+        grow_rounds(replace(request, seed=1))
+
+
+def test_a_budget_below_a_round_is_refused_with_what_a_round_takes(tmp_path):
+    asked = ["grow", "points", "--preset", "line", "--output", tmp_path / "grown", *CHANGES]
+    answer = slap(*asked, "--settings", "ours", "--steps", 6000)
+    assert answer.exit_code == ErrorCode.INVALID_PARAMETER
+    said = " ".join(answer.stderr.split())
+    assert "too few for a round" in said and "a shortcut takes 6144; give --steps" in said
+    assert not (tmp_path / "grown").exists()
 
 
 def test_an_evaluation_against_skills_names_them_and_both_digests(trained, tmp_path):

@@ -5,6 +5,7 @@
 An iteration of :meth:`Curriculum.run` is one of the algorithm:
 
 - *reset, plan, roll out*: plans are carried out with the skills at hand (``rollouts``);
+  with shortcuts, also the skills that a search tries after them (``after_shortcuts``);
 - *collect failed skills with their simulator states*: the ``initiation_states`` of rollouts;
 - *train them from these states*: those that ``skill_selection`` chooses, each in its
   ``skill_training``; a new one begins with the *retrieved* known skill (``warm_start``), where
@@ -28,6 +29,7 @@ from statistics import fmean
 from typing import Any
 
 from slap_ros.acquisition.curriculum import jobs
+from slap_ros.acquisition.curriculum.after_shortcuts import ShortcutsChoice
 from slap_ros.acquisition.curriculum.curriculum_callback import CurriculumCallback, OngoingRound
 from slap_ros.acquisition.curriculum.curriculum_folder import CurriculumFolder
 from slap_ros.acquisition.curriculum.curriculum_state import CurriculumState
@@ -67,6 +69,7 @@ class Curriculum:
         kept: Skills that are there already, by the path of their folders. They are used as they
             are, and learned further only where they fail.
         encoder: Encoder that gives operators the keys by which known skills are found.
+        shortcuts: Shortcuts after which skills are tried as well; None for no shortcuts.
     """
 
     source: TaskSource
@@ -77,6 +80,7 @@ class Curriculum:
     known: dict[str, AcquiredSkill] = field(default_factory=dict)
     encoder: SkillEncoder = field(default_factory=MetricSignatureEncoder)
     kept: dict[str, AcquiredSkill] = field(default_factory=dict)
+    shortcuts: ShortcutsChoice | None = None
 
     def __post_init__(self) -> None:
         self._results = CurriculumFolder(self.folder)
@@ -154,9 +158,21 @@ class Curriculum:
         """Carry out plans with the skills at hand: those that were learned, or else are kept."""
         learned = {name: str(self._skill(name, state)) for name in state.learned}
         work = [(self.source, index, self._kept_folders | learned) for index in tasks]
-        return self._results.rollouts(
-            iteration, name, lambda: self._run("carrying out plans", jobs.carry_out, work)
-        )
+        return self._results.rollouts(iteration, name, lambda: self._carry_out(work))
+
+    def _carry_out(self, work: Sequence[tuple[TaskSource, int, dict[str, str]]]) -> list[Any]:
+        """Carry out plans, and what a search tries after shortcuts, if there are any.
+
+        Args:
+            work: Arguments of :func:`~slap_ros.acquisition.curriculum.jobs.carry_out`, one tuple
+                for each task.
+        """
+        plans = self._run("carrying out plans", jobs.carry_out, work)
+        if self.shortcuts is None:
+            return plans
+        after = [(*one, self.shortcuts) for one in work]
+        tried = self._run("trying skills after shortcuts", jobs.try_after_shortcuts, after)
+        return [*plans, *(rollout for task in tried for rollout in task)]
 
     def _skill(self, name: str, state: CurriculumState) -> Path:
         """The folder of a skill that was learned."""
@@ -315,6 +331,8 @@ class Curriculum:
         data = {"source": self.source.as_json(), **self._stored_settings, "known": known}
         if self.encoder.name != METRICS:
             data["encoder"] = self.encoder.name
+        if self.shortcuts is not None:
+            data["shortcuts"] = self.shortcuts.digest
         if self.kept:
             data["kept"] = SkillLibrary(self.source.domain.name, tuple(self.kept.values())).digest
         return data

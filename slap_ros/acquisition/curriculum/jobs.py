@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from slap_ros.acquisition.curriculum.after_shortcuts import AfterShortcuts, ShortcutsChoice
 from slap_ros.acquisition.curriculum.initiation_states import InitiationRecord, InitiationStates
 from slap_ros.acquisition.curriculum.rollouts import roll_out
 from slap_ros.acquisition.curriculum.task_source import TaskSource
@@ -132,6 +133,26 @@ def learn(job: LearningJob, cores: int = 1) -> dict[str, Any]:
         )
         outcome = training.run(job.number, accepted, judge, policy)
     return {**asdict(outcome), "refused": refused}
+
+
+def try_after_shortcuts(
+    source: TaskSource, index: int, skills: Mapping[str, str], shortcuts: ShortcutsChoice
+) -> list[dict[str, Any]]:
+    """Carry out the skills that a search for a plan with shortcuts tries after them.
+
+    Args:
+        source: Source of the tasks.
+        index: Index of the task.
+        skills: Folders of the skills at hand, by operator name.
+        shortcuts: Shortcuts to plan with.
+
+    Returns:
+        Each as a :class:`~slap_ros.acquisition.curriculum.rollouts.PlanRollout` as JSON.
+    """
+    domain = source.make_domain()
+    acquired = {name: load_skill(Path(folder), domain) for name, folder in skills.items()}
+    after = AfterShortcuts(shortcuts, acquired, source.rewards())
+    return [found.as_json() for found in after.roll_out(domain, source.task(index), index)]
 
 
 @contextmanager

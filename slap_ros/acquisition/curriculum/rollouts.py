@@ -180,14 +180,40 @@ def roll_out(
         return PlanRollout(index, (), (), str(error))
     world, stages = domain.make_world(task.initial_state), []
     for operator in plan:
-        name = operator.operator.name
-        stage = _carry_out(domain, world, space, operator, skills.get(name))
-        if not stage.done and rewards:
-            stage = replace(stage, metrics=_metrics(rewards[name], operator, world.state))
+        skill = skills.get(operator.operator.name)
+        stage = carry_out_stage(domain, world, space, operator, skill, rewards)
         stages.append(stage)
         if not stage.done:
             break
     return PlanRollout(index, tuple(map(str, plan)), tuple(stages))
+
+
+def carry_out_stage(
+    domain: Domain,
+    world: World,
+    space: AtomSpace,
+    operator: GroundOperator,
+    skill: LearnedSkill | None,
+    rewards: Mapping[str, RewardTemplate] | None = None,
+) -> Stage:
+    """Carry out one stage of a plan.
+
+    Args:
+        domain: Domain of the world.
+        world: World in which the stage begins.
+        space: Atoms of the task.
+        operator: Operator of the stage.
+        skill: Skill of the operator; None where there is none.
+        rewards: Rewards by operator name, whose metrics are told of a failed stage.
+
+    Returns:
+        How it went.
+    """
+    stage = _carry_out(domain, world, space, operator, skill)
+    if stage.done or not rewards:
+        return stage
+    metrics = _metrics(rewards[operator.operator.name], operator, world.state)
+    return replace(stage, metrics=metrics)
 
 
 def _carry_out(

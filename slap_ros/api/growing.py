@@ -1,0 +1,260 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The whole loop: operators, skills, shortcuts over them, skills where these shortcuts lead.
+
+A round acquires skills and then learns shortcuts over them. From the second round on, skills are
+learned from where plans with shortcuts fail. It ends when plans get no shorter.
+"""
+
+from __future__ import annotations
+
+import math
+import shutil
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from slap_ros.api.acquisition import AcquisitionWatch, carry_out
+from slap_ros.api.growth import GrowthRequest, GrowthRound, TriedShortcut
+from slap_ros.api.growth_page import growth_page
+from slap_ros.api.training import Unwatched, train
+from slap_ros.files import require_writable, sole_use, write_whole
+from slap_ros.learning.work_folder import WorkFolder
+from slap_ros.policies.library_files import replace_folder
+from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
+from slap_ros.shortcuts.training import CandidateGroup, TrainingCallback
+from slap_ros.skills.domain_choice import DomainChoice, open_domain
+from slap_ros.skills.skill_library import SkillLibrary
+
+PAGE = "report.md"
+
+
+@dataclass(frozen=True)
+class GrowthWatch:
+    """Functions that are called while skills and shortcuts grow.
+
+    Args:
+        skills: Functions that are called while skills are acquired.
+        shortcuts: Function that opens the callback for events of training shortcuts.
+        on_round: Function that receives the number of each round, from 0, and what it has brought.
+    """
+
+    skills: AcquisitionWatch = field(default_factory=AcquisitionWatch)
+    shortcuts: Callable[[], AbstractContextManager[TrainingCallback]] = field(
+        default=lambda: nullcontext(Unwatched())
+    )
+    on_round: Callable[[int, GrowthRound], None] = lambda _, __: None
+
+
+@dataclass(frozen=True)
+class Grown:
+    """What has grown.
+
+    Args:
+        rounds: Rounds, in order.
+        best: Number of the round with the shortest plans, from 0.
+        ended: Reason why there is no further round, in words.
+    """
+
+    rounds: tuple[GrowthRound, ...]
+    best: int
+    ended: str
+
+    def as_json(self) -> dict[str, Any]:
+        """A JSON object."""
+        return {
+            "rounds": [one.as_json() for one in self.rounds],
+            "best": self.best,
+            "ended": self.ended,
+        }
+
+
+def grow_rounds(
+    request: GrowthRequest, jobs: int | None = None, watch: GrowthWatch = GrowthWatch()
+) -> Grown:
+    """Acquire skills, learn shortcuts over them, and again, until plans get no shorter.
+
+    The libraries of the round with the shortest plans are in ``skills`` and ``shortcuts`` of the
+    folder, beside the page that says what each round has brought. Interrupted, it continues where
+    it was when it is called with the same request.
+
+    Args:
+        request: Request: what is to grow, and how.
+        jobs: Number of processes; None for this one. Results do not depend on it.
+        watch: Functions that are called while skills and shortcuts grow.
+
+    Returns:
+        What has grown.
+
+    Raises:
+        InvalidParameterError: The folder has another growth, or is damaged.
+        UnsolvableError: With the skills of a round, no task has a plan.
+        BusyError: Another process grows in the same folder.
+    """
+    require_writable(request.folder)
+    with sole_use(request.folder):
+        work = WorkFolder(request.folder)
+        work.require_same({"command": request.command})
+        rounds: list[GrowthRound] = []
+        while not (ended := request.why_over(rounds)):
+            number = len(rounds)
+            one = work.cached(
+                f"round{number + 1}",
+                lambda: _carry_out_round(request, tuple(rounds), jobs, watch).as_json(),
+                GrowthRound.from_json,
+            )
+            rounds.append(one)
+            watch.on_round(number, one)
+        grown = Grown(tuple(rounds), _best(rounds), ended)
+        _save(request, grown)
+    return grown
+
+
+def _best(rounds: Sequence[GrowthRound]) -> int:
+    """The number of the first round with the shortest plans."""
+    return min(range(len(rounds)), key=lambda number: rounds[number].length)
+
+
+def _carry_out_round(
+    request: GrowthRequest, before: Sequence[GrowthRound], jobs: int | None, watch: GrowthWatch
+) -> GrowthRound:
+    """Acquire skills, and learn shortcuts over them unless they are the same as before.
+
+    Args:
+        request: What is to grow.
+        before: Earlier rounds.
+        jobs: Number of processes; None for this one.
+        watch: Functions that are called.
+    """
+    left = request.steps - sum(one.steps for one in before)
+    acquired = _acquire(request, len(before), left, jobs, watch)
+    left -= int(acquired.record["steps"])
+    if before and acquired.digest == before[-1].skills_digest:
+        return _round(acquired, (), 0, before[-1].length_alone, before[-1].length)
+    library, tried = _train(request, len(before), left, jobs, watch)
+    explored = int(library.record["environment_steps"]["exploring"])
+    steps = explored + len(tried) * request.training.total_steps
+    validation = library.record["validation"]
+    return _round(acquired, tried, steps, validation["pure_planning"], validation["slap"])
+
+
+def _round(
+    acquired: SkillLibrary,
+    tried: tuple[TriedShortcut, ...],
+    shortcut_steps: int,
+    length_alone: float,
+    length: float,
+) -> GrowthRound:
+    """What a round has brought.
+
+    Args:
+        acquired: Skills of the round.
+        tried: Shortcuts that were learned.
+        shortcut_steps: Environment steps that exploring and learning shortcuts took.
+        length_alone: Mean plan length with skills alone, environment steps.
+        length: Mean plan length with shortcuts, environment steps.
+    """
+    record = acquired.record
+    return GrowthRound(
+        tuple(skill.operator.name for skill in acquired.skills),
+        acquired.digest,
+        float(record["progress_on_fresh_tasks"]),
+        str(record["ended"]),
+        length_alone,
+        length,
+        tried,
+        int(record["steps"]),
+        shortcut_steps,
+    )
+
+
+def _acquire(
+    request: GrowthRequest, number: int, left: int, jobs: int | None, watch: GrowthWatch
+) -> SkillLibrary:
+    """The skills of a round, which leave environment steps for a shortcut.
+
+    Args:
+        request: What is to grow.
+        number: Number of the round, from 0.
+        left: Environment steps that are left.
+        jobs: Number of processes; None for this one.
+        watch: Functions that are called.
+    """
+    most = request.most_skill_steps(left)
+    return carry_out(request.acquisition(number, most), jobs, watch=watch.skills)
+
+
+def _train(
+    request: GrowthRequest, number: int, left: int, jobs: int | None, watch: GrowthWatch
+) -> tuple[ShortcutLibrary, tuple[TriedShortcut, ...]]:
+    """The shortcuts of a round, and all that were tried.
+
+    Args:
+        request: What is to grow.
+        number: Number of the round, from 0.
+        left: Environment steps that are left.
+        jobs: Number of processes; None for this one.
+        watch: Functions that are called.
+    """
+    here = request.round_folder(number)
+    choice = DomainChoice(request.domain.name, request.domain.preset, str(here / "skills"))
+    with watch.shortcuts() as callback:
+        notes = TrainingNotes(callback)
+        library = train(
+            open_domain(choice),
+            here / "shortcuts",
+            seed=request.seed,
+            settings=request.shortcut_settings,
+            changes=request.affordable_changes(left),
+            jobs=jobs,
+            callback=notes,
+        )
+    return library, tuple(notes.tried)
+
+
+class TrainingNotes:
+    """Notes which shortcuts a training tries, and passes all events on."""
+
+    def __init__(self, callback: TrainingCallback) -> None:
+        """Begin with nothing tried.
+
+        Args:
+            callback: Receiver of all events.
+        """
+        self._callback = callback
+        self.tried: list[TriedShortcut] = []
+        self.on_progress = callback.on_progress
+        self.on_left_out = callback.on_left_out
+
+    def on_ranked(self, ranked: Sequence[CandidateGroup]) -> None:
+        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+        self._callback.on_ranked(ranked)
+
+    def on_learning(self, name: str, folder: Path, total_steps: int) -> None:
+        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+        self._callback.on_learning(name, folder, total_steps)
+
+    def on_validated(self, name: str, before: float, after: float, kept: bool) -> None:
+        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+        self._callback.on_validated(name, before, after, kept)
+        solved = after if math.isfinite(after) else None
+        self.tried.append(TriedShortcut(name, before, solved, kept))
+
+
+def _save(request: GrowthRequest, grown: Grown) -> None:
+    """Write the libraries of the best round, and the page."""
+    best = request.round_folder(grown.best)
+    for name in ("skills", "shortcuts"):
+        _copy(best / name, request.folder / name)
+    write_whole(request.folder / PAGE, growth_page(request, grown.rounds, grown.best, grown.ended))
+
+
+def _copy(folder: Path, path: Path) -> None:
+    """Write a copy of a folder in place of the one that may be there."""
+
+    def write(draft: Path) -> None:
+        shutil.copytree(folder, draft, dirs_exist_ok=True)
+
+    replace_folder(path, write)

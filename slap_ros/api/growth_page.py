@@ -1,0 +1,63 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The page that says what each round of growing has brought, in Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from slap_ros.api.growth import GrowthRequest, GrowthRound, TriedShortcut
+
+_HEAD = (
+    "| round | skills | task progress | steps for skills | plan of skills alone [steps] "
+    "| plan with shortcuts [steps] | steps for shortcuts |\n"
+    "|---|---|---|---|---|---|---|\n"
+)
+
+
+def growth_page(
+    request: GrowthRequest, rounds: Sequence[GrowthRound], best: int, ended: str
+) -> str:
+    """The page of a growth: a table of its rounds, and what was tried in each.
+
+    Args:
+        request: What was to grow.
+        rounds: Rounds, in order.
+        best: Number of the round with the shortest plans, from 0.
+        ended: Reason why there was no further round, in words.
+    """
+    domain, spent = request.domain, sum(one.steps for one in rounds)
+    shortest = rounds[best]
+    saved = 1.0 - shortest.length / shortest.length_alone if shortest.length_alone else 0.0
+    sections = "".join(_section(number, one) for number, one in enumerate(rounds))
+    return (
+        f"# What grew in {domain.name}, preset {domain.preset}\n\n"
+        f"    {request.command}\n\n"
+        f"{_HEAD}{''.join(_row(number, one) for number, one in enumerate(rounds))}\n"
+        f"Plans are shortest in round {best + 1}: {shortest.length:.1f} steps, where its skills "
+        f"alone take {shortest.length_alone:.1f} (saved: {saved:.0%}). Lengths are means over "
+        "validation tasks, which training never sees. `skills` and `shortcuts` are the libraries "
+        f"of this round. It ended since {ended}, after {spent} of {request.steps} environment "
+        f"steps.\n{sections}"
+    )
+
+
+def _row(number: int, one: GrowthRound) -> str:
+    return (
+        f"| {number + 1} | {', '.join(one.skills)} | {one.progress:.2f} | {one.skill_steps} "
+        f"| {one.length_alone:.1f} | {one.length:.1f} | {one.shortcut_steps} |\n"
+    )
+
+
+def _section(number: int, one: GrowthRound) -> str:
+    tried = "".join(f"- {_in_words(shortcut)}\n" for shortcut in one.tried)
+    return (
+        f"\n## Round {number + 1}\n\n"
+        f"Skills {one.skills_digest}: {one.ended}.\n\n{tried or 'No shortcut was learned.'}"
+    ).rstrip("\n") + "\n"
+
+
+def _in_words(tried: TriedShortcut) -> str:
+    after = "unsolved for a task" if tried.after is None else f"{tried.after:.1f} steps"
+    kept = "" if tried.kept else "; not kept"
+    return f"{tried.name}: {tried.before:.1f} steps → {after}{kept}"
