@@ -54,6 +54,9 @@ def make_ppo(
         policy: Kind of policy, as stable-baselines3 has it.
         policy_kwargs: Further arguments of the policy.
         options: Further arguments of stable-baselines3's PPO.
+
+    Returns:
+        The algorithm, before its first step.
     """
     return PPO(
         policy,

@@ -354,6 +354,9 @@ def learn_stages(
         stages: Number of stages.
         recorder: Recorder of the progress.
         processes: Number of processes that may step environments.
+
+    Returns:
+        The learner of the last of these stages.
     """
     from slap_ros.shortcuts.normalised_vec_env import normalisation_of  # torch, here alone
     from slap_ros.shortcuts.ppo import Learner

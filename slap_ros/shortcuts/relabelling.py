@@ -61,7 +61,16 @@ class RelabellingBuffer(ReplayBuffer):
         done: NDArray[Any],
         infos: list[dict[str, Any]],
     ) -> None:
-        """Take a transition of each environment, and what it was for another shortcut."""
+        """Take a transition of each environment, and what it was for another shortcut.
+
+        Args:
+            obs: Observations before the step, shape (n, size).
+            next_obs: Observations after the step, of the same shape.
+            action: Actions, from -1 to 1, shape (n, axes).
+            reward: Rewards, shape (n,).
+            done: Whether each episode ended with the step, shape (n,).
+            infos: What is said of each environment.
+        """
         super().add(obs, next_obs, action, reward, done, infos)
         if not self._share:
             return
