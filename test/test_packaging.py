@@ -110,7 +110,7 @@ def build(source, folder):
     subprocess.run([*command, str(source)], check=True, capture_output=True)
 
 
-def requirements(wheel):
+def requirements(wheel, extra=""):
     """The distributions, by name, that a wheel's installation brings along, all the way down."""
     with zipfile.ZipFile(wheel) as archive:
         (name,) = (n for n in archive.namelist() if n.endswith(".dist-info/METADATA"))
@@ -118,7 +118,7 @@ def requirements(wheel):
     queue, seen = found, set()
     while queue:
         wanted = Requirement(queue.pop())
-        if wanted.name in seen or (wanted.marker and not wanted.marker.evaluate({"extra": ""})):
+        if wanted.name in seen or (wanted.marker and not wanted.marker.evaluate({"extra": extra})):
             continue
         seen.add(wanted.name)
         queue.extend(metadata.distribution(wanted.name).requires or [])
@@ -135,8 +135,17 @@ def install(names, folder):
                 (folder / top).symlink_to(distribution.locate_file(top))
 
 
+EVERY_ENVIRONMENT = """
+import sys, gymnasium, slap_ros.environments
+names = [name for name in gymnasium.registry if name.startswith("slap_ros/")]
+for name in names:
+    gymnasium.make(name).reset(seed=0)
+print(len(names), "torch" in sys.modules)
+"""
+
+
 @pytest.mark.slow
-@pytest.mark.timeout(300)  # builds two distributions, and starts an ensemble from them
+@pytest.mark.timeout(420)  # builds two distributions, and starts an ensemble and learners' worlds
 def test_the_published_wheels_run_in_an_empty_environment(checkout, tmp_path, network):
     """With what they require and no more, away from any checkout, shipped shortcuts included."""
     shutil.rmtree(checkout / "models")
@@ -172,6 +181,17 @@ def test_the_published_wheels_run_in_an_empty_environment(checkout, tmp_path, ne
     result = json.loads(run.stdout)
     assert result["success"]
     assert result["shortcut_steps"] > 0
+
+    gym = tmp_path / "gym"
+    install(set().union(*(requirements(wheel, "gym") for wheel in wheels)), gym)
+    made = subprocess.run(
+        [python, "-c", EVERY_ENVIRONMENT],
+        cwd=empty,
+        env={**environment, "PYTHONPATH": str(gym)},
+        capture_output=True,
+        text=True,
+    )
+    assert made.stdout.split() == ["20", "False"], made.stderr
     assert not list(empty.iterdir())
 
 

@@ -36,7 +36,8 @@ def test_processors_that_are_not_known_are_refused(capsys):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(300)  # nine plans, each in a process of its own
+@pytest.mark.timeout(300)  # three plans and three runs, each in a process of its own
 def test_plans_and_runs_are_the_same_on_other_processors(network):
-    found = differences(["nehalem", "baseline"], [PLAN, RECORDED_RUN])
+    """Motion planning is not compiled anew for them: its kernels' own tests stand for it."""
+    found = differences(["nehalem", "libraries"], [PLAN, RECORDED_RUN])
     assert not list(map(str, found))

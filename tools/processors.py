@@ -42,6 +42,11 @@ def _numpy_features() -> str:
 # numba compiles for a processor without extensions; both variables are needed.
 NUMBA_BASELINE = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
 GLIBC_BASELINE = "glibc.cpu.hwcaps=-AVX2,-FMA,-AVX"
+LIBRARIES_BASELINE = {
+    "OPENBLAS_CORETYPE": "Prescott",
+    "NPY_DISABLE_CPU_FEATURES": _numpy_features(),
+    "GLIBC_TUNABLES": GLIBC_BASELINE,
+}
 PROCESSORS: Mapping[str, Mapping[str, str]] = {
     "prescott": {"OPENBLAS_CORETYPE": "Prescott"},
     "nehalem": {"OPENBLAS_CORETYPE": "Nehalem"},
@@ -49,12 +54,8 @@ PROCESSORS: Mapping[str, Mapping[str, str]] = {
     "numpy": {"NPY_DISABLE_CPU_FEATURES": _numpy_features()},
     "glibc": {"GLIBC_TUNABLES": GLIBC_BASELINE},
     "numba": NUMBA_BASELINE,
-    "baseline": {
-        "OPENBLAS_CORETYPE": "Prescott",
-        "NPY_DISABLE_CPU_FEATURES": _numpy_features(),
-        "GLIBC_TUNABLES": GLIBC_BASELINE,
-        **NUMBA_BASELINE,
-    },
+    "libraries": LIBRARIES_BASELINE,
+    "baseline": {**LIBRARIES_BASELINE, **NUMBA_BASELINE},
 }
 AS_IT_IS: Mapping[str, str] = {}
 

@@ -22,8 +22,7 @@ from robot_bridge.transforms import transform
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.relational import State
-from slap_ros.robot.mujoco.camera import add_camera, add_tags
-from slap_ros.robot.mujoco.model import compiled, scene_around, scene_spec
+from slap_ros.robot.mujoco.camera import tagged_plant
 from slap_ros.robot.mujoco.plant import MujocoPlant
 from slap_ros.robot.mujoco.rendering_process import Picture, RenderingProcess, Shot
 from slap_ros.robot.scene_config import read_scene_config
@@ -53,12 +52,7 @@ def plant_with_camera(
             f"{domain.name} --seed {settings.seed} --tags FOLDER, then --scene FOLDER/scene.yaml"
         )
     tags = placed_tags(read_scene_config(Path(settings.scene), domain))
-    scene = scene_around(domain, initial)
-    spec = scene_spec(scene, initial)
-    add_camera(spec, settings.pinhole, settings.optical_pose)
-    add_tags(spec, tags)
-    model = compiled(spec)
-    return MujocoPlant(model, scene, initial), model
+    return tagged_plant(domain, initial, tags, settings.pinhole, settings.optical_pose)
 
 
 class CameraPublisher:

@@ -178,9 +178,9 @@ def carry_out(
     """
     settings = request.chosen_settings()
     least = settings.segment_steps(horizon_of(request.domain))
-    _require_budget(settings, least)
+    require_budget(settings, least)
     encoder = request.skill_encoder()
-    known = _known(request.begin_with, watch.tell)
+    known = known_skills(request.begin_with, watch.tell)
     there = _library_to_keep(request.keep, request.domain)
     for folder in (request.library_folder, request.work_folder):
         require_writable(folder)
@@ -297,7 +297,7 @@ def _proposed(request: AcquisitionRequest, watch: AcquisitionWatch) -> _Proposed
     return proposed
 
 
-def _require_budget(settings: AcquisitionSettings, least: int) -> None:
+def require_budget(settings: AcquisitionSettings, least: int) -> None:
     """Refuse a budget in which no skill can be judged even once.
 
     Args:
@@ -314,8 +314,12 @@ def _require_budget(settings: AcquisitionSettings, least: int) -> None:
         )
 
 
-def _known(paths: Sequence[Path], tell: Tell) -> dict[str, AcquiredSkill]:
+def known_skills(paths: Sequence[Path], tell: Tell) -> dict[str, AcquiredSkill]:
     """The skills of libraries, each in the words of its own domain, by folder.
+
+    Args:
+        paths: Folders of the libraries.
+        tell: Function that receives warnings about skills that are left out.
 
     Raises:
         InvalidLibraryError: One of them cannot be read.

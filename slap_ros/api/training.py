@@ -22,6 +22,7 @@ from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.planning.problem import require_skills
 from slap_ros.shortcuts.settings import TrainingSettings, training_settings
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary, save_library
+from slap_ros.shortcuts.subgoals import SubgoalTraining
 from slap_ros.shortcuts.training import CandidateGroup, Training, TrainingCallback
 from slap_ros.skills.domain_choice import WORDS, DomainChoice
 
@@ -67,7 +68,7 @@ def train(
         folder: Folder that the library is saved to.
         seed: Seed of all random numbers.
         settings: Name of the hyper-parameters: ours, ours_short, ours_several, ours_near,
-            paper, or the domain's own.
+            subgoals, paper, or the domain's own.
         changes: Settings to change, by dotted name, as ``{"exploration.rollouts": 16}``; or texts
             as on the command line.
         steps: Environment steps per shortcut; None for those of the settings.
@@ -95,7 +96,8 @@ def train(
     distribution = TaskDistribution(choice, seed)
     watched = callback if callback is not None else Unwatched()
     with sole_use(work_folder), some_workers(jobs, ray) as workers:
-        library = Training(distribution, chosen, work_folder, workers, watched).run()
+        kind = SubgoalTraining if chosen.together > 1 else Training
+        library = kind(distribution, chosen, work_folder, workers, watched).run()
     command = train_command(choice, seed, settings, steps, change_texts(changes))
     made_by: dict[str, Any] = {"command": command}
     if acquired := describe_skills(domain):

@@ -36,4 +36,5 @@ METHODS: Mapping[str, MethodEntry] = {
     "hierarchical": MethodEntry(
         "hierarchical", "PPO over joint displacements and an activation for each ground skill."
     ),
+    "sol": MethodEntry("sol", "A controller over skills and learned options, in one network."),
 }

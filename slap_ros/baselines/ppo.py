@@ -11,13 +11,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import torch
-from stable_baselines3 import PPO
-
 from slap_ros.baselines.budgeted_learner import BudgetedLearner, weights_of
 from slap_ros.baselines.method import Method
 from slap_ros.baselines.training_envs import TrainingEnvs, as_observed, joined_envs
 from slap_ros.learning.policy_export import exported_layers, hidden_layers
+from slap_ros.learning.ppo import make_ppo
 from slap_ros.policies.mlp_policy import MlpPolicy
 
 
@@ -58,25 +56,7 @@ class PpoLearner(BudgetedLearner):
             options: Further arguments of stable-baselines3's PPO.
         """
         self._hidden = len(settings.net_arch)
-        self._ppo = PPO(
-            "MlpPolicy",
-            envs.make(),
-            n_steps=settings.n_steps,
-            batch_size=settings.batch_size,
-            n_epochs=settings.n_epochs,
-            learning_rate=settings.learning_rate,
-            gamma=settings.gamma,
-            gae_lambda=settings.gae_lambda,
-            ent_coef=settings.ent_coef,
-            policy_kwargs={
-                "net_arch": list(settings.net_arch),
-                "activation_fn": torch.nn.Tanh,
-                "log_std_init": settings.log_std_init,
-            },
-            seed=seed,
-            device="cpu",
-            **options,
-        )
+        self._ppo = make_ppo(envs.make(), settings, settings.learning_rate, seed, **options)
         super().__init__(self._ppo, envs, settings.total_steps, seed)
 
     def policy(self) -> MlpPolicy:

@@ -23,6 +23,7 @@ from slap_ros.baselines.method import Method
 from slap_ros.baselines.training_envs import TrainingEnvs, as_observed, separate_envs
 from slap_ros.files import write_whole
 from slap_ros.learning.policy_export import exported_layers, hidden_layers
+from slap_ros.learning.sac_state import restore_sac, sac_state
 from slap_ros.learning.work_folder import damaged
 from slap_ros.policies.mlp_policy import MlpPolicy
 
@@ -98,29 +99,11 @@ class SacHerLearner(BudgetedLearner):
 
     def state(self) -> dict[str, Any]:
         """See :class:`~slap_ros.baselines.budgeted_learner.BudgetedLearner`."""
-        sac = self._sac
-        assert sac.ent_coef_optimizer is not None
-        assert sac.log_ent_coef is not None
-        return {
-            "policy": sac.policy.state_dict(),
-            "actor_optimizer": sac.actor.optimizer.state_dict(),
-            "critic_optimizer": sac.critic.optimizer.state_dict(),
-            "log_ent_coef": sac.log_ent_coef.detach(),
-            "ent_coef_optimizer": sac.ent_coef_optimizer.state_dict(),
-            "actions": sac.num_timesteps,
-        }
+        return sac_state(self._sac)
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """See :class:`~slap_ros.baselines.budgeted_learner.BudgetedLearner`."""
-        sac = self._sac
-        assert sac.ent_coef_optimizer is not None
-        assert sac.log_ent_coef is not None
-        sac.policy.load_state_dict(saved["policy"])
-        sac.actor.optimizer.load_state_dict(saved["actor_optimizer"])
-        sac.critic.optimizer.load_state_dict(saved["critic_optimizer"])
-        sac.log_ent_coef.data.copy_(saved["log_ent_coef"])
-        sac.ent_coef_optimizer.load_state_dict(saved["ent_coef_optimizer"])
-        sac.num_timesteps = int(saved["actions"])
+        restore_sac(self._sac, saved)
 
     # -- transitions ------------------------------------------------------------------------------
 

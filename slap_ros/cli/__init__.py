@@ -43,6 +43,11 @@ COMMANDS = (
         "Acquire skills: execute plans, train each skill that fails from where it fails, repeat.",
     ),
     CommandEntry(
+        "acquire-sequence",
+        "slap_ros.cli.acquire_sequence:acquire_sequence_command",
+        "Acquire skills for one goal after another, with one library that grows.",
+    ),
+    CommandEntry(
         "skills",
         "slap_ros.cli.skills:skills",
         "Show a library of skills: operators, rewards, success, and which skills each began from.",

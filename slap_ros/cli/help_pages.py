@@ -41,7 +41,7 @@ PANELS: Mapping[str, str] = {
         MODEL,
     ),
     **dict.fromkeys(
-        ("settings", "set", "steps", "work", "ray", "begin", "encoder", "keep"), LEARNING
+        ("settings", "set", "steps", "work", "ray", "begin", "encoder", "keep", "scratch"), LEARNING
     ),
     **dict.fromkeys(
         ("world", "scene", "mock", "mujoco", "perception", "to", "robot", "dry_run", "yes"), ROBOT
@@ -60,6 +60,7 @@ EXAMPLES: Mapping[str, str] = {  # those of studies are in their files
     "report": "slap report runs/tower --output runs/tower.html",
     "train": "slap train obstacle2d --output runs/models/obstacle2d",
     "acquire": "slap acquire stow_hammer --output runs/skills/stow_hammer",
+    "acquire-sequence": "slap acquire-sequence groceries --seeds 5",
     "skills": "slap skills models/skills/stow_hammer",
     "check": "slap check obstacle2d",
     "scene": "slap scene obstacle_tower --seed 1 --tags runs/tags",

@@ -83,9 +83,10 @@ def beginning(found: Mapping[str, Any]) -> str:
 
     Args:
         found: Record of the beginning, as the curriculum writes it: the known skill, how similar it
-            is, and its share of successes before anything was learned.
+            is, its share of successes before anything was learned, and those that were tried.
     """
     if "skill" not in found:
-        return "random weights"
+        tried = [f"{one['skill']} {one['success']:.2f}" for one in found.get("tried", ())]
+        return "random weights" + (f" (success at once: {', '.join(tried)})" if tried else "")
     worth = f", success {found['success']:.2f} at once" if "success" in found else ""
     return f"{found['skill']} (similarity {found['similarity']:.2f}{worth})"

@@ -50,7 +50,8 @@ class TrainOptions:
         typer.Option(
             help="Hyper-parameters: ours, ours_short (ends as soon as plans get no shorter), "
             "ours_several (more shortcuts, also for random goals), ours_near (explores with pushes "
-            "at objects, and beyond what operators reach), paper (the paper's), or the name of the "
+            "at objects, and beyond what operators reach), subgoals (one policy for several "
+            "shortcuts), paper (the paper's), or the name of the "
             "domain's own."
         ),
     ] = "ours"

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from slap_ros.environments.task_env import TaskEnv
 
-OBSERVATIONS = ("state", "view", "dict")
+OBSERVATIONS = ("state", "view", "dict", "options")
 NAMESPACE = "slap_ros"
 TASKS: Mapping[str, str] = {  # names within the namespace, and their domains
     "Obstacle2D-v0": "obstacle2d",
@@ -29,16 +29,39 @@ TASKS: Mapping[str, str] = {  # names within the namespace, and their domains
 }
 
 
+# Those for which a library of shortcuts ships, and those whose skills can be acquired.
+SHORTCUTS: Mapping[str, str] = {
+    "Obstacle2D-shortcut-v0": "obstacle2d",
+    "ObstacleTower-shortcut-v0": "obstacle_tower",
+    "ClutteredDrawer-shortcut-v0": "cluttered_drawer",
+    "CleanupTable-shortcut-v0": "cleanup_table",
+}
+SKILLS: Mapping[str, str] = {
+    "StackAtTarget-skill-v0": "stack_at_target",
+    "StowHammer-skill-v0": "stow_hammer",
+    "PegInHole-skill-v0": "peg_in_hole",
+    "MakeCoffee-skill-v0": "make_coffee",
+    "Groceries-skill-v0": "groceries",
+    "Bowls-skill-v0": "bowls",
+}
+MADE_BY: Mapping[str, Mapping[str, str]] = {  # by what in the package
+    "registration:make_task_env": TASKS,
+    "shortcut_env:ShortcutEnv": SHORTCUTS,
+    "skill_env:SkillEnv": SKILLS,
+}
+
+
 def register() -> None:
-    """Register an environment for each of our domains."""
+    """Register the environments of each of our domains."""
     import gymnasium
 
-    for name, domain in TASKS.items():
-        gymnasium.register(
-            f"{NAMESPACE}/{name}",
-            entry_point="slap_ros.environments.registration:make_task_env",
-            kwargs={"domain": domain},
-        )
+    for maker, names in MADE_BY.items():
+        for name, domain in names.items():
+            gymnasium.register(
+                f"{NAMESPACE}/{name}",
+                entry_point=f"slap_ros.environments.{maker}",
+                kwargs={"domain": domain},
+            )
 
 
 def make_task_env(domain: str, preset: str = "", *, obs: str = "state", **options: Any) -> TaskEnv:
@@ -47,7 +70,8 @@ def make_task_env(domain: str, preset: str = "", *, obs: str = "state", **option
     Args:
         domain: Name of the domain.
         preset: Name of a preset, maybe with settings; empty for the domain's first.
-        obs: Observation: ``state``, ``view``, or ``dict`` for one with goals.
+        obs: Observation: ``state``, ``view``, ``dict`` for one with goals, or ``options`` for one
+            with the option that runs.
         options: Further arguments of :class:`~slap_ros.environments.task_env.TaskEnv`.
 
     Returns:
@@ -57,6 +81,7 @@ def make_task_env(domain: str, preset: str = "", *, obs: str = "state", **option
         InvalidParameterError: An argument has a value that it cannot have.
     """
     from slap_ros.environments.goal_task_env import GoalTaskEnv
+    from slap_ros.environments.option_task_env import OptionTaskEnv
     from slap_ros.environments.task_env import TaskEnv
     from slap_ros.errors import InvalidParameterError
 
@@ -64,4 +89,8 @@ def make_task_env(domain: str, preset: str = "", *, obs: str = "state", **option
         raise InvalidParameterError(f"unknown obs {obs!r}; there are {', '.join(OBSERVATIONS)}")
     if obs == "dict":
         return GoalTaskEnv(domain, preset, **options)
+    if obs == "options":
+        if options.setdefault("control", "both") != "both":
+            raise InvalidParameterError("obs='options' has control='both', and no other")
+        return OptionTaskEnv(domain, preset, **options)
     return TaskEnv(domain, preset, obs=obs, **options)

@@ -152,15 +152,21 @@ class TaskEnv(gymnasium.Env[Any, Any]):
             InvalidParameterError: No episode has begun.
             InvalidCommandError: The action is not in the action space; nothing moved.
         """
-        episode, total = self._under_way, 0.0
+        episode = self._under_way
         assert self._world is not None
-        for state in self._control.act(action, episode, self._world):
+        total = self._advance(self._control.act(action, episode, self._world))
+        solved = episode.solved
+        return self._observe(), total, solved, episode.at_limit and not solved, self._info()
+
+    def _advance(self, states: Iterator[State]) -> float:
+        """Go through states until the goal holds or the steps are used up; the reward of all."""
+        episode, total = self._under_way, 0.0
+        for state in states:
             episode.state, episode.steps = state, episode.steps + 1
             total += self._reward.of(episode)
             if episode.solved or episode.at_limit:
                 break
-        solved = episode.solved
-        return self._observe(), total, solved, episode.at_limit and not solved, self._info()
+        return total
 
     def render(self) -> NDArray[np.uint8] | None:
         """A picture of the newest state, shape (height, width, 3); None without a render mode."""

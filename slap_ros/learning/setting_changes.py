@@ -24,17 +24,32 @@ OFF = "none"  # text on the command line for a part that is left out
 LARGEST = 10**9  # largest value of a whole number
 # Counts that may be 0; others begin at 1.
 ZERO_TOO = frozenset(
-    {"also_repeat", "alternatives", "inside", "pushes", "refinements", "shortcuts"}
+    {
+        "also_repeat",
+        "alternatives",
+        "cloning_steps",
+        "critic_updates",
+        "inside",
+        "pushes",
+        "refinements",
+        "shortcuts",
+    }
 )
 BELOW_1 = math.nextafter(1.0, 0.0)
 RANGES: Mapping[str, tuple[float, float]] = {  # least and greatest value; all others are finite
+    "acting": (0.0, 1.0),
+    "cloning": (0.0, sys.float_info.max),
     "gamma": (0.0, BELOW_1),
     "enough": (0.0, 1.0),
+    "ent_coef_init": (math.ulp(0.0), sys.float_info.max),
     "ent_coef": (0.0, sys.float_info.max),
     "gae_lambda": (0.0, 1.0),
+    "hindsight": (0.0, BELOW_1),
     "learning_rate": (math.ulp(0.0), 1.0),
     "least_saving": (0.0, BELOW_1),
     "least_similarity": (0.0, 1.0),
+    "least_success": (0.0, 1.0),
+    "log_std": (-20.0, 2.0),
     "log_std_init": (-20.0, 2.0),
     "progress": (0.0, 1.0),
     "random_goals": (0.0, 1.0),

@@ -43,11 +43,20 @@ class StableBaselinesVecEnv(Sb3VecEnv):
             infos[i]["terminal_observation"] = final[i]
             infos[i]["TimeLimit.truncated"] = bool(step.truncated[i])
             self.count(step, int(i))
+        self.tell(step, infos)
         observations = self.normalisation(step.observations)
         return observations, step.rewards.astype(np.float32), step.dones, infos
 
     def count(self, step: VecEnvStep, i: int) -> None:
         """Take note of an episode that ended, in environment ``i``; does nothing here."""
+
+    def tell(self, step: VecEnvStep, infos: list[dict[str, Any]]) -> None:
+        """Add what a learner is told of a step besides; nothing here.
+
+        Args:
+            step: Step in all environments.
+            infos: What is said of each environment, to be added to.
+        """
 
     def close(self) -> None:
         """Do nothing: the environments are closed where they were made."""

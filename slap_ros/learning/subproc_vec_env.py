@@ -59,7 +59,7 @@ class SubprocVecEnv:
         """
         for link, share in zip(self._links, np.split(actions, self._bounds), strict=True):
             send(link, share)
-        step = _concatenated(self._receive_all())
+        step = concatenated(self._receive_all())
         self.observations = step.observations
         return step
 
@@ -95,10 +95,11 @@ def _step_until_closed(link: Connection, specs: Sequence[VecEnvSpec]) -> None:
     link.send(np.concatenate([env.observations for env in envs]))
     while True:
         parts = zip(envs, np.split(link.recv(), bounds), strict=True)
-        link.send(_concatenated([env.step(actions) for env, actions in parts]))
+        link.send(concatenated([env.step(actions) for env, actions in parts]))
 
 
-def _concatenated(steps: Sequence[VecEnvStep]) -> VecEnvStep:
+def concatenated(steps: Sequence[VecEnvStep]) -> VecEnvStep:
+    """The steps of several environments as one."""
     kind = type(steps[0])  # it may be a step with more than every environment has
     return kind(
         *(np.concatenate([getattr(step, field.name) for step in steps]) for field in fields(kind))

@@ -18,12 +18,16 @@ class ActionMap:
         space = domain.learned_actions
         low, high = np.array(space.low), np.array(space.high)
         self._middle, self._half = (low + high) / 2, (high - low) / 2
-        self._axes = list(range(len(low)) if gripper else space.displacement_indices)
-        self.size = len(self._axes)
+        self.axes = list(range(len(low)) if gripper else space.displacement_indices)
+        self.size = len(self.axes)
+
+    def places_of(self, fewer: ActionMap) -> list[int]:
+        """Where the axes of a map that commands no more than this one are among its own."""
+        return [self.axes.index(axis) for axis in fewer.axes]
 
     def __call__(self, actions: Array) -> Array:
         """The robot's actions, shape (..., axes); one that is not commanded is 0."""
         mapped = np.zeros((*actions.shape[:-1], len(self._middle)))
-        scaled = self._half[self._axes] * np.clip(actions, -1.0, 1.0)
-        mapped[..., self._axes] = self._middle[self._axes] + scaled
+        scaled = self._half[self.axes] * np.clip(actions, -1.0, 1.0)
+        mapped[..., self.axes] = self._middle[self.axes] + scaled
         return mapped

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 from slap_ros.geometry.pose import Pose, normalised
 from slap_ros.robot.joint_reading import JointReading
+from slap_ros.robot.line_of_sight import across
 from slap_ros.robot.state_assembly import Grasp, possible_joints
 from slap_ros.robot.tracking import PoseEstimate
 from slap_ros.worlds.panda import hand_pose
@@ -42,6 +43,8 @@ def is_lost(grasp: Grasp, reading: JointReading, seen: PoseEstimate | None) -> b
 def grasp_as_seen(grasp: Grasp, reading: JointReading, seen: PoseEstimate | None) -> Grasp:
     """The grasp with its pose measured again; the same to the bit where nothing slipped.
 
+    How far away a camera sees it says nothing of a slip.
+
     Args:
         grasp: Grasp as it was measured last.
         reading: Joints, measured now.
@@ -49,5 +52,9 @@ def grasp_as_seen(grasp: Grasp, reading: JointReading, seen: PoseEstimate | None
     """
     if seen is None or not seen.at_rest or seen.pose == expected_pose(grasp, reading):
         return grasp
-    pose = hand_pose(possible_joints(reading.joints)).inverse().compose(seen.pose)
+    expected, found = expected_pose(grasp, reading).position, seen.pose.position
+    offset = [b - a for a, b in zip(expected, found, strict=True)]
+    x, y, z = (a + d for a, d in zip(expected, across(offset, found, seen.eye), strict=True))
+    in_base = Pose((x, y, z), seen.pose.quaternion)
+    pose = hand_pose(possible_joints(reading.joints)).inverse().compose(in_base)
     return replace(grasp, pose=Pose(pose.position, normalised(pose.quaternion)))

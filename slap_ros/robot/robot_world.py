@@ -28,8 +28,10 @@ from slap_ros.errors import (
 from slap_ros.geometry.pose import Pose
 from slap_ros.relational import Object, State
 from slap_ros.robot.grasp_tracking import GRASPED, expected_pose, grasp_as_seen, is_lost
+from slap_ros.robot.hidden_objects import PredictedMotion
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.limits import STEP_TOLERANCE, JointMotion, Limits
+from slap_ros.robot.line_of_sight import is_slanted
 from slap_ros.robot.scene_config import SceneConfig
 from slap_ros.robot.state_assembly import Grasp, StateAssembler, feature_values
 from slap_ros.robot.tracking import (
@@ -39,6 +41,7 @@ from slap_ros.robot.tracking import (
     Track,
     TrackingSettings,
     measured_pose,
+    still,
 )
 from slap_ros.worlds.contact.features import ROBOT as HAND_OF_FORCES
 from slap_ros.worlds.features import JOINT_FEATURES
@@ -116,6 +119,7 @@ class RobotWorld:
         self._state: State | None = None
         self._measured: State | None = None  # the state before those that are expected
         self._space = self.domain.atom_space(template)
+        self._predicted: PredictedMotion | None = None  # since the state, where objects may hide
 
     # -- measurements ---------------------------------------------------------------------------
 
@@ -125,7 +129,7 @@ class RobotWorld:
         Args:
             frame: Name of the child frame.
             stamp_s: Time of the measurement, s.
-            base: Pose of the parent frame in the base's frame.
+            base: Pose of the parent frame in the base's frame; of a tag's, the camera's.
             seen: Pose of the child frame in its parent.
 
         Raises:
@@ -135,13 +139,17 @@ class RobotWorld:
         if frame not in self._frames:
             return
         obj, how = self._frames[frame]
-        pose = base.compose(measured_pose(*seen)).compose(how.offset)
+        found = measured_pose(*seen)
+        pose = base.compose(found).compose(how.offset)
         if math.hypot(*pose.position) > FARTHEST:
             raise InvalidMeasurementError(
                 f"{obj.name} is detected {math.hypot(*pose.position):.6g} m away from the robot: "
                 "are positions in m?"
             )
-        self._tracks[obj].add(Detection(stamp_s, pose, frame))
+        is_tag = how.tag_size is not None
+        if not (is_tag and is_slanted(found)):
+            eye = base.position if is_tag else None
+            self._tracks[obj].add(Detection(stamp_s, pose, frame, eye))
         if not self._pictures or stamp_s > self._pictures[-1]:
             self._pictures.append(stamp_s)
 
@@ -213,6 +221,7 @@ class RobotWorld:
         for obj, estimate in known.items():
             self._tracks[obj].remember(estimate)
         self._state = self._measured = state
+        self._predicted = None
         return state
 
     def _estimates(
@@ -223,7 +232,9 @@ class RobotWorld:
         if grasp is not None and grasp.obj in self._tracks:
             self._tracks[grasp.obj].expect(expected_pose(grasp, reading))
         estimates = {
-            obj: track.last_at_rest if self._is_hidden(track, since_s) else track.estimate(since_s)
+            obj: self._hidden(obj, track)
+            if self._is_hidden(track, since_s)
+            else track.estimate(since_s)
             for obj, track in self._tracks.items()
         }
         if grasp is not None and is_lost(grasp, reading, estimates.get(grasp.obj)):
@@ -234,6 +245,12 @@ class RobotWorld:
         """Whether pictures since then, and since it was seen last, show others but not this one."""
         enough, unseen_s = self.tracking.hidden_after, max(since_s, track.newest_s)
         return 0 < enough <= sum(stamp_s > unseen_s for stamp_s in self._pictures)
+
+    def _hidden(self, obj: Object, track: Track) -> PoseEstimate | None:
+        """What is known of an object that pictures do not show: nothing, if they never did."""
+        last = track.last_at_rest
+        moved = self._predicted.moved(obj) if self._predicted is not None else None
+        return last if last is None or moved is None else still(moved, last.weight)
 
     def _settled(self, estimates: Mapping[Object, PoseEstimate | None], since_s: float) -> bool:
         """Whether everything that is seen has come to rest: what is hidden in the hand has."""
@@ -259,6 +276,9 @@ class RobotWorld:
         after = self._model.step(action)
         start = feature_values(self._state, self._robot, JOINT_FEATURES)
         target = self._model.joints_off_fixed_bodies(tuple(start), PRESSED, HIGHEST)
+        if self.tracking.hidden_after:
+            actions = self.domain.action_space
+            self._predicted = PredictedMotion.of(self._model, actions, self._state, after)
         moved = self.joint_distance(feature_values(self._measured, self._robot, JOINT_FEATURES))
         if moved > DRIFT:
             raise UnsafeCommandError(

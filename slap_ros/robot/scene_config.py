@@ -107,6 +107,20 @@ def read_scene_config(path: Path, domain: Domain) -> SceneConfig:
         content = parse_yaml(read_text(path, MAX_SCENE_BYTES))
     except (OSError, ValueError) as error:
         raise InvalidSceneError(f"scene file {path} cannot be read: {error}") from error
+    return scene_config(content, str(path), domain)
+
+
+def scene_config(content: object, path: str, domain: Domain) -> SceneConfig:
+    """The scene that the content of a scene file describes.
+
+    Args:
+        content: What the YAML says.
+        path: Name of the file, for messages.
+        domain: Domain of the objects.
+
+    Raises:
+        InvalidSceneError: It is malformed, or its objects are not the domain's.
+    """
     if not isinstance(content, dict) or not isinstance(content.get("objects"), dict):
         raise InvalidSceneError(f"scene file {path} has no mapping `objects`")
     features: dict[Object, Mapping[str, float]] = {ROBOT("robot"): robot_features(HOME)}

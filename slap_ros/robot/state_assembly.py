@@ -89,7 +89,8 @@ class StateAssembler:
         steady = {
             i: known[o].pose for i, o in enumerate(self._bodies) if o in known and known[o].at_rest
         }
-        return resting_poses(steady, self._scene.free, fixed)
+        eyes = {i: eye for i in steady if (eye := known[self._bodies[i]].eye) is not None}
+        return resting_poses(steady, self._scene.free, fixed, eyes)
 
     def _fixed_pose(self, name: str, otherwise: Pose, known: Mapping[Object, PoseEstimate]) -> Pose:
         obj = self._template.layout.by_name.get(name)

@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 from slap_ros.errors import InvalidMeasurementError, InvalidParameterError
 from slap_ros.geometry.pose import ORIGIN, Pose, Vector, conjugate, multiply
+from slap_ros.robot.line_of_sight import across
 
 UNIT_TOLERANCE = 1e-2  # 1, of a measured quaternion's length: further off it is none
 SURPRISE = 4.5  # standard deviations beyond which a detection is not explained by noise
@@ -29,6 +30,7 @@ class Detection(NamedTuple):
     stamp_s: float  # when it was seen
     pose: Pose  # in the base's frame
     frame: str = ""  # in which it was seen: an object may have a tag on each face
+    eye: Vector | None = None  # where the camera is; None where distances are as good as the rest
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,7 @@ class PoseEstimate(NamedTuple):
     spin: Vector  # rad/s
     at_rest: bool
     weight: int  # detections behind the pose
+    eye: Vector | None = None  # where it was seen from, if by a camera
 
 
 def measured_pose(position: Sequence[float], quaternion: Sequence[float]) -> Pose:
@@ -101,7 +104,7 @@ class Track:
         if detection.stamp_s == self.newest_s and detection.frame not in self._together:
             self._together[detection.frame] = detection.pose
             mean = mean_pose(list(self._together.values()))
-            self._detections[-1] = Detection(detection.stamp_s, mean)
+            self._detections[-1] = Detection(detection.stamp_s, mean, eye=detection.eye)
             return
         if detection.stamp_s <= self.newest_s:
             raise InvalidMeasurementError(
@@ -137,7 +140,7 @@ class Track:
 
     def expect(self, pose: Pose) -> None:
         """Take a pose as well known: few detections that agree with it confirm it to the bit."""
-        self._known = _still(pose, self._settings.initial_detections)
+        self._known = still(pose, self._settings.initial_detections)
 
     def forget(self) -> None:
         """Drop the pose at rest: the object was moved on purpose."""
@@ -145,24 +148,23 @@ class Track:
 
     def let_go(self, pose: Pose) -> None:
         """Drop the pose at rest: the object was moved on purpose, and let go at a pose."""
-        self._known, self.last_at_rest = None, _still(pose, self._settings.confirmations)
+        self._known, self.last_at_rest = None, still(pose, self._settings.confirmations)
 
     def _agree(self, detections: Sequence[Detection]) -> bool:
         """Whether one place explains all of them."""
         middle = mean_pose([d.pose for d in detections])
-        return all(self._near(d.pose, middle, 1.0) for d in detections)
+        return all(self._near(d.pose, middle, 1.0, d.eye) for d in detections)
 
     def _explains(self, known: PoseEstimate, few: Sequence[Detection]) -> bool:
         spread = math.sqrt(1.0 / len(few) + 1.0 / known.weight)
-        return self._near(mean_pose([d.pose for d in few]), known.pose, spread)
+        return self._near(mean_pose([d.pose for d in few]), known.pose, spread, few[-1].eye)
 
-    def _near(self, pose: Pose, other: Pose, spread: float) -> bool:
+    def _near(self, pose: Pose, other: Pose, spread: float, eye: Vector | None) -> bool:
         far = SURPRISE * spread * self._settings.position_noise_m
         turned = SURPRISE * spread * self._settings.turn_noise_rad * math.sqrt(3.0)
-        return (
-            all(abs(a - b) <= far for a, b in zip(pose.position, other.position, strict=True))
-            and pose.angle_to(other) <= turned
-        )
+        offset = [a - b for a, b in zip(pose.position, other.position, strict=True)]
+        near = all(abs(part) <= far for part in across(offset, pose.position, eye))
+        return near and pose.angle_to(other) <= turned
 
     def _merged(self, known: PoseEstimate, few: Sequence[Detection]) -> PoseEstimate:
         """A little better known; what is known well enough stays the same to the bit."""
@@ -170,7 +172,7 @@ class Track:
             return known
         weight = known.weight + len(few)
         poses = [known.pose] * known.weight + [d.pose for d in few]
-        return _still(mean_pose(poses), weight)
+        return still(mean_pose(poses), weight, few[-1].eye)
 
 
 def mean_pose(poses: Sequence[Pose]) -> Pose:
@@ -189,11 +191,18 @@ def mean_pose(poses: Sequence[Pose]) -> Pose:
 
 
 def _standing(detections: Sequence[Detection]) -> PoseEstimate:
-    return _still(mean_pose([d.pose for d in detections]), len(detections))
+    return still(mean_pose([d.pose for d in detections]), len(detections), detections[-1].eye)
 
 
-def _still(pose: Pose, weight: int) -> PoseEstimate:
-    return PoseEstimate(pose, ORIGIN, ORIGIN, at_rest=True, weight=weight)
+def still(pose: Pose, weight: int, eye: Vector | None = None) -> PoseEstimate:
+    """What is known of an object that does not move.
+
+    Args:
+        pose: Pose of the object.
+        weight: Number of detections behind the pose.
+        eye: Where the camera is that saw it, m; None without one.
+    """
+    return PoseEstimate(pose, ORIGIN, ORIGIN, at_rest=True, weight=weight, eye=eye)
 
 
 def _moving(detections: Sequence[Detection]) -> PoseEstimate:

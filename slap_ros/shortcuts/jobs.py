@@ -4,26 +4,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
 from statistics import fmean
 from time import process_time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from slap_ros.errors import PlanningLimitError, SlapError, UnsolvableError
 from slap_ros.learning.random_goals import RandomGoalsChoice
-from slap_ros.learning.subproc_vec_env import make_vec_env
+from slap_ros.learning.subproc_vec_env import VecEnvSpec, make_vec_env
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.task_range import TaskRange
 from slap_ros.planning.graph_planner import GraphPlanner
 from slap_ros.planning.problem import Problem
 from slap_ros.shortcuts.explore import Explorer, OperatorPath
 from slap_ros.shortcuts.grounded_shortcuts import GroundedShortcuts
-from slap_ros.shortcuts.progress import Progress, ProgressRecorder, latest
+from slap_ros.shortcuts.progress import (
+    Progress,
+    ProgressRecorder,
+    SavableLearner,
+    SnapshotRecorder,
+    latest,
+)
 from slap_ros.shortcuts.sampling import Sampling
 from slap_ros.shortcuts.settings import ExplorationSettings, TrainingSettings
 from slap_ros.shortcuts.shortcut import Shortcut
@@ -35,7 +41,7 @@ from slap_ros.shortcuts.stopping import PlanLengths, validation_record
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 
 if TYPE_CHECKING:
-    from slap_ros.shortcuts.ppo import Learner
+    from slap_ros.shortcuts.stage_learner import StageLearner
 
 WARM_UP = 64  # random steps in each environment, from which observations are normalised
 EXPLORATION = TaskRange("exploration", 0, 10_000)
@@ -164,6 +170,48 @@ def mean_length(lengths: Sequence[int | str]) -> float:
     return fmean(length if isinstance(length, int) else inf for length in lengths)
 
 
+class StagedAttempt(Protocol):
+    """What is learned from, stage after stage."""
+
+    @property
+    def name(self) -> str:
+        """What is learned."""
+        ...
+
+    @property
+    def settings(self) -> TrainingSettings:
+        """All hyper-parameters of the training."""
+        ...
+
+    @property
+    def starts(self) -> Sequence[StartRecord]:
+        """Initial states of episodes."""
+        ...
+
+    @property
+    def seed(self) -> int:
+        """Seed of weights and noise."""
+        ...
+
+    @property
+    def folder(self) -> str:
+        """Folder of checkpoints and progress."""
+        ...
+
+    @property
+    def work(self) -> ShortcutWorkFolder:
+        """The folder, which is made where there is none."""
+        ...
+
+    def parts(self, stage: int) -> Sequence[VecEnvSpec]:
+        """The parts of a stage's environments."""
+        ...
+
+    def plan_lengths(self, learner: SavableLearner) -> PlanLengths | None:
+        """The validations while it is learned; None where no rule asks for them."""
+        ...
+
+
 @dataclass(frozen=True)
 class LearningAttempt:
     """One attempt to learn a shortcut, as data that other processes can be sent.
@@ -201,15 +249,20 @@ class LearningAttempt:
             return seed
         return int(np.random.SeedSequence([seed, self.number]).generate_state(1)[0])
 
+    @property
+    def name(self) -> str:
+        """The name of the shortcut."""
+        return self.signature.name
+
     def recorder(self) -> ProgressRecorder:
         """The recorder of the attempt's progress."""
-        return ProgressRecorder(self.work, self.signature, self.settings.total_steps)
+        return SnapshotRecorder(self.work, self.signature, self.settings.total_steps)
 
-    def plan_lengths(self, shortcut: Callable[[], Shortcut]) -> PlanLengths | None:
+    def plan_lengths(self, learner: SavableLearner) -> PlanLengths | None:
         """The validations while the shortcut is learned; None where no rule asks for them.
 
         Args:
-            shortcut: Function that returns the shortcut as it is now.
+            learner: Learner, which has the shortcut's policy as it is now.
         """
         settings = self.settings
         if settings.stopping is None:
@@ -217,7 +270,8 @@ class LearningAttempt:
         tasks = any_goal(self.distribution, settings.random_goals)
 
         def plan() -> float:
-            used = (*self.learned, shortcut())
+            now = Shortcut(self.signature, learner.policy(), learner.shortest)
+            used = (*self.learned, now)
             return mean_length(
                 [plan_length(tasks, i, used, settings.sampling) for i in self.validation]
             )
@@ -246,7 +300,7 @@ def learn_first_stage(attempt: LearningAttempt, processes: int) -> Progress:
     """Train a shortcut in the first stage alone; :func:`learn` continues from there.
 
     Args:
-        attempt: Attempt to learn a shortcut.
+        attempt: StagedAttempt to learn a shortcut.
         processes: Number of processes that may step environments.
 
     Returns:
@@ -256,7 +310,7 @@ def learn_first_stage(attempt: LearningAttempt, processes: int) -> Progress:
         ChildProcessError: A process that stepped environments has ended.
         InvalidParameterError: A checkpoint or the progress is damaged.
     """
-    _learn_stages(attempt, 1, attempt.recorder(), processes)
+    learn_stages(attempt, 1, attempt.recorder(), processes)
     return latest(attempt.work)[0]
 
 
@@ -267,7 +321,7 @@ def learn(attempt: LearningAttempt, processes: int) -> Shortcut:
     of processes makes no difference to what is learned.
 
     Args:
-        attempt: Attempt to learn a shortcut.
+        attempt: StagedAttempt to learn a shortcut.
         processes: Number of processes that may step environments.
 
     Returns:
@@ -282,7 +336,7 @@ def learn(attempt: LearningAttempt, processes: int) -> Shortcut:
     if work.finished.exists():
         return load_shortcut(work.shortcut)
     recorder = attempt.recorder()
-    learner = _learn_stages(attempt, len(attempt.settings.stages), recorder, processes)
+    learner = learn_stages(attempt, len(attempt.settings.stages), recorder, processes)
     record = recorder.record() | validation_record(work.plan_lengths)
     shortcut = Shortcut(attempt.signature, learner.policy(), learner.shortest, record)
     save_shortcut(work.shortcut, shortcut)
@@ -290,20 +344,30 @@ def learn(attempt: LearningAttempt, processes: int) -> Shortcut:
     return shortcut
 
 
-def _learn_stages(
-    attempt: LearningAttempt, stages: int, recorder: ProgressRecorder, processes: int
-) -> Learner:
-    """Learn some stages, each beginning with the weights of the one before it."""
-    from slap_ros.shortcuts.ppo import Learner, normalisation_of  # torch, here alone
+def learn_stages(
+    attempt: StagedAttempt, stages: int, recorder: ProgressRecorder, processes: int
+) -> StageLearner:
+    """Learn some stages, each beginning with the weights of the one before it.
+
+    Args:
+        attempt: What is learned from.
+        stages: Number of stages.
+        recorder: Recorder of the progress.
+        processes: Number of processes that may step environments.
+    """
+    from slap_ros.shortcuts.normalised_vec_env import normalisation_of  # torch, here alone
+    from slap_ros.shortcuts.ppo import Learner
+    from slap_ros.shortcuts.stage_learner import make_learner
 
     work = attempt.work
     rng = np.random.default_rng([attempt.seed, len(attempt.starts)])
     normalisation = normalisation_of(attempt.parts(0)[0].make(), rng, WARM_UP)
-    learner: Learner | None = None
-    for stage, ppo in enumerate(attempt.settings.stages[:stages]):
+    learner: StageLearner | None = None
+    for stage, settings in enumerate(attempt.settings.stages[:stages]):
         with make_vec_env(attempt.parts(stage), processes) as env:
-            earlier, learner = learner, Learner(env, normalisation, ppo, attempt.seed)
-            if earlier is not None:
+            earlier = learner
+            learner = make_learner(env, normalisation, settings, attempt.seed)
+            if isinstance(earlier, Learner) and isinstance(learner, Learner):
                 learner.initialise_from(earlier)
             if work.checkpoint(stage).exists():
                 learner.resume(work.checkpoint(stage))
@@ -314,13 +378,11 @@ def _learn_stages(
 
 
 def _learn_stage(
-    attempt: LearningAttempt, stage: int, learner: Learner, recorder: ProgressRecorder
+    attempt: StagedAttempt, stage: int, learner: StageLearner, recorder: ProgressRecorder
 ) -> None:
     """Learn until the stage's environment steps are used up, or its rule says that it is over."""
     report = recorder.of(stage, learner)
-    lengths = attempt.plan_lengths(
-        lambda: Shortcut(attempt.signature, learner.policy(), learner.shortest)
-    )
+    lengths = attempt.plan_lengths(learner)
     if lengths is None:
         learner.learn(report, attempt.work.path / "tensorboard")
     elif lengths.go_on(stage, steps=0):  # else an earlier run has ended it

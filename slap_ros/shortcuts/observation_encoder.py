@@ -10,7 +10,7 @@ a kind than training had, the slots hold those that are not done yet, in their o
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
@@ -45,20 +45,57 @@ def make_action_map(domain: Domain, signature: Signature) -> ActionMap:
     return ActionMap(domain, uses_gripper(domain, signature))
 
 
-def observation_size(domain: Domain, signature: Signature) -> int | None:
-    """Features of an observation; None where no task at hand has objects of all its kinds."""
-    interface, state = learner_interface(domain), domain.task(0).initial_state
-    kind = kinds(domain.atom_space(state))
+@dataclass(frozen=True)
+class ObservationLayout:
+    """Which features an observation has: those of the robot, then those of each slot.
+
+    Args:
+        robot: Number of features of the robot.
+        slots: Number of slots of each kind, kinds in order.
+        widths: Number of features in a slot of each kind.
+    """
+
+    robot: int
+    slots: Mapping[Kind, int]
+    widths: Mapping[Kind, int]
+
+    @property
+    def size(self) -> int:
+        """The number of all features."""
+        return self.robot + sum(count * self.widths[kind] for kind, count in self.slots.items())
+
+
+def observation_layout(
+    domain: Domain, signature: Signature, state: State
+) -> ObservationLayout | None:
+    """Which features observations of a shortcut have.
+
+    Args:
+        domain: Domain whose learner's interface is used.
+        signature: Signature of the shortcut.
+        state: State of a task.
+
+    Returns:
+        The layout; None where the task lacks objects of one of the signature's kinds.
+    """
+    interface, kind = learner_interface(domain), kinds(domain.atom_space(state))
     examples = {name: obj for obj, name in kind.items()}
     if not set(signature.slots) <= set(examples):
         return None
     batch = state.alone()
     hand = interface.hand(batch)
-    size = interface.robot(batch, hand).shape[-1]
-    for name, slots in signature.slots.items():
-        features = interface.objects(batch, hand, Column((examples[name],)))
-        size += slots * (2 + features.shape[-1])  # whether there is one, and its deficit
-    return int(size)
+    widths = {
+        # whether there is one, its deficit, and its own features
+        name: 2 + interface.objects(batch, hand, Column((examples[name],))).shape[-1]
+        for name in signature.slots
+    }
+    return ObservationLayout(interface.robot(batch, hand).shape[-1], signature.slots, widths)
+
+
+def observation_size(domain: Domain, signature: Signature) -> int | None:
+    """Features of an observation; None where no task at hand has objects of all its kinds."""
+    layout = observation_layout(domain, signature, domain.task(0).initial_state)
+    return None if layout is None else layout.size
 
 
 @dataclass(frozen=True)

@@ -7,63 +7,28 @@ The algorithm is stable-baselines3's.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import torch
-from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
 from slap_ros.learning.checkpoint import load_checkpoint, save_checkpoint
 from slap_ros.learning.policy_export import exported_layers, hidden_layers
-from slap_ros.learning.stable_baselines import StableBaselinesVecEnv
-from slap_ros.learning.vec_env import VecEnv, VecEnvStep
+from slap_ros.learning.ppo import make_ppo
+from slap_ros.learning.vec_env import VecEnv
 from slap_ros.policies.mlp_policy import MlpPolicy, ObservationNormalisation
+from slap_ros.shortcuts.normalised_vec_env import NormalisedVecEnv
 from slap_ros.shortcuts.ppo_settings import PpoSettings
 from slap_ros.shortcuts.progress import Progress
-
-RECENT = 200  # episodes over which success and length are taken
-ACTION_REPEAT = 8  # steps for which a random action is repeated before normalisation
-
-
-class _NormalisedVecEnv(StableBaselinesVecEnv):
-    """The environments of a shortcut, with normalised observations and statistics of episodes."""
-
-    def __init__(self, env: VecEnv, normalisation: ObservationNormalisation) -> None:
-        super().__init__(env, normalisation)
-        self.history: deque[tuple[bool, int, bool]] = deque(maxlen=RECENT)
-        self.episodes = 0
-        self.shortest = env.horizon
-
-    def count(self, step: VecEnvStep, i: int) -> None:
-        """Take note of an episode that ended."""
-        success, length = bool(step.success[i]), int(step.lengths[i])
-        self.history.append((success, length, bool(step.failure[i])))
-        self.episodes += 1
-        if success:
-            self.shortest = min(self.shortest, length)
-
-    def progress(self, steps: int) -> Progress:
-        lengths = [length for success, length, _ in self.history if success]
-        count = max(len(self.history), 1)
-        return Progress(
-            steps,
-            self.episodes,
-            len(lengths) / count,
-            float(np.mean(lengths)) if lengths else float("nan"),
-            sum(failure for _, _, failure in self.history) / count,
-            self.shortest,
-        )
 
 
 class _RolloutCallback(BaseCallback):
     """Reports after each rollout, and stops when the answer is no."""
 
-    def __init__(self, env: _NormalisedVecEnv, report: Callable[[Progress], bool]) -> None:
+    def __init__(self, env: NormalisedVecEnv, report: Callable[[Progress], bool]) -> None:
         super().__init__()
         self._env, self._report, self._go_on = env, report, True
 
@@ -72,25 +37,6 @@ class _RolloutCallback(BaseCallback):
 
     def _on_step(self) -> bool:
         return self._go_on
-
-
-def normalisation_of(env: VecEnv, rng: np.random.Generator, steps: int) -> ObservationNormalisation:
-    """Mean and deviation of the observations that random actions lead to.
-
-    Args:
-        env: Environments that random actions step.
-        rng: Generator that draws the actions, each of which is repeated for a while.
-        steps: Number of steps in each environment.
-
-    Returns:
-        The normalisation.
-    """
-    observations = []
-    for step in range(steps):
-        if step % ACTION_REPEAT == 0:
-            actions = rng.uniform(-1.0, 1.0, (env.num_envs, env.action_map.size))
-        observations.append(env.step(actions).observations)
-    return ObservationNormalisation.of(np.concatenate(observations))
 
 
 class Learner:
@@ -109,25 +55,8 @@ class Learner:
         """
         torch.set_num_threads(1)  # tiny networks: more threads only wait for one another
         self.settings = settings
-        self._env = _NormalisedVecEnv(env, normalisation)
-        self._ppo = PPO(
-            "MlpPolicy",
-            self._env,
-            n_steps=settings.n_steps,
-            batch_size=settings.batch_size,
-            n_epochs=settings.n_epochs,
-            learning_rate=self._rate,
-            gamma=settings.gamma,
-            gae_lambda=settings.gae_lambda,
-            ent_coef=settings.ent_coef,
-            policy_kwargs={
-                "net_arch": list(settings.net_arch),
-                "activation_fn": torch.nn.Tanh,
-                "log_std_init": settings.log_std_init,
-            },
-            seed=seed,
-            device="cpu",
-        )
+        self._env = NormalisedVecEnv(env, normalisation)
+        self._ppo = make_ppo(self._env, settings, self._rate, seed)
 
     def _rate(self, remaining: float) -> float:
         rate = self.settings.learning_rate

@@ -92,20 +92,11 @@ class SavableLearner(Protocol):
 
 
 class ProgressRecorder:
-    """Appends figures to the progress file, and saves checkpoints and snapshots now and then."""
+    """Appends figures to the progress file, and saves checkpoints now and then."""
 
-    def __init__(self, folder: ShortcutWorkFolder, signature: Signature, total_steps: int) -> None:
-        """Go on from what is in a folder.
-
-        Args:
-            folder: Folder to write to.
-            signature: Signature of the shortcut that is learned.
-            total_steps: Environment steps of all stages.
-        """
+    def __init__(self, folder: ShortcutWorkFolder) -> None:
+        """Go on from what is in a folder."""
         self._folder = folder
-        self._signature = signature
-        self._interval = max(1, total_steps // SNAPSHOTS)
-        self._snapshots = -1  # the number of whole intervals before the last snapshot
         self._began = self._saved = monotonic()
         self._cpu_s = _cpu_s()
         self._latest = latest(folder)
@@ -120,19 +111,13 @@ class ProgressRecorder:
             if monotonic() - self._saved > CHECKPOINT_S:
                 learner.save(self._folder.checkpoint(stage))
                 self._saved = monotonic()
-            self._take_snapshot(learner)
+            self.after_rollout(learner)
             return True
 
         return report
 
-    def _take_snapshot(self, learner: SavableLearner) -> None:
-        """Keep the policy, the first time in each interval of environment steps."""
-        steps = self._steps
-        if steps // self._interval != self._snapshots:
-            self._snapshots = steps // self._interval
-            taken = Shortcut(self._signature, learner.policy(), learner.shortest)
-            folder = self._folder.snapshot(steps)
-            replace_folder(folder.parent, lambda draft: save_shortcut(draft / folder.name, taken))
+    def after_rollout(self, learner: SavableLearner) -> None:
+        """Do what is done after a rollout besides; here nothing."""
 
     @property
     def _steps(self) -> int:
@@ -149,6 +134,32 @@ class ProgressRecorder:
             "length": last.length if last.length == last.length else -1.0,
             "cpu_s": _cpu_s() - self._cpu_s,
         }
+
+
+class SnapshotRecorder(ProgressRecorder):
+    """Keeps the shortcut now and then besides, as it is while it is learned."""
+
+    def __init__(self, folder: ShortcutWorkFolder, signature: Signature, total_steps: int) -> None:
+        """Go on from what is in a folder.
+
+        Args:
+            folder: Folder to write to.
+            signature: Signature of the shortcut that is learned.
+            total_steps: Environment steps of all stages.
+        """
+        super().__init__(folder)
+        self._signature = signature
+        self._interval = max(1, total_steps // SNAPSHOTS)
+        self._snapshots = -1  # the number of whole intervals before the last snapshot
+
+    def after_rollout(self, learner: SavableLearner) -> None:
+        """Keep the policy, the first time in each interval of environment steps."""
+        steps = self._steps
+        if steps // self._interval != self._snapshots:
+            self._snapshots = steps // self._interval
+            taken = Shortcut(self._signature, learner.policy(), learner.shortest)
+            folder = self._folder.snapshot(steps)
+            replace_folder(folder.parent, lambda draft: save_shortcut(draft / folder.name, taken))
 
 
 def _cpu_s() -> float:

@@ -14,6 +14,7 @@ from slap_ros.learning.setting_changes import changed
 from slap_ros.learning.stored_keys import restored, stored
 from slap_ros.shortcuts.ppo_settings import PpoSettings
 from slap_ros.shortcuts.rewards import Rewards
+from slap_ros.shortcuts.sac_settings import ShortcutSacSettings
 from slap_ros.shortcuts.sampling import DEFAULT, PAPER, Sampling
 from slap_ros.shortcuts.stopping import Stopping
 
@@ -111,6 +112,9 @@ class TrainingSettings:
             their own.
         stopping: Rule by which a stage of learning ends early; None to use all of its environment
             steps.
+        sac: Settings of SAC, which learns in the place of PPO, in a single stage; None for PPO.
+        together: Number of shortcuts that one policy learns (:mod:`slap_ros.shortcuts.subgoals`);
+            1 for a policy each.
     """
 
     exploration: ExplorationSettings = field(default_factory=ExplorationSettings)
@@ -127,10 +131,14 @@ class TrainingSettings:
     attempts: int = 1
     random_goals: float = 0.0
     stopping: Stopping | None = None
+    sac: ShortcutSacSettings | None = None
+    together: int = 1
 
     @property
-    def stages(self) -> tuple[PpoSettings, ...]:
-        """PPO's hyper-parameters, stage after stage."""
+    def stages(self) -> tuple[PpoSettings | ShortcutSacSettings, ...]:
+        """The learner's hyper-parameters, stage after stage."""
+        if self.sac is not None:
+            return (self.sac,)
         return (self.ppo,) if self.polish is None else (self.ppo, self.polish)
 
     def rewards_in(self, stage: int) -> Rewards:
@@ -151,6 +159,8 @@ class TrainingSettings:
         """
         if steps < len(self.stages):
             raise InvalidParameterError(f"{len(self.stages)} stages cannot share {steps} steps")
+        if self.sac is not None:
+            return replace(self, sac=replace(self.sac, total_steps=steps))
         if self.polish is None:
             return replace(self, ppo=replace(self.ppo, total_steps=steps))
         share = round(steps * self.ppo.total_steps / self.total_steps)
@@ -164,11 +174,11 @@ class TrainingSettings:
     def as_json(self) -> dict[str, Any]:
         """A JSON object, under the keys of :mod:`slap_ros.learning.stored_keys`.
 
-        A single attempt, no other goals and no rule that ends learning are left out, as work
-        folders have it from when there was no other way.
+        A single attempt, no other goals, no rule that ends learning, no SAC and a policy for each
+        shortcut are left out, as work folders have it from when there was no other way.
         """
         data = stored(self)
-        for name in ("attempts", "random_goals", "stopping"):
+        for name in ("attempts", "random_goals", "stopping", "sac", "together"):
             if getattr(self, name) == getattr(OURS, name):
                 del data[name]
         return data
@@ -214,7 +224,24 @@ _NEAR: Mapping[str, SettingValue] = {
     "exploration.inside": 8,
     "exploration.beyond": True,
 }
-_VARIANTS = {SEVERAL: _SEVERAL, SHORT: _SHORT, NEAR: _NEAR}  # of a domain's "ours"
+SUBGOALS = "subgoals"  # settings that learn one policy for several shortcuts
+_SUBGOALS: Mapping[str, SettingValue] = {"together": 4, "attempts": 1}
+SAC = "sac"  # settings that learn with SAC in the place of PPO
+_SAC: Mapping[str, SettingValue] = {"sac.gamma": ShortcutSacSettings().gamma}
+ABSTRACT_HER = "abstract_her"  # one policy of SAC for several shortcuts, and their targets in turn
+_ABSTRACT_HER: Mapping[str, SettingValue] = {
+    **_SUBGOALS,
+    "sac.buffer_size": 1_000,
+    "sac.hindsight": 0.95,
+}
+_VARIANTS = {
+    SEVERAL: _SEVERAL,
+    SHORT: _SHORT,
+    NEAR: _NEAR,
+    SUBGOALS: _SUBGOALS,
+    SAC: _SAC,
+    ABSTRACT_HER: _ABSTRACT_HER,
+}  # of a domain's "ours"
 GENERAL: Mapping[str, TrainingSettings] = {
     "ours": OURS,
     **{name: changed(OURS, changes) for name, changes in _VARIANTS.items()},

@@ -64,6 +64,22 @@ class ShortcutVecEnv:
         self._lengths = np.zeros(self.num_envs, dtype=np.intp)
         self.observations = np.concatenate([group.observations for group in self._groups])
 
+    @property
+    def transitions(self) -> list[GroupTransitions]:
+        """What happened in the newest step, group after group in the order of environments."""
+        return [group.transitions for group in self._groups]
+
+    def begin(self, start: Start) -> None:
+        """Begin every episode in a start, over the same objects and for the same change as before.
+
+        Args:
+            start: Start of this and all later episodes.
+        """
+        for group in self._groups:
+            group.begin(start)
+        self._lengths[:] = 0
+        self.observations = np.concatenate([group.observations for group in self._groups])
+
     def step(self, actions: Array) -> VecEnvStep:
         """See :meth:`slap_ros.learning.vec_env.VecEnv.step`."""
         self._lengths += 1
@@ -92,6 +108,20 @@ class ShortcutVecEnv:
         )
 
 
+class GroupTransitions(NamedTuple):
+    """What happened in the newest step of n environments with the same objects and change.
+
+    Args:
+        starts: Starts of the episodes, n of them.
+        before: States before the step, a batch.
+        after: States after the step and before resets, a batch.
+    """
+
+    starts: Sequence[Start]
+    before: State
+    after: State
+
+
 class _GroupStep(NamedTuple):
     """The outcome of one step of a group; arrays of shape (n,) or (n, size)."""
 
@@ -116,19 +146,27 @@ class _Group:
     ) -> None:
         self.size, self._pool, self._rng = size, pool, rng
         self.encoder = ObservationEncoder(domain, pool[0].space, signature, pool[0].change)
-        drawn = [self._draw() for _ in range(size)]
-        self._targets = [start.target for start in drawn]
-        self._worlds = domain.make_vector_world([start.state for start in drawn])
+        self._drawn = [self._draw() for _ in range(size)]
+        self._targets = [start.target for start in self._drawn]
+        self._worlds = domain.make_vector_world([start.state for start in self._drawn])
+        states = self._worlds.states
+        self.transitions = GroupTransitions(tuple(self._drawn), states, states)
         encoding = self.encoder.encode(self._worlds.states)
         self.observations, self._potential = encoding.observations, encoding.potential
 
     def _draw(self) -> Start:
         return self._pool[int(self._rng.integers(len(self._pool)))]
 
+    def begin(self, start: Start) -> None:
+        """Begin every episode in one start, and all later ones."""
+        self._pool = [start]
+        self._reset(np.arange(self.size))
+
     def step(self, commands: Array, truncated: Bools) -> _GroupStep:
         """Step with commands, shape (size, axes), and reset where an episode ended."""
-        before = self._potential
+        before, begun = self._potential, _copied(self._worlds.states)
         state = self._worlds.step(commands)
+        self.transitions = GroupTransitions(tuple(self._drawn), begun, _copied(state))
         encoding = self.encoder.encode(state)
         success = self.encoder.success(state, encoding, self._targets)
         self.observations = encoding.observations.copy()
@@ -148,11 +186,16 @@ class _Group:
             return
         starts = [self._draw() for _ in ended]
         for i, start in zip(ended, starts, strict=True):
-            self._targets[i] = start.target
+            self._drawn[i], self._targets[i] = start, start.target
             self._worlds.reset(int(i), start.state)
         encoding = self.encoder.encode(State.batch([start.state for start in starts]))
         self.observations[ended] = encoding.observations
         self._potential[ended] = encoding.potential
+
+
+def _copied(states: State) -> State:
+    """The states, whatever becomes of the worlds that they are of."""
+    return State(states.layout, states.data.copy())
 
 
 def _pools(starts: Sequence[Start]) -> list[list[Start]]:

@@ -8,6 +8,7 @@ task costs no more than the options that lead to where the shortcut begins.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -99,7 +100,7 @@ def find_start(
     seed: int,
     index: int,
     signature: Signature,
-    operator_path: OperatorPath,
+    operator_path: OperatorPath | None,
     operator_steps: Mapping[str, float],
     beyond: bool = False,
 ) -> StartRecord | None:
@@ -113,7 +114,8 @@ def find_start(
         seed: Seed of the task.
         index: Index of the task.
         signature: Signature of the shortcut.
-        operator_path: Names of the operators that lead from the initial state to the start.
+        operator_path: Names of the operators that lead from the initial state to the start; None
+            for whatever operators lead to one, as few as can be.
         operator_steps: Mean environment steps of each operator, by name.
         beyond: Whether the shortcut leads to abstract states that operators alone do not reach.
 
@@ -167,17 +169,32 @@ def _made(option: Option) -> Option:
 
 def _nearest_to_goal_first(
     graph: AbstractGraph,
-    operator_path: OperatorPath,
+    operator_path: OperatorPath | None,
     matcher: SignatureMatcher,
     to_go: Sequence[float],
 ) -> list[tuple[tuple[Edge, ...], int, int]]:
     """Paths to where a shortcut may begin, with the nodes where it begins and ends."""
     choices = []
-    for path in _paths(graph, operator_path):
+    paths = _shortest_paths(graph) if operator_path is None else _paths(graph, operator_path)
+    for path in paths:
         source = path[-1].target if path else 0
         targets = matcher.targets(graph.nodes, source)
         choices += [(path, source, target) for target in targets if np.isfinite(to_go[target])]
     return sorted(choices, key=lambda choice: to_go[choice[2]])
+
+
+def _shortest_paths(graph: AbstractGraph) -> Iterator[tuple[Edge, ...]]:
+    """A sequence of edges from the initial state to each node, with as few edges as can be."""
+    forward = graph.forward_edges()
+    found: dict[int, tuple[Edge, ...]] = {0: ()}
+    queue = deque([0])
+    while queue:
+        node = queue.popleft()
+        yield found[node]
+        for edge in forward[node]:
+            if edge.target not in found:
+                found[edge.target] = (*found[node], edge)
+                queue.append(edge.target)
 
 
 def _paths(graph: AbstractGraph, operator_path: OperatorPath) -> Iterator[tuple[Edge, ...]]:

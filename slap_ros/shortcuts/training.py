@@ -8,7 +8,7 @@ interrupted.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from statistics import fmean
@@ -201,18 +201,33 @@ class Training:
         ranked = rank(explored)
         self.callback.on_ranked(ranked)
         operator_steps = mean_steps(explored)
+        length = self._learn_from(ranked, operator_steps, length)
+        record = self._record(explored, baseline, length)
+        return ShortcutLibrary(self.distribution.domain.name, tuple(self._shortcuts), record)
+
+    def _learn_from(
+        self, ranked: Sequence[CandidateGroup], operator_steps: Mapping[str, float], length: float
+    ) -> float:
+        """Learn a shortcut from each group that is worth it, one after the other.
+
+        Args:
+            ranked: Candidates, the most promising first.
+            operator_steps: Mean environment steps of each operator, by name.
+            length: Mean plan length without shortcuts, environment steps.
+
+        Returns:
+            Mean plan length with what is kept.
+        """
         kept: list[CandidateGroup] = []
         for _ in range(self.settings.shortcuts):
             group = self._most_promising(ranked, kept)
             if group is None:
                 break
-            key = problem_key(group.signature)
-            ranked = [other for other in ranked if problem_key(other.signature) != key]
+            ranked = other_problems(ranked, group)
             before, length = length, self._try(group, operator_steps, length)
             if length < before:
                 kept.append(group)
-        record = self._record(explored, baseline, length)
-        return ShortcutLibrary(self.distribution.domain.name, tuple(self._shortcuts), record)
+        return length
 
     def _most_promising(
         self, groups: Sequence[CandidateGroup], kept: Sequence[CandidateGroup]
@@ -232,7 +247,9 @@ class Training:
         """Whether a plan length is less by what a shortcut must save at least."""
         return steps < than * (1.0 - self.settings.least_saving)
 
-    def _try(self, group: CandidateGroup, operator_steps: dict[str, float], length: float) -> float:
+    def _try(
+        self, group: CandidateGroup, operator_steps: Mapping[str, float], length: float
+    ) -> float:
         """Learn a shortcut and keep it if it shortens plans.
 
         Args:
@@ -246,7 +263,18 @@ class Training:
         starts = self._starts(group, operator_steps)
         if not starts:  # it can begin in no task
             return length
-        shortcut = _with_origin(self._learn(group.signature, starts), group)
+        return self._judge(with_origin(self._learn(group.signature, starts), group), length)
+
+    def _judge(self, shortcut: Shortcut, length: float) -> float:
+        """Keep a shortcut if it shortens plans.
+
+        Args:
+            shortcut: Shortcut that was learned.
+            length: Mean plan length without the shortcut, environment steps.
+
+        Returns:
+            Mean plan length with what is kept.
+        """
         with_it = self._plan_length((*self._shortcuts, shortcut))
         kept = self._shorter(with_it, length)
         self.callback.on_validated(shortcut.name, length, with_it, kept)
@@ -317,7 +345,7 @@ class Training:
         return fmean(solved.values())
 
     def _starts(
-        self, group: CandidateGroup, operator_steps: dict[str, float]
+        self, group: CandidateGroup, operator_steps: Mapping[str, float]
     ) -> tuple[StartRecord, ...]:
         name = group.signature.name
         work = [
@@ -378,11 +406,11 @@ class Training:
         )
 
     def _run_attempt(
-        self, learn: Callable[[jobs.LearningAttempt, int], Result], attempt: jobs.LearningAttempt
+        self, learn: Callable[[Any, int], Result], attempt: jobs.StagedAttempt
     ) -> Result:
         """The result of a job that learns in an attempt."""
-        name, steps = attempt.signature.name, self.settings.total_steps
-        self.callback.on_learning(name, Path(attempt.folder), steps)
+        steps = attempt.settings.total_steps
+        self.callback.on_learning(attempt.name, Path(attempt.folder), steps)
         ((_, result),) = self.workers.run(learn, [(attempt, self.workers.processes)])
         return result
 
@@ -433,7 +461,15 @@ def _decode_lengths(data: Any, count: int) -> list[int | str]:
     return lengths
 
 
-def _with_origin(shortcut: Shortcut, group: CandidateGroup) -> Shortcut:
+def other_problems(
+    groups: Sequence[CandidateGroup], learned: CandidateGroup
+) -> list[CandidateGroup]:
+    """The groups that another policy is learned for than for one of them."""
+    key = problem_key(learned.signature)
+    return [other for other in groups if problem_key(other.signature) != key]
+
+
+def with_origin(shortcut: Shortcut, group: CandidateGroup) -> Shortcut:
     """The shortcut, whose record says what found it; random actions do where it says nothing."""
     if group.found_by == (RANDOM,):
         return shortcut

@@ -61,6 +61,12 @@ APPROACH_STYLES = {
     "ppo": ApproachStyle("PPO", "#cc79a7", "P"),
     "sac_her": ApproachStyle("SAC+HER", "#56b4e9", "X"),
     "hierarchical": ApproachStyle("hierarchical RL", "#009e73", "d"),
+    "sol": ApproachStyle("SOL", "#e69f00", "D"),
+    "independent_ppo": ApproachStyle("PPO, a policy each", SHORTCUT, "s"),
+    "independent_sac": ApproachStyle("SAC, a policy each", "#56b4e9", "X"),
+    "subgoals": ApproachStyle("Abstract Subgoals (PPO)", "#cc79a7", "P"),
+    "subgoals_sac": ApproachStyle("one policy, SAC", "#e69f00", "D"),
+    "abstract_her": ApproachStyle("Abstract HER (SAC)", "#009e73", "d"),
     "slap_trained_perturbed": ApproachStyle("SLAP, trained perturbed", "#009e73", "v"),
 }
 

@@ -15,13 +15,16 @@ from slap_ros.studies.lg_sail import (
     planning_ablation,
     replanning,
     reward_ablation,
+    sequence,
     vacuity,
+    warm_start,
 )
 from slap_ros.studies.slap import (
     ablation,
     dynamics,
     generalisation,
     goals,
+    learners,
     occluded,
     perception,
     perturbed,
@@ -51,35 +54,19 @@ STUDIES: Mapping[str, Study[Any]] = {
         vacuity.STUDY,
         acquisition.STUDY,
         replanning.STUDY,
+        warm_start.STUDY,
+        sequence.STUDY,
         induction.STUDY,
         planning_ablation.STUDY,
         planning_ablation.MODELS_STUDY,
         reward_ablation.STUDY,
         table1.STUDY,
         rivals.STUDY,
+        learners.STUDY,
         ablation.STUDY,
     )
 }
 WITHOUT_STUDY = (
-    not_made(
-        "SLAP Table 1",
-        "options within one network: SOL",
-        "100% in Obstacle 2D, 24.9 steps; else 0%",
-        "not part of this project",
-    ),
-    PaperFigure(
-        "SLAP Table 3",
-        "other algorithms that learn shortcuts",
-        domains=("cleanup_table",),
-        found={"": "PPO 113.7, SAC 160.2, SAC+HER 131.0 steps; pure planning 446"},
-        not_run="only PPO learns shortcuts here",
-    ),
-    not_made(
-        "SLAP Fig. 6",
-        "independent policies against one for all",
-        "independent policies are better",
-        "this project has independent policies only",
-    ),
     not_made(
         "LG-SAIL Table 7",
         "imitation with and without planning",
@@ -91,15 +78,6 @@ WITHOUT_STUDY = (
         "learning curves beside other learners",
         "curves",
         "no such learner was trained in these domains",
-    ),
-    not_made(
-        "LG-SAIL Fig. 5", "a sequence of tasks", "curves", "no sequence of ten tasks was trained"
-    ),
-    not_made(
-        "LG-SAIL Fig. 6",
-        "skills of another domain to begin with",
-        "curves",
-        "no trainings with and without them were compared",
     ),
     not_made(
         "LG-SAIL Fig. 8", "a real robot", "0.8 and 1.0 of 10 trials", "no robot was available"

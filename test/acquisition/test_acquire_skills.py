@@ -51,13 +51,26 @@ def children_of(launcher, name):
 @pytest.mark.slow
 @pytest.mark.training
 @pytest.mark.timeout(180)  # learns both skills
-def test_skills_are_acquired_announced_and_recorded(network, tmp_path):
+def test_skills_are_acquired_announced_recorded_and_acted_with(network, tmp_path):
+    """Training needs no planner: one that is back takes on what is latched, and acts with it."""
     bag, output = tmp_path / "bag", tmp_path / "skills"
     parameters = {"output": str(output), "changes": LEARNED, "steps": 30_000}
-    with asking(bag, **parameters) as (asker, spinner, _):
-        result = acquire(asker, spinner, proposer="induced", rewarder="composed", seed=1)
+    names = ("sim_node", "perception_node", "skill_server", "planner_node", "acquisition_node")
+    with asking(bag, names=names, **parameters) as (asker, spinner, launcher):
+        goal = {"proposer": "induced", "rewarder": "composed", "seed": 1}
+        ended = send(asker, spinner, **goal).get_result_async()
+        assert spinner.spin_until(lambda: any(one.skill for one in asker.feedback), LIMIT)
+        launcher.processes["planner_node"].kill()
+        assert spinner.spin_until(ended.done, LIMIT)
+        result = ended.result().result
         assert result.success, result.error_msg
         assert spinner.spin_until(lambda: asker.libraries, LIMIT)
+        # Until DDS has missed the killed one, a goal goes to it.
+        assert spinner.spin_until(lambda: not asker.solver.server_is_ready(), LIMIT)
+        with ProcessLauncher({"planner_node": planner_parameters(output)}):
+            number = begin_again(asker, spinner)
+            solved = solve(asker, spinner, number)
+            assert solved.success, solved.error_msg
     operators = parse_domain(result.operators_pddl, "the result").operators
     assert {op.name for op in operators} == set(result.skills) == {"AchieveHolding", "AchieveAt"}
     assert (result.ended, result.progress) == ("nothing fails", 1.0)
@@ -124,12 +137,28 @@ def begin(asker, spinner):
     return handle
 
 
+@contextmanager
+def small_files(pid, limit=40_000):
+    """As on a full disk: a process, and those that it starts, cannot write more into a file."""
+    before = resource.prlimit(pid, resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
+    try:
+        yield
+    finally:
+        resource.prlimit(pid, resource.RLIMIT_FSIZE, before)
+
+
 @pytest.mark.slow
 @pytest.mark.training
-@pytest.mark.timeout(180)  # a node and three trainings, each of which imports torch
-def test_a_training_that_was_killed_and_canceled_goes_on_with_the_same_goal(network, tmp_path):
-    """Killed, it is reported; canceled, its process ends; what was learned before is read."""
+@pytest.mark.timeout(240)  # a node and four trainings, each of which imports torch
+def test_a_training_that_was_stopped_goes_on_with_the_same_goal(network, tmp_path):
+    """A full disk and a kill are reported; canceled, its process ends; what was learned is read."""
     with asking(output=str(tmp_path), **BRIEF) as (asker, spinner, launcher):
+        with small_files(launcher.processes["acquisition_node"].pid):
+            result = acquire(asker, spinner)
+        assert result.error_code in (ErrorCode.INPUT_OUTPUT, ErrorCode.STORAGE_FULL)
+        assert not asker.libraries
+
+        asker.events.clear()
         ended = begin(asker, spinner).get_result_async()
         for process in children_of(launcher, "acquisition_node"):
             os.kill(process, signal.SIGKILL)
@@ -158,49 +187,6 @@ def test_a_training_that_was_killed_and_canceled_goes_on_with_the_same_goal(netw
             for events in (asker.events, asker.events[begun:], asker.events[canceled:])
         )
         assert first == second == third  # read, not learned again
-
-
-@contextmanager
-def small_files(pid, limit=40_000):
-    """As on a full disk: a process, and those that it starts, cannot write more into a file."""
-    before = resource.prlimit(pid, resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
-    try:
-        yield
-    finally:
-        resource.prlimit(pid, resource.RLIMIT_FSIZE, before)
-
-
-@pytest.mark.training
-@pytest.mark.slow
-@pytest.mark.timeout(180)  # a node and two trainings, each of which imports torch
-def test_a_full_disk_is_reported_and_the_same_goal_goes_on(network, tmp_path):
-    with asking(output=str(tmp_path), **BRIEF) as (asker, spinner, launcher):
-        with small_files(launcher.processes["acquisition_node"].pid):
-            result = acquire(asker, spinner)
-        assert result.error_code in (ErrorCode.INPUT_OUTPUT, ErrorCode.STORAGE_FULL)
-        assert not asker.libraries
-        assert acquire(asker, spinner).success
-
-
-@pytest.mark.training
-@pytest.mark.slow
-@pytest.mark.timeout(180)  # learns both skills
-def test_a_planner_that_goes_away_meanwhile_takes_the_skills_on_when_it_is_back(network, tmp_path):
-    """Training does not need it; what is latched reaches it, and with the next episode it acts."""
-    parameters = {"output": str(tmp_path), "changes": LEARNED, "steps": 30_000}
-    names = ("sim_node", "perception_node", "skill_server", "planner_node", "acquisition_node")
-    with asking(names=names, **parameters) as (asker, spinner, launcher):
-        ended = send(asker, spinner).get_result_async()
-        assert spinner.spin_until(lambda: any(one.skill for one in asker.feedback), LIMIT)
-        launcher.processes["planner_node"].kill()
-        assert spinner.spin_until(ended.done, LIMIT)
-        assert ended.result().result.success
-        # Until DDS has missed the killed one, a goal goes to it.
-        assert spinner.spin_until(lambda: not asker.solver.server_is_ready(), LIMIT)
-        with ProcessLauncher({"planner_node": planner_parameters(tmp_path)}):
-            number = begin_again(asker, spinner)
-            solved = solve(asker, spinner, number)
-            assert solved.success, solved.error_msg
 
 
 @pytest.mark.training

@@ -355,16 +355,6 @@ def random_policy(seed=0):
     return MlpPolicy(AS_OBSERVED, layers, np.zeros(3, dtype=np.float32), "relu", squashed=True)
 
 
-@pytest.mark.training
-def test_a_skill_begins_with_the_nearest_known_one(tmp_path):
-    known = AcquiredSkill(PICK, REWARDS["Pick"], random_policy(), 12)
-    folder = tmp_path / known.folder_name
-    save_skill(folder, known)
-    library, _ = acquire(tmp_path / "work", SHORT, known={str(folder): known})
-    pick = library.skills[0]
-    assert pick.record["began_with"]["skill"] == known.folder_name
-
-
 def kept(path, *skills):
     """The skills of a library, by folder."""
     write_library(path, *skills)

@@ -17,6 +17,7 @@ from slap_ros.acquisition.training.sac_settings import SAC_PRESETS, SMALL, sac_p
 from slap_ros.acquisition.training.sac_update import LeanSac
 from slap_ros.acquisition.training.skill_env import SkillMdp, SkillVecEnv
 from slap_ros.acquisition.training.twin_critics import NormalisedRectifier, Rectifier, TwinCritics
+from slap_ros.acquisition.training.warm_start_settings import WarmStartSettings
 from slap_ros.errors import InvalidParameterError
 from slap_ros.relational import RewardTemplate
 from slap_ros.skills.groundings import Groundings
@@ -218,17 +219,17 @@ def test_a_skill_can_begin_with_another_ones_weights():
     one, other = learner(), learner(seed=2)
     policy = one.policy()
     assert not np.array_equal(other.policy().mean(FRESH_SEEN), policy.mean(FRESH_SEEN))
-    other.begin_with(policy)
+    other.begin_with(policy, WarmStartSettings())
     assert np.array_equal(other.policy().mean(FRESH_SEEN), policy.mean(FRESH_SEEN))
     large = SkillLearner(SkillVecEnv(MDP, STARTS, 8, HORIZON, (1,)), SAC_PRESETS["large"], 1)
     with pytest.raises(InvalidParameterError, match="same hidden layers"):
-        large.begin_with(policy)
+        large.begin_with(policy, WarmStartSettings())
 
 
 @pytest.mark.training
 def test_larger_critics_leave_the_policy_as_small_as_it_is():
     small, one = learner(), learner(settings=replace(QUICK, critic_net_arch=(24, 16)))
-    one.begin_with(small.policy())  # has the same layers
+    one.begin_with(small.policy(), WarmStartSettings())  # has the same layers
     critics = {k: v.shape for k, v in weights(one).items() if k.startswith("critic.qf1")}
     widths = [shape[0] for name, shape in critics.items() if name.endswith("weight")]
     assert widths == [24, 16, 1]

@@ -40,6 +40,7 @@ def slap(*arguments):
     return ran.stdout
 
 
+@pytest.mark.slow
 def test_trials_are_those_of_the_command(domain, tmp_path):
     rows = slap_ros.evaluate(domain, tasks=1, seeds=1)
     file = tmp_path / "trials.json"

@@ -134,7 +134,7 @@ def test_what_follows_a_long_action_is_discounted_by_its_steps():
 # -- training -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("method", ["ppo", "hierarchical", "sac-her"])
+@pytest.mark.parametrize("method", ["ppo", "hierarchical", "sac-her", "sol"])
 def test_an_interrupted_training_goes_on(tmp_path, domain, method):
     changes = {"n_envs": 2, "batch_size": 8, "validation": 1}
     changes |= {"learning_starts": 102} if method == "sac-her" else {"n_steps": 16}
@@ -238,7 +238,7 @@ def test_more_objects_than_a_policy_has_room_for_count_as_failed(trained, domain
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        (("dreamer", "obstacle2d"), 2, "there are ppo, sac-her, hierarchical"),
+        (("dreamer", "obstacle2d"), 2, "there are ppo, sac-her, hierarchical, sol"),
         (("ppo", "moon"), ErrorCode.UNKNOWN_DOMAIN, "moon"),
         (("ppo", "obstacle2d", "--settings", "best"), 15, "there are ours, paper"),
         (("ppo", "obstacle2d", "--set", "tau=1"), 15, "unknown setting 'tau'; there are n_envs"),
@@ -255,4 +255,4 @@ def test_what_there_is_not_is_refused(tmp_path, arguments, code, words):
 def test_methods_are_listed():
     code, said, _ = slap("baseline", "list", "--json")
     assert code == 0
-    assert list(json.loads(said)) == ["ppo", "sac-her", "hierarchical"]
+    assert list(json.loads(said)) == ["ppo", "sac-her", "hierarchical", "sol"]

@@ -49,3 +49,11 @@ def test_sac_with_hindsight_takes_a_block(tmp_path):
 @pytest.mark.timeout(180)
 def test_hierarchical_learning_finds_the_four_skills_of_a_task(tmp_path):
     assert success("hierarchical", "paper", None, 12_000, {}, tmp_path) >= 0.5
+
+
+@pytest.mark.slow  # 4,000 environment steps, one after the other
+@pytest.mark.training
+@pytest.mark.timeout(180)
+def test_a_controller_of_options_takes_a_block(tmp_path):
+    """By the skill that does it, not by one of the options, which are not learned yet."""
+    assert success("sol", EASY, HOLDING, 4_000, {}, tmp_path) >= 0.9

@@ -86,13 +86,8 @@ def states(client):
     return [message for type_name, message in client.heard if type_name == STATE]
 
 
-@pytest.mark.parametrize(
-    "order",
-    [
-        pytest.param(ALL, id="sim first", marks=pytest.mark.slow),
-        pytest.param(ALL[::-1], id="recorder first"),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("order", [ALL, ALL[::-1]], ids=["sim first", "recorder first"])
 def test_any_order_of_start_gives_the_same_complete_bag(network, tmp_path, order):
     nodes = parameters(tmp_path / "bag")
     with temporary_node(Listener) as (client, spinner):

@@ -187,8 +187,9 @@ def test_a_domain_without_a_learners_interface_says_so():
 
 def test_the_examples_of_the_page_run():
     page = (ROOT / "docs" / "learners.md").read_text(encoding="utf-8")
-    first, learned, masked = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    first, learned, ours, masked = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     exec(first, {})
+    exec(ours, {})
     short = learned.replace("learn(6_000)", "learn(1)").replace("range(50)", "range(2)")
     found: dict[str, object] = {}
     exec(short, found)

@@ -245,6 +245,7 @@ def replayed(bag, *options):
     return ran.returncode, ran.stdout, " ".join(ran.stderr.split())
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(240)  # two processes import what they need, and one of them the simulation
 def test_a_recording_is_replayed_on_it_without_stops(network, simulation, bag):
     code, out, told = replayed(bag, "--to", "franka-sim", "--robot", "speed=1.0", "--json")

@@ -17,7 +17,8 @@ from slap_ros.domains import get_domain
 from slap_ros.learning.task_distribution import TRAINING_SEED
 from slap_ros.planning.problem import Problem
 from slap_ros.relational import Target
-from slap_ros.shortcuts.ppo import Learner, normalisation_of
+from slap_ros.shortcuts.normalised_vec_env import normalisation_of
+from slap_ros.shortcuts.ppo import Learner
 from slap_ros.shortcuts.ppo_settings import PpoSettings
 from slap_ros.shortcuts.progress import Progress
 from slap_ros.shortcuts.rewards import Rewards

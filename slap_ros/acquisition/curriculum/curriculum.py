@@ -7,7 +7,8 @@ An iteration of :meth:`Curriculum.run` is one of the algorithm:
 - *reset, plan, roll out*: plans are carried out with the skills at hand (``rollouts``);
 - *collect failed skills with their simulator states*: the ``initiation_states`` of rollouts;
 - *train them from these states*: those that ``skill_selection`` chooses, each in its
-  ``skill_training``; a new one begins with the *retrieved* known skill (``warm_start``);
+  ``skill_training``; a new one begins with the *retrieved* known skill (``warm_start``), where
+  that does something for it: the nearest known ones are tried first;
 - a *dead end*, which is ours: what never succeeds is learned from scratch, and what comes before
   it (``dead_ends``);
 - *write back*: the best checkpoint is a skill at hand of the next iteration;
@@ -20,7 +21,7 @@ continues where it was interrupted.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from statistics import fmean
@@ -43,7 +44,7 @@ from slap_ros.acquisition.curriculum.skill_selection import (
 from slap_ros.acquisition.curriculum.task_source import ROLLOUTS, VALIDATION, TaskSource
 from slap_ros.acquisition.training.retrieval import METRICS, MetricSignatureEncoder, SkillEncoder
 from slap_ros.acquisition.training.settings import AcquisitionSettings
-from slap_ros.acquisition.training.warm_start import WarmStarts
+from slap_ros.acquisition.training.warm_start import ChosenStart, TriedStart, WarmStarts
 from slap_ros.errors import UnsolvableError
 from slap_ros.learning.stored_keys import stored
 from slap_ros.learning.workers import Workers, run_in_order
@@ -128,7 +129,8 @@ class Curriculum:
         if not selection.operators:
             return NO_PROGRESS
         self._start_over(iteration, selection.dead_ends, state)
-        self._train(iteration, self._rounds(selection, rollouts, fresh, state), state)
+        starts = self._choose_starts(iteration, selection.operators, rollouts, state)
+        self._train(iteration, self._rounds(selection, rollouts, fresh, state, starts), state)
         return ""
 
     def _why_over(self, rollouts: Sequence[PlanRollout], state: CurriculumState) -> str:
@@ -171,12 +173,53 @@ class Curriculum:
             for name in (dead_end.before, dead_end.skill):
                 state.skills[name] = state.skills[name].from_scratch()
 
+    def _choose_starts(
+        self,
+        iteration: int,
+        names: Sequence[str],
+        rollouts: Sequence[PlanRollout],
+        state: CurriculumState,
+    ) -> dict[str, ChosenStart]:
+        """How skills that are learned for the first time begin; known skills are tried for that.
+
+        Args:
+            iteration: Number of the iteration, from 0.
+            names: Names of the operators of the selected skills.
+            rollouts: Rollouts on training tasks, with the states in which known skills are tried.
+            state: State of the curriculum.
+        """
+        settings, known = self.settings.warm_start, self._warm_starts
+        progress = {name: state.skills[name] for name in names}
+        new = [name for name, one in progress.items() if not one.rounds and not one.attempt]
+        own = {name: known.find_own(self._operators[name]) for name in new}
+        chosen = {name: ChosenStart(start) for name, start in own.items() if start is not None}
+        near = {
+            name: known.find_near(self._operators[name], settings.candidates)
+            for name in new
+            if name not in chosen
+        }
+        work = [
+            (self.source, name, starts, InitiationStates.of(name, rollouts).all[: settings.trials])
+            for name, starts in near.items()
+            if starts
+        ]
+        if not work:
+            return chosen
+        found = self._results.known(
+            iteration, lambda: self._run("trying known skills", jobs.try_known, work)
+        )
+        for (_, name, starts, _), successes in zip(work, found, strict=True):
+            tried = tuple(map(TriedStart, starts, successes))
+            chosen[name] = ChosenStart.among(tried, settings.least_success)
+        return chosen
+
     def _rounds(
         self,
         selection: SkillSelection,
         rollouts: Sequence[PlanRollout],
         fresh: Sequence[PlanRollout],
         state: CurriculumState,
+        starts: Mapping[str, ChosenStart],
     ) -> list[LearningJob]:
         """A round of training per selected skill; the first one of a skill begins warm.
 
@@ -185,21 +228,29 @@ class Curriculum:
             rollouts: Rollouts on training tasks.
             fresh: Rollouts on tasks that training never sees.
             state: State of the curriculum.
+            starts: How skills that are learned for the first time begin, by name.
         """
         settings = replace(self.settings, skill_steps=selection.steps)
         rounds = []
         for name in selection.operators:
             skill = state.skills[name]
             number, attempt = skill.rounds, skill.attempt
-            again = number or attempt
-            warm_start = None if again else self._warm_starts.find(self._operators[name])
+            start = starts.get(name, ChosenStart())
             states = InitiationStates.of(name, rollouts), InitiationStates.of(name, fresh)
             if attempt and not number:
                 states = states[0].for_another, states[1]
             folder = self._results.training(name, attempt)
             rounds.append(
                 LearningJob(
-                    self.source, name, number, *states, settings, folder, warm_start, attempt
+                    self.source,
+                    name,
+                    number,
+                    *states,
+                    settings,
+                    folder,
+                    start.start,
+                    attempt,
+                    start.tried,
                 )
             )
         return rounds
@@ -230,7 +281,7 @@ class Curriculum:
             record = skill_record(state.skills[name], vacuity[name], self.source.seed)
             skills.append(replace(skill, record=record))
         ordered = sorted(skills, key=lambda skill: skill.folder_name)
-        record = library_record(self.source, self.settings, state, ended, fresh)
+        record = library_record(self.source, self._stored_settings, state, ended, fresh)
         return SkillLibrary(self.source.domain.name, tuple(ordered), record)
 
     def _vacuity(self, names: Sequence[str], fresh: Sequence[PlanRollout]) -> dict[str, Any]:
@@ -248,10 +299,20 @@ class Curriculum:
     def _steps_left(self, state: CurriculumState) -> int:
         return self.settings.total_steps - state.steps
 
+    @property
+    def _stored_settings(self) -> dict[str, Any]:
+        """All hyper-parameters as JSON; those of warm starts where there may be one.
+
+        Other trainings do not depend on these, and continue in folders of earlier versions.
+        """
+        settings = stored(self.settings)
+        warm_start = settings.pop("warm_start")
+        return {**settings, "warm_start": warm_start} if self.known or self.kept else settings
+
     def _as_json(self) -> dict[str, Any]:
         """All that the results depend on, as JSON."""
         known = sorted(skill.folder_name for skill in self.known.values())
-        data = {"source": self.source.as_json(), **stored(self.settings), "known": known}
+        data = {"source": self.source.as_json(), **self._stored_settings, "known": known}
         if self.encoder.name != METRICS:
             data["encoder"] = self.encoder.name
         if self.kept:
@@ -259,8 +320,8 @@ class Curriculum:
         return data
 
     def _run(
-        self, what: str, function: Callable[..., dict[str, Any]], work: Sequence[tuple[Any, ...]]
-    ) -> list[dict[str, Any]]:
+        self, what: str, function: Callable[..., Any], work: Sequence[tuple[Any, ...]]
+    ) -> list[Any]:
         return run_in_order(self.workers, function, work, what, self.callback)
 
 

@@ -9,6 +9,7 @@
       iteration0/
         rollouts.json          plans that were carried out
         fresh.json             the same on tasks that training never sees; final.json in the last
+        known.json             success of the known skills that new ones may begin with
         rounds.json            how a round of training went, per skill
       Pick/                    the training of a skill; see skill_training
       Pick-1/                  the same from scratch, after a dead end
@@ -63,6 +64,22 @@ class CurriculumFolder:
             f"iteration{iteration}/{name}",
             compute,
             lambda data: [PlanRollout.from_json(one) for one in data],
+        )
+
+    def known(self, iteration: int, compute: Compute) -> list[list[float]]:
+        """The success rates of known skills in place of each new one.
+
+        Args:
+            iteration: Number of the iteration, from 0.
+            compute: Function that tries the known skills.
+
+        Raises:
+            InvalidParameterError: What is in the folder is damaged.
+        """
+        return self._work.cached(
+            f"iteration{iteration}/known",
+            compute,
+            lambda data: [[float(success) for success in one] for one in data],
         )
 
     def rounds(self, iteration: int, compute: Compute) -> list[Round]:

@@ -29,7 +29,8 @@ class SkillProgress:
         stale: Number of rounds in a row without progress.
         learned_from: Digest of the initiation states of the last round.
         steps: Number of environment steps learned.
-        began_with: Known skill that the first round began with, for the record.
+        began_with: Known skill that the first round began with, and those that were tried, for
+            the record.
         attempt: Number of times that the skill was learned from scratch before.
     """
 
@@ -46,6 +47,8 @@ class SkillProgress:
         began_with = self.began_with
         if job.warm_start is not None:
             began_with = {**job.warm_start.as_json(), "success": outcome.initial}
+        if job.tried:
+            began_with = {**began_with, "tried": [one.as_json() for one in job.tried]}
         better = outcome.success > max(outcome.initial, self.success)
         return replace(
             self,

@@ -26,7 +26,7 @@ from slap_ros.acquisition.training.settings import AcquisitionSettings
 from slap_ros.acquisition.training.skill_env import Initiation
 from slap_ros.acquisition.training.skill_training import SkillTraining
 from slap_ros.acquisition.training.validation import SkillTrials
-from slap_ros.acquisition.training.warm_start import WarmStart
+from slap_ros.acquisition.training.warm_start import TriedStart, WarmStart
 from slap_ros.core import Domain, MakeVectorWorld
 from slap_ros.errors import InvalidStateError
 from slap_ros.learning.divided_worlds import divided_worlds
@@ -53,6 +53,7 @@ class LearningJob:
         folder: Folder in which the skill is learned.
         warm_start: Known skill that the first round begins with; None for no warm start.
         attempt: Number of times that the skill was learned from scratch before.
+        tried: Known skills that were tried before the first round, for the record.
     """
 
     source: TaskSource
@@ -64,6 +65,7 @@ class LearningJob:
     folder: Path
     warm_start: WarmStart | None = None
     attempt: int = 0
+    tried: tuple[TriedStart, ...] = ()
 
     @property
     def segment_steps(self) -> int:
@@ -177,6 +179,31 @@ def _starts(job: LearningJob, domain: Domain) -> tuple[list[Initiation], int]:
             "learned"
         )
     return accepted, refused
+
+
+def try_known(
+    source: TaskSource,
+    operator: str,
+    starts: Sequence[WarmStart],
+    states: Sequence[InitiationRecord],
+) -> list[float]:
+    """How well known skills do in place of a new one.
+
+    Args:
+        source: Source of the tasks.
+        operator: Name of the new skill's operator.
+        starts: Warm starts to try.
+        states: Initiation states of the new skill, one per episode.
+
+    Returns:
+        The success rate of each known skill; 0 where the world refuses all states.
+    """
+    domain = source.make_domain()
+    accepted, _ = _accepted(source, domain, states)
+    if not accepted:
+        return [0.0] * len(starts)
+    trials = SkillTrials(domain, _reward(source, operator, domain), accepted, horizon_of(domain))
+    return [trials.success(start.policy.mean) for start in starts]
 
 
 def vacuity(

@@ -12,8 +12,6 @@ from slap_ros.acquisition.curriculum.curriculum_state import CurriculumState, Sk
 from slap_ros.acquisition.curriculum.rollouts import PlanRollout
 from slap_ros.acquisition.curriculum.skill_selection import NO_PROGRESS
 from slap_ros.acquisition.curriculum.task_source import TaskSource
-from slap_ros.acquisition.training.settings import AcquisitionSettings
-from slap_ros.learning.stored_keys import stored
 from slap_ros.versions import processor, versions
 
 
@@ -41,7 +39,7 @@ def skill_record(
 
 def library_record(
     source: TaskSource,
-    settings: AcquisitionSettings,
+    settings: Mapping[str, Any],
     state: CurriculumState,
     ended: str,
     fresh: Sequence[PlanRollout],
@@ -50,7 +48,7 @@ def library_record(
 
     Args:
         source: Source of the tasks.
-        settings: All hyper-parameters of the curriculum.
+        settings: All hyper-parameters of the curriculum, as JSON.
         state: State of the curriculum in the end.
         ended: Reason why the curriculum is over, in words.
         fresh: Rollouts on tasks that training never saw.
@@ -64,7 +62,7 @@ def library_record(
         "progress": state.task_progress,
         "progress_on_fresh_tasks": fmean(rollout.progress for rollout in fresh),
         "steps": state.steps,
-        "settings": stored(settings),
+        "settings": settings,
         "versions": dict(versions()),
         "processor": processor(),
     }

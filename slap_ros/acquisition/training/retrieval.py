@@ -16,6 +16,9 @@ from slap_ros.relational import LiftedOperator
 from slap_ros.skills.skill_signature import SkillSignature, signature_of
 
 METRICS = "metrics"
+SAME_TO = (
+    12  # decimals to which similarities are compared: the last ones depend on the order of sums
+)
 
 
 class SkillEncoder(Protocol):
@@ -41,6 +44,23 @@ class MetricSignatureEncoder:
         return signature_of(operator)
 
 
+def by_similarity(
+    key: SkillSignature, known: Mapping[str, SkillSignature]
+) -> list[tuple[str, float]]:
+    """The names of known keys that have something in common with a key, the nearest first.
+
+    Args:
+        key: Key of the new skill.
+        known: Keys of the known skills, by name.
+
+    Returns:
+        Names and similarities; of keys that are equally near, the first by name comes first.
+    """
+    found = [(name, key.similarity(known[name])) for name in sorted(known)]
+    near = [(name, similarity) for name, similarity in found if similarity > 0.0]
+    return sorted(near, key=lambda pair: -round(pair[1], SAME_TO))
+
+
 def nearest(key: SkillSignature, known: Mapping[str, SkillSignature]) -> tuple[str, float] | None:
     """The name of the nearest of the known keys, and its similarity.
 
@@ -52,9 +72,4 @@ def nearest(key: SkillSignature, known: Mapping[str, SkillSignature]) -> tuple[s
         Name and similarity, the first by name of keys that are equally near; None where no key has
         anything in common.
     """
-    best: tuple[str, float] | None = None
-    for name in sorted(known):
-        similarity = key.similarity(known[name])
-        if similarity > 0.0 and (best is None or similarity > best[1] + 1e-12):
-            best = name, similarity
-    return best
+    return next(iter(by_similarity(key, known)), None)

@@ -9,20 +9,20 @@ so that one that is resumed there ends with the same weights.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from stable_baselines3.common.logger import Logger
 
 from slap_ros.acquisition.training.episodes import Episodes
+from slap_ros.acquisition.training.guided_sac import Guide, GuidedSac
 from slap_ros.acquisition.training.replay_buffer import SkillReplayBuffer
 from slap_ros.acquisition.training.sac_settings import SacSettings
-from slap_ros.acquisition.training.sac_update import LeanSac
 from slap_ros.acquisition.training.skill_env import SkillVecEnv
+from slap_ros.acquisition.training.warm_start_settings import WarmStartSettings
 from slap_ros.errors import InvalidParameterError
 from slap_ros.learning.checkpoint import load_checkpoint, save_checkpoint
 from slap_ros.learning.policy_export import exported_layers, hidden_layers
@@ -33,53 +33,6 @@ from slap_ros.skills.observations import SIZE
 WORTH_A_THREAD = 128  # units of a critic's layer; with fewer, waking a second one takes longer
 ONE = np.ones(SIZE, dtype=np.float32)
 AS_OBSERVED = ObservationNormalisation(0.0 * ONE, ONE)  # clipped alone: any skill can begin another
-
-
-class ExploringSac(LeanSac):
-    """SAC whose noise is held: in the last environment longest, in each before it half as long.
-
-    Random actions of the beginning are held for 1, 2, 3 steps and so on. Noise that is correlated
-    in time reaches what white noise hardly does (Eberhard et al. 2023): fingers that are to grasp
-    must close for some steps on end. It is a function of seed and step, so that nothing of it
-    needs to be kept.
-    """
-
-    longest_hold = 1  # longest time that noise is held, environment steps
-
-    def _sample_action(
-        self, learning_starts: int, action_noise: Any = None, n_envs: int = 1
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        del action_noise
-        if self.num_timesteps < learning_starts:
-            holds = [1 + env % self.longest_hold for env in range(n_envs)]
-            drawn = [rng.uniform(-1.0, 1.0, self._axes) for rng in self._draws(holds)]
-            actions = np.stack(drawn).astype(np.float32)
-        else:
-            holds = [max(1, self.longest_hold >> (n_envs - 1 - env)) for env in range(n_envs)]
-            noise = [rng.standard_normal(self._axes) for rng in self._draws(holds)]
-            actions = self._act_with(np.stack(noise).astype(np.float32))
-        return actions, actions
-
-    def _draws(self, holds: Sequence[int]) -> Iterator[np.random.Generator]:
-        """A generator for each environment, the same for the steps that it holds what it drew."""
-        assert self.seed is not None
-        step = self.num_timesteps // len(holds)
-        for env, hold in enumerate(holds):
-            yield np.random.default_rng((self.seed, env, step // hold))
-
-    @property
-    def _axes(self) -> int:
-        assert self.action_space.shape is not None
-        return self.action_space.shape[0]
-
-    def _act_with(self, noise: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The policy's actions in the present states, given noise of deviation 1, (n, axes)."""
-        with torch.no_grad():
-            mean, log_std = self.distribution(torch.as_tensor(self._last_obs))
-            actions: NDArray[np.float32] = torch.tanh(
-                mean + log_std.exp() * torch.from_numpy(noise)
-            ).numpy()
-        return actions
 
 
 class SkillLearner:
@@ -105,7 +58,7 @@ class SkillLearner:
         self.settings, self._env = settings, env
         actions = env.action_map.size
         critic_hidden = list(settings.critic_net_arch or settings.net_arch)
-        self._sac = ExploringSac(
+        self._sac = GuidedSac(
             "MlpPolicy",
             StableBaselinesVecEnv(env, AS_OBSERVED),
             learning_rate=settings.learning_rate,
@@ -174,8 +127,12 @@ class SkillLearner:
     def _layer_names(self) -> list[str]:
         return [*hidden_layers("latent_pi", len(self.settings.net_arch)), "mu"]
 
-    def begin_with(self, policy: MlpPolicy) -> None:
+    def begin_with(self, policy: MlpPolicy, settings: WarmStartSettings) -> None:
         """Begin with the layers of another skill's policy; its noise is not taken over.
+
+        Args:
+            policy: Policy of the other skill.
+            settings: Settings of the warm start: how the policy is kept from being destroyed.
 
         Raises:
             InvalidParameterError: It has other layers.
@@ -193,6 +150,7 @@ class SkillLearner:
             for tensors in (now, self._sac.averaged):
                 tensors[f"{name}.weight"].copy_(torch.from_numpy(weight))
                 tensors[f"{name}.bias"].copy_(torch.from_numpy(bias))
+        self._sac.be_guided(Guide.of(policy, settings))
 
     # -- checkpoints ------------------------------------------------------------------------------
 

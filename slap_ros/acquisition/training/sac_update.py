@@ -79,6 +79,21 @@ class LeanSac(SAC):
                 torch._foreach_lerp_(following, online, self.tau)
         self._n_updates += gradient_steps
 
+    def train_critics(self, gradient_steps: int, batch_size: int) -> None:
+        """Update the critics alone, so that they know what the actor is worth as it is.
+
+        Args:
+            gradient_steps: Number of updates.
+            batch_size: Number of transitions of each update.
+        """
+        assert self.log_ent_coef is not None
+        ent_coef = self.log_ent_coef.detach().exp()
+        for _ in range(gradient_steps):
+            batch = self.replay_buffer.sample(batch_size)  # type: ignore[union-attr]
+            self._update_critic(batch, ent_coef)
+            with torch.no_grad():
+                torch._foreach_lerp_(self._target.tensors, self._online.tensors, self.tau)
+
     @contextmanager
     def _threads(self) -> Iterator[None]:
         """Two threads where there is a core for the second: a critic each, so that no sum changes.
@@ -153,11 +168,28 @@ class LeanSac(SAC):
             forward = self._online(observations, actions)
             by_values = _share_in_minimum(forward.values).mul_(-1.0 / n)
             by_actions = self._online.action_gradient(forward, by_values, axes)
+            self._add_to_gradient(by_actions, observations, actions, forward.values)
             by_log_prob = (ent_coef / n).expand_as(log_prob)
         gradients = torch.autograd.grad(
             (actions, log_prob), self._actor_weights, (by_actions, by_log_prob)
         )
         _descend(self.actor.optimizer, self._actor_weights, gradients)
+
+    def _add_to_gradient(
+        self,
+        by_actions: torch.Tensor,
+        observations: torch.Tensor,
+        actions: torch.Tensor,
+        values: torch.Tensor,
+    ) -> None:
+        """Add to the gradient of the actor's loss by actions what a subclass wants of them.
+
+        Args:
+            by_actions: Gradient, shape (n, axes), which is changed in place.
+            observations: Observations, shape (n, size).
+            actions: Actions drawn from the policy, shape (n, axes).
+            values: Values of the actions by both critics, shape (2, n, 1).
+        """
 
 
 def _share_in_minimum(values: torch.Tensor) -> torch.Tensor:

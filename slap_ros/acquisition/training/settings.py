@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from slap_ros.acquisition.training.sac_settings import SAC_PRESETS, SacSettings
+from slap_ros.acquisition.training.warm_start_settings import WarmStartSettings
 from slap_ros.errors import InvalidParameterError
 
 
@@ -33,6 +34,7 @@ class AcquisitionSettings:
             before.
         least_similarity: Least similarity of a known skill to a new one that begins with its
             weights.
+        warm_start: Settings of how a new skill makes use of a known one.
     """
 
     sac: SacSettings = field(default_factory=SacSettings)
@@ -48,6 +50,7 @@ class AcquisitionSettings:
     patience: int = 2
     rehearsal: float = 0.25
     least_similarity: float = 0.3
+    warm_start: WarmStartSettings = field(default_factory=WarmStartSettings)
 
     def __post_init__(self) -> None:
         for name in ("rollouts", "validation", "judged", "segment_episodes", "patience"):

@@ -210,11 +210,13 @@ class SkillTraining:
             learner: Learner that continues.
             number: Number of the round, from 0.
             done: Number of segments so far, of all rounds.
-            beginning: Policy of another skill that the first round begins with; None for random
-                weights.
+            beginning: Policy of another skill that the first round begins with, and that guides
+                it when it is resumed as well; None for random weights.
         """
         types = self.domain.types_by_name
         earlier = [load_episodes(self._episodes(i), types) for i in range(done)]
+        if beginning is not None:
+            learner.begin_with(beginning, self.settings.warm_start)
         if done:
             # Where none has succeeded yet, the last one has learned most.
             previous = self._rounds[number - 1]
@@ -222,8 +224,6 @@ class SkillTraining:
             worse = begins and previous.segments[-1] < previous.success
             path = self.folder / "best.pt" if worse else self._checkpoint(done)
             learner.resume(path, earlier)
-        elif beginning is not None:
-            learner.begin_with(beginning)
 
     def _judge(
         self, learner: SkillLearner, judge: Judge, done: int, before: Round | None

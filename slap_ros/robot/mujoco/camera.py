@@ -16,9 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError, InvalidSceneError
 from slap_ros.geometry.pose import Pose, Quaternion, multiply
+from slap_ros.relational import State
 from slap_ros.robot.mujoco.engine import mujoco
+from slap_ros.robot.mujoco.model import compiled, scene_around, scene_spec
+from slap_ros.robot.mujoco.plant import MujocoPlant
 from slap_ros.robot.tagged_scene import PlacedTag
 from slap_ros.vision.pinhole_camera import PinholeCamera
 from slap_ros.vision.tags import CELLS, MARGIN, tag_image
@@ -38,6 +42,33 @@ NO_GL = (
     "no OpenGL for the camera ({error}): install Debian's packages libegl1 and libgl1-mesa-dri, or "
     "libosmesa6 and set MUJOCO_GL=osmesa"
 )
+
+
+def tagged_plant(
+    domain: Domain,
+    initial: State,
+    tags: Sequence[PlacedTag],
+    camera: PinholeCamera,
+    pose: Pose,
+) -> tuple[MujocoPlant, Any]:
+    """A plant whose objects have tags, and its model with a camera.
+
+    Args:
+        domain: Domain of the state.
+        initial: State to begin in.
+        tags: Tags, and where they are.
+        camera: Intrinsics of the camera.
+        pose: Pose of its optical frame in the robot's base.
+
+    Raises:
+        InvalidSceneError: MuJoCo cannot express the scene, or a tag is on no object of it.
+    """
+    scene = scene_around(domain, initial)
+    spec = scene_spec(scene, initial)
+    add_camera(spec, camera, pose)
+    add_tags(spec, tags)
+    model = compiled(spec)
+    return MujocoPlant(model, scene, initial), model
 
 
 def add_camera(spec: Any, camera: PinholeCamera, pose: Pose) -> None:

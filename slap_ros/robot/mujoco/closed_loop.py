@@ -17,16 +17,14 @@ from slap_ros.errors import (
     InvalidStateError,
     NoDetectionError,
 )
-from slap_ros.geometry.pose import IDENTITY
 from slap_ros.relational import State
 from slap_ros.robot.finger_tracking import FingerTracker
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.joint_trajectory import TrajectoryPoint
 from slap_ros.robot.limits import PANDA, JointMotion, Limits, Workspace
 from slap_ros.robot.mujoco.arm import FINGER_FORCE, PERIOD_S
-from slap_ros.robot.mujoco.plant import MujocoPlant
+from slap_ros.robot.mujoco.detectors import ExactDetector, ObjectDetector
 from slap_ros.robot.robot_world import GAP_OPEN, GAP_SHUT, GripperAction, RobotWorld
-from slap_ros.robot.scene_config import DETECTED, sampled_scene_config
 from slap_ros.robot.tracking import TrackingSettings
 from slap_ros.robot.trajectory_tracking import (
     TrajectoryCode,
@@ -49,7 +47,6 @@ class ClosedLoopSettings:
         tracking: How far detections can be trusted.
         tolerances: Tolerances of the arm's controller.
         finger_force: Largest force of each finger, N.
-        detection_period_s: Time between two detections, s.
         settle_time_s: Time to wait for what moves to come to rest, s.
         detection_timeout_s: Time without a state after which a step fails, s.
     """
@@ -58,7 +55,6 @@ class ClosedLoopSettings:
     tracking: TrackingSettings = field(default_factory=TrackingSettings)
     tolerances: TrajectoryTolerances = TOLERANCES
     finger_force: float = FINGER_FORCE
-    detection_period_s: float = 1.0 / 30.0
     settle_time_s: float = 1.5
     detection_timeout_s: float = 2.0
 
@@ -70,6 +66,7 @@ class ClosedLoopWorld:
         domain: Domain with a Panda.
         initial: State of a task, in which the plant begins.
         settings: Settings of the loop.
+        detector: What tells where objects are, with the plant; without one, poses are exact.
 
     Raises:
         SlapError: MuJoCo cannot express the scene, or it cannot be measured.
@@ -80,14 +77,13 @@ class ClosedLoopWorld:
         domain: Domain,
         initial: State,
         settings: ClosedLoopSettings | None = None,
+        detector: ObjectDetector | None = None,
     ) -> None:
         settings = settings or ClosedLoopSettings()
         self._settings = settings
-        self._period_s = domain.execution.control_period_s
-        self.plant = MujocoPlant.of(domain, initial)
-        self._robot = RobotWorld(
-            domain, sampled_scene_config(initial), settings.limits, settings.tracking
-        )
+        self._detector = detector or ExactDetector(domain, initial)
+        self.plant = self._detector.plant
+        self._robot = RobotWorld(domain, self._detector.config, settings.limits, settings.tracking)
         self._arm, self._fingers = TrajectoryTracker(self.plant.joints), FingerTracker()
         self._detected_s = self.plant.time_s
         self._state = self._measured(self.plant.time_s)
@@ -118,8 +114,9 @@ class ClosedLoopWorld:
         return self._state
 
     def close(self) -> None:
-        """Release what the core of the bridge uses."""
+        """Release what the core of the bridge and the detector use."""
         self._robot.close()
+        self._detector.close()
 
     def _actuate(self, action: GripperAction) -> None:
         """As the bridge does: what closes around nothing is opened again."""
@@ -172,12 +169,13 @@ class ClosedLoopWorld:
         plant = self.plant
         plant.command(self._arm.command(plant.time_s))
         plant.step()
-        if plant.time_s - self._detected_s < self._settings.detection_period_s - 0.5 * PERIOD_S:
+        if plant.time_s - self._detected_s < self._detector.period_s - 0.5 * PERIOD_S:
             return False
         self._detected_s = now_s = plant.time_s
         self._robot.add_joint_reading(
             JointReading(now_s, tuple(plant.joints), tuple(plant.joint_velocities), plant.gap)
         )
-        for name, pose in plant.poses().items():
-            self._robot.add_detection(f"{DETECTED}{name}", now_s, IDENTITY, pose)
+        if not self._arm.busy:  # what is detected on the way counts for nothing
+            for found in self._detector.detect():
+                self._robot.add_detection(found.frame, now_s, found.base, found.seen)
         return True

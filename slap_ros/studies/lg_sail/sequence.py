@@ -1,0 +1,265 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""One goal after another with one library: what later goals cost, what is forgotten (Fig. 5)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import fmean
+from typing import TYPE_CHECKING, Annotated, Any
+
+from slap_ros.api.acquisition_sequence import SequenceStep
+from slap_ros.api.command_options import CommandOption, DomainName, Jobs
+from slap_ros.api.left_out import Tell
+from slap_ros.domains import get_domain
+from slap_ros.errors import InvalidLibraryError, InvalidParameterError
+from slap_ros.evaluation.summary import Spread
+from slap_ros.learning.work_folder import DECODING_ERRORS
+from slap_ros.skills.skill_library import read_library_record
+from slap_ros.studies.comparison import format_spread
+from slap_ros.studies.figures import LINES
+from slap_ros.studies.options import RESULTS, Output
+from slap_ros.studies.results import Data, MarkdownTable, StudyReport
+from slap_ros.studies.study import PaperFigure, PreparedStudy, Study
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MEASURED = """\
+Skills are acquired for one goal after another. A library is carried on: skills that carry out the
+next goal are used as they are, and learned further where they fail. Beside it are sequences in
+which each goal is learned from scratch, where such were run. Steps are those of learning for a
+goal, all skills together, the mean ± sample standard deviation over sequences; they go on until
+nothing fails, or the budget is spent, so that a goal costs steps also after .8 was reached. Task
+progress is measured after each goal, in tasks that training never sees: of the goal itself, and the
+mean over all goals before it, with what it was right after each was learned. The paper counts steps
+until three judgements in a row have 80 % of success."""
+SEQUENCES = "runs/sequences"
+CARRIED, SCRATCH = "carried on", "from scratch"
+
+
+@dataclass(frozen=True)
+class GoalOfSequence:
+    """A goal, over all sequences of one kind.
+
+    Args:
+        goal: Name of the goal, or its atoms.
+        steps: Environment steps that each sequence learned for it.
+        progress: Task progress on it right after it was learned, of each sequence.
+        kept: Mean task progress on all goals before it, of each sequence; empty for the first.
+        before: Mean of what that was right after each of these goals was learned.
+    """
+
+    goal: str
+    steps: tuple[int, ...]
+    progress: tuple[float, ...]
+    kept: tuple[float, ...]
+    before: tuple[float, ...]
+
+
+def goals_of(sequences: Sequence[Sequence[SequenceStep]]) -> list[GoalOfSequence]:
+    """The goals of sequences that have the same ones, in their order."""
+    found = []
+    for number, first in enumerate(sequences[0] if sequences else ()):
+        own = [sequence[number] for sequence in sequences]
+        earlier = [[one.goal for one in sequence[:number]] for sequence in sequences]
+        kept = [
+            fmean(s.tried[g] for g in goals) for s, goals in zip(own, earlier, strict=True) if goals
+        ]
+        before = [
+            fmean(one.tried[one.goal] for one in sequence[:number])
+            for sequence in sequences
+            if number
+        ]
+        progress = tuple(one.tried[one.goal] for one in own)
+        steps = tuple(one.steps for one in own)
+        found.append(GoalOfSequence(first.goal, steps, progress, tuple(kept), tuple(before)))
+    return found
+
+
+def later_share(goals: Sequence[GoalOfSequence]) -> float | None:
+    """Mean environment steps of all goals after the first, over those of the first."""
+    if len(goals) < 2 or not sum(goals[0].steps):
+        return None
+    return fmean(fmean(goal.steps) for goal in goals[1:]) / fmean(goals[0].steps)
+
+
+def study(domain: str, kinds: Mapping[str, Sequence[Sequence[SequenceStep]]]) -> StudyReport:
+    """Compare the costs of goals in sequences of both kinds.
+
+    Args:
+        domain: Name of the domain.
+        kinds: Sequences that carry a library on, and those from scratch; all have the same goals.
+
+    Returns:
+        The report.
+    """
+    goals = {kind: goals_of(sequences) for kind, sequences in kinds.items()}
+    shares = {kind: later_share(of_kind) for kind, of_kind in goals.items()}
+    return StudyReport(
+        study="sequence",
+        source="LG-SAIL Fig. 5",
+        title=f"One goal after another: {domain}",
+        measured=MEASURED,
+        table=MarkdownTable(
+            (
+                "library",
+                "goal",
+                "sequences",
+                "steps",
+                "task progress",
+                "on goals before",
+                "as these were learned",
+            ),
+            [_row(kind, goal) for kind, of_kind in goals.items() for goal in of_kind],
+        ),
+        found={
+            "later_over_first": shares,
+            "sequences": {
+                kind: [[step.as_json() for step in steps] for steps in sequences]
+                for kind, sequences in kinds.items()
+            },
+        },
+        draw=lambda figure: draw(figure, goals),
+        size=(7.0, 3.2),
+    )
+
+
+def _row(kind: str, goal: GoalOfSequence) -> list[str]:
+    return [
+        kind,
+        goal.goal,
+        str(len(goal.steps)),
+        format_spread(Spread.of([float(steps) for steps in goal.steps]), 0),
+        format_spread(Spread.of(goal.progress), 2),
+        format_spread(Spread.of(goal.kept), 2) if goal.kept else "-",
+        format_spread(Spread.of(goal.before), 2) if goal.before else "-",
+    ]
+
+
+def draw(figure: Figure, kinds: Mapping[str, Sequence[GoalOfSequence]]) -> None:
+    """Draw the steps of each goal, every sequence a dot, and their means as a line."""
+    axes = figure.subplots()
+    for colour, (kind, goals) in zip(LINES, kinds.items(), strict=False):
+        places = range(1, len(goals) + 1)
+        means = [fmean(goal.steps) for goal in goals]
+        axes.plot(places, means, color=colour, linewidth=1.2, label=kind)
+        for place, goal in zip(places, goals, strict=True):
+            axes.plot([place] * len(goal.steps), goal.steps, ".", color=colour)
+    axes.set_xlabel("goal, in the order of the sequence")
+    axes.set_ylabel("environment steps")
+    axes.legend(loc="upper right")
+
+
+def _summary(found: Data) -> str:
+    shares = found["later_over_first"]
+    said = [
+        f"{kind}: {share:.2f} of the first goal's steps for each later one"
+        for kind, share in shares.items()
+        if share is not None
+    ]
+    return ", ".join(said) or "nothing was learned for the first goal"
+
+
+@dataclass(frozen=True, kw_only=True)
+class SequenceStudyOptions:
+    """Options of this study."""
+
+    domain: DomainName
+    library: Annotated[
+        list[Path] | None,
+        CommandOption(
+            "Folder that `slap acquire-sequence` made, one per seed, with --scratch or without. "
+            f"May be repeated. Default: all in {SEQUENCES}/DOMAIN*.",
+            metavar="FOLDER",
+        ),
+    ] = None
+    jobs: Jobs = 1
+    output: Output = RESULTS
+
+
+def prepare(options: SequenceStudyOptions, tell: Tell) -> PreparedStudy:
+    """Read every sequence; one that cannot be used is left out, and said.
+
+    Raises:
+        InvalidParameterError: None can be used, or they have other goals.
+    """
+    domain = get_domain(options.domain)
+    folders = options.library or _in_runs(domain.name)
+    kinds: dict[str, list[tuple[SequenceStep, ...]]] = {CARRIED: [], SCRATCH: []}
+    for folder in folders:
+        try:
+            kind, steps = read_sequence(folder, domain.name)
+        except InvalidLibraryError as error:
+            tell(f"a sequence is left out: {error}")
+            continue
+        kinds[kind].append(steps)
+    sequences = [steps for of_kind in kinds.values() for steps in of_kind]
+    if not sequences:
+        raise InvalidParameterError(
+            f"no sequence of {domain.name} is left; `slap acquire-sequence {domain.name}` makes one"
+        )
+    if len({tuple(step.goal for step in steps) for steps in sequences}) > 1:
+        raise InvalidParameterError("these sequences have different goals; compare others")
+    known = {kind: of_kind for kind, of_kind in kinds.items() if of_kind}
+    counts = {kind: len(of_kind) for kind, of_kind in known.items()}
+    return PreparedStudy(
+        {"trainings": len(sequences), "sequences": counts},
+        lambda _: study(domain.name, known),
+        {
+            "library": [folder.as_posix() for folder in folders] if options.library else None,
+            "trainings": None,
+        },
+    )
+
+
+def read_sequence(folder: Path, domain: str) -> tuple[str, tuple[SequenceStep, ...]]:
+    """The kind of a sequence, and what came of each of its goals.
+
+    Args:
+        folder: Folder of the sequence's last library.
+        domain: Name of the domain that it must be of.
+
+    Raises:
+        InvalidLibraryError: There is no library, it is another domain's, or no sequence made it.
+    """
+    about = read_library_record(folder)
+    if about["domain"] != domain:
+        raise InvalidLibraryError(f"{folder}: of domain {about['domain']!r}, not of {domain!r}")
+    try:
+        sequence: Any = about["sequence"]
+        steps = tuple(map(SequenceStep.from_json, sequence["goals"]))
+        for number, step in enumerate(steps):
+            if any(goal.goal not in step.tried for goal in steps[: number + 1]):
+                raise ValueError(f"after {step.goal}, not all goals were tried")
+        if not steps:
+            raise ValueError("it has no goals")
+        return SCRATCH if sequence["scratch"] else CARRIED, steps
+    except DECODING_ERRORS as error:
+        raise InvalidLibraryError(
+            f"{folder}: no sequence made it, or it is damaged ({error!r}); `slap "
+            f"acquire-sequence {domain}` makes one"
+        ) from error
+
+
+def _in_runs(domain: str) -> list[Path]:
+    """The sequences of a domain in the folder in which they are by default."""
+    found = [*Path(SEQUENCES).glob(f"{domain}*"), *Path(SEQUENCES).glob(f"{domain}*/*")]
+    return sorted(path for path in found if (path / "library.json").exists())
+
+
+STUDY = Study(
+    "sequence",
+    help="LG-SAIL Fig. 5: environment steps of one goal after another, and what is forgotten.",
+    example="slap study sequence groceries",
+    options=SequenceStudyOptions,
+    prepare=prepare,
+    summary=_summary,
+    figures=(
+        PaperFigure(
+            "LG-SAIL Fig. 5", "a sequence of tasks", ("groceries", "bowls"), {"": "curves"}
+        ),
+    ),
+)

@@ -1,0 +1,257 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Plans with shortcuts of other learners: other algorithms, or one policy for all.
+
+SLAP Table 3 and Fig. 6. A library's record says how it was learned. Libraries of the same learner
+share a row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from slap_ros.api.command_options import DomainName, Jobs, Preset, Samples
+from slap_ros.api.left_out import Tell
+from slap_ros.api.library_descriptions import describe_library
+from slap_ros.api.shortcut_choice import SAMPLES, sampling
+from slap_ros.domains import get_domain
+from slap_ros.errors import InvalidParameterError
+from slap_ros.evaluation.approaches import PURE_PLANNING, Approach, approaches
+from slap_ros.evaluation.experiment import Experiment, Trial
+from slap_ros.shortcuts.sampling import Sampling
+from slap_ros.shortcuts.shipped import shipped_libraries
+from slap_ros.shortcuts.shortcut_library import Record, ShortcutLibrary
+from slap_ros.skills.domain_choice import DomainChoice
+from slap_ros.studies.comparison import (
+    PlanningSetup,
+    format_spread,
+    named_tasks,
+    not_solved,
+    solve_task,
+)
+from slap_ros.studies.figures import LINES, label
+from slap_ros.studies.job_runner import Job, JobRunner
+from slap_ros.studies.options import FRESH_SEED, RESULTS, FirstSeed, Libraries, Output, Seeds, Tasks
+from slap_ros.studies.results import Data, MarkdownTable, StudyReport
+from slap_ros.studies.row_figures import name_rows, plot_each
+from slap_ros.studies.slap.table1 import (
+    LibraryTrials,
+    Row,
+    TrainedLibrary,
+    open_library,
+    relative_cell,
+)
+from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, PreparedStudy, Study, format_steps
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MEASURED = """\
+Every task is planned and executed in the world, with the shortcuts of each library. Libraries of
+the same learner share a row: a policy for each shortcut by PPO (ours) or by SAC, or one policy for
+all (Abstract Subgoals), and the same by SAC with relabelled steps (Abstract HER). Success has
+Wilson's 95 % interval. Length is the mean over solved tasks with the sample standard deviation.
+Relative length is over tasks that pure planning solved too. Shortcuts are those that a training
+kept, and steps the environment steps in which they were learned, both as means over libraries."""
+
+
+def learner_of(record: Record) -> str:
+    """The learner of a library, as rows are called.
+
+    Args:
+        record: Record of how the library was made.
+    """
+    settings: Mapping[str, Any] = record.get("settings", {})
+    sac = settings.get("sac")
+    if settings.get("together", 1) > 1:
+        if sac is None:
+            return "subgoals"
+        return "abstract_her" if sac["hindsight"] else "subgoals_sac"
+    return "independent_ppo" if sac is None else "independent_sac"
+
+
+def study(
+    experiment: Experiment,
+    libraries: Sequence[TrainedLibrary],
+    chosen: Sampling,
+    runner: JobRunner,
+) -> StudyReport:
+    """Plan with every library, and put those of the same learner together.
+
+    Args:
+        experiment: Tasks to solve.
+        libraries: Libraries to plan with.
+        chosen: Settings of how shortcuts are tried out.
+        runner: Runner of the jobs.
+
+    Returns:
+        The report.
+    """
+    experiment = experiment.without_repetitions()
+    planned = [("", "", PURE_PLANNING)]
+    for trained in libraries:
+        approach = approaches(trained.library, chosen)[-1]
+        planned.append((trained.name, trained.library.digest, approach))
+    batches = [_batch(experiment, *one) for one in planned]
+    preset = experiment.domain.preset
+    found = runner.run(preset, solve_task, Trial.from_json, *batches, failure=not_solved)
+    trials = [tuple(found[name] for name in batch) for batch in batches]
+    rows = [_row(experiment, PURE_PLANNING.name, {"": trials[0]}, trials[0])]
+    own = list(zip(libraries, trials[1:], strict=True))
+    for learner in dict.fromkeys(learner_of(one.library.record) for one in libraries):
+        of_it = {one.name: done for one, done in own if learner_of(one.library.record) == learner}
+        rows.append(_row(experiment, learner, of_it, trials[0]))
+    costs = [_costs([one.library for one in libraries], row.approach) for row in rows]
+    return StudyReport(
+        study="learners",
+        source="SLAP Table 3, Fig. 6",
+        title=f"Other learners of shortcuts: {experiment.domain.name}",
+        measured=MEASURED,
+        table=MarkdownTable(COLUMNS, [_cells(*one) for one in zip(rows, costs, strict=True)]),
+        found={"rows": [{**row.as_json(), **cost} for row, cost in zip(rows, costs, strict=True)]},
+        draw=lambda figure: _draw(figure, rows),
+        size=(7.0, 0.6 + 0.4 * len(rows)),
+    )
+
+
+def _batch(experiment: Experiment, library: str, digest: str, approach: Approach) -> dict[str, Job]:
+    """The tasks of an experiment, planned in one way."""
+    setup = PlanningSetup(DomainChoice.of(experiment.domain), experiment.planner, approach)
+    whose = " ".join(filter(None, (library, digest, approach.name)))
+    return {f"{whose}: {name}": (setup, *task) for name, task in named_tasks(experiment).items()}
+
+
+def _row(
+    experiment: Experiment,
+    name: str,
+    trials: Mapping[str, tuple[Trial, ...]],
+    pure: tuple[Trial, ...],
+) -> Row:
+    results = tuple(LibraryTrials(library, name, found) for library, found in trials.items())
+    return Row(experiment.domain.preset, name, len(experiment), results, pure)
+
+
+def _costs(libraries: Sequence[ShortcutLibrary], learner: str) -> Data:
+    """What the libraries of a learner have, and took; nothing of pure planning."""
+    own = [one for one in libraries if learner_of(one.record) == learner]
+    if not own:
+        return {}
+    steps = [one.record.get("environment_steps", {}).get("learning", 0) for one in own]
+    return {
+        "kept": [len(one.shortcuts) for one in own],
+        "learning_steps": steps,
+    }
+
+
+COLUMNS = (
+    "learner",
+    "tasks × libraries",
+    "success [95 %]",
+    "plan length [steps]",
+    "relative [95 %]",
+    "shortcuts kept",
+    "learning of these [steps]",
+)
+
+
+def _cells(row: Row, cost: Data) -> list[str]:
+    """A row of the page's table."""
+    rate, within = row.success
+    count = len(row.results)
+    return [
+        label(row.approach),
+        f"{row.tasks} × {count}" if cost else f"{row.tasks}",
+        f"{rate:.0%} [{within.low:.0%}, {within.high:.0%}]",
+        format_spread(row.length, 1),
+        relative_cell(row),
+        f"{sum(cost['kept']) / count:.1f}" if cost else "-",
+        f"{sum(cost['learning_steps']) / count:,.0f}" if cost else "-",
+    ]
+
+
+def _draw(figure: Figure, rows: Sequence[Row]) -> None:
+    """A dot for each row's mean length, a stroke for each of its tasks."""
+    axes = figure.subplots()
+    name_rows(axes, [label(row.approach) for row in rows])
+    for place, row in enumerate(rows):
+        plot_each(axes, place, [float(t.plan_length) for t in row.trials if t.success])
+        if row.length is not None:
+            axes.plot([row.length.mean], [place], "o", color=LINES[1], markersize=6)
+    axes.set_xlabel("plan length [steps]; strokes: tasks, dots: means")
+
+
+def _summary(found: Data) -> str:
+    return "; ".join(
+        f"{label(row['approach'])} {row['success_rate']:.0%}, "
+        f"{format_steps(row['plan_length'])} steps"
+        for row in found["rows"]
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class LearnersOptions:
+    """Options of this study."""
+
+    domain: DomainName
+    libraries: Libraries = None
+    preset: Preset = None
+    tasks: Tasks = 4
+    seeds: Seeds = 5
+    first_seed: FirstSeed = FRESH_SEED
+    samples: Samples = SAMPLES
+    jobs: Jobs = 1
+    output: Output = RESULTS
+
+
+def prepare(options: LearnersOptions, tell: Tell) -> PreparedStudy:
+    """Open every library.
+
+    Raises:
+        InvalidParameterError: There is none to compare.
+    """
+    domain = get_domain(options.domain, options.preset)
+    folders = options.libraries or shipped_libraries(options.domain)
+    trained = [one for folder in folders if (one := open_library(folder, domain, tell))]
+    if not trained:
+        raise InvalidParameterError(
+            f"no library of {domain.name} to compare: give --library, a folder that `slap train "
+            f"{domain.name} --settings subgoals` made"
+        )
+    own = {"tasks": options.tasks, "seeds": options.seeds, "first_seed": options.first_seed}
+    own["samples"] = options.samples
+    experiment = Experiment(domain, options.tasks, options.seeds, options.first_seed)
+    described = [
+        {**describe_library(one.name, one.library), "learner": learner_of(one.library.record)}
+        for one in trained
+    ]
+    return PreparedStudy(
+        {"preset": domain.preset, **own, "libraries": described},
+        lambda runner: study(experiment, trained, sampling(options.samples), runner),
+        {"library": options.libraries, "preset": domain.preset, **own},
+    )
+
+
+STUDY = Study(
+    "learners",
+    help="SLAP Table 3, Fig. 6: plans with shortcuts of other learners, and of one policy for all.",
+    example="slap study learners obstacle2d --library runs/models/subgoals",
+    options=LearnersOptions,
+    prepare=prepare,
+    summary=_summary,
+    figures=(
+        PaperFigure(
+            "SLAP Table 3",
+            "other algorithms that learn shortcuts",
+            ("cleanup_table",),
+            {"": "PPO 113.7, SAC 160.2, SAC+HER 131.0 steps; pure planning 446"},
+        ),
+        PaperFigure(
+            "SLAP Fig. 6",
+            "independent policies against one for all",
+            SLAP_DOMAINS,
+            {"": "independent policies are better"},
+        ),
+    ),
+)

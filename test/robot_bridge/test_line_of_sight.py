@@ -1,0 +1,185 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a camera knows of tags: their direction. Their distance is taken from elsewhere."""
+
+import math
+
+import numpy as np
+import pytest
+import yaml
+
+from slap_ros.domains import get_domain
+from slap_ros.geometry.pose import NO_ROTATION, Pose, from_rotation_vector, from_yaw
+from slap_ros.robot.grasp_tracking import expected_pose, grasp_as_seen
+from slap_ros.robot.joint_reading import JointReading
+from slap_ros.robot.limits import PANDA, Workspace
+from slap_ros.robot.line_of_sight import across, is_slanted
+from slap_ros.robot.robot_world import RobotWorld
+from slap_ros.robot.scene_config import scene_config
+from slap_ros.robot.state_assembly import Grasp
+from slap_ros.robot.tagged_scene import placed_tags, tagged_scene
+from slap_ros.robot.tracking import Detection, Track, TrackingSettings, still
+from slap_ros.vision.pinhole_camera import looking_at
+from slap_ros.vision.tags import tag_frame
+from slap_ros.worlds.features import JOINT_FEATURES, POSE_FEATURES
+from slap_ros.worlds.joint_space.scene import TABLE, TABLE_TOP, cube
+from slap_ros.worlds.joint_space.settling import resting_poses
+from slap_ros.worlds.panda import HOME
+
+EYE = (1.05, -0.45, 0.75)  # m
+CAMERA = looking_at(EYE, (0.5, 0.0, 0.1))
+DOMAIN = get_domain("obstacle_tower", "fair")
+TASK = DOMAIN.task(1)
+
+
+def farther(point, by):
+    """A point as seen at a wrong distance, m."""
+    sight = np.subtract(point, EYE)
+    return tuple((np.array(point) + by * sight / np.linalg.norm(sight)).tolist())
+
+
+@pytest.mark.parametrize("errors", [(0.01, -0.01, 0.006), (-0.008, 0.009, -0.011)])
+def test_a_tower_seen_at_wrong_distances_stands_where_it_is(errors):
+    """What is a centimetre too high or too low is beside its place as well."""
+    cubes = [cube(f"block{i}") for i in range(3)]
+    true = [(0.5, 0.05, TABLE_TOP + 0.05 * (i + 0.5)) for i in range(3)]
+    seen = {i: Pose(farther(true[i], errors[i])) for i in range(3)}
+    fixed = [TABLE.at(TABLE.pose)]
+    found = resting_poses(seen, cubes, fixed, dict.fromkeys(seen, EYE))
+    for i, pose in found.items():
+        assert pose.position == pytest.approx(true[i], abs=1e-4)
+    upright = resting_poses(seen, cubes, fixed)
+    assert math.dist(upright[0].position, true[0]) > 0.005
+
+
+def test_a_camera_level_with_the_table_says_no_place_along_its_sight():
+    """There a millimetre of height would be decimetres of distance."""
+    seen = Pose((0.5, 0.0, TABLE_TOP + 0.025 + 0.005))
+    level = {0: (1.5, 0.0, TABLE_TOP + 0.03)}
+    (found,) = resting_poses({0: seen}, [cube("a")], [TABLE.at(TABLE.pose)], level).values()
+    assert found.position == pytest.approx((0.5, 0.0, TABLE_TOP + 0.025), abs=1e-9)
+
+
+def test_tags_that_come_and_go_in_pictures_move_nothing():
+    """Each is seen at another distance: their mean jumps with every tag that is found or missed."""
+    track, true = Track(TrackingSettings()), (0.5, 0.1, 0.1)
+    for number in range(1, 24):
+        if number == 11:
+            first = track.estimate(0.0)
+            assert first.at_rest
+            track.remember(first)
+        for frame, error in (("a", 0.009), ("b", -0.009))[number % 2 :]:
+            pose = Pose(farther(true, error), NO_ROTATION)
+            track.add(Detection(0.1 * number, pose, frame, EYE))
+    assert track.estimate(1.0).pose == first.pose
+    beside = np.cross(np.subtract(true, EYE), (0.0, 0.0, 1.0))
+    moved = np.array(true) + 0.012 * beside / np.linalg.norm(beside)
+    for number in range(24, 34):
+        pose = Pose(tuple(moved.tolist()), NO_ROTATION)
+        track.add(Detection(0.1 * number, pose, "a", EYE))
+    assert track.estimate(2.35).pose.position == pytest.approx(tuple(moved.tolist()))
+
+
+def test_only_errors_of_the_distance_are_left_out():
+    """Also where there is a camera, what is 4 cm nearer has been moved."""
+    point = (0.5, 0.1, 0.1)
+    near = np.subtract(farther(point, 0.01), point)
+    assert across(near, point, EYE) == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
+    assert across(near, point, None) == tuple(near)
+    far = np.subtract(farther(point, 0.04), point)
+    assert math.hypot(*across(far, point, EYE)) == pytest.approx(0.025)
+    assert across((0.0, 0.0, 0.0), EYE, EYE) == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("degrees", "slanted"), [(0.0, False), (55.0, False), (80.0, True), (100.0, True)]
+)
+def test_tags_seen_from_the_side_are_slanted(degrees, slanted):
+    turn = from_rotation_vector((math.pi - math.radians(degrees), 0.0, 0.0))
+    assert is_slanted(Pose((0.0, 0.0, 1.0), turn)) == slanted
+
+
+class TaggedBench:
+    """A RobotWorld that is told of tags, as a camera sees them."""
+
+    def __init__(self):
+        state = TASK.initial_state
+        self.config = scene_config(yaml.safe_load(tagged_scene(DOMAIN, state)), "here", DOMAIN)
+        self.tags = placed_tags(self.config)
+        tracking = TrackingSettings(hidden_after=5)
+        self.world = RobotWorld(DOMAIN, self.config, PANDA.scaled(0.5, Workspace()), tracking)
+        self.now = 0.0
+        self.poses = {
+            obj: Pose(*parts(obj, state)) for obj in state.objects if obj.name.startswith("block")
+        }
+        (robot,) = [o for o in state.objects if o.type.name == "robot"]
+        self.joints = tuple(float(state.get(robot, f.name)) for f in JOINT_FEATURES)
+
+    def look(self, error=0.0, slanted_error=0.0, without=(), times=12):
+        for _ in range(times):
+            self.now += 0.1
+            for tag in self.tags:
+                pose = self.poses[tag.obj].compose(tag.pose)
+                seen = CAMERA.inverse().compose(pose)
+                wrong = slanted_error if is_slanted(seen) else error
+                pose = Pose(farther(pose.position, wrong), pose.quaternion)
+                seen = CAMERA.inverse().compose(pose)
+                if tag.obj.name not in without:
+                    self.world.add_detection(tag_frame(tag.tag), self.now, CAMERA, seen)
+            self.world.add_joint_reading(JointReading(self.now, self.joints, gap=0.08))
+
+
+def parts(obj, state):
+    x, y, z, *turn = (float(state.get(obj, f.name)) for f in POSE_FEATURES)
+    return (x, y, z), tuple(turn)
+
+
+def test_a_state_by_camera_is_the_task_in_spite_of_distances_and_slanted_tags():
+    bench = TaggedBench()
+    bench.look(error=0.008, slanted_error=0.05)
+    state = bench.world.measure(0.0)
+    for obj, pose in bench.poses.items():
+        assert parts(obj, state)[0] == pytest.approx(pose.position, abs=3e-4)
+    space = DOMAIN.atom_space(TASK.initial_state)
+    assert space.abstract(state) == space.abstract(TASK.initial_state)
+
+
+def test_what_moves_where_nothing_sees_it_is_where_the_model_has_it():
+    """An arm hides what it moves; where that was before, other blocks or the arm may be by now."""
+    bench = TaggedBench()
+    dropped, other = (TASK.initial_state.layout.object(name) for name in ("block2", "block1"))
+    bench.poses[dropped] = Pose((0.4, 0.2, TABLE_TOP + 0.08))  # in the air, as it was seen last
+    bench.look()
+    before = bench.world.measure(0.0)
+    bench.world.plan_command(np.zeros(8))
+    since = bench.now
+    bench.look(without=("block2",))
+    after = bench.world.measure(since)
+    assert before.get(dropped, "z") == pytest.approx(TABLE_TOP + 0.08, abs=1e-3)
+    assert after.get(dropped, "z") == pytest.approx(TABLE_TOP + 0.025, abs=1e-3)
+    assert parts(other, after) == parts(other, before)
+    bench.poses[dropped] = Pose((0.4, 0.25, TABLE_TOP + 0.025))
+    since = bench.now
+    bench.look()  # it is seen again: elsewhere
+    assert bench.world.measure(since).get(dropped, "y") == pytest.approx(0.25, abs=1e-3)
+    since = bench.now
+    bench.look(without=("block2",))  # and hidden again, where it is
+    assert bench.world.measure(since).get(dropped, "y") == pytest.approx(0.25, abs=1e-3)
+
+
+@pytest.mark.parametrize("error", [-0.01, 0.01])
+def test_a_slip_in_the_hand_is_known_but_for_how_far_away_it_is_seen(error):
+    reading = JointReading(1.0, tuple(HOME), gap=0.05)
+    grasp = Grasp(TASK.initial_state.layout.object("block1"), Pose((0.0, 0.0, 0.1)), 0.025)
+    held = expected_pose(grasp, reading)
+    beside = np.cross(np.subtract(held.position, EYE), (0.0, 0.0, 1.0))
+    slipped = np.array(held.position) + 0.012 * beside / np.linalg.norm(beside)
+    seen = Pose(farther(tuple(slipped.tolist()), error), held.quaternion)
+    found = expected_pose(grasp_as_seen(grasp, reading, still(seen, 10, EYE)), reading)
+    assert found.position == pytest.approx(tuple(slipped.tolist()), abs=3e-4)
+
+
+def test_turned_blocks_keep_their_turn():
+    seen = Pose(farther((0.5, 0.0, TABLE_TOP + 0.025), 0.01), from_yaw(0.4))
+    (found,) = resting_poses({0: seen}, [cube("a")], [TABLE.at(TABLE.pose)], {0: EYE}).values()
+    assert found.angle_to(seen) < 1e-9

@@ -1,0 +1,88 @@
+# SPDX-FileCopyrightText: The slap_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The study of sequences: from libraries whose records are known, to the figures of the page."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from ensemble.cli.application import app
+
+pytest.importorskip("matplotlib")
+GOALS = ("task0", "task1", "task2")
+
+
+def sequence(folder, steps, tried, scratch=False, **changes):
+    """A library of groceries with the record of a sequence."""
+    goals = [
+        {
+            "goal": goal,
+            "steps": count,
+            "steps_to_level": count,
+            "reached": True,
+            "learned": {"Pick": count},
+            "ended": "nothing fails",
+            "tried": dict(zip(GOALS, progress, strict=False)),
+        }
+        for goal, count, progress in zip(GOALS, steps, tried, strict=True)
+    ]
+    folder.mkdir()
+    about = {
+        "format": 1,
+        "domain": "groceries",
+        "sequence": {"scratch": scratch, "goals": goals},
+        **changes,
+    }
+    (folder / "library.json").write_text(json.dumps(about))
+    return folder
+
+
+def study(*arguments):
+    command = ["study", "sequence", "groceries", *arguments]
+    return CliRunner().invoke(app, [str(argument) for argument in command])
+
+
+def test_later_goals_are_compared_with_the_first_and_forgetting_shows(tmp_path):
+    one = sequence(tmp_path / "0", (1000, 100, 300), ((1.0,), (0.5, 1.0), (0.75, 0.25, 1.0)))
+    two = sequence(tmp_path / "1", (3000, 500, 700), ((1.0,), (1.0, 0.5), (1.0, 0.5, 1.0)))
+    alone = sequence(tmp_path / "s", (900, 900, 900), ((1.0,), (0.0, 1.0), (0.0, 0.0, 1.0)), True)
+    libraries = [word for folder in (one, two, alone) for word in ("--library", folder)]
+    ran = study(*libraries, "--output", tmp_path / "out")
+    assert ran.exit_code == 0, ran.output
+    found = json.loads((tmp_path / "out" / "sequence_groceries.json").read_text())["found"]
+    assert found["later_over_first"] == {"carried on": 0.2, "from scratch": 1.0}
+    page = (tmp_path / "out" / "sequence_groceries.md").read_text()
+    # after the third goal: (.75 + .25) / 2 and .75 of what was (1 + 1) / 2 and (1 + .5) / 2
+    assert (
+        "| carried on | task2 | 2 | 500 ± 283 | 1.00 ± 0.00 | 0.62 ± 0.18 | 0.88 ± 0.18 |" in page
+    )
+    assert (
+        "| from scratch | task2 | 1 | 900 ± 0 | 1.00 ± 0.00 | 0.00 ± 0.00 | 1.00 ± 0.00 |" in page
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"domain": "bowls"}, "of domain 'bowls', not of 'groceries'"),
+        ({"sequence": None}, "no sequence made it"),
+        ({"sequence": {"scratch": False, "goals": []}}, "it has no goals"),
+        ({"sequence": {"scratch": False, "goals": [{"goal": "task0"}]}}, "no sequence made it"),
+    ],
+)
+def test_what_is_no_sequence_is_left_out_with_a_reason(tmp_path, changes, said):
+    done = ((1.0,), (1.0, 1.0), (1.0, 1.0, 1.0))
+    other = sequence(tmp_path / "other", (1, 1, 1), done, **changes)
+    ran = study("--library", other, "--output", tmp_path / "out")
+    assert ran.exit_code != 0
+    text = " ".join(ran.stderr.split())
+    assert said in text
+    assert "slap acquire-sequence groceries" in text
+
+
+def test_after_each_goal_all_goals_so_far_must_have_been_tried(tmp_path):
+    untried = sequence(tmp_path / "one", (1, 1, 1), ((1.0,), (1.0, 1.0), (1.0,)))
+    ran = study("--library", untried, "--output", tmp_path / "out")
+    assert ran.exit_code != 0
+    assert "not all goals were tried" in " ".join(ran.stderr.split())
