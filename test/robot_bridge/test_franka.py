@@ -255,6 +255,19 @@ def test_a_recording_is_replayed_on_it_without_stops(network, simulation, bag):
     assert [e["quantity"].split()[0] for e in data["extremes"]][2:5] == list(ORDERS)
 
 
+@pytest.mark.slow  # all nodes, each in a process of its own, and the simulation
+@pytest.mark.timeout(300)
+def test_a_task_is_solved_on_it_in_closed_loop(network, simulation):
+    command = [sys.executable, "-m", "ensemble.cli", "run", "obstacle_tower", "--seed", "1"]
+    command += ["--goal", "(Holding robot block4)", "--shortcuts", "none", "--json"]
+    command += ["--world", "franka-sim", "--robot", "horizon=3,speed=1.0"]
+    ran = subprocess.run(command, capture_output=True, text=True, timeout=280)
+    assert ran.returncode == 0, ran.stderr
+    data = json.loads(ran.stdout)
+    assert data["success"]
+    assert data["plan_length"] == 15
+
+
 def test_no_arm_moves_without_a_yes_and_a_dry_run_needs_no_robot(bag):
     pytest.importorskip("franky", reason=NO_WHEEL)
     for command in (
