@@ -33,10 +33,10 @@ from support.steady_skills import PICKING, towards, write_library
 
 pytestmark = pytest.mark.usefixtures("points_installed")
 SAC = replace(SMALL, net_arch=(4,), critic_net_arch=(32, 32), learning_starts=192)
-WARM = WarmStartSettings(critic_updates=200, cloning_steps=1_000)
-UNPROTECTED = WarmStartSettings(
-    acting=0.0, critic_updates=0, cloning=0.0, log_std=0.0, ent_coef=0.1
+WARM = WarmStartSettings(
+    acting=0.75, critic_updates=200, cloning=0.5, cloning_steps=1_000, noise=0.4, entropy=0.2
 )
+UNPROTECTED = WarmStartSettings()
 STARTS, FRESH = begin(PICK, range(20)), begin(PICK, range(20, 40))
 MDP = SkillMdp(
     POINTS,
@@ -98,6 +98,21 @@ def test_a_warm_start_that_is_resumed_ends_with_the_same_weights(tmp_path, round
     assert all(torch.equal(own[name], other[name]) for name in own)
 
 
+@pytest.mark.training
+def test_by_default_a_warm_start_is_the_known_weights_and_nothing_else():
+    """To the bit, so that a warm training is the one that earlier versions made."""
+    learned = []
+    for guided in (True, False):
+        one = learner()  # which seeds torch
+        one.begin_with(PICKING.policy, WarmStartSettings())
+        if not guided:
+            one._sac.guide = None
+        one.learn(3)
+        learned.append(one._sac.policy.state_dict() | {"entropy": one._sac.log_ent_coef})
+    found, expected = learned
+    assert all(torch.equal(found[name], expected[name]) for name in expected)
+
+
 def test_the_known_skill_acts_in_its_share_of_the_environments_and_its_pull_fades():
     shares = [GuidedSac._guided(8, share).sum() for share in (0.0, 0.25, 0.75, 1.0)]
     assert shares == [0, 2, 6, 8]
@@ -116,7 +131,7 @@ def _rows():
 
 
 def test_impossible_settings_are_refused():
-    for wrong in ({"acting": 1.5}, {"acting": -0.1}, {"ent_coef": 0.0}):
+    for wrong in ({"acting": 1.5}, {"acting": -0.1}, {"entropy": 0.0}):
         with pytest.raises(InvalidParameterError, match="give a share from 0 to 1"):
             WarmStartSettings(**wrong)
 

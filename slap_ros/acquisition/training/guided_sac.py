@@ -1,14 +1,16 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Soft actor-critic that begins with a known policy and does not lose it. Needs torch.
+"""Soft actor-critic that begins with a known policy, and may be kept from losing it. Needs torch.
 
-A good policy is destroyed by critics that have seen random actions alone. So the known policy acts
-before the first update (jump-start: Uchendu et al. 2023), critics are trained before the policy
-is, and a term that fades keeps the policy near the known one (kickstarting: Schmitt et al. 2018).
+A good policy can be destroyed by critics that have seen random actions alone. Against that, the
+known policy may act before the first update (jump-start: Uchendu et al. 2023), critics may be
+trained before the policy is, and a term that fades may keep the policy near the known one
+(kickstarting: Schmitt et al. 2018). :class:`WarmStartSettings` has each of them.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -59,7 +61,7 @@ class Guide:
 
 
 class GuidedSac(ExploringSac):
-    """SAC that may begin with a guide; without one, it is the same to the bit."""
+    """SAC that may begin with a guide; without one, or by default, it is the same to the bit."""
 
     guide: Guide | None = None
 
@@ -68,9 +70,9 @@ class GuidedSac(ExploringSac):
         self.guide = guide
         assert self.log_ent_coef is not None
         with torch.no_grad():
-            self.log_ent_coef.fill_(np.log(guide.settings.ent_coef))
+            self.log_ent_coef.add_(math.log(guide.settings.entropy))
             for weights in (self.actor.state_dict(), self.averaged):
-                weights["log_std.bias"].fill_(guide.settings.log_std)
+                weights["log_std.bias"].add_(math.log(guide.settings.noise))
 
     def train(self, gradient_steps: int, batch_size: int = 64) -> None:
         """See :meth:`LeanSac.train`; before the first update of all, critics learn alone.
@@ -91,9 +93,10 @@ class GuidedSac(ExploringSac):
         self, learning_starts: int, action_noise: Any = None, n_envs: int = 1
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         actions, _ = super()._sample_action(learning_starts, action_noise, n_envs)
-        if self.guide is not None and self.num_timesteps < learning_starts:
+        share = 0.0 if self.guide is None else self.guide.settings.acting
+        if share > 0.0 and self.num_timesteps < learning_starts:
             known, _ = super()._sample_action(0, action_noise, n_envs)
-            guided = self._guided(n_envs, self.guide.settings.acting)
+            guided = self._guided(n_envs, share)
             actions[guided] = known[guided]
         return actions, actions
 
