@@ -118,12 +118,12 @@ class TrainingBars(LearningBars):
         super().__init__(BarColumn(), TimeRemainingColumn())
 
     def on_progress(self, what: str, done: int, total: int) -> None:
-        """So many jobs of a kind are done; what was learned before them is."""
+        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
         self.unfollow()
         super().on_progress(what, done, total)
 
     def on_left_out(self, use: str, index: int, reason: str) -> None:
-        """A task has no plan."""
+        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
         console.print(f"{use}: task {index} is left out, as it has no plan: {reason}")
 
     def on_ranked(self, ranked: Sequence[CandidateGroup]) -> None:
@@ -137,7 +137,7 @@ class TrainingBars(LearningBars):
             )
 
     def on_learning(self, name: str, folder: Path, total_steps: int) -> None:
-        """Follow a training."""
+        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
         self.unfollow()
         bar = self.bars.add_task(f"learning {name}", total=total_steps, detail="")
         work = ShortcutWorkFolder(folder)
@@ -153,7 +153,7 @@ class TrainingBars(LearningBars):
             self.bars.update(bar, completed=steps, detail=detail)
 
     def on_validated(self, name: str, before: float, after: float, kept: bool) -> None:
-        """What it is worth."""
+        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
         console.print(
             f"{name}: plans of {before:.1f} steps become {after:.1f}{'' if kept else '; not kept'}",
         )

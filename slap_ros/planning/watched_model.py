@@ -17,13 +17,13 @@ class WatchedModel(Model):
     """
 
     def __init__(self, world: World, space: AtomSpace, actions: ActionSpace) -> None:
-        """Begin with nothing noted; see :class:`~slap_ros.planning.model.Model`."""
+        """See :class:`~slap_ros.planning.model.Model`; nothing is noted yet."""
         super().__init__(world, space, actions)
         self._after: set[bytes] = set()  # keys of the states that shortcuts led to
         self._tried: dict[tuple[Option, bytes], tuple[Option, State]] = {}
 
     def roll_out(self, option: Option, state: State, target: Target) -> Rollout:
-        """See :meth:`Model.roll_out <slap_ros.planning.model.Model.roll_out>`."""
+        """See :meth:`~slap_ros.planning.model.Model.roll_out`."""
         rollout = super().roll_out(option, state, target)
         given, after = option.kind is OptionKind.OPERATOR, state.key in self._after
         if given and after:

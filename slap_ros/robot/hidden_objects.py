@@ -38,7 +38,7 @@ class PredictedMotion:
 
         Args:
             world: Model, in the state after the command.
-            actions: Its actions.
+            actions: Actions that the model takes.
             before: State in which the command was given.
             after: State after the command.
 

@@ -51,7 +51,7 @@ class Horizon:
 def motion_through(
     motions: Sequence[JointMotion], limits: MotionLimits, least_s: float
 ) -> tuple[TrajectoryPoint, ...]:
-    """Points of one motion through the targets of some: a single one goes from rest to rest.
+    """The points of one motion through the targets of some; a single one is from rest to rest.
 
     Args:
         motions: Safe motions, each of which begins where the one before ends.

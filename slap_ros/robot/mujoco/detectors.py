@@ -71,7 +71,7 @@ class ExactDetector:
         return [DetectedPose(f"{DETECTED}{name}", IDENTITY, pose) for name, pose in poses.items()]
 
     def close(self) -> None:
-        """Do nothing."""
+        """Nothing is open here."""
 
 
 @dataclass(frozen=True)
