@@ -20,6 +20,7 @@ BY_A_BENCHMARK = {
     "robot_bridge_obstacle_tower",
     "detections_obstacle_tower",
     "franka_obstacle_tower",
+    "franka_closed_loop_obstacle_tower",
 }
 
 
