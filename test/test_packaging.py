@@ -139,7 +139,7 @@ EVERY_ENVIRONMENT = """
 import sys, gymnasium, slap_ros.environments
 names = [name for name in gymnasium.registry if name.startswith("slap_ros/")]
 for name in names:
-    gymnasium.make(name).reset(seed=0)
+    gymnasium.make(name)
 print(len(names), "torch" in sys.modules)
 """
 
