@@ -10,20 +10,39 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from slap_ros.geometry.pose import Pose, normalised
+from slap_ros.geometry.pose import IDENTITY, Pose, conjugate, normalised, rotate
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.line_of_sight import across
 from slap_ros.robot.state_assembly import Grasp, possible_joints
 from slap_ros.robot.tracking import PoseEstimate
+from slap_ros.worlds.joint_space.scene import Body
 from slap_ros.worlds.panda import hand_pose
 
-GRASPED = 0.5  # of the expected gap; with less there is nothing between the fingers
+GRASPED = 0.5  # of the object's width; with less there is nothing between the fingers
 FOLLOWS = 0.03  # m, by which what is held may slip in a step; what is further away was lost
 
 
 def expected_pose(grasp: Grasp, reading: JointReading) -> Pose:
     """Where the hand has what it holds, in the base's frame, if it has not slipped."""
     return hand_pose(possible_joints(reading.joints)).compose(grasp.pose)
+
+
+def narrowest_width(body: Body, grasp: Pose) -> float:
+    """How wide a body is between the fingers, m, where it is narrowest.
+
+    Fingers close until they meet it, wherever in the hand it is: its middle may be beside theirs,
+    and a tool has a handle that is narrower than the rest of it.
+
+    Args:
+        body: What the hand closes around.
+        grasp: Pose of the body in the hand's frame.
+    """
+    along = rotate(conjugate(grasp.quaternion), (0.0, 1.0, 0.0))
+    widths = []
+    for core in body.cores(IDENTITY):
+        seen = rotate(conjugate(core.pose.quaternion), along)
+        widths.append(2.0 * sum(abs(a) * half for a, half in zip(seen, core.half, strict=True)))
+    return min(widths)
 
 
 def is_lost(grasp: Grasp, reading: JointReading, seen: PoseEstimate | None) -> bool:
@@ -36,7 +55,7 @@ def is_lost(grasp: Grasp, reading: JointReading, seen: PoseEstimate | None) -> b
     """
     expected = expected_pose(grasp, reading).position
     strayed = seen is not None and math.dist(seen.pose.position, expected) > FOLLOWS
-    shut = reading.gap is not None and reading.gap < GRASPED * 2.0 * grasp.finger
+    shut = reading.gap is not None and reading.gap < GRASPED * grasp.width
     return strayed or shut
 
 

@@ -38,7 +38,7 @@ class PredictedMotion:
 
         Args:
             world: Model, in the state after the command.
-            actions: Actions that the model takes.
+            actions: Actions of the model.
             before: State in which the command was given.
             after: State after the command.
 

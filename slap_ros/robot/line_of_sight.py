@@ -3,10 +3,10 @@
 """What one picture of a tag says exactly, and what it does not.
 
 Across the line of sight, a tag is known to a fraction of a millimetre. How far away it is follows
-from its size in the picture, and is off by up to a centimetre. A tag that is seen at a slant is
-narrow in the picture: it may seem to be anywhere within half a decimetre, or to face the other way.
-So slanted tags do not count, and distance is taken from elsewhere: from what an object stands on
-(``slap_ros.worlds.joint_space.settling``), or from the hand that holds it.
+from its size in the picture, and is off by millimetres, sometimes by centimetres. A tag that is
+seen at a slant is narrow in the picture: it may seem to be anywhere within half a decimetre, or to
+face the other way. So slanted tags do not count, and distance is taken from elsewhere: from what an
+object stands on (``slap_ros.worlds.joint_space.settling``), or from the hand that holds it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from slap_ros.geometry.pose import Pose, Vector, rotate
 
 SLANTED = 0.4  # cosine of the angle between a tag's normal and the line of sight, about 66 degrees
-DISTANCE_ERROR = 0.015  # m, by which a tag may seem nearer or further away than it is
+DISTANCE_ERROR = 0.03  # m, by which a tag may seem nearer or further away than it is
 
 
 def is_slanted(seen: Pose) -> bool:

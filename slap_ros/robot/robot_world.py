@@ -27,7 +27,13 @@ from slap_ros.errors import (
 )
 from slap_ros.geometry.pose import Pose
 from slap_ros.relational import Object, State
-from slap_ros.robot.grasp_tracking import GRASPED, expected_pose, grasp_as_seen, is_lost
+from slap_ros.robot.grasp_tracking import (
+    GRASPED,
+    expected_pose,
+    grasp_as_seen,
+    is_lost,
+    narrowest_width,
+)
 from slap_ros.robot.hidden_objects import PredictedMotion
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.limits import STEP_TOLERANCE, JointMotion, Limits
@@ -204,6 +210,20 @@ class RobotWorld:
         Raises:
             InvalidStateError: What is measured cannot be; better measurements may follow.
         """
+        predicted = self._predicted
+        try:
+            return self._attempt(since_s, moving)
+        except InvalidStateError:
+            if predicted is None:
+                raise
+            self._predicted = None  # what is seen leaves no room for it: hidden ones have stayed
+        try:
+            return self._attempt(since_s, moving)
+        except InvalidStateError:
+            self._predicted = predicted  # for better measurements
+            raise
+
+    def _attempt(self, since_s: float, moving: bool) -> State | None:
         reading = self._reading
         if reading is None or reading.stamp_s <= since_s or not reading.at_rest:
             return None
@@ -319,7 +339,9 @@ class RobotWorld:
             x, y, z, *turn = feature_values(after, self._robot, GRASP_FEATURES)
             qx, qy, qz, qw = turn
             finger = float(after.get(self._robot, "finger"))
-            self._candidate = Grasp(held[0], Pose((x, y, z), (qx, qy, qz, qw)), finger)
+            pose = Pose((x, y, z), (qx, qy, qz, qw))
+            body = self._model.scene.free[self._bodies.index(held[0])]
+            self._candidate = Grasp(held[0], pose, finger, narrowest_width(body, pose))
             return GripperAction.CLOSE
         if self._lost or (self._grasp is not None and not held):
             return GripperAction.OPEN
@@ -335,7 +357,7 @@ class RobotWorld:
             Whether something is in the hand.
         """
         candidate, self._candidate = self._candidate, None
-        if candidate is None or not gap > GRASPED * 2.0 * candidate.finger:
+        if candidate is None or not gap > GRASPED * candidate.width:
             return False
         self._grasp, self._lost = candidate, False
         self._tracks[candidate.obj].forget()

@@ -28,7 +28,8 @@ class Grasp:
 
     obj: Object
     pose: Pose  # in the hand's frame
-    finger: float  # m, of each from the middle
+    finger: float  # m, of each from the middle, as the model has it
+    width: float = 0.0  # m, between the fingers where the object is narrowest
 
 
 class StateAssembler:

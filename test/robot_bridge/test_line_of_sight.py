@@ -10,7 +10,12 @@ import yaml
 
 from slap_ros.domains import get_domain
 from slap_ros.geometry.pose import NO_ROTATION, Pose, from_rotation_vector, from_yaw
-from slap_ros.robot.grasp_tracking import expected_pose, grasp_as_seen
+from slap_ros.robot.grasp_tracking import (
+    expected_pose,
+    grasp_as_seen,
+    is_lost,
+    narrowest_width,
+)
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.limits import PANDA, Workspace
 from slap_ros.robot.line_of_sight import across, is_slanted
@@ -38,7 +43,7 @@ def farther(point, by):
     return tuple((np.array(point) + by * sight / np.linalg.norm(sight)).tolist())
 
 
-@pytest.mark.parametrize("errors", [(0.01, -0.01, 0.006), (-0.008, 0.009, -0.011)])
+@pytest.mark.parametrize("errors", [(0.01, -0.01, 0.006), (-0.03, 0.01, -0.02)])
 def test_a_tower_seen_at_wrong_distances_stands_where_it_is(errors):
     """What is a centimetre too high or too low is beside its place as well."""
     cubes = [cube(f"block{i}") for i in range(3)]
@@ -81,13 +86,13 @@ def test_tags_that_come_and_go_in_pictures_move_nothing():
 
 
 def test_only_errors_of_the_distance_are_left_out():
-    """Also where there is a camera, what is 4 cm nearer has been moved."""
+    """Also where there is a camera, what is 6 cm nearer has been moved."""
     point = (0.5, 0.1, 0.1)
     near = np.subtract(farther(point, 0.01), point)
     assert across(near, point, EYE) == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
     assert across(near, point, None) == tuple(near)
-    far = np.subtract(farther(point, 0.04), point)
-    assert math.hypot(*across(far, point, EYE)) == pytest.approx(0.025)
+    far = np.subtract(farther(point, 0.06), point)
+    assert math.hypot(*across(far, point, EYE)) == pytest.approx(0.03)
     assert across((0.0, 0.0, 0.0), EYE, EYE) == (0.0, 0.0, 0.0)
 
 
@@ -167,6 +172,22 @@ def test_what_moves_where_nothing_sees_it_is_where_the_model_has_it():
     assert bench.world.measure(since).get(dropped, "y") == pytest.approx(0.25, abs=1e-3)
 
 
+def test_what_is_seen_leaves_no_room_for_what_the_model_has_of_hidden_objects():
+    """Our physics may push a block to where another one is seen: then it has stayed."""
+    bench = TaggedBench()
+    dropped, other = (TASK.initial_state.layout.object(name) for name in ("block2", "block1"))
+    above, below = Pose((0.4, 0.2, TABLE_TOP + 0.08)), Pose((0.4, 0.2, TABLE_TOP + 0.025))
+    bench.poses[dropped] = above
+    bench.look()
+    before = bench.world.measure(0.0)
+    bench.world.plan_command(np.zeros(8))  # the model has it fall
+    since, bench.poses[other] = bench.now, below
+    bench.look(without=("block2",))
+    after = bench.world.measure(since)
+    assert after.get(dropped, "z") == pytest.approx(before.get(dropped, "z"), abs=0.01)
+    assert parts(other, after)[0] == pytest.approx(below.position, abs=1e-3)
+
+
 @pytest.mark.parametrize("error", [-0.01, 0.01])
 def test_a_slip_in_the_hand_is_known_but_for_how_far_away_it_is_seen(error):
     reading = JointReading(1.0, tuple(HOME), gap=0.05)
@@ -183,3 +204,21 @@ def test_turned_blocks_keep_their_turn():
     seen = Pose(farther((0.5, 0.0, TABLE_TOP + 0.025), 0.01), from_yaw(0.4))
     (found,) = resting_poses({0: seen}, [cube("a")], [TABLE.at(TABLE.pose)], {0: EYE}).values()
     assert found.angle_to(seen) < 1e-9
+
+
+@pytest.mark.parametrize("beside", [0.0, 0.012, -0.02])
+def test_how_narrow_a_tool_is_does_not_depend_on_where_it_is_in_the_hand(beside):
+    """The model's fingers stand as far from the middle as the side that is further away."""
+    domain = get_domain("cleanup_table")
+    world = domain.make_world(domain.task(1).initial_state)
+    with world:
+        (wiper,) = [body for body in world.scene.free if body.name == "wiper"]
+    grasp = Pose((0.0, beside, 0.1), from_yaw(0.5 * math.pi))
+    across_it = narrowest_width(wiper, Pose((0.0, beside, 0.1)))
+    along_it = narrowest_width(wiper, grasp)
+    assert 0.01 < across_it < 0.02 < along_it
+    tool = domain.task(1).initial_state.layout.object("wiper")
+    held = Grasp(tool, Pose((0.0, beside, 0.1)), 0.01 + abs(beside), across_it)
+    closed = JointReading(1.0, tuple(HOME), gap=0.018)
+    assert not is_lost(held, closed, None)
+    assert is_lost(held, JointReading(2.0, tuple(HOME), gap=0.001), None)

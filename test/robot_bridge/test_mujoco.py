@@ -184,3 +184,23 @@ def test_a_stack_is_built_in_closed_loop_by_what_is_measured(tower):
     on, under = (world.plant.poses()[name].position for name in ("block4", "block5"))
     assert on == pytest.approx((under[0], under[1], under[2] + 0.05), abs=0.01)
     world.close()
+
+
+@pytest.mark.slow  # 24 steps with a body of many pieces
+@pytest.mark.timeout(300)
+def test_a_tool_is_held_by_its_handle_though_its_middle_is_beside_the_hand():
+    """Fingers meet where it is narrow, far closer than the model's fingers stand around it."""
+    domain = get_domain("cleanup_table")
+    world = ClosedLoopWorld(domain, domain.task(1).initial_state)
+    state = world.state
+    objects = tuple(state.layout.object(name) for name in ("robot", "wiper", "table"))
+    try:
+        for skill in ("Reach", "Grasp", "Lift"):
+            policy = domain.skills[skill].start(state, objects)
+            while (action := policy(state)) is not None:
+                state = world.step(action)
+        assert state.get(objects[1], "held") == 1.0
+        assert world.plant.poses()["wiper"].position[2] > 0.1
+        assert 0.01 < world.plant.gap < 0.03
+    finally:
+        world.close()

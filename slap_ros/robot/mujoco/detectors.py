@@ -44,7 +44,7 @@ class ObjectDetector(Protocol):
     period_s: float  # time between two detections
 
     def detect(self) -> Sequence[DetectedPose]:
-        """What is detected now."""
+        """Find the frames that show objects at this moment."""
         ...
 
     def close(self) -> None:
@@ -71,7 +71,7 @@ class ExactDetector:
         return [DetectedPose(f"{DETECTED}{name}", IDENTITY, pose) for name, pose in poses.items()]
 
     def close(self) -> None:
-        """Nothing is open here."""
+        """Release nothing: exact poses need no camera."""
 
 
 @dataclass(frozen=True)

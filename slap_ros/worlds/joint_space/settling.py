@@ -17,6 +17,7 @@ from slap_ros.geometry.pose import Pose, Vector
 from slap_ros.worlds.joint_space.scene import Body
 from slap_ros.worlds.settling import FLOATING, levelled
 
+SEEN_FLOATING = 0.024  # m, the same as FLOATING for what a camera sees; less than half a block
 STEEP = 0.3  # sine of the least angle of a line of sight with the table that says where things are
 
 
@@ -55,7 +56,8 @@ def _put_down(
     box = body.at(pose)  # whose middle need not be the body's origin
     bottom = box.bottom
     tops = [other.top for other in below if _under(box, other)]
-    near = [top for top in tops if abs(bottom - top) <= FLOATING]
+    floating = FLOATING if eye is None else SEEN_FLOATING
+    near = [top for top in tops if abs(bottom - top) <= floating]
     if not near:
         return None
     return Pose(_raised(pose.position, max(near) - bottom, eye), pose.quaternion)
