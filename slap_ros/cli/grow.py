@@ -22,7 +22,7 @@ from slap_ros.cli.console import console, print_json, warn
 from slap_ros.cli.options import Goal, Json
 from slap_ros.cli.propose import show_entry
 from slap_ros.cli.proposer_options import ProposerOptions
-from slap_ros.cli.train import TrainingBars
+from slap_ros.cli.train import training_bars
 from slap_ros.cli.training_options import TrainingSeed, setting_changes
 from slap_ros.shortcuts.settings import NEAR
 
@@ -118,7 +118,7 @@ def grow(options: GrowOptions, proposers: ProposerOptions) -> int:
         AcquisitionWatch(
             on_attempt=show_entry, curriculum=lambda: AcquisitionBars(events), tell=warn
         ),
-        TrainingBars,
+        training_bars,
         _show_round,
     )
     grown = grow_rounds(request, options.jobs, watch)

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from math import isnan
 from pathlib import Path
@@ -29,7 +30,7 @@ from slap_ros.cli.training_options import (
     setting_changes,
 )
 from slap_ros.shortcuts.progress import latest
-from slap_ros.shortcuts.training import CandidateGroup
+from slap_ros.shortcuts.training import CandidateGroup, TrainingCallback
 from slap_ros.shortcuts.work_folder import ShortcutWorkFolder
 from slap_ros.skills.domain_choice import SHIPPED
 
@@ -88,7 +89,7 @@ def train(options: TrainOptions) -> int:
     """
     domain = open_chosen(options.domain, options.preset, options.skills)
     began, folder = monotonic(), options.library_folder
-    with TrainingBars() as bars:
+    with _TrainingBars() as bars:
         library = train_library(
             domain,
             folder,
@@ -111,7 +112,12 @@ def train(options: TrainOptions) -> int:
     return 0
 
 
-class TrainingBars(LearningBars):
+def training_bars() -> AbstractContextManager[TrainingCallback]:
+    """Bars that show how far a training is, and a line for what came of each of its steps."""
+    return _TrainingBars()
+
+
+class _TrainingBars(LearningBars):
     """How far a training is, and what came of its steps."""
 
     def __init__(self) -> None:

@@ -17,13 +17,28 @@ class WatchedModel(Model):
     """
 
     def __init__(self, world: World, space: AtomSpace, actions: ActionSpace) -> None:
-        """Begin with nothing noted; see :class:`~slap_ros.planning.model.Model`."""
+        """Begin with nothing noted.
+
+        Args:
+            world: World in which options are rolled out; nobody else may use it.
+            space: Atoms of the task.
+            actions: Actions of the robot.
+        """
         super().__init__(world, space, actions)
         self._after: set[bytes] = set()  # keys of the states that shortcuts led to
         self._tried: dict[tuple[Option, bytes], tuple[Option, State]] = {}
 
     def roll_out(self, option: Option, state: State, target: Target) -> Rollout:
-        """See :meth:`Model.roll_out <slap_ros.planning.model.Model.roll_out>`."""
+        """Execute an option, and note where it began if that is after a shortcut.
+
+        Args:
+            option: Option that is executed.
+            state: State in which the option begins.
+            target: Target that the option shall reach.
+
+        Returns:
+            The outcome, as :meth:`~slap_ros.planning.model.Model.roll_out` has it.
+        """
         rollout = super().roll_out(option, state, target)
         given, after = option.kind is OptionKind.OPERATOR, state.key in self._after
         if given and after:
