@@ -31,7 +31,7 @@ Floats = NDArray[np.float32]
 class Turns(NamedTuple):
     """Whose turn it was in each of n environments, and what came of it; arrays of shape (n,).
 
-    Args:
+    Attributes:
         controller: 1 where the controller chose, 0 where an option acted.
         intrinsic: Reward of the option that acted.
         over: 1 where the option ended with its action.

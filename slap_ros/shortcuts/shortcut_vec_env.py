@@ -111,7 +111,7 @@ class ShortcutVecEnv:
 class GroupTransitions(NamedTuple):
     """What happened in the newest step of n environments with the same objects and change.
 
-    Args:
+    Attributes:
         starts: Starts of the episodes, n of them.
         before: States before the step, a batch.
         after: States after the step and before resets, a batch.

@@ -54,7 +54,7 @@ def test_a_second_goal_is_learned_with_the_skills_of_the_first(tmp_path, monkeyp
     [
         (("--goal", "train"), "a sequence has two goals at least"),
         (("--goal", "train", "--goal", "train"), "stands twice"),
-        (("--seeds", 0), "greater than or equal to 1"),
+        (("--seeds", 0), "--seeds"),
         (("--steps", 10), "too few to learn anything"),
         (("--set", "sac.magic=1"), "sac.magic"),
     ],

@@ -243,6 +243,7 @@ def test_what_was_commanded_is_executed_when_nothing_more_is(network):
             bench.step(deltas=[0.04, *STILL[1:]])
         bench.until(lambda: bench.joints[-1][0] == pytest.approx(before + 0.2, abs=1e-3))
         assert [state.step for state in bench.states] == [0, 1, 2, 3, 4, 5]
+        bench.until(lambda: bench.health.get("steps") == "5")
         assert bench.health["stale_commands"] == "0"
 
 
