@@ -26,7 +26,9 @@ from slap_ros.cli.options import Goal, Json
 from slap_ros.cli.propose import show_entry
 from slap_ros.cli.proposer_options import ProposerOptions
 from slap_ros.cli.training_options import (
+    BeginWith,
     Ray,
+    Rewarder,
     TrainingSeed,
     WorkFolder,
     new_library,
@@ -47,19 +49,8 @@ class AcquireOptions:
     preset: Preset = None
     goal: Goal = None
     seed: TrainingSeed = 0
-    rewarder: Annotated[
-        str,
-        typer.Option(
-            help="Source of rewards: manual (hand-written), composed (from metrics), or language "
-            "(from a language model)."
-        ),
-    ] = MANUAL
-    begin: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--from", help="Skill library whose skills training may begin from. May be repeated."
-        ),
-    ] = None
+    rewarder: Rewarder = MANUAL
+    begin: BeginWith = None
     encoder: Annotated[
         str | None,
         typer.Option(

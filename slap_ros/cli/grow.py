@@ -23,7 +23,7 @@ from slap_ros.cli.options import Goal, Json
 from slap_ros.cli.propose import show_entry
 from slap_ros.cli.proposer_options import ProposerOptions
 from slap_ros.cli.train import training_bars
-from slap_ros.cli.training_options import TrainingSeed, setting_changes
+from slap_ros.cli.training_options import BeginWith, Rewarder, TrainingSeed, setting_changes
 from slap_ros.shortcuts.settings import NEAR
 
 ROOM = Path("runs/grown")
@@ -44,19 +44,8 @@ class GrowOptions:
     preset: Preset = None
     goal: Goal = None
     seed: TrainingSeed = 0
-    rewarder: Annotated[
-        str,
-        typer.Option(
-            help="Source of rewards: manual (hand-written), composed (from metrics), or language "
-            "(from a language model)."
-        ),
-    ] = MANUAL
-    begin: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--from", help="Skill library whose skills training may begin from. May be repeated."
-        ),
-    ] = None
+    rewarder: Rewarder = MANUAL
+    begin: BeginWith = None
     keep: Annotated[
         Path | None,
         typer.Option(

@@ -1,11 +1,13 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The options that ``slap train`` and ``slap acquire`` have in common."""
+"""The options that ``slap train``, ``slap acquire`` and ``slap grow`` have in common."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Annotated
+
+import typer
 
 from slap_ros.api.command_options import MAX_SEED, CommandOption
 
@@ -17,6 +19,20 @@ WorkFolder = Annotated[
     Path | None,
     CommandOption(
         "Folder for checkpoints and results. With the same folder again, training goes on."
+    ),
+]
+
+Rewarder = Annotated[
+    str,
+    CommandOption(
+        "Source of rewards: manual (hand-written), composed (from metrics), or language (from a "
+        "language model)."
+    ),
+]
+BeginWith = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--from", help="Skill library whose skills training may begin from. May be repeated."
     ),
 ]
 
