@@ -53,8 +53,8 @@ FR3 that speaks the robot's protocol (franky-sim, in MuJoCo), at half speed. No 
 Objects are those of the planner's model: they follow the measured hand, and are detected without
 noise. The horizon is the largest number of commands that the arm executes in one motion. Motion is
 the time in which the arm moves, on the robot's clock. That clock waits for its driver, so this time
-does not depend on the machine. Seconds a step are this machine's, which was loaded. Steps and times
-are the mean over solved tasks, with the sample standard deviation. Replans are counted over all
+does not depend on the machine. Seconds a step are of two cores with some other work. Steps and
+times are means over solved tasks, with the sample standard deviation. Replans are counted over all
 tasks. Success has Wilson's 95 % interval."""
 
 
