@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 
@@ -127,8 +126,3 @@ class _StepBudget(BaseCallback):
             self._next = progress.steps + self._every
             self._report(progress)
         return progress.steps < self._total
-
-
-def weights_of(network: torch.nn.Module) -> dict[str, NDArray[np.float32]]:
-    """Copies of a network's arrays, by name."""
-    return {name: value.cpu().numpy().copy() for name, value in network.state_dict().items()}

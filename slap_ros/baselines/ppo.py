@@ -11,10 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from slap_ros.baselines.budgeted_learner import BudgetedLearner, weights_of
+from slap_ros.baselines.budgeted_learner import BudgetedLearner
 from slap_ros.baselines.method import Method
 from slap_ros.baselines.training_envs import TrainingEnvs, as_observed, joined_envs
-from slap_ros.learning.policy_export import exported_layers, hidden_layers
+from slap_ros.learning.policy_export import exported_layers, hidden_layers, weights_of
 from slap_ros.learning.ppo import make_ppo
 from slap_ros.policies.mlp_policy import MlpPolicy
 

@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 from stable_baselines3 import SAC
 
-from slap_ros.baselines.budgeted_learner import BudgetedLearner, weights_of
+from slap_ros.baselines.budgeted_learner import BudgetedLearner
 from slap_ros.baselines.hindsight_buffer import HindsightBuffer
 from slap_ros.baselines.method import Method
 from slap_ros.baselines.training_envs import TrainingEnvs, as_observed, separate_envs
 from slap_ros.files import write_whole
-from slap_ros.learning.policy_export import exported_layers, hidden_layers
+from slap_ros.learning.policy_export import exported_layers, hidden_layers, weights_of
 from slap_ros.learning.sac_state import restore_sac, sac_state
 from slap_ros.learning.work_folder import damaged
 from slap_ros.policies.mlp_policy import MlpPolicy

@@ -5,11 +5,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+if TYPE_CHECKING:
+    import torch
+
 Layers = tuple[tuple[NDArray[np.float32], NDArray[np.float32]], ...]
+
+
+def weights_of(network: torch.nn.Module) -> dict[str, NDArray[np.float32]]:
+    """Copies of a network's arrays, by name."""
+    return {name: value.cpu().numpy().copy() for name, value in network.state_dict().items()}
 
 
 def hidden_layers(prefix: str, count: int) -> list[str]:

@@ -16,7 +16,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
 from slap_ros.learning.checkpoint import load_checkpoint, save_checkpoint
-from slap_ros.learning.policy_export import exported_layers, hidden_layers
+from slap_ros.learning.policy_export import exported_layers, hidden_layers, weights_of
 from slap_ros.learning.ppo import make_ppo
 from slap_ros.learning.vec_env import VecEnv
 from slap_ros.policies.mlp_policy import MlpPolicy, ObservationNormalisation
@@ -79,7 +79,7 @@ class Learner:
 
     def policy(self) -> MlpPolicy:
         """The policy as it is now, without torch."""
-        weights = {k: v.detach().cpu().numpy().copy() for k, v in self._weights().items()}
+        weights = weights_of(self._ppo.policy)
         hidden = hidden_layers("mlp_extractor.policy_net", len(self.settings.net_arch))
         layers = exported_layers(weights, [*hidden, "action_net"])
         return MlpPolicy(self._env.normalisation, layers, weights["log_std"])

@@ -20,7 +20,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
 from slap_ros.learning.checkpoint import load_checkpoint, save_checkpoint
-from slap_ros.learning.policy_export import exported_layers, hidden_layers
+from slap_ros.learning.policy_export import exported_layers, hidden_layers, weights_of
 from slap_ros.learning.sac_state import restore_sac, sac_state
 from slap_ros.learning.vec_env import VecEnv
 from slap_ros.policies.mlp_policy import MlpPolicy, ObservationNormalisation
@@ -107,8 +107,7 @@ class SacLearner:
 
     def policy(self) -> MlpPolicy:
         """The policy as it is now, without torch."""
-        actor = self._sac.actor
-        weights = {k: v.detach().cpu().numpy().copy() for k, v in actor.state_dict().items()}
+        weights = weights_of(self._sac.actor)
         names = [*hidden_layers("latent_pi", len(self.settings.net_arch)), "mu"]
         layers = exported_layers(weights, names)
         noise = np.log(np.maximum(self._noise(), LEAST_STD)).astype(np.float32)

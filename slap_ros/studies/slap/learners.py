@@ -18,29 +18,26 @@ from slap_ros.api.library_descriptions import describe_library
 from slap_ros.api.shortcut_choice import SAMPLES, sampling
 from slap_ros.domains import get_domain
 from slap_ros.errors import InvalidParameterError
-from slap_ros.evaluation.approaches import PURE_PLANNING, Approach, approaches
+from slap_ros.evaluation.approaches import PURE_PLANNING, approaches
 from slap_ros.evaluation.experiment import Experiment, Trial
 from slap_ros.shortcuts.sampling import Sampling
 from slap_ros.shortcuts.shipped import shipped_libraries
 from slap_ros.shortcuts.shortcut_library import Record, ShortcutLibrary
-from slap_ros.skills.domain_choice import DomainChoice
 from slap_ros.studies.comparison import (
-    PlanningSetup,
     format_spread,
-    named_tasks,
     not_solved,
     solve_task,
 )
 from slap_ros.studies.figures import LINES, label
-from slap_ros.studies.job_runner import Job, JobRunner
+from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.options import FRESH_SEED, RESULTS, FirstSeed, Libraries, Output, Seeds, Tasks
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.row_figures import name_rows, plot_each
 from slap_ros.studies.slap.table1 import (
-    LibraryTrials,
     Row,
     TrainedLibrary,
     open_library,
+    planning_jobs,
     relative_cell,
 )
 from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, PreparedStudy, Study, format_steps
@@ -94,15 +91,15 @@ def study(
     for trained in libraries:
         approach = approaches(trained.library, chosen)[-1]
         planned.append((trained.name, trained.library.digest, approach))
-    batches = [_batch(experiment, *one) for one in planned]
+    batches = [planning_jobs(experiment, *one) for one in planned]
     preset = experiment.domain.preset
     found = runner.run(preset, solve_task, Trial.from_json, *batches, failure=not_solved)
     trials = [tuple(found[name] for name in batch) for batch in batches]
-    rows = [_row(experiment, PURE_PLANNING.name, {"": trials[0]}, trials[0])]
+    rows = [Row.of(experiment, PURE_PLANNING.name, {"": trials[0]}, trials[0])]
     own = list(zip(libraries, trials[1:], strict=True))
     for learner in dict.fromkeys(learner_of(one.library.record) for one in libraries):
         of_it = {one.name: done for one, done in own if learner_of(one.library.record) == learner}
-        rows.append(_row(experiment, learner, of_it, trials[0]))
+        rows.append(Row.of(experiment, learner, of_it, trials[0]))
     costs = [_costs([one.library for one in libraries], row.approach) for row in rows]
     return StudyReport(
         study="learners",
@@ -114,23 +111,6 @@ def study(
         draw=lambda figure: _draw(figure, rows),
         size=(7.0, 0.6 + 0.4 * len(rows)),
     )
-
-
-def _batch(experiment: Experiment, library: str, digest: str, approach: Approach) -> dict[str, Job]:
-    """The tasks of an experiment, planned in one way."""
-    setup = PlanningSetup(DomainChoice.of(experiment.domain), experiment.planner, approach)
-    whose = " ".join(filter(None, (library, digest, approach.name)))
-    return {f"{whose}: {name}": (setup, *task) for name, task in named_tasks(experiment).items()}
-
-
-def _row(
-    experiment: Experiment,
-    name: str,
-    trials: Mapping[str, tuple[Trial, ...]],
-    pure: tuple[Trial, ...],
-) -> Row:
-    results = tuple(LibraryTrials(library, name, found) for library, found in trials.items())
-    return Row(experiment.domain.preset, name, len(experiment), results, pure)
 
 
 def _costs(libraries: Sequence[ShortcutLibrary], learner: str) -> Data:

@@ -32,7 +32,7 @@ from slap_ros.studies.job_runner import JobRunner
 from slap_ros.studies.options import FRESH_SEED, RESULTS, FirstSeed, Output, Seeds, Tasks
 from slap_ros.studies.results import Data, MarkdownTable, StudyReport
 from slap_ros.studies.row_figures import name_rows, plot_interval, plot_whole
-from slap_ros.studies.slap.table1 import LibraryTrials, Row, relative_cell
+from slap_ros.studies.slap.table1 import Row, relative_cell
 from slap_ros.studies.study import SLAP_DOMAINS, PaperFigure, PreparedStudy, Study, format_steps
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ def _rows(
     setup = PlanningSetup(DomainChoice.of(experiment.domain), experiment.planner, PURE_PLANNING)
     planned = {f"{preset}, planning: {name}": (setup, *task) for name, task in tasks.items()}
     pure = tuple(runner.run(f"{preset}, planning", solve_task, Trial.from_json, planned).values())
-    rows = [BaselineRow(_row(experiment, PURE_PLANNING.name, {"": pure}, pure), ())]
+    rows = [BaselineRow(Row.of(experiment, PURE_PLANNING.name, {"": pure}, pure), ())]
     for method in dict.fromkeys(one.name for one in baselines.values()):
         own = {name: one for name, one in baselines.items() if one.name == method}
         jobs = {
@@ -124,18 +124,8 @@ def _rows(
         found = runner.run(what, try_baseline, Trial.from_json, *jobs.values(), failure=not_solved)
         trials = {folder: tuple(found[name] for name in batch) for folder, batch in jobs.items()}
         trained = tuple({"name": name, **describe_baseline(one)} for name, one in own.items())
-        rows.append(BaselineRow(_row(experiment, method, trials, pure), trained))
+        rows.append(BaselineRow(Row.of(experiment, method, trials, pure), trained))
     return rows
-
-
-def _row(
-    experiment: Experiment,
-    name: str,
-    trials: Mapping[str, tuple[Trial, ...]],
-    pure: tuple[Trial, ...],
-) -> Row:
-    results = tuple(LibraryTrials(folder, name, found) for folder, found in trials.items())
-    return Row(experiment.domain.preset, name, len(experiment), results, pure)
 
 
 COLUMNS = (

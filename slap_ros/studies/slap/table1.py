@@ -8,7 +8,7 @@ chosen by what it does here (SLAP Table 1).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import fmean
@@ -98,6 +98,25 @@ class Row:
     tasks: int
     results: tuple[LibraryTrials, ...]
     baseline: tuple[Trial, ...]
+
+    @classmethod
+    def of(
+        cls,
+        experiment: Experiment,
+        approach: str,
+        trials: Mapping[str, tuple[Trial, ...]],
+        baseline: tuple[Trial, ...],
+    ) -> Row:
+        """The row of an experiment.
+
+        Args:
+            experiment: Tasks that were solved.
+            approach: Name of the way to solve them.
+            trials: Trials by the name of the library, which is empty for pure planning.
+            baseline: Trials of the same tasks with pure planning.
+        """
+        results = tuple(LibraryTrials(name, approach, found) for name, found in trials.items())
+        return cls(experiment.domain.preset, approach, len(experiment), results, baseline)
 
     @property
     def trials(self) -> list[Trial]:
@@ -235,7 +254,7 @@ def _rows(
             searched.add(_signatures(search))
             ways = [search, *ways]
         planned += [(trained.name, trained.library.digest, way) for way in ways]
-    batches = [_batch(experiment, *one) for one in planned]
+    batches = [planning_jobs(experiment, *one) for one in planned]
     found = runner.run(domain.preset, solve_task, Trial.from_json, *batches, failure=not_solved)
     measured: dict[str, list[LibraryTrials]] = {}
     for (library, _, way), batch in zip(planned, batches, strict=True):
@@ -248,7 +267,9 @@ def _rows(
     ]
 
 
-def _batch(experiment: Experiment, library: str, digest: str, approach: Approach) -> dict[str, Job]:
+def planning_jobs(
+    experiment: Experiment, library: str, digest: str, approach: Approach
+) -> dict[str, Job]:
     """The tasks of an experiment, for an approach.
 
     Args:
