@@ -4,6 +4,9 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 TORCH := torch==2.13.0  # pinned: another version trains other policies from the same seed
+# pip would compile every test of every library, too, and on one processor.
+PIP_INSTALL := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
+COMPILE := $(BIN)/python -m compileall -qq -j 0 -x '/tests?/' $(VENV)/lib || true  # some have files of other Pythons
 TESTS_AT_ONCE := 3  # on two cores: many wait for nodes, networks and clocks
 METADATA := pyproject.toml setup.py setup.cfg embedded_ros/pyproject.toml
 # Images set it. Tests start hundreds of processes, and each would compile all that it imports.
@@ -22,12 +25,13 @@ $(VENV)/.installed: $(METADATA)
 	@echo "== setting up $(VENV), which takes about two minutes"
 	$(PYTHON) -m venv $(VENV) || \
 	  { echo "no venv module; on Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
-	$(BIN)/pip install --quiet --disable-pip-version-check -e ./embedded_ros -e '.[physics]'
-	$(BIN)/python -m slap_ros.motion.kernels
+	$(PIP_INSTALL) -e ./embedded_ros -e '.[physics]'
+	$(COMPILE) & $(BIN)/python -m slap_ros.motion.kernels && wait $$!
 	@touch $@
 
 $(VENV)/.tested: $(VENV)/.installed
-	$(BIN)/pip install --quiet --disable-pip-version-check '$(strip $(TORCH))' -e '.[test]'
+	$(PIP_INSTALL) '$(strip $(TORCH))' -e '.[test]'
+	$(COMPILE)
 	@touch $@
 
 demo: install  ## Run the whole ensemble with and without a shortcut, record, replay, report
@@ -90,7 +94,7 @@ docs: $(VENV)/.documented  ## Build the documentation into site/
 	@echo "open site/index.html; for the search: $(BIN)/python -m http.server --directory site"
 
 $(VENV)/.documented: $(VENV)/.installed
-	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[docs]'
+	$(PIP_INSTALL) -e '.[docs]'
 	@touch $@
 
 clean:  ## Remove what was made
