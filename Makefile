@@ -7,7 +7,7 @@ TORCH := torch==2.13.0  # pinned: another version trains other policies from the
 # pip would compile every test of every library, too, and on one processor.
 PIP_INSTALL := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
 COMPILE := $(BIN)/python -m compileall -qq -j 0 -x '/tests?/' $(VENV)/lib || true  # some have files of other Pythons
-TESTS_AT_ONCE := 3  # on two cores: many wait for nodes, networks and clocks
+TESTS_AT_ONCE := 4  # on two cores: many wait for nodes, networks and clocks
 METADATA := pyproject.toml setup.py setup.cfg embedded_ros/pyproject.toml
 # Images set it. Tests start hundreds of processes, and each would compile all that it imports.
 unexport PYTHONDONTWRITEBYTECODE
