@@ -247,9 +247,7 @@ def _masks(truth: NDArray[np.bool_]) -> list[int]:
     """Bits of the atoms of each state, a row each."""
     packed = np.packbits(truth, axis=1, bitorder="little")
     width, data = packed.shape[1], packed.tobytes()
-    return [
-        int.from_bytes(data[i * width : (i + 1) * width], "little") for i in range(len(packed))
-    ]
+    return [int.from_bytes(data[i * width : (i + 1) * width], "little") for i in range(len(packed))]
 
 
 def _columns_of(layout: Layout, left_out: Collection[Type]) -> NDArray[np.intp]:
