@@ -12,7 +12,8 @@ METADATA := pyproject.toml setup.py setup.cfg embedded_ros/pyproject.toml
 # Images set it. Tests start hundreds of processes, and each would compile all that it imports.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help install demo test test-all test-ros faults reproduce lint format docs clean
+.PHONY: help install demo test test-all quick-tests all-tests embedded-tests test-ros faults \
+  reproduce lint style types format docs clean
 
 help:  ## Show what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -56,19 +57,28 @@ demo: install  ## Run the whole ensemble with and without a shortcut, record, re
 	echo "more: \`slap evaluate obstacle2d\`: 50 tasks, success and plan length with intervals"; \
 	echo "more: \`slap evaluate obstacle2d --preset paper\`: from the paper's start states"
 
-PYTEST := $(abspath $(BIN))/pytest -q -n $(TESTS_AT_ONCE) --dist worksteal
+PYTEST := $(abspath $(BIN))/pytest -q --dist worksteal
 # No test should wait until motion planning is compiled. Half a second where it is.
 COMPILED := $(BIN)/python -m slap_ros.motion.kernels
+# Types are checked, and embedded_ros is tested, while other tests wait.
+BESIDE := $(MAKE) --no-print-directory --jobs 3 types embedded-tests
 
-test: $(VENV)/.tested lint  ## Check style and types, and run all tests but the slow ones
+test: $(VENV)/.tested style  ## Check style and types, and run all tests but the slow ones
 	$(COMPILED)
-	$(PYTEST) -m "not slow"
-	cd embedded_ros && $(PYTEST)
+	$(BESIDE) quick-tests
 
-test-all: $(VENV)/.tested lint  ## The same with the slow tests, as CI does
+test-all: $(VENV)/.tested style  ## The same with the slow tests, as CI does
 	$(COMPILED)
-	$(PYTEST)
-	cd embedded_ros && $(PYTEST)
+	$(BESIDE) all-tests
+
+quick-tests:
+	$(PYTEST) -n $(TESTS_AT_ONCE) -m "not slow"
+
+all-tests:
+	$(PYTEST) -n $(TESTS_AT_ONCE)
+
+embedded-tests:
+	cd embedded_ros && $(PYTEST) -n 2
 
 test-ros: $(VENV)/.installed  ## Run the tests that face ROS 2 on a sourced Jazzy
 	EMBEDDED_PYTHON=$(abspath $(BIN))/python test/ros/run
@@ -79,9 +89,13 @@ faults: $(VENV)/.tested  ## Inject many more faults than the tests do, for about
 reproduce: $(VENV)/.tested  ## Make every published figure again; says first what that takes
 	$(BIN)/python -m tools.reproduce $(FIGURES)
 
-lint: $(VENV)/.tested  ## Check style and types
+lint: style types  ## Check style and types
+
+style: $(VENV)/.tested
 	$(BIN)/ruff check . embedded_ros
 	$(BIN)/ruff format --check . embedded_ros
+
+types: $(VENV)/.tested
 	$(BIN)/mypy
 	cd embedded_ros && $(abspath $(BIN))/mypy
 
