@@ -67,11 +67,26 @@ def explore(
         PlanningLimitError: A limit was reached before a plan was found.
     """
     began = process_time()
+    found = explorer(distribution, index, settings).explore()
+    return {**found.as_json(), "cpu_s": process_time() - began}
+
+
+def explorer(distribution: TaskDistribution, index: int, settings: ExplorationSettings) -> Explorer:
+    """The explorer of one task, with its random numbers.
+
+    Args:
+        distribution: Distribution from which the task is drawn.
+        index: Index of the task among those that are explored, from 0.
+        settings: Settings of exploration.
+
+    Raises:
+        UnsolvableError: The task has no plan.
+        PlanningLimitError: A limit was reached before a plan was found.
+    """
     rng = np.random.default_rng([distribution.seed, EXPLORATION.first, index])
-    explorer = Explorer.of_task(
+    return Explorer.of_task(
         distribution.make_domain(), distribution.task_seed, EXPLORATION.index(index), settings, rng
     )
-    return {**explorer.explore().as_json(), "cpu_s": process_time() - began}
 
 
 def try_to_explore(
