@@ -150,7 +150,8 @@ def plan_length(
         sampling: Settings of how shortcuts are tried out in the model.
 
     Returns:
-        Environment steps of the plan in the model; or why there is none, in words.
+        Environment steps of the plan in the model; or why there is none that reaches the goal
+        there, in words.
     """
     domain = distribution.make_domain()
     task = domain.task(distribution.task_seed, VALIDATION.index(index))
@@ -161,7 +162,7 @@ def plan_length(
         result = planner.plan(initial, problem.model.space.mask(task.goal))
     except SlapError as error:
         return str(error)
-    return result.plan.predicted_steps
+    return result.fails or result.plan.predicted_steps
 
 
 def any_goal(distribution: TaskDistribution, share: float) -> TaskDistribution:

@@ -3,6 +3,7 @@
 """Shortcuts that are learned over acquired skills: both halves in one plan."""
 
 import json
+import math
 import shutil
 from contextlib import nullcontext
 from dataclasses import replace
@@ -25,15 +26,22 @@ from slap_ros.api.training import Unwatched
 from slap_ros.core.goals import task_with_goal
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode, InvalidParameterError, SkillsChangedError
-from slap_ros.evaluation.approaches import approaches
+from slap_ros.evaluation.approaches import PURE_PLANNING, approaches
 from slap_ros.evaluation.experiment import solve
+from slap_ros.learning.task_distribution import TaskDistribution
+from slap_ros.planning.graph_planner import GraphPlanner
+from slap_ros.planning.problem import Problem
 from slap_ros.relational import State
 from slap_ros.relational.pddl import parse_goal
+from slap_ros.shortcuts import jobs
 from slap_ros.shortcuts.library_choice import LibraryChoice
 from slap_ros.shortcuts.sampling import DEFAULT
+from slap_ros.shortcuts.settings import training_settings
 from slap_ros.shortcuts.shipped import chosen_library, require_usable
 from slap_ros.shortcuts.shortcut_library import load_library, save_library
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
+from slap_ros.studies.comparison import PlanningSetup
+from slap_ros.studies.slap.planning_time import plan_once
 from support.points import REWARDS
 from support.steady_skills import PICKING, PUTTING, towards, write_library
 
@@ -373,6 +381,30 @@ def test_skills_that_lack_an_operator_leave_nothing_to_shorten(tmp_path):
     answer = train(half, tmp_path / "library")
     assert answer.exit_code == ErrorCode.UNSOLVABLE
     assert "lacks a skill for Put(" in " ".join(answer.stderr.split())
+
+
+@pytest.fixture
+def hasty(tmp_path):
+    """Tasks whose plans fail in the model: Put is over before it is there."""
+    skills = write_library(tmp_path / "hasty", PICKING, replace(PUTTING, horizon=1))
+    choice = DomainChoice("points", "line", str(skills))
+    return TaskDistribution(DomainChoice.of(open_domain(choice), str(skills)), 0)
+
+
+def test_a_plan_that_fails_in_the_model_is_no_plan_to_shorten(hasty):
+    """Its steps end where it fails: counted as a length, a plan that works would be longer."""
+    domain = hasty.make_domain()
+    task = domain.task(hasty.task_seed, jobs.VALIDATION.index(0))
+    problem = Problem.of(domain, task.initial_state)
+    goal = problem.model.space.mask(task.goal)
+    assert GraphPlanner(problem).plan(task.initial_state, goal).fails  # so it would be executed
+    assert "Put" in str(jobs.plan_length(hasty, 0, (), DEFAULT))
+    assert jobs.mean_length([jobs.plan_length(hasty, 0, (), DEFAULT)]) == math.inf
+    explored = jobs.try_to_explore(hasty, 0, training_settings("ours", domain).exploration)
+    assert "Put" in str(explored) and isinstance(explored, str)
+    alone = PlanningSetup(hasty.domain, "lazy", PURE_PLANNING)
+    planned = plan_once(alone, hasty.task_seed, jobs.VALIDATION.index(0))
+    assert not planned.success and "Put" in planned.reason
 
 
 @pytest.mark.slow
