@@ -19,8 +19,9 @@ from ensemble.observation import Episode
 from ensemble.shortcuts import ShortcutParameters, ShortcutProvider
 from slap_ros.acquisition.curriculum.after_shortcuts import AfterShortcuts
 from slap_ros.acquisition.curriculum.initiation_states import InitiationStates
-from slap_ros.api.growing import GrowthWatch, grow_rounds
-from slap_ros.api.growth import GrowthRequest
+from slap_ros.api.growing import GrowthWatch, TrainingNotes, grow_rounds
+from slap_ros.api.growth import GrowthRequest, GrowthRound, TriedShortcut
+from slap_ros.api.growth_page import growth_page
 from slap_ros.api.shortcut_choice import choose_library
 from slap_ros.api.training import Unwatched
 from slap_ros.core.goals import task_with_goal
@@ -335,6 +336,38 @@ def test_what_grows_is_what_the_other_commands_make_interrupted_or_not(trained, 
     assert grow_rounds(request) == grown and contents(folder) == before
     with pytest.raises(InvalidParameterError, match="has a training with other settings"):
         grow_rounds(replace(request, seed=1))
+
+
+def grown_round(digest, unsolved, length, kept=True):
+    """A round as `slap grow` keeps it."""
+    tried = TriedShortcut("At-1", length + 9.0, length, kept)
+    return GrowthRound(
+        ("Pick",), digest, 1.0, "nothing fails", length + 9.0, length, (tried,), 100, 100, unsolved
+    )
+
+
+def test_a_round_that_solves_more_tasks_is_better_though_its_plans_are_longer():
+    """Tasks that had no plan before are the longer ones: their mean says nothing against it."""
+    request = GrowthRequest(
+        get_domain("points", "line"), Path("grown"), shortcut_settings="ours",
+        shortcut_changes=SMALL, steps=100_000,
+    )  # fmt: skip
+    weak, able = grown_round("1", 3, 40.0), grown_round("2", 0, 50.0)
+    assert request.why_over([weak, able]) == ""
+    assert request.why_over([able, replace(weak, skills_digest="3")]) == "plans get no shorter"
+    shorter = grown_round("3", 0, 45.0, kept=False)
+    assert request.why_over([able, shorter]) == "no shortcut makes plans shorter"
+    assert min((weak, able, shorter), key=lambda one: one.rank) is shorter
+    assert GrowthRound.from_json(weak.as_json()) == weak
+    page = growth_page(request, (weak, able), 1, "the budget is spent")
+    assert "The best is round 2" in page and "Validation tasks without a plan: 3." in page
+
+
+def test_tasks_without_a_plan_are_counted_where_they_are_for_validation():
+    notes = TrainingNotes(Unwatched())
+    for use in (jobs.VALIDATION.use, jobs.EXPLORATION.use, jobs.VALIDATION.use):
+        notes.on_left_out(use, 0, "no path")
+    assert notes.unsolved == 2
 
 
 def test_a_budget_below_a_round_is_refused_with_what_a_round_takes(tmp_path):
