@@ -266,6 +266,9 @@ def study(
         settings: Name of the settings of exploration.
         runner: Runner of the jobs.
 
+    Returns:
+        The report.
+
     Raises:
         UnsolvableError: No task has a plan.
     """
@@ -293,17 +296,7 @@ def study(
             tried=_tried(found, settings),
             scripted=SCRIPTED if distribution.domain.skills == DEMONSTRATOR else "",
         ),
-        table=MarkdownTable(
-            (
-                "in place of",
-                "tasks",
-                "saves at most",
-                "the skills take [steps]",
-                "may take [steps]",
-                "found",
-            ),
-            [row.as_row() for row in rows],
-        ),
+        table=_table(rows),
         found={
             "exploration": exploration.as_json(),
             "rows": [asdict(row) for row in rows],
@@ -312,6 +305,11 @@ def study(
         draw=lambda figure: draw(figure, rows),
         size=(7.0, 1.4 + 0.3 * len(rows)),
     )
+
+
+def _table(rows: Sequence[SavingsRow]) -> MarkdownTable:
+    columns = ("in place of", "tasks", "saves at most", "the skills take [steps]")
+    return MarkdownTable((*columns, "may take [steps]", "found"), [row.as_row() for row in rows])
 
 
 def _tried(found: Sequence[TaskSavings], settings: str) -> str:
