@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from slap_ros.core import Domain, Task
+from slap_ros.errors import UnsolvableError
 from slap_ros.learning.stored_keys import restored, stored
 from slap_ros.planning.abstract_graph import Edge, build_abstract_graph
 from slap_ros.planning.graph_planner import GraphPlanner
@@ -244,14 +245,16 @@ class Explorer:
             rng: Generator that draws the random actions.
 
         Raises:
-            UnsolvableError: The task has no plan.
+            UnsolvableError: The task has no plan that reaches the goal in the model.
             PlanningLimitError: A limit was reached before a plan was found.
         """
         task = domain.task(seed, index)
         problem = Problem.of(domain, task.initial_state)
         goal = problem.model.space.mask(task.goal)
-        plan = GraphPlanner(problem).plan(task.initial_state, goal).plan
-        return cls(domain, problem, task, plan, settings, rng)
+        found = GraphPlanner(problem).plan(task.initial_state, goal)
+        if found.fails:  # its steps end there, and say nothing of how long a plan is
+            raise UnsolvableError(found.fails)
+        return cls(domain, problem, task, found.plan, settings, rng)
 
     @property
     def plan_steps(self) -> int:
