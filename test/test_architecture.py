@@ -22,7 +22,7 @@ FLOORS = (
     ("studies",),
     ("api",),
     ("report",),
-    ("baselines",),
+    ("baselines", "imitation"),
     ("environments", "robot", "bags", "evaluation", "encoding"),
     ("acquisition", "shortcuts"),
     ("learning", "language"),

@@ -11,6 +11,7 @@ from typing import Any
 from slap_ros.studies.lg_sail import (
     acquisition,
     demonstrations,
+    imitation,
     induction,
     planning_ablation,
     replanning,
@@ -56,6 +57,7 @@ STUDIES: Mapping[str, Study[Any]] = {
         vacuity.STUDY,
         acquisition.STUDY,
         replanning.STUDY,
+        imitation.STUDY,
         warm_start.STUDY,
         sequence.STUDY,
         induction.STUDY,
@@ -69,12 +71,6 @@ STUDIES: Mapping[str, Study[Any]] = {
     )
 }
 WITHOUT_STUDY = (
-    not_made(
-        "LG-SAIL Table 7",
-        "imitation with and without planning",
-        "Stack 1.00, Peg 0.95, Peg goal 2 0.90",
-        "this project has no learning by imitation",
-    ),
     not_made(
         "LG-SAIL Fig. 4",
         "learning curves beside other learners",

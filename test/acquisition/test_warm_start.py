@@ -22,12 +22,14 @@ from slap_ros.acquisition.training.skill_env import SkillMdp, SkillVecEnv
 from slap_ros.acquisition.training.warm_start import ChosenStart, TriedStart, WarmStart
 from slap_ros.acquisition.training.warm_start_settings import WarmStartSettings
 from slap_ros.api.acquisition import UnwatchedCurriculum
+from slap_ros.api.learning_curves import Point
 from slap_ros.cli.skills import beginning
 from slap_ros.errors import InvalidParameterError
 from slap_ros.learning.workers import SequentialWorkers
 from slap_ros.skills.groundings import Groundings
 from slap_ros.skills.reward import SkillReward
 from slap_ros.skills.skill_library import AcquiredSkill
+from slap_ros.studies.lg_sail.warm_start import StartComparison
 from support.points import HORIZON, INTERFACE, PICK, POINTS, REWARDS, begin
 from support.steady_skills import PICKING, towards, write_library
 
@@ -212,6 +214,27 @@ def test_the_study_counts_the_steps_of_both_and_is_read_again(tmp_path):
     before = path.read_text()
     assert study(*arguments).exit_code == 0
     assert json.loads(path.read_text())["found"] == json.loads(before)["found"]
+
+
+NEVER, LATE, AT_ONCE = (
+    (Point(0, first), Point(600, last)) for first, last in ((0.0, 0.7), (0.0, 0.9), (0.9, 0.5))
+)
+
+
+@pytest.mark.parametrize(
+    ("scratch", "warm", "ratio", "is_bound"),
+    [
+        ((LATE, LATE), (LATE, AT_ONCE), 0.5, False),
+        ((LATE, NEVER), (LATE, AT_ONCE), 0.5, True),  # it would have taken more steps
+        ((NEVER, NEVER), (NEVER, AT_ONCE), None, True),  # and here, nobody knows
+        ((AT_ONCE, AT_ONCE), (AT_ONCE, AT_ONCE), None, False),
+    ],
+)
+def test_steps_compare_only_where_they_were_counted_to_the_end(scratch, warm, ratio, is_bound):
+    found = StartComparison("Pick", scratch, warm).as_json()
+    assert (found["ratio"], found["ratio_is_bound"]) == (ratio, is_bound)
+    assert (found["ratio_interval"] is None) == (ratio is None)
+    assert found["last"]["warm"] == [one[-1].success for one in warm]
 
 
 def test_the_study_wants_a_library(tmp_path):

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 from slap_ros.acquisition.curriculum.rollouts import PlanRollout, Stage, roll_out
 from slap_ros.api.command_options import CommandOption, DomainName, Jobs, Preset
 from slap_ros.api.left_out import Tell
+from slap_ros.core import Domain
 from slap_ros.core.goals import task_with_goal
 from slap_ros.domains import get_domain
 from slap_ros.drawing.palette import MUTED
@@ -106,20 +107,18 @@ def _in_words(stage: Stage) -> str:
     return f"{stage.operator} {stage.steps}{failed}"
 
 
-@dataclass(frozen=True)
-class GoalProgress:
-    """All libraries of one origin at one goal.
+@dataclass(frozen=True, kw_only=True)
+class LibrariesProgress:
+    """Several libraries at one goal.
 
     Args:
         domain: Name of the domain.
         goal: Name of the goal; empty for the goal that comes with each task.
-        origin: Proposer and rewarder of the libraries.
         libraries: Progress with each library, one at least.
     """
 
     domain: str
     goal: str
-    origin: Origin
     libraries: tuple[LibraryProgress, ...]
 
     @property
@@ -139,6 +138,26 @@ class GoalProgress:
         return SuccessRate(done, len(self.rollouts))
 
     @property
+    def failures(self) -> str:
+        """Stages that failed of all libraries, by operator, in words."""
+        failures = sum((library.failures for library in self.libraries), Counter[str]())
+        return ", ".join(f"{name} {count}" for name, count in failures.most_common()) or "none"
+
+
+@dataclass(frozen=True, kw_only=True)
+class GoalProgress(LibrariesProgress):
+    """All libraries of one origin at one goal.
+
+    Args:
+        domain: Name of the domain.
+        goal: Name of the goal; empty for the goal that comes with each task.
+        libraries: Progress with each library, one at least.
+        origin: Proposer and rewarder of the libraries.
+    """
+
+    origin: Origin
+
+    @property
     def paper(self) -> float | None:
         """LG-SAIL's task progress."""
         return PAPER.get((self.domain, self.goal))
@@ -156,14 +175,13 @@ class GoalProgress:
 
     def as_row(self) -> list[str]:
         """Row of a table."""
-        failures = sum((library.failures for library in self.libraries), Counter[str]())
         return [
             self.goal or "(the task's own)",
             ", ".join(self.origin),
             f"{len(self.libraries)} × {len(self.libraries[0].rollouts)}",
             format_spread(self.progress, 2),
             str(self.solved),
-            ", ".join(f"{name} {count}" for name, count in failures.most_common()) or "none",
+            self.failures,
             "" if self.paper is None else f"{self.paper:.2f}",
         ]
 
@@ -195,9 +213,12 @@ def study(
     for goal, count in counts.items():
         found: dict[Origin, list[LibraryProgress]] = {}
         for choice in choices:
-            origin, progress = _of_library(choice, goal, range(count), seed, runner)
+            origin, progress = of_library(choice, goal, range(count), seed, runner)
             found.setdefault(origin, []).append(progress)
-        goals += [GoalProgress(name, goal, origin, tuple(each)) for origin, each in found.items()]
+        goals += [
+            GoalProgress(domain=name, goal=goal, origin=origin, libraries=tuple(each))
+            for origin, each in found.items()
+        ]
     return StudyReport(
         study="acquisition",
         source="LG-SAIL Table 1",
@@ -221,10 +242,18 @@ def study(
     )
 
 
-def _of_library(
+def of_library(
     choice: DomainChoice, goal: str, indices: Sequence[int], seed: int, runner: JobRunner
 ) -> tuple[Origin, LibraryProgress]:
-    """Where a library is from, and what comes of a goal's tasks with it."""
+    """Where a library is from, and what comes of a goal's tasks with it.
+
+    Args:
+        choice: Domain with the skills of the library.
+        goal: Name of the goal; empty for the goal that comes with each task.
+        indices: Indices of the tasks.
+        seed: Seed of the tasks.
+        runner: Runner of the jobs.
+    """
     library = chosen_skills(choice)
     assert library is not None
     record = library.record
@@ -248,7 +277,29 @@ def carry_out_task(choice: DomainChoice, goal: str, seed: int, index: int) -> di
         A :class:`~slap_ros.acquisition.curriculum.rollouts.PlanRollout` as JSON, without states.
     """
     domain = open_domain(choice)
-    skills = {n: skill for n, skill in domain.skills.items() if isinstance(skill, LearnedSkill)}
+    return carry_out(domain, goal, seed, index, learned_skills(domain))
+
+
+def learned_skills(domain: Domain) -> dict[str, LearnedSkill]:
+    """The skills of a domain that were learned, by operator name."""
+    return {n: skill for n, skill in domain.skills.items() if isinstance(skill, LearnedSkill)}
+
+
+def carry_out(
+    domain: Domain, goal: str, seed: int, index: int, skills: Mapping[str, LearnedSkill]
+) -> dict[str, Any]:
+    """Carry out one task's plan with given skills.
+
+    Args:
+        domain: Domain with the operators to plan with.
+        goal: Name of the goal; empty for the task's own.
+        seed: Seed of the task.
+        index: Index of the task.
+        skills: Skills by operator name.
+
+    Returns:
+        A :class:`~slap_ros.acquisition.curriculum.rollouts.PlanRollout` as JSON, without states.
+    """
     task = task_with_goal(domain, seed, index, goal)
     rollout = roll_out(domain, task, index, domain.operators, skills).as_json()
     for stage in rollout["stages"]:

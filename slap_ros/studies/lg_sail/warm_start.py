@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass
 from hashlib import sha256
 from itertools import chain
 from pathlib import Path
+from statistics import fmean
 from typing import TYPE_CHECKING, Annotated, Any
 
 from slap_ros.acquisition.curriculum.jobs import horizon_of
@@ -44,9 +45,12 @@ after how many environment steps of learning a success of {level:g} was first me
 plans by their task progress, which is measured between rounds of training, and of a skill by the
 judgements of its checkpoints, one every {segment:,} steps. Steps are the mean ± sample standard
 deviation over seeds. Where a training never came there, its own length is counted, and the cell
-has a ≥. The ratio is that of the means, with the bootstrap's 95 % interval over seeds. Episodes in
-which known skills are tried, and in which checkpoints are judged, are not counted as steps. The
-last column has the skills that were begun with, and their success before any training.
+has a ≥. The ratio is that of the means, with the bootstrap's 95 % interval over seeds; it has a ≤
+where a training from scratch never came there, and there is none where a warm one never did. *Last*
+is what was measured after all steps: of plans with the best checkpoint of each skill, of a skill
+with the weights that it had by then. Episodes in which known skills are tried, and in which
+checkpoints are judged, are not counted as steps. The last column has the skills that were begun
+with, and their success before any training.
 """
 SCRATCH, WARM = "scratch", "warm"
 LEVEL = 0.8  # task progress, and success, up to which steps are counted
@@ -69,30 +73,40 @@ class StartComparison:
 
     @property
     def ratio(self) -> tuple[float, Interval | None] | None:
-        """Steps of warm trainings over steps of those from scratch; None where these have none."""
+        """Steps of warm trainings over steps of those from scratch.
+
+        None where a warm training never came there, or one from scratch was there at once.
+        """
         ours, theirs = (
             [steps_to(one, LEVEL)[0] for one in side] for side in (self.warm, self.scratch)
         )
-        if not ours or not all(theirs):
+        if not ours or not all(theirs) or not all(_reached(self.warm)):
             return None
         return sum(ours) / sum(theirs), ratio_interval(ours, theirs)
+
+    @property
+    def is_bound(self) -> bool:
+        """Whether the ratio is at most that: a training from scratch never came there."""
+        return not all(_reached(self.scratch))
 
     def as_json(self) -> dict[str, Any]:
         """The summary, and all measurements."""
         ratio = self.ratio
+        sides = {SCRATCH: self.scratch, WARM: self.warm}
         return {
             "of": self.name,
-            "steps": {
-                SCRATCH: [steps_to(one, LEVEL)[0] for one in self.scratch],
-                WARM: [steps_to(one, LEVEL)[0] for one in self.warm],
-            },
-            "reached": {
-                SCRATCH: [steps_to(one, LEVEL)[1] for one in self.scratch],
-                WARM: [steps_to(one, LEVEL)[1] for one in self.warm],
-            },
+            "steps": {name: [steps_to(one, LEVEL)[0] for one in of] for name, of in sides.items()},
+            "reached": {name: _reached(of) for name, of in sides.items()},
+            "last": {name: [one[-1].success for one in of] for name, of in sides.items()},
             "ratio": None if ratio is None else ratio[0],
+            "ratio_is_bound": self.is_bound,
             "ratio_interval": asdict(ratio[1]) if ratio is not None and ratio[1] else None,
         }
+
+
+def _reached(trainings: Sequence[Sequence[Point]]) -> list[bool]:
+    """Whether each training ever came to the level."""
+    return [steps_to(one, LEVEL)[1] for one in trainings]
 
 
 def study(
@@ -131,7 +145,15 @@ def study(
         title=f"Skills to begin with: {setup.domain}",
         measured=MEASURED.format(level=LEVEL, segment=segment_steps),
         table=MarkdownTable(
-            ("of", "from scratch [steps]", "warm [steps]", "warm / scratch [95 %]", "begun with"),
+            (
+                "of",
+                "from scratch [steps]",
+                "warm [steps]",
+                "warm / scratch [95 %]",
+                "last, from scratch",
+                "last, warm",
+                "begun with",
+            ),
             [_row(one, by_start[WARM]) for one in comparisons],
         ),
         found={
@@ -171,7 +193,9 @@ def _row(comparison: StartComparison, warm: Sequence[LearningCurves]) -> list[st
         comparison.name,
         _steps(comparison.scratch),
         _steps(comparison.warm),
-        "-" if ratio is None else _ratio(*ratio),
+        "-" if ratio is None else f"{'≤ ' if comparison.is_bound else ''}{_ratio(*ratio)}",
+        _last(comparison.scratch),
+        _last(comparison.warm),
         _begun_with([one.began_with.get(comparison.name, {}) for one in warm]),
     ]
 
@@ -181,6 +205,10 @@ def _steps(trainings: Sequence[Sequence[Point]]) -> str:
     reached = sum(done for _, done in found)
     spread = format_spread(Spread.of([float(steps) for steps, _ in found]), 0)
     return spread if reached == len(found) else f"≥ {spread} ({reached} of {len(found)} came there)"
+
+
+def _last(trainings: Sequence[Sequence[Point]]) -> str:
+    return format_spread(Spread.of([one[-1].success for one in trainings]), 2)
 
 
 def _ratio(value: float, interval: Interval | None) -> str:
@@ -220,11 +248,15 @@ def draw(figure: Figure, comparisons: Sequence[StartComparison]) -> None:
 
 def _summary(found: Data) -> str:
     of = f"{found['goal']}: " if found["goal"] else ""
-    return of + ", ".join(
-        f"{one['of']} {one['ratio']:.2f} of the steps"
-        for one in found["comparisons"]
-        if one["ratio"] is not None
-    )
+    return of + ", ".join(map(_compared, found["comparisons"]))
+
+
+def _compared(one: Data) -> str:
+    """A comparison in a few words: success after all steps, and steps where they compare."""
+    last = " → ".join(f"{fmean(one['last'][name]):.2f}" for name in (SCRATCH, WARM))
+    bound = "≤ " if one["ratio_is_bound"] else ""
+    steps = "" if one["ratio"] is None else f", {bound}{one['ratio']:.2f} of the steps"
+    return f"{one['of']} {last}{steps}"
 
 
 @dataclass(frozen=True, kw_only=True)
