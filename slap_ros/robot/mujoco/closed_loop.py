@@ -162,7 +162,7 @@ class ClosedLoopWorld:
                     return state
         if invalid:
             raise InvalidStateError(invalid)
-        raise NoDetectionError(f"not detected: {', '.join(self._robot.undetected(since_s))}")
+        raise NoDetectionError(f"not detected: {self._robot.what_is_missing(since_s)}")
 
     def _pass_period(self) -> bool:
         """Let a period pass; whether something was measured at its end."""
