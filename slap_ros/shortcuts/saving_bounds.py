@@ -51,7 +51,7 @@ def saving_bounds(graph: AbstractGraph, operator_steps: Mapping[str, float]) -> 
         Bounds, the largest saving first.
     """
     usual = fmean(operator_steps.values() or [1.0])
-    ways = _Ways(graph, lambda edge: operator_steps.get(edge.option.skill.name, usual))
+    ways = _CheapestWays(graph, lambda edge: operator_steps.get(edge.option.skill.name, usual))
     to_go, from_start = steps_to_goal(graph, operator_steps), ways.leading_from(0)
     bounds = []
     for i, j in graph.candidates():
@@ -62,7 +62,7 @@ def saving_bounds(graph: AbstractGraph, operator_steps: Mapping[str, float]) -> 
     return sorted(bounds, key=lambda bound: (-bound.saving, bound.pair))
 
 
-class _Ways:
+class _CheapestWays:
     """The cheapest ways through a graph, from any node."""
 
     def __init__(self, graph: AbstractGraph, cost: Callable[[Edge], float]) -> None:
