@@ -156,7 +156,7 @@ OWN = {
     "doctor/machine.py",
     "domains/cleanup_table/shapes/__init__.py",
     "files.py",
-    "messages/interfaces.py",
+    "messages/typestore.py",
     "motion/kernels/compilation.py",
     "report/page.py",
 }

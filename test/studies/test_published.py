@@ -85,12 +85,26 @@ def test_pages_have_tasks_enough():
     }
 
 
-@pytest.mark.parametrize("name", sorted(n for n, data in RESULTS.items() if "libraries" in data))
+def of_libraries(learners):
+    """The results about several libraries: of other learners, or of ours alone."""
+    named = (name for name, data in RESULTS.items() if "libraries" in data)
+    return sorted(name for name in named if (RESULTS[name]["study"] == "learners") == learners)
+
+
+@pytest.mark.parametrize("name", of_libraries(False))
 def test_the_main_table_is_of_all_shipped_libraries(name):
     data = RESULTS[name]
     shipped = digests(shipped_libraries(data["domain"]), data["domain"])
     assert [library["digest"] for library in data["libraries"]] == shipped, data["command"]
     assert len(set(shipped)) == len(shipped)
+
+
+@pytest.mark.parametrize("name", of_libraries(True))
+def test_other_learners_are_those_whose_libraries_ship(name):
+    data = RESULTS[name]
+    others = sorted((ROOT / "models" / "learners" / data["domain"]).iterdir())
+    wanted = digests([shipped_library(data["domain"]), *others], data["domain"])
+    assert {library["digest"] for library in data["libraries"]} == set(wanted), data["command"]
 
 
 def test_figures_are_of_tasks_that_development_did_not_look_at():
