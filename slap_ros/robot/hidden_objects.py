@@ -83,7 +83,7 @@ def pushed_aside(
         is seen. Where there is no room within a few centimetres, there is none here.
     """
     placed = [body.at(_pose(state, obj)) for obj, body in bodies.items() if obj not in hidden]
-    moved = {}
+    moved: dict[Object, Pose] = {}
     for obj, body in bodies.items():
         if obj in hidden:
             start = _pose(state, obj)
