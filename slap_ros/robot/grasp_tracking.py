@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from slap_ros.geometry.pose import IDENTITY, Pose, conjugate, normalised, rotate
+from slap_ros.geometry.pose import IDENTITY, Pose, Vector, conjugate, normalised, rotate
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.line_of_sight import across
 from slap_ros.robot.state_assembly import Grasp, possible_joints
@@ -48,13 +48,14 @@ def narrowest_width(body: Body, grasp: Pose) -> float:
 def is_lost(grasp: Grasp, reading: JointReading, seen: PoseEstimate | None) -> bool:
     """Whether what was held does not follow the hand, or the fingers are shut.
 
+    How far away a camera sees it says nothing of that: fingers cover its tags.
+
     Args:
         grasp: Grasp as it was measured last.
         reading: Joints and fingers, measured now.
         seen: Pose of the held object, if anything sees it.
     """
-    expected = expected_pose(grasp, reading).position
-    strayed = seen is not None and math.dist(seen.pose.position, expected) > FOLLOWS
+    strayed = seen is not None and math.hypot(*_offset(grasp, reading, seen)) > FOLLOWS
     shut = reading.gap is not None and reading.gap < GRASPED * grasp.width
     return strayed or shut
 
@@ -71,9 +72,14 @@ def grasp_as_seen(grasp: Grasp, reading: JointReading, seen: PoseEstimate | None
     """
     if seen is None or not seen.at_rest or seen.pose == expected_pose(grasp, reading):
         return grasp
-    expected, found = expected_pose(grasp, reading).position, seen.pose.position
-    offset = [b - a for a, b in zip(expected, found, strict=True)]
-    x, y, z = (a + d for a, d in zip(expected, across(offset, found, seen.eye), strict=True))
+    expected, offset = expected_pose(grasp, reading).position, _offset(grasp, reading, seen)
+    x, y, z = (a + d for a, d in zip(expected, offset, strict=True))
     in_base = Pose((x, y, z), seen.pose.quaternion)
     pose = hand_pose(possible_joints(reading.joints)).inverse().compose(in_base)
     return replace(grasp, pose=Pose(pose.position, normalised(pose.quaternion)))
+
+
+def _offset(grasp: Grasp, reading: JointReading, seen: PoseEstimate) -> Vector:
+    """From where the hand has what it holds to where it is seen, m."""
+    expected, found = expected_pose(grasp, reading).position, seen.pose.position
+    return across([b - a for a, b in zip(expected, found, strict=True)], found, seen.eye)

@@ -3,7 +3,8 @@
 """What one picture of a tag says exactly, and what it does not.
 
 Across the line of sight, a tag is known to a fraction of a millimetre. How far away it is follows
-from its size in the picture, and is off by millimetres, sometimes by centimetres. A tag that is
+from its size in the picture, and is off by millimetres, or by centimetres where a finger covers an
+edge of it. A tag that is
 seen at a slant is narrow in the picture: it may seem to be anywhere within half a decimetre, or to
 face the other way. So slanted tags do not count, and distance is taken from elsewhere: from what an
 object stands on (``slap_ros.worlds.joint_space.settling``), or from the hand that holds it.
@@ -25,7 +26,7 @@ from slap_ros.worlds.settling import levelled
 SLANTED = 0.4  # cosine of the angle between a tag's normal and the line of sight, about 66 degrees
 HALF_TURN: Quaternion = (0.0, 0.0, 1.0, 0.0)  # about a tag's normal
 LIKE_BEFORE = 0.5  # rad, by which what has not rolled over may have turned since it was seen
-DISTANCE_ERROR = 0.03  # m, by which a tag may seem nearer or further away than it is
+DISTANCE_ERROR = 0.06  # m, by which a tag may seem nearer or further away than it is
 
 
 def is_slanted(seen: Pose) -> bool:

@@ -34,7 +34,7 @@ from slap_ros.robot.grasp_tracking import (
     is_lost,
     narrowest_width,
 )
-from slap_ros.robot.hidden_objects import PredictedMotion
+from slap_ros.robot.hidden_objects import PredictedMotion, pushed_aside
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.limits import STEP_TOLERANCE, JointMotion, Limits
 from slap_ros.robot.line_of_sight import Ways, is_slanted
@@ -255,12 +255,24 @@ class RobotWorld:
         if self._grasp is not None:
             self._grasp = grasp_as_seen(self._grasp, reading, estimates.get(self._grasp.obj))
         state = self._assembler.assemble(reading, known, self._grasp)
+        if aside := self._pushed_aside(state, known, since_s):
+            known |= aside
+            state = self._assembler.assemble(reading, known, self._grasp)
         self._model.reset(state)
         for obj, estimate in known.items():
             self._tracks[obj].remember(estimate)
         self._state = self._measured = state
         self._predicted = None
         return state
+
+    def _pushed_aside(
+        self, state: State, known: Mapping[Object, PoseEstimate], since_s: float
+    ) -> dict[Object, PoseEstimate]:
+        hidden = [obj for obj in known if self._is_hidden(self._tracks[obj], since_s)]
+        free = zip(self._bodies, self._model.scene.free, strict=True)
+        bodies = {obj: body for obj, body in free if obj in known}
+        moved = pushed_aside(state, bodies, hidden) if hidden else {}
+        return {obj: still(pose, known[obj].weight) for obj, pose in moved.items()}
 
     def _estimates(
         self, reading: JointReading, since_s: float
