@@ -4,12 +4,16 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 TORCH := torch==2.13.0  # pinned: another version trains other policies from the same seed
-TESTS_AT_ONCE := 3  # on two cores: many wait for nodes, networks and clocks
+# pip would compile every test of every library, too, and on one processor.
+PIP_INSTALL := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
+COMPILE := $(BIN)/python -m compileall -qq -j 0 -x '/tests?/' $(VENV)/lib || true  # some have files of other Pythons
+TESTS_AT_ONCE := 4  # on two cores: many wait for nodes, networks and clocks
 METADATA := pyproject.toml setup.py setup.cfg embedded_ros/pyproject.toml
 # Images set it. Tests start hundreds of processes, and each would compile all that it imports.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help install demo test test-all test-ros faults reproduce lint format docs clean
+.PHONY: help install demo test test-all quick-tests all-tests embedded-tests test-ros faults \
+  reproduce lint style types format docs clean
 
 help:  ## Show what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 12
@@ -22,12 +26,13 @@ $(VENV)/.installed: $(METADATA)
 	@echo "== setting up $(VENV), which takes about two minutes"
 	$(PYTHON) -m venv $(VENV) || \
 	  { echo "no venv module; on Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
-	$(BIN)/pip install --quiet --disable-pip-version-check -e ./embedded_ros -e '.[physics]'
-	$(BIN)/python -m slap_ros.motion.kernels
+	$(PIP_INSTALL) -e ./embedded_ros -e '.[physics]'
+	$(COMPILE) & $(BIN)/python -m slap_ros.motion.kernels && wait $$!
 	@touch $@
 
 $(VENV)/.tested: $(VENV)/.installed
-	$(BIN)/pip install --quiet --disable-pip-version-check '$(strip $(TORCH))' -e '.[test]'
+	$(PIP_INSTALL) '$(strip $(TORCH))' -e '.[test]'
+	$(COMPILE)
 	@touch $@
 
 demo: install  ## Run the whole ensemble with and without a shortcut, record, replay, report
@@ -52,19 +57,28 @@ demo: install  ## Run the whole ensemble with and without a shortcut, record, re
 	echo "more: \`slap evaluate obstacle2d\`: 50 tasks, success and plan length with intervals"; \
 	echo "more: \`slap evaluate obstacle2d --preset paper\`: from the paper's start states"
 
-PYTEST := $(abspath $(BIN))/pytest -q -n $(TESTS_AT_ONCE) --dist worksteal
+PYTEST := $(abspath $(BIN))/pytest -q --dist worksteal
 # No test should wait until motion planning is compiled. Half a second where it is.
 COMPILED := $(BIN)/python -m slap_ros.motion.kernels
+# Types are checked, and embedded_ros is tested, while other tests wait.
+BESIDE := $(MAKE) --no-print-directory --jobs 3 types embedded-tests
 
-test: $(VENV)/.tested lint  ## Check style and types, and run all tests but the slow ones
+test: $(VENV)/.tested style  ## Check style and types, and run all tests but the slow ones
 	$(COMPILED)
-	$(PYTEST) -m "not slow"
-	cd embedded_ros && $(PYTEST)
+	$(BESIDE) quick-tests
 
-test-all: $(VENV)/.tested lint  ## The same with the slow tests, as CI does
+test-all: $(VENV)/.tested style  ## The same with the slow tests, as CI does
 	$(COMPILED)
-	$(PYTEST)
-	cd embedded_ros && $(PYTEST)
+	$(BESIDE) all-tests
+
+quick-tests:
+	$(PYTEST) -n $(TESTS_AT_ONCE) -m "not slow"
+
+all-tests:
+	$(PYTEST) -n $(TESTS_AT_ONCE)
+
+embedded-tests:
+	cd embedded_ros && $(PYTEST) -n 2
 
 test-ros: $(VENV)/.installed  ## Run the tests that face ROS 2 on a sourced Jazzy
 	EMBEDDED_PYTHON=$(abspath $(BIN))/python test/ros/run
@@ -75,9 +89,13 @@ faults: $(VENV)/.tested  ## Inject many more faults than the tests do, for about
 reproduce: $(VENV)/.tested  ## Make every published figure again; says first what that takes
 	$(BIN)/python -m tools.reproduce $(FIGURES)
 
-lint: $(VENV)/.tested  ## Check style and types
+lint: style types  ## Check style and types
+
+style: $(VENV)/.tested
 	$(BIN)/ruff check . embedded_ros
 	$(BIN)/ruff format --check . embedded_ros
+
+types: $(VENV)/.tested
 	$(BIN)/mypy
 	cd embedded_ros && $(abspath $(BIN))/mypy
 
@@ -90,7 +108,7 @@ docs: $(VENV)/.documented  ## Build the documentation into site/
 	@echo "open site/index.html; for the search: $(BIN)/python -m http.server --directory site"
 
 $(VENV)/.documented: $(VENV)/.installed
-	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[docs]'
+	$(PIP_INSTALL) -e '.[docs]'
 	@touch $@
 
 clean:  ## Remove what was made

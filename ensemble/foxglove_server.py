@@ -17,7 +17,7 @@ from rclpy.serialization import serialize_message
 
 from ensemble.interfaces import DIAGNOSTICS, PLAN_EVENTS, RECORDED, SKILL_EVENTS, Topic
 from slap_ros.errors import InvalidParameterError
-from slap_ros.messages.interfaces import definition
+from slap_ros.messages.typestore import definition
 
 if TYPE_CHECKING:
     from foxglove.websocket import ChannelView, Client

@@ -88,7 +88,7 @@ class Robot:
 
     def no_detection(self, since_s: float, when: str) -> NoDetectionError:
         """The error that names what was not detected since then."""
-        missing = ", ".join(self.world.undetected(since_s)) or "none at all"
+        missing = self.world.what_is_missing(since_s)
         seldom = ", ".join(self.world.seldom_detected(since_s))
         too_few = f"; too few times: {seldom}" if seldom else ""
         return NoDetectionError(f"not detected {when}: {missing}{too_few}")

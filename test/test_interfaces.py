@@ -8,7 +8,7 @@ from importlib.resources import files
 import pytest
 
 from slap_ros.errors import ErrorCode, SlapError
-from slap_ros.messages.interfaces import typestore
+from slap_ros.messages.typestore import typestore
 from slap_ros.planning.options import OptionKind
 
 INTERFACES = sorted(

@@ -12,7 +12,7 @@ import math
 import shutil
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from slap_ros.api.training import Unwatched, train
 from slap_ros.files import require_writable, sole_use, write_whole
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.policies.library_files import replace_folder
+from slap_ros.shortcuts.jobs import VALIDATION
 from slap_ros.shortcuts.shortcut_library import ShortcutLibrary
 from slap_ros.shortcuts.training import CandidateGroup, TrainingCallback
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
@@ -54,7 +55,8 @@ class Grown:
 
     Args:
         rounds: Rounds, in order.
-        best: Number of the round with the shortest plans, from 0.
+        best: Number of the best round, from 0; see
+            :attr:`~slap_ros.api.growth.GrowthRound.rank`.
         ended: Reason why there is no further round, in words.
     """
 
@@ -113,8 +115,8 @@ def grow_rounds(
 
 
 def _best(rounds: Sequence[GrowthRound]) -> int:
-    """The number of the first round with the shortest plans."""
-    return min(range(len(rounds)), key=lambda number: rounds[number].length)
+    """The number of the first round that no other is better than."""
+    return min(range(len(rounds)), key=lambda number: rounds[number].rank)
 
 
 def _carry_out_round(
@@ -132,41 +134,38 @@ def _carry_out_round(
     acquired = _acquire(request, len(before), left, jobs, watch)
     left -= int(acquired.record["steps"])
     if before and acquired.digest == before[-1].skills_digest:
-        return _round(acquired, (), 0, before[-1].length_alone, before[-1].length)
-    library, tried = _train(request, len(before), left, jobs, watch)
+        same = before[-1]
+        return replace(_of_skills(acquired, same.length_alone, same.length), unsolved=same.unsolved)
+    library, notes = _train(request, len(before), left, jobs, watch)
     explored = int(library.record["environment_steps"]["exploring"])
-    steps = explored + len(tried) * request.training.total_steps
     validation = library.record["validation"]
-    return _round(acquired, tried, steps, validation["pure_planning"], validation["slap"])
+    return replace(
+        _of_skills(acquired, validation["pure_planning"], validation["slap"]),
+        tried=tuple(notes.tried),
+        shortcut_steps=explored + len(notes.tried) * request.training.total_steps,
+        unsolved=notes.unsolved,
+    )
 
 
-def _round(
-    acquired: SkillLibrary,
-    tried: tuple[TriedShortcut, ...],
-    shortcut_steps: int,
-    length_alone: float,
-    length: float,
-) -> GrowthRound:
-    """What a round has brought.
+def _of_skills(acquired: SkillLibrary, length_alone: float, length: float) -> GrowthRound:
+    """What a round has brought in which no shortcut was learned.
 
     Args:
         acquired: Skills of the round.
-        tried: Shortcuts that were learned.
-        shortcut_steps: Environment steps that exploring and learning shortcuts took.
         length_alone: Mean plan length with skills alone, environment steps.
         length: Mean plan length with shortcuts, environment steps.
     """
     record = acquired.record
     return GrowthRound(
-        tuple(skill.operator.name for skill in acquired.skills),
-        acquired.digest,
-        float(record["progress_on_fresh_tasks"]),
-        str(record["ended"]),
-        length_alone,
-        length,
-        tried,
-        int(record["steps"]),
-        shortcut_steps,
+        skills=tuple(skill.operator.name for skill in acquired.skills),
+        skills_digest=acquired.digest,
+        progress=float(record["progress_on_fresh_tasks"]),
+        ended=str(record["ended"]),
+        length_alone=length_alone,
+        length=length,
+        tried=(),
+        skill_steps=int(record["steps"]),
+        shortcut_steps=0,
     )
 
 
@@ -188,8 +187,8 @@ def _acquire(
 
 def _train(
     request: GrowthRequest, number: int, left: int, jobs: int | None, watch: GrowthWatch
-) -> tuple[ShortcutLibrary, tuple[TriedShortcut, ...]]:
-    """The shortcuts of a round, and all that were tried.
+) -> tuple[ShortcutLibrary, TrainingNotes]:
+    """The shortcuts of a round, and notes of what was tried.
 
     Args:
         request: What is to grow.
@@ -211,11 +210,16 @@ def _train(
             jobs=jobs,
             callback=notes,
         )
-    return library, tuple(notes.tried)
+    return library, notes
 
 
 class TrainingNotes:
-    """Notes which shortcuts a training tries, and passes all events on."""
+    """Notes which shortcuts a training tries, and passes all events on.
+
+    Attributes:
+        tried: Shortcuts that were learned, in order.
+        unsolved: Number of validation tasks without a plan.
+    """
 
     def __init__(self, callback: TrainingCallback) -> None:
         """Begin with nothing tried.
@@ -225,8 +229,13 @@ class TrainingNotes:
         """
         self._callback = callback
         self.tried: list[TriedShortcut] = []
+        self.unsolved = 0
         self.on_progress = callback.on_progress
-        self.on_left_out = callback.on_left_out
+
+    def on_left_out(self, use: str, index: int, reason: str) -> None:
+        """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""
+        self._callback.on_left_out(use, index, reason)
+        self.unsolved += use == VALIDATION.use
 
     def on_ranked(self, ranked: Sequence[CandidateGroup]) -> None:
         """See :class:`~slap_ros.shortcuts.training.TrainingCallback`."""

@@ -54,6 +54,7 @@ class GrowthRound:
         tried: Shortcuts that were learned, in order.
         skill_steps: Environment steps that learning skills took.
         shortcut_steps: Environment steps that exploring and learning shortcuts took.
+        unsolved: Number of validation tasks without a plan, over which lengths are no means.
     """
 
     skills: tuple[str, ...]
@@ -65,6 +66,15 @@ class GrowthRound:
     tried: tuple[TriedShortcut, ...]
     skill_steps: int
     shortcut_steps: int
+    unsolved: int = 0
+
+    @property
+    def rank(self) -> tuple[int, float]:
+        """Less for a better round: tasks that have a plan come first, then short plans.
+
+        Skills that solve one more task may well have longer plans in the mean.
+        """
+        return self.unsolved, self.length
 
     @property
     def steps(self) -> int:
@@ -240,12 +250,12 @@ class GrowthRequest:
         if not rounds:
             return ""
         *before, last = rounds
-        if not any(one.kept for one in last.tried) and not before:
-            return "no shortcut makes plans shorter"
         if before and last.skills_digest == before[-1].skills_digest:
             return "no skill learns from where shortcuts have led"
-        if before and last.length >= before[-1].length:
+        if before and last.rank >= before[-1].rank:
             return "plans get no shorter"
+        if not any(one.kept for one in last.tried):
+            return "no shortcut makes plans shorter"
         if self.steps - sum(one.steps for one in rounds) < self.least_steps:
             return "the budget is spent"
         return ""

@@ -34,11 +34,12 @@ def growth_page(
         f"# What grew in {domain.name}, preset {domain.preset}\n\n"
         f"    {request.command}\n\n"
         f"{_HEAD}{''.join(_row(number, one) for number, one in enumerate(rounds))}\n"
-        f"Plans are shortest in round {best + 1}: {shortest.length:.1f} steps, where its skills "
-        f"alone take {shortest.length_alone:.1f} (saved: {saved:.0%}). Lengths are means over "
-        "validation tasks, which training never sees. `skills` and `shortcuts` are the libraries "
-        f"of this round. It ended since {ended}, after {spent} of {request.steps} environment "
-        f"steps.\n{sections}"
+        f"The best is round {best + 1}: plans of {shortest.length:.1f} steps, where its skills "
+        f"alone take {shortest.length_alone:.1f} (saved: {saved:.0%}). Lengths are means over the "
+        "validation tasks that have a plan; training never sees them. A round is better where more "
+        "of them have one, and among equals where plans are shorter. `skills` and `shortcuts` are "
+        f"the libraries of this round. It ended since {ended}, after {spent} of {request.steps} "
+        f"environment steps.\n{sections}"
     )
 
 
@@ -51,9 +52,11 @@ def _row(number: int, one: GrowthRound) -> str:
 
 def _section(number: int, one: GrowthRound) -> str:
     tried = "".join(f"- {_in_words(shortcut)}\n" for shortcut in one.tried)
+    without = f" Validation tasks without a plan: {one.unsolved}." if one.unsolved else ""
     return (
         f"\n## Round {number + 1}\n\n"
-        f"Skills {one.skills_digest}: {one.ended}.\n\n{tried or 'No shortcut was learned.'}"
+        f"Skills {one.skills_digest}: {one.ended}.{without}\n\n"
+        f"{tried or 'No shortcut was learned.'}"
     ).rstrip("\n") + "\n"
 
 

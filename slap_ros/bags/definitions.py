@@ -24,7 +24,8 @@ from rosbags.typesys.store import Typestore
 
 from slap_ros.bags.raw import Channel, MessageDefinition, one_line
 from slap_ros.errors import DamagedBagError, ForeignBagError
-from slap_ros.messages.interfaces import PACKAGE, PLAN, definition, message_texts, typestore
+from slap_ros.messages.interfaces import PACKAGE, PLAN
+from slap_ros.messages.typestore import definition, message_texts, typestore
 
 IDL_SEPARATOR = "=" * 80 + "\n"
 # With those of nested types, and constants; an array of fixed length counts as many fields as it

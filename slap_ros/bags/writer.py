@@ -17,7 +17,7 @@ from rosbags.typesys import TypesysError
 from slap_ros.bags.mcap_writer import McapWriter
 from slap_ros.bags.rosbag2 import TopicRecord, bag_information, to_yaml, write_metadata
 from slap_ros.errors import BagExistsError, InvalidParameterError, StorageFullError
-from slap_ros.messages.interfaces import definition, typestore
+from slap_ros.messages.typestore import definition, typestore
 
 METADATA_NAME = "slap_ros"  # of the MCAP record with the run's configuration
 CHECKSUM_NAME = "slap_ros.checksum"  # of the MCAP record with that record's checksum,

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from stable_baselines3 import SAC
 
 from slap_ros.baselines.budgeted_learner import BudgetedLearner
 from slap_ros.baselines.hindsight_buffer import HindsightBuffer
@@ -23,6 +22,7 @@ from slap_ros.baselines.method import Method
 from slap_ros.baselines.training_envs import TrainingEnvs, as_observed, separate_envs
 from slap_ros.files import write_whole
 from slap_ros.learning.policy_export import exported_layers, hidden_layers, weights_of
+from slap_ros.learning.sac import make_sac
 from slap_ros.learning.sac_state import restore_sac, sac_state
 from slap_ros.learning.work_folder import damaged
 from slap_ros.policies.mlp_policy import MlpPolicy
@@ -67,26 +67,18 @@ class SacHerLearner(BudgetedLearner):
         """
         self._hidden = len(settings.net_arch)
         first_episode = settings.n_envs * (envs.step_limit + 1)
-        self._sac = SAC(
-            "MultiInputPolicy",
+        self._sac = make_sac(
             envs.make(),
-            replay_buffer_class=HindsightBuffer,
+            settings,
+            seed,
+            policy="MultiInputPolicy",
+            replay=HindsightBuffer,
             replay_buffer_kwargs={
                 "n_sampled_goal": settings.n_sampled_goal,
                 "goal_selection_strategy": "future",
             },
             buffer_size=min(settings.buffer_size, settings.total_steps + first_episode),
             learning_starts=max(settings.learning_starts, first_episode),
-            batch_size=settings.batch_size,
-            learning_rate=settings.learning_rate,
-            ent_coef=f"auto_{settings.ent_coef_init}",
-            tau=settings.tau,
-            gamma=settings.gamma,
-            train_freq=settings.train_freq,
-            gradient_steps=settings.gradient_steps,
-            policy_kwargs={"net_arch": list(settings.net_arch)},
-            seed=seed,
-            device="cpu",
         )
         super().__init__(self._sac, envs, settings.total_steps, seed)
 

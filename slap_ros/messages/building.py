@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from rosbags.interfaces import Nodetype
 
-from slap_ros.messages.interfaces import typestore
+from slap_ros.messages.typestore import typestore
 
 TEXT = ("string", "wstring")
 

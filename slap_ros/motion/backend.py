@@ -39,9 +39,9 @@ class Backend(Protocol):
 def backend() -> Backend:
     """The faster one that can be had here."""
     try:
-        from slap_ros.motion.kernels.compiled_backend import CompiledBackend
+        from slap_ros.motion.kernels.compiled_backend import compiled_backend
     except ImportError:
         from slap_ros.motion.numpy_backend import NumpyBackend
 
         return NumpyBackend()
-    return CompiledBackend()
+    return compiled_backend()

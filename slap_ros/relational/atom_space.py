@@ -138,7 +138,7 @@ class AtomSpace:
 
     def abstract_each(self, states: State) -> list[int]:
         """The abstract states of a batch of states, shape (n, layout.size)."""
-        return [_mask(truth) for truth in self.truth(states)]
+        return _masks(self.truth(states))
 
     def truth(self, state: State) -> NDArray[np.bool_]:
         """Whether each atom holds, for a state or a batch of states, shape (..., atoms)."""
@@ -241,6 +241,13 @@ class _Block:
 def _mask(truth: NDArray[np.bool_]) -> int:
     """Bits of one state's atoms."""
     return int.from_bytes(np.packbits(truth, bitorder="little").tobytes(), "little")
+
+
+def _masks(truth: NDArray[np.bool_]) -> list[int]:
+    """Bits of the atoms of each state, a row each."""
+    packed = np.packbits(truth, axis=1, bitorder="little")
+    width, data = packed.shape[1], packed.tobytes()
+    return [int.from_bytes(data[i * width : (i + 1) * width], "little") for i in range(len(packed))]
 
 
 def _columns_of(layout: Layout, left_out: Collection[Type]) -> NDArray[np.intp]:

@@ -9,6 +9,9 @@ from enum import Enum
 REACHED = 0.002  # m, of the gap, by which fingers that arrived may be off
 STALLED = 0.001  # m/s, of the gap: slower fingers stand
 STALL_TIME_S = 0.1  # for which they stand before they have stalled
+# Fingers on a round thing may tremble for ever: fast, and nowhere.
+TREMBLING = 0.0005  # m, of the gap, within which they do
+TREMBLE_TIME_S = 0.5  # for which they do before they have stalled
 
 
 class GripOutcome(Enum):
@@ -24,6 +27,7 @@ class FingerTracker:
     def __init__(self) -> None:
         self._target: float | None = None  # m, of the gap
         self._moved_s = 0.0  # when the fingers moved last
+        self._around: tuple[float, float] | None = None  # m, of the gap, and since when, s
 
     @property
     def busy(self) -> bool:
@@ -32,7 +36,7 @@ class FingerTracker:
 
     def start(self, gap: float, now_s: float) -> None:
         """Begin a motion to a gap, m, at a time, s."""
-        self._target, self._moved_s = gap, now_s
+        self._target, self._moved_s, self._around = gap, now_s, None
 
     def stop(self) -> None:
         """End the motion under way."""
@@ -50,8 +54,14 @@ class FingerTracker:
             return None
         if abs(velocity) > STALLED:
             self._moved_s = now_s
-        if now_s - self._moved_s < STALL_TIME_S:
+        if now_s - self._moved_s < STALL_TIME_S and not self._trembles(now_s, gap):
             return None
         reached = abs(gap - self._target) <= REACHED
         self._target = None
         return GripOutcome.REACHED if reached else GripOutcome.STALLED
+
+    def _trembles(self, now_s: float, gap: float) -> bool:
+        """Whether the fingers have gone nowhere for a while, however fast."""
+        if self._around is None or abs(gap - self._around[0]) > TREMBLING:
+            self._around = gap, now_s
+        return now_s - self._around[1] >= TREMBLE_TIME_S

@@ -37,7 +37,7 @@ from slap_ros.robot.grasp_tracking import (
 from slap_ros.robot.hidden_objects import PredictedMotion
 from slap_ros.robot.joint_reading import JointReading
 from slap_ros.robot.limits import STEP_TOLERANCE, JointMotion, Limits
-from slap_ros.robot.line_of_sight import is_slanted
+from slap_ros.robot.line_of_sight import Ways, is_slanted
 from slap_ros.robot.scene_config import SceneConfig
 from slap_ros.robot.state_assembly import Grasp, StateAssembler, feature_values
 from slap_ros.robot.tracking import (
@@ -145,19 +145,26 @@ class RobotWorld:
         if frame not in self._frames:
             return
         obj, how = self._frames[frame]
-        found = measured_pose(*seen)
+        found, is_tag = measured_pose(*seen), how.tag_size is not None
         pose = base.compose(found).compose(how.offset)
         if math.hypot(*pose.position) > FARTHEST:
             raise InvalidMeasurementError(
                 f"{obj.name} is detected {math.hypot(*pose.position):.6g} m away from the robot: "
                 "are positions in m?"
             )
-        is_tag = how.tag_size is not None
-        if not (is_tag and is_slanted(found)):
-            eye = base.position if is_tag else None
-            self._tracks[obj].add(Detection(stamp_s, pose, frame, eye))
+        if not is_tag:
+            self._tracks[obj].add(Detection(stamp_s, pose, frame))
+        elif not is_slanted(found):
+            pose = self._likelier(obj, Ways.of(base, found, how.offset))
+            self._tracks[obj].add(Detection(stamp_s, pose, frame, base.position))
         if not self._pictures or stamp_s > self._pictures[-1]:
             self._pictures.append(stamp_s)
+
+    def _likelier(self, obj: Object, ways: Ways) -> Pose:
+        grasp, last = self._grasp, self._tracks[obj].last_at_rest
+        if grasp is not None and grasp.obj == obj and self._reading is not None:
+            return ways.in_hand(expected_pose(grasp, self._reading))
+        return ways.at_rest(last.pose if last is not None else None)
 
     def add_joint_reading(self, reading: JointReading) -> None:
         """Take joint positions.
@@ -184,6 +191,17 @@ class RobotWorld:
         """Names of the objects that were not detected since then, held ones left out."""
         held = self._grasp.obj if self._grasp is not None else None
         return [o.name for o, t in self._tracks.items() if o != held and t.newest_s <= since_s]
+
+    def what_is_missing(self, since_s: float) -> str:
+        """What was not detected since then, in words, and what to do about what is hidden."""
+        missing = ", ".join(self.undetected(since_s)) or "none at all"
+        never = ", ".join(self.undetected(-math.inf))
+        if not (self._pictures and never):
+            return missing
+        return (
+            f"{missing}; others are seen, but never yet {never}: move what is in front of it, or "
+            "the camera"
+        )
 
     def seldom_detected(self, since_s: float) -> list[str]:
         """Names of those that were detected since then, but too few times to be known."""

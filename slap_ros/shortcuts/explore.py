@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from slap_ros.core import Domain, Task
+from slap_ros.errors import UnsolvableError
 from slap_ros.learning.stored_keys import restored, stored
 from slap_ros.planning.abstract_graph import Edge, build_abstract_graph
 from slap_ros.planning.graph_planner import GraphPlanner
@@ -143,18 +144,20 @@ class _Reached:
 
     Args:
         shortest: State in which the shortest of them was there.
+        least: Environment steps of the shortest.
         lengths: Environment steps of each rollout until it was there.
         found_by: Names of the exploration policies of the rollouts, without repetitions.
     """
 
     shortest: State
+    least: int
     lengths: list[int] = field(default_factory=list)
     found_by: dict[str, None] = field(default_factory=dict)  # a set that keeps its order
 
     def add(self, steps: int, state: State, policy: ExplorationPolicy) -> None:
         """Take note of one more rollout, which was there after so many steps, in a state."""
-        if steps < min(self.lengths, default=steps + 1):
-            self.shortest = state
+        if steps < self.least:
+            self.shortest, self.least = state, steps
         self.lengths.append(steps)
         self.found_by[policy.name] = None
 
@@ -242,14 +245,16 @@ class Explorer:
             rng: Generator that draws the random actions.
 
         Raises:
-            UnsolvableError: The task has no plan.
+            UnsolvableError: The task has no plan that reaches the goal in the model.
             PlanningLimitError: A limit was reached before a plan was found.
         """
         task = domain.task(seed, index)
         problem = Problem.of(domain, task.initial_state)
         goal = problem.model.space.mask(task.goal)
-        plan = GraphPlanner(problem).plan(task.initial_state, goal).plan
-        return cls(domain, problem, task, plan, settings, rng)
+        found = GraphPlanner(problem).plan(task.initial_state, goal)
+        if found.fails:  # its steps end there, and say nothing of how long a plan is
+            raise UnsolvableError(found.fails)
+        return cls(domain, problem, task, found.plan, settings, rng)
 
     @property
     def plan_steps(self) -> int:
@@ -378,7 +383,7 @@ class Explorer:
         node = self.graph.nodes[source.node]
         change = Change.between(node, target.node)
         context = context_of(node, learner_interface(self._domain).grasping, self.space)
-        motions, steps = origin.g - source.g, min(reached.lengths)
+        motions, steps = origin.g - source.g, reached.least
         expected = source.g + ABSORBED_MOTION * motions + steps
         return ShortcutCandidate(
             Signature.of(change, self.space, context),
@@ -438,7 +443,7 @@ class Explorer:
         for policy in self._policies(origin.state):
             for first in self._roll_out_batch(origin.state, policy):
                 for abstract, (steps, state) in first.items():
-                    reached.setdefault(abstract, _Reached(state)).add(steps, state, policy)
+                    reached.setdefault(abstract, _Reached(state, steps)).add(steps, state, policy)
         return reached
 
     def _policies(self, state: State) -> Iterator[ExplorationPolicy]:

@@ -67,11 +67,26 @@ def explore(
         PlanningLimitError: A limit was reached before a plan was found.
     """
     began = process_time()
+    found = explorer(distribution, index, settings).explore()
+    return {**found.as_json(), "cpu_s": process_time() - began}
+
+
+def explorer(distribution: TaskDistribution, index: int, settings: ExplorationSettings) -> Explorer:
+    """The explorer of one task, with its random numbers.
+
+    Args:
+        distribution: Distribution from which the task is drawn.
+        index: Index of the task among those that are explored, from 0.
+        settings: Settings of exploration.
+
+    Raises:
+        UnsolvableError: The task has no plan.
+        PlanningLimitError: A limit was reached before a plan was found.
+    """
     rng = np.random.default_rng([distribution.seed, EXPLORATION.first, index])
-    explorer = Explorer.of_task(
+    return Explorer.of_task(
         distribution.make_domain(), distribution.task_seed, EXPLORATION.index(index), settings, rng
     )
-    return {**explorer.explore().as_json(), "cpu_s": process_time() - began}
 
 
 def try_to_explore(
@@ -135,7 +150,8 @@ def plan_length(
         sampling: Settings of how shortcuts are tried out in the model.
 
     Returns:
-        Environment steps of the plan in the model; or why there is none, in words.
+        Environment steps of the plan in the model; or why there is none that reaches the goal
+        there, in words.
     """
     domain = distribution.make_domain()
     task = domain.task(distribution.task_seed, VALIDATION.index(index))
@@ -146,7 +162,7 @@ def plan_length(
         result = planner.plan(initial, problem.model.space.mask(task.goal))
     except SlapError as error:
         return str(error)
-    return result.plan.predicted_steps
+    return result.fails or result.plan.predicted_steps
 
 
 def any_goal(distribution: TaskDistribution, share: float) -> TaskDistribution:

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from stable_baselines3 import SAC
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
 from slap_ros.learning.checkpoint import load_checkpoint, save_checkpoint
 from slap_ros.learning.policy_export import exported_layers, hidden_layers, weights_of
+from slap_ros.learning.sac import make_sac
 from slap_ros.learning.sac_state import restore_sac, sac_state
 from slap_ros.learning.vec_env import VecEnv
 from slap_ros.policies.mlp_policy import MlpPolicy, ObservationNormalisation
@@ -70,23 +70,14 @@ class SacLearner:
         torch.set_num_threads(1)  # tiny networks: more threads only wait for one another
         self.settings = settings
         self._env = RelabelledVecEnv(env, normalisation)
-        self._sac = SAC(
-            "MlpPolicy",
+        self._sac = make_sac(
             self._env,
-            replay_buffer_class=RelabellingBuffer,
+            settings,
+            seed,
+            replay=RelabellingBuffer,
             replay_buffer_kwargs={"share": settings.hindsight},
             buffer_size=settings.buffer_size,
             learning_starts=settings.learning_starts,
-            batch_size=settings.batch_size,
-            learning_rate=settings.learning_rate,
-            ent_coef=f"auto_{settings.ent_coef_init}",
-            tau=settings.tau,
-            gamma=settings.gamma,
-            train_freq=settings.train_freq,
-            gradient_steps=settings.gradient_steps,
-            policy_kwargs={"net_arch": list(settings.net_arch)},
-            seed=seed,
-            device="cpu",
         )
 
     def learn(self, report: Callable[[Progress], bool], logs: Path | None = None) -> None:

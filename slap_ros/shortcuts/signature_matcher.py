@@ -79,7 +79,8 @@ class SignatureMatcher:
         change = Change.between(source, target)
         return (
             not (change.add | change.delete) & self._left_alone
-            and bool(change.add & self.may_be_added) == bool(self._adds)
+            and not change.add & ~self.may_be_added
+            and bool(change.add) == bool(self._adds)
             and bool(change.delete & self._may_be_deleted) == bool(self._deletes)
             and self._signature.matches(change, source, self._space)
         )

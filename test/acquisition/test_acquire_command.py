@@ -31,6 +31,7 @@ def slap(*arguments):
     return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
+@pytest.mark.slow
 @pytest.mark.training
 def test_a_library_is_acquired_shown_and_begun_with(tmp_path):
     made = slap("acquire", "points", "--output", tmp_path / "one", "--json", *BUDGET)

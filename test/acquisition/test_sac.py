@@ -263,6 +263,7 @@ def test_torch_and_numpy_say_the_same():
     assert np.allclose(ours, theirs, atol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.training
 def test_pick_is_learned():
     one = learner()

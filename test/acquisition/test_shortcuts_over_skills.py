@@ -3,6 +3,7 @@
 """Shortcuts that are learned over acquired skills: both halves in one plan."""
 
 import json
+import math
 import shutil
 from contextlib import nullcontext
 from dataclasses import replace
@@ -18,22 +19,30 @@ from ensemble.observation import Episode
 from ensemble.shortcuts import ShortcutParameters, ShortcutProvider
 from slap_ros.acquisition.curriculum.after_shortcuts import AfterShortcuts
 from slap_ros.acquisition.curriculum.initiation_states import InitiationStates
-from slap_ros.api.growing import GrowthWatch, grow_rounds
-from slap_ros.api.growth import GrowthRequest
+from slap_ros.api.growing import GrowthWatch, TrainingNotes, grow_rounds
+from slap_ros.api.growth import GrowthRequest, GrowthRound, TriedShortcut
+from slap_ros.api.growth_page import growth_page
 from slap_ros.api.shortcut_choice import choose_library
 from slap_ros.api.training import Unwatched
 from slap_ros.core.goals import task_with_goal
 from slap_ros.domains import get_domain
 from slap_ros.errors import ErrorCode, InvalidParameterError, SkillsChangedError
-from slap_ros.evaluation.approaches import approaches
+from slap_ros.evaluation.approaches import PURE_PLANNING, approaches
 from slap_ros.evaluation.experiment import solve
+from slap_ros.learning.task_distribution import TaskDistribution
+from slap_ros.planning.graph_planner import GraphPlanner
+from slap_ros.planning.problem import Problem
 from slap_ros.relational import State
 from slap_ros.relational.pddl import parse_goal
+from slap_ros.shortcuts import jobs
 from slap_ros.shortcuts.library_choice import LibraryChoice
 from slap_ros.shortcuts.sampling import DEFAULT
+from slap_ros.shortcuts.settings import training_settings
 from slap_ros.shortcuts.shipped import chosen_library, require_usable
 from slap_ros.shortcuts.shortcut_library import load_library, save_library
 from slap_ros.skills.domain_choice import DomainChoice, open_domain
+from slap_ros.studies.comparison import PlanningSetup
+from slap_ros.studies.slap.planning_time import plan_once
 from support.points import REWARDS
 from support.steady_skills import PICKING, PUTTING, towards, write_library
 
@@ -329,6 +338,38 @@ def test_what_grows_is_what_the_other_commands_make_interrupted_or_not(trained, 
         grow_rounds(replace(request, seed=1))
 
 
+def grown_round(digest, unsolved, length, kept=True):
+    """A round as `slap grow` keeps it."""
+    tried = TriedShortcut("At-1", length + 9.0, length, kept)
+    return GrowthRound(
+        ("Pick",), digest, 1.0, "nothing fails", length + 9.0, length, (tried,), 100, 100, unsolved
+    )
+
+
+def test_a_round_that_solves_more_tasks_is_better_though_its_plans_are_longer():
+    """Tasks that had no plan before are the longer ones: their mean says nothing against it."""
+    request = GrowthRequest(
+        get_domain("points", "line"), Path("grown"), shortcut_settings="ours",
+        shortcut_changes=SMALL, steps=100_000,
+    )  # fmt: skip
+    weak, able = grown_round("1", 3, 40.0), grown_round("2", 0, 50.0)
+    assert request.why_over([weak, able]) == ""
+    assert request.why_over([able, replace(weak, skills_digest="3")]) == "plans get no shorter"
+    shorter = grown_round("3", 0, 45.0, kept=False)
+    assert request.why_over([able, shorter]) == "no shortcut makes plans shorter"
+    assert min((weak, able, shorter), key=lambda one: one.rank) is shorter
+    assert GrowthRound.from_json(weak.as_json()) == weak
+    page = growth_page(request, (weak, able), 1, "the budget is spent")
+    assert "The best is round 2" in page and "Validation tasks without a plan: 3." in page
+
+
+def test_tasks_without_a_plan_are_counted_where_they_are_for_validation():
+    notes = TrainingNotes(Unwatched())
+    for use in (jobs.VALIDATION.use, jobs.EXPLORATION.use, jobs.VALIDATION.use):
+        notes.on_left_out(use, 0, "no path")
+    assert notes.unsolved == 2
+
+
 def test_a_budget_below_a_round_is_refused_with_what_a_round_takes(tmp_path):
     asked = ["grow", "points", "--preset", "line", "--output", tmp_path / "grown", *CHANGES]
     answer = slap(*asked, "--settings", "ours", "--steps", 6000)
@@ -373,6 +414,30 @@ def test_skills_that_lack_an_operator_leave_nothing_to_shorten(tmp_path):
     answer = train(half, tmp_path / "library")
     assert answer.exit_code == ErrorCode.UNSOLVABLE
     assert "lacks a skill for Put(" in " ".join(answer.stderr.split())
+
+
+@pytest.fixture
+def hasty(tmp_path):
+    """Tasks whose plans fail in the model: Put is over before it is there."""
+    skills = write_library(tmp_path / "hasty", PICKING, replace(PUTTING, horizon=1))
+    choice = DomainChoice("points", "line", str(skills))
+    return TaskDistribution(DomainChoice.of(open_domain(choice), str(skills)), 0)
+
+
+def test_a_plan_that_fails_in_the_model_is_no_plan_to_shorten(hasty):
+    """Its steps end where it fails: counted as a length, a plan that works would be longer."""
+    domain = hasty.make_domain()
+    task = domain.task(hasty.task_seed, jobs.VALIDATION.index(0))
+    problem = Problem.of(domain, task.initial_state)
+    goal = problem.model.space.mask(task.goal)
+    assert GraphPlanner(problem).plan(task.initial_state, goal).fails  # so it would be executed
+    assert "Put" in str(jobs.plan_length(hasty, 0, (), DEFAULT))
+    assert jobs.mean_length([jobs.plan_length(hasty, 0, (), DEFAULT)]) == math.inf
+    explored = jobs.try_to_explore(hasty, 0, training_settings("ours", domain).exploration)
+    assert "Put" in str(explored) and isinstance(explored, str)
+    alone = PlanningSetup(hasty.domain, "lazy", PURE_PLANNING)
+    planned = plan_once(alone, hasty.task_seed, jobs.VALIDATION.index(0))
+    assert not planned.success and "Put" in planned.reason
 
 
 @pytest.mark.slow

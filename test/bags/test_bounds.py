@@ -27,7 +27,8 @@ from slap_ros.bags.mcap_records import CHUNK, MAGIC, RECORD, Opcode, prefixed, r
 from slap_ros.bags.raw import Channel, MessageDefinition
 from slap_ros.bags.sqlite_reader import read_sqlite
 from slap_ros.errors import DamagedBagError
-from slap_ros.messages.interfaces import STATE, definition, typestore
+from slap_ros.messages.interfaces import STATE
+from slap_ros.messages.typestore import definition, typestore
 from support.truthful_run import Script
 from support.truthful_run import record as write_bag
 

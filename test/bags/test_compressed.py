@@ -30,7 +30,8 @@ from slap_ros.bags.compression import MAGIC
 from slap_ros.bags.reading_budget import MAX_GROWTH
 from slap_ros.bags.rosbag2 import ROOT
 from slap_ros.errors import DamagedBagError, SlapError
-from slap_ros.messages.interfaces import STATE, definition, typestore
+from slap_ros.messages.interfaces import STATE
+from slap_ros.messages.typestore import definition, typestore
 from support.marks import slow
 from support.truthful_run import Published, Script, make
 

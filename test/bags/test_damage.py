@@ -20,7 +20,7 @@ from slap_ros.bags import (
 )
 from slap_ros.bags.mcap_records import MAGIC, RECORD, Opcode
 from slap_ros.errors import DamagedBagError, SlapError
-from slap_ros.messages.interfaces import typestore
+from slap_ros.messages.typestore import typestore
 from support.truthful_run import Script, record
 
 Truth = list[tuple[str, int, bytes]]

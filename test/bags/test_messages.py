@@ -24,7 +24,8 @@ from slap_ros.messages.decode import (
     stamp_ns,
 )
 from slap_ros.messages.events import PlanEventKind, SkillEventKind
-from slap_ros.messages.interfaces import COMMAND, STATE, TASK, message_texts, typestore
+from slap_ros.messages.interfaces import COMMAND, STATE, TASK
+from slap_ros.messages.typestore import message_texts, typestore
 from slap_ros.planning.options import OptionKind
 from support.truthful_run import Script
 

@@ -19,7 +19,8 @@ from slap_ros.bags import bag_digest, bag_info, evaluate_bag, read_bag, replay_b
 from slap_ros.bags.mcap_records import CHUNK
 from slap_ros.bags.rosbag2 import ROOT
 from slap_ros.errors import DamagedBagError, ForeignBagError, SlapError
-from slap_ros.messages.interfaces import PLAN, TASK, definition, message_texts, typestore
+from slap_ros.messages.interfaces import PLAN, TASK
+from slap_ros.messages.typestore import definition, message_texts, typestore
 from support.truthful_run import Published, Script, make, record, under
 
 SEPARATOR = "=" * 80

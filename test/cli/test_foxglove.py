@@ -19,7 +19,7 @@ import pytest
 from slap_ros.domains import get_domain
 from slap_ros.messages.decode import decode_state
 from slap_ros.messages.events import PlanEventKind
-from slap_ros.messages.interfaces import definition, typestore
+from slap_ros.messages.typestore import definition, typestore
 
 websocket = pytest.importorskip("websocket", reason="websocket-client is not installed")
 pytest.importorskip("foxglove", reason="foxglove-sdk is not installed")

@@ -54,6 +54,7 @@ def test_tasks_differ_and_rest():
         ("fair:cubes=4", "training", PRINTED),
         ("fair:blocked=1", "real", [*CLEARED, *REAL]),
         ("fair:cubes=4,blocked=1", "training", 6),
+        ("fair:cubes=4,blocked=2", "training", 6),
     ],
 )
 def test_the_demonstrator_does_exactly_what_operators_say(preset, goal, plan):
@@ -142,7 +143,7 @@ def target():
     ("setting", "message"),
     [
         ("cubes=1", "'cubes' is 1; it must be from 2 to 4"),
-        ("blocked=2", "'blocked' is 2; it must be from 0 to 1"),
+        ("blocked=3", "'blocked' is 3; it must be from 0 to 2"),
         ("blocked=some", "'some' cannot replace"),
         ("apart=nan", "'apart' is nan"),
         ("x=0.1..0.9", "'x' is"),

@@ -115,6 +115,7 @@ def _check_dry_run(bag: Path, steps: int) -> None:
         off_table.require_safe()
 
 
+@pytest.mark.slow
 def test_with_noise_things_that_rest_are_seen_at_rest(network, tmp_path):
     """No perceived state is one that the planner's world refuses; the replay is exact."""
     noise = {"position_noise": 0.002, "turn_noise": 0.01, "debounce": 3, "noise_seed": 1}

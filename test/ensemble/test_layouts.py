@@ -16,7 +16,7 @@ from ensemble.interfaces import MARKERS
 from ensemble.launcher import InProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.spinner import temporary_node
-from slap_ros.messages.interfaces import typestore
+from slap_ros.messages.typestore import typestore
 from slap_ros.skills.domain_choice import DomainChoice
 
 CONFIG = Path(__file__).parents[2] / "config"

@@ -25,7 +25,7 @@ from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.workers import SequentialWorkers
 from slap_ros.meshes.obj import from_obj
 from slap_ros.meshes.solid import Solid
-from slap_ros.messages.interfaces import definition, typestore
+from slap_ros.messages.typestore import definition, typestore
 from slap_ros.relational.pddl import write_domain, write_problem
 from slap_ros.report import read_report, render
 from slap_ros.robot.scene_config import read_scene_config

@@ -122,7 +122,7 @@ def test_a_message_definition_is_no_program(tmp_path, definition, monkeypatch):
 
 
 def add(writer, item):
-    from slap_ros.messages.interfaces import definition, typestore
+    from slap_ros.messages.typestore import definition, typestore
 
     return writer.add_connection(
         item.topic,

@@ -9,7 +9,6 @@ from slap_ros.errors import ErrorCode
 from slap_ros.messages.events import SkillEventKind
 from slap_ros.messages.interfaces import SKILL_EVENT, STATE
 from support.living_ensemble import laboratory
-from support.marks import slow
 from support.process_faults import LIMIT
 
 SLOWLY = 1.0  # environment steps a second: a skill takes longer than a dead node is missed
@@ -48,12 +47,14 @@ def test_a_planner_that_dies_leaves_the_robot_holding(network):
         require_rest(bench)
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(3 * LIMIT)
 @pytest.mark.parametrize(
     ("victim", "code"),
     [
         ("perception_node", ErrorCode.NO_STATE),
-        *slow(("sim_node", ErrorCode.NO_STATE), ("skill_server", ErrorCode.NODE_DIED)),
+        ("sim_node", ErrorCode.NO_STATE),
+        ("skill_server", ErrorCode.NODE_DIED),
     ],
 )
 def test_whoever_else_dies_ends_the_run_and_the_robot_holds(network, victim, code):

@@ -231,7 +231,7 @@ print(arm_frames(np.zeros((1, 7))).shape)
 PART = """
 from slap_ros.motion.kernels import trigonometry
 from slap_ros.motion.kernels.compilation import compile_once
-compile_once(lambda: trigonometry.sin_cos(0.3))
+compile_once([lambda: trigonometry.sin_cos(0.3)])
 print(*map(float.hex, trigonometry.sin_cos(0.3)))
 """
 

@@ -167,7 +167,7 @@ def all_atoms(domain: StripsDomain, objects: list[Object]) -> list[GroundAtom]:
 
 
 @given(domains())
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_domains_are_read_back(domain: StripsDomain) -> None:
     text = rewritten(domain)
     assert StripsDomain.of(parse_domain(text)) == domain
@@ -175,7 +175,7 @@ def test_domains_are_read_back(domain: StripsDomain) -> None:
 
 
 @given(problems())
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_problems_are_read_back(
     stated: tuple[StripsDomain, Layout, frozenset[GroundAtom], frozenset[GroundAtom]],
 ) -> None:

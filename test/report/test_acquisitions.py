@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from slap_ros.messages.events import AcquisitionEventKind as Kind
-from slap_ros.messages.interfaces import ACQUISITION_EVENT, typestore
+from slap_ros.messages.interfaces import ACQUISITION_EVENT
+from slap_ros.messages.typestore import typestore
 from slap_ros.report.acquisitions import recorded_acquisitions
 from slap_ros.report.proposals import recorded_proposals
 

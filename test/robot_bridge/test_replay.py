@@ -19,7 +19,7 @@ from ensemble.run import RunRequest, run
 from slap_ros.bags import read_bag
 from slap_ros.bags.writer import BagWriter
 from slap_ros.errors import DamagedBagError, InvalidParameterError, UnsafeCommandError
-from slap_ros.messages.interfaces import typestore
+from slap_ros.messages.typestore import typestore
 from slap_ros.robot.dry_run import DryRun
 from slap_ros.robot.limits import FR3, PANDA, Limits, Workspace
 from slap_ros.robot.recorded_motion import read_recorded_motion

@@ -267,6 +267,19 @@ def test_a_missing_frame_is_missed_by_name():
     bench.measure(without=("block2",))
     assert bench.robot_world.measure(0.0) is None
     assert bench.robot_world.undetected(0.0) == ["block2"]
+    told = bench.robot_world.what_is_missing(0.0)
+    assert told.startswith("block2; others are seen, but never yet block2: move what is in front")
+
+
+def test_nothing_is_said_of_what_stands_in_front_where_it_was_seen_or_nothing_is():
+    bench = Bench()
+    everything = bench.robot_world.what_is_missing(0.0)
+    assert "block2" in everything
+    assert "in front" not in everything
+    bench.measure()
+    since = bench.now
+    bench.measure(without=("block2",))
+    assert bench.robot_world.what_is_missing(since) == "block2"
 
 
 def test_what_pictures_do_not_show_is_where_it_was_where_that_is_asked_for():

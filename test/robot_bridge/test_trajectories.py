@@ -138,3 +138,21 @@ def test_fingers_have_stalled_where_they_stand_for_a_while_before_they_are_there
     assert not fingers.busy
     fingers.start(0.08, 6.0)
     assert fingers.check(6.2, 0.0795, 0.0) is GripOutcome.REACHED
+
+
+def test_fingers_that_tremble_have_stalled_where_they_go_nowhere():
+    """On a round toy of 10 g, the engine's fingers go to and fro by 0.1 mm at 50 mm/s, for ever."""
+    fingers = FingerTracker()
+    fingers.start(0.0, 5.0)
+    times = [5.0 + 0.002 * i for i in range(1, 600)]
+    closing = {t: max(0.0428, 0.08 - 0.2 * (t - 5.0)) for t in times}
+    outcomes = {
+        t: fingers.check(t, gap + 0.00005 * (-1) ** i, 0.04 * (-1) ** i)
+        for i, (t, gap) in enumerate(closing.items())
+    }
+    (stalled_s,) = (t for t, outcome in outcomes.items() if outcome is not None)
+    assert outcomes[stalled_s] is GripOutcome.STALLED
+    assert closing[stalled_s] == 0.0428
+    slow = FingerTracker()  # but not where they are on their way
+    slow.start(0.0, 5.0)
+    assert all(slow.check(t, 0.08 - 0.01 * (t - 5.0), -0.01) is None for t in times)

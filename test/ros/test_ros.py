@@ -166,7 +166,9 @@ def test_a_wrong_environment_is_an_error_and_no_traceback(network, wrong, words)
 
 # What rclpy itself prints where the signal comes while it makes a task, of which there is no more.
 HALF_MADE_TASK = re.compile(
-    r"Exception ignored in: <function Task\.__del__.*?has no attribute '_exception'\n", re.DOTALL
+    r"Traceback \(most recent call last\):\n  File \"\S*rclpy/task\.py\", line \d+, in __del__\n"
+    r".*?has no attribute '_exception'\n",
+    re.DOTALL,
 )
 
 

@@ -14,7 +14,7 @@ from itertools import count
 
 from slap_ros.bags import BagWriter
 from slap_ros.errors import StorageFullError
-from slap_ros.messages.interfaces import typestore
+from slap_ros.messages.typestore import typestore
 
 STRING = "std_msgs/msg/String"
 STATE = "slap_msgs/msg/ObjectCentricState"

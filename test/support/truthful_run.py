@@ -17,7 +17,7 @@ from slap_ros.bags import BagWriter
 from slap_ros.domains import get_domain
 from slap_ros.messages import interfaces
 from slap_ros.messages.events import PlanEventKind, SkillEventKind
-from slap_ros.messages.interfaces import typestore
+from slap_ros.messages.typestore import typestore
 from slap_ros.planning.abstract_graph import build_abstract_graph
 from slap_ros.planning.lazy_search import search_lazily
 from slap_ros.planning.model import Model

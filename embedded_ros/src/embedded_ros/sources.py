@@ -14,34 +14,6 @@ import sys
 ENTRY_POINT_GROUP = "embedded_ros.interfaces"
 ENVIRONMENT_VARIABLE = "EMBEDDED_ROS_INTERFACES"
 
-# The packages in rosbags' Jazzy type store; listed here so that asking does not import it.
-STORE_PACKAGES = frozenset(
-    {
-        "action_msgs",
-        "actionlib_msgs",
-        "builtin_interfaces",
-        "diagnostic_msgs",
-        "geometry_msgs",
-        "lifecycle_msgs",
-        "nav_msgs",
-        "rcl_interfaces",
-        "rmw_dds_common",
-        "rosbag2_interfaces",
-        "rosgraph_msgs",
-        "sensor_msgs",
-        "service_msgs",
-        "shape_msgs",
-        "statistics_msgs",
-        "std_msgs",
-        "stereo_msgs",
-        "tf2_msgs",
-        "trajectory_msgs",
-        "type_description_interfaces",
-        "unique_identifier_msgs",
-        "visualization_msgs",
-    }
-)
-
 
 def from_environment() -> list[tuple[str, str]]:
     """The ``(package, directory)`` pairs of ``EMBEDDED_ROS_INTERFACES``.
@@ -74,8 +46,7 @@ def shipped() -> frozenset[str]:
 def is_interface_package(name: str) -> bool:
     """Whether some source has an interface package of this name; cheap answers first."""
     return (
-        name in STORE_PACKAGES
-        or name in shipped()
+        name in shipped()
         or any(name == package for package, _ in from_environment())
         or name in from_entry_points()
     )

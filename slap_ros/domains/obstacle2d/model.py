@@ -64,12 +64,14 @@ def _rest_margin(state: State, block: Column) -> Array:
     return np.maximum(margin, STEEPNESS * margin)
 
 
-def _overlap_margin(state: State, block: Column, surface: Column) -> Array:
+def _target_reach(state: State, block: Column, surface: Column) -> Array:
     """Only target areas can be overlapped; the table is simply what blocks lie on."""
-    reach = np.where(
-        _is_target(state, surface), _reach(state, block, surface) - OVERLAP_TOLERANCE, -1.0
-    )
-    return np.minimum(_rest_margin(state, block), reach)
+    reach = _reach(state, block, surface) - OVERLAP_TOLERANCE
+    return np.where(_is_target(state, surface), reach, -1.0)
+
+
+def _overlap_margin(state: State, block: Column, surface: Column) -> Array:
+    return np.minimum(_rest_margin(state, block), _target_reach(state, block, surface))
 
 
 def _inside_margin(tolerance: float, state: State, block: Column, surface: Column) -> Array:
@@ -95,9 +97,10 @@ def _columns_of(layout: Layout, kind: Type) -> list[Column]:
 
 def _on_margin(tolerance: float, state: State, block: Column, surface: Column) -> Array:
     """On a target area: inside it. On the table: at rest and off every target area."""
-    overlaps = [_overlap_margin(state, block, other) for other in _each(state, SURFACE)]
-    off_targets = strictly(-np.max(overlaps, axis=0))
-    on_table = np.minimum(_rest_margin(state, block), off_targets)
+    reaches = [_target_reach(state, block, other) for other in _each(state, SURFACE)]
+    rest = _rest_margin(state, block)
+    off_targets = strictly(-np.minimum(rest, np.max(reaches, axis=0)))
+    on_table = np.minimum(rest, off_targets)
     inside = _inside_margin(tolerance, state, block, surface)
     return np.where(_is_target(state, surface), inside, on_table)
 

@@ -30,15 +30,16 @@ class StackTasks(TaskSettings):
     """Where cubes and targets stand is sampled for each task.
 
     Args:
-        cubes: Number of cubes on the table, besides one that may block a target.
-        blocked: 1 if target0 is blocked by one more cube, for which there is a target1; else 0.
+        cubes: Number of cubes on the table, besides those that block targets.
+        blocked: Number of targets that are blocked, target0 first, each by one more cube. There is
+            one more target than that.
         x: Range of the x of what stands on the table, m.
         y: Range of the y of what stands on the table, m.
         yaw: Range of the yaw of cubes, rad.
         apart: Least distance between the middles of what stands on the table, m.
     """
 
-    limits: ClassVar = BENCH_LIMITS | {"cubes": (2, 4), "blocked": (0, 1), "apart": (0.0, 0.5)}
+    limits: ClassVar = BENCH_LIMITS | {"cubes": (2, 4), "blocked": (0, 2), "apart": (0.0, 0.5)}
 
     cubes: int = 2
     blocked: int = 0
@@ -60,9 +61,9 @@ class StackTasks(TaskSettings):
             features[TARGET(f"target{i}")] = target_features(x, y)
         for i, (x, y) in enumerate(places[targets:]):
             features[CUBE(f"cube{i}")] = cube_features(x, y, float(rng.uniform(*self.yaw)))
-        if self.blocked:
-            (x, y), (dx, dy) = places[0], rng.uniform(-BLOCKER_OFF, BLOCKER_OFF, 2).tolist()
-            yaw, top = float(rng.uniform(*self.yaw)), 2.0 * TARGET_HALF[2]
-            features[CUBE(f"cube{self.cubes}")] = cube_features(x + dx, y + dy, yaw, top)
+        for i, (x, y) in enumerate(places[: self.blocked]):
+            (dx, dy), top = rng.uniform(-BLOCKER_OFF, BLOCKER_OFF, 2).tolist(), 2.0 * TARGET_HALF[2]
+            yaw = float(rng.uniform(*self.yaw))
+            features[CUBE(f"cube{self.cubes + i}")] = cube_features(x + dx, y + dy, yaw, top)
         state = State.build(features)
         return Task(state, GOALS["training"](state), STEP_LIMIT)

@@ -15,7 +15,7 @@ from __future__ import annotations
 import fcntl
 import logging
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from hashlib import blake2b
@@ -53,19 +53,26 @@ def compiled(function: Function) -> Function:
     return cast(Function, made)
 
 
-def compile_once(use: Callable[[], None]) -> None:
+def is_compiled() -> bool:
+    """Whether everything is in the cache, or can never be."""
+    folder = cache_folder()
+    return folder is None or (folder / COMPLETE).exists()
+
+
+def compile_once(calls: Iterable[Callable[[], object]]) -> None:
     """Compile everything unless it is in the cache; one process does, and others wait for it.
 
     Args:
-        use: Function that calls every compiled function.
+        calls: A call of every compiled function.
     """
     folder = cache_folder()
-    if folder is None or (folder / COMPLETE).exists():
+    if folder is None or is_compiled():
         return
     with _lock(folder):
-        if not (folder / COMPLETE).exists():
+        if not is_compiled():
             logger.warning("compiling motion planning for this processor, once: half a minute")
-            use()
+            for call in calls:
+                call()
             (folder / COMPLETE).touch()
 
 

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from slap_ros.geometry.oriented_box import OrientedBox
@@ -22,10 +24,6 @@ from slap_ros.worlds.panda import FINGER_OPEN, HOME, grasp_pose
 class CompiledBackend:
     """See :class:`slap_ros.motion.backend.Backend`."""
 
-    def __init__(self) -> None:
-        """Compile everything where that was not done yet."""
-        compile_once(self._use)
-
     def arm_frames(self, q: Joints) -> Array:
         """See :meth:`slap_ros.motion.backend.Backend.arm_frames`."""
         return arm_frames(np.array(q, dtype=np.float64, order="C"))
@@ -42,20 +40,30 @@ class CompiledBackend:
         path = rows_to(np.array(q), matrix(start), shift, turn, count)
         return path if len(path) else None
 
-    def _use(self) -> None:
-        """Call every compiled function."""
+    def calls(self) -> list[Callable[[], object]]:
+        """A call of every compiled function, of which each takes about as long to compile."""
         start, rng = np.array(HOME), np.random.default_rng(0)
         goal = start + 0.1
-        self.arm_frames(start[None])
-        self.linear_rows(start, grasp_pose(goal), 1)
+        path = np.stack([start, goal])
         box = OrientedBox(Pose((0.5, 0.5, 0.5)), (0.1, 0.1, 0.1))
         scene = make_scene(moving_shapes(None, FINGER_OPEN, 0.0, 0.0), [box], True)
         space = self.free_space(scene)
-        space.free(start[None])
-        space.nearest_configurations(np.eye(4)[None], start)
-        space.line_is_free(start, goal, RESOLUTION)
-        path = np.stack([start, goal])
-        space.path_is_free(path, RESOLUTION)
-        space.via_point_path(start, goal, rng, RESOLUTION)
-        space.rrt_connect(start, goal, rng, 1, RESOLUTION)
-        space.straighten(space.shorten(path, rng, 1, RESOLUTION), RESOLUTION)
+        return [
+            lambda: self.arm_frames(start[None]),
+            lambda: self.linear_rows(start, grasp_pose(goal), 1),
+            lambda: space.nearest_configurations(np.eye(4)[None], start),
+            lambda: space.free(start[None]),
+            lambda: space.line_is_free(start, goal, RESOLUTION),
+            lambda: space.path_is_free(path, RESOLUTION),
+            lambda: space.via_point_path(start, goal, rng, RESOLUTION),
+            lambda: space.rrt_connect(start, goal, rng, 1, RESOLUTION),
+            lambda: space.shorten(path, rng, 1, RESOLUTION),
+            lambda: space.straighten(path, RESOLUTION),
+        ]
+
+
+def compiled_backend() -> CompiledBackend:
+    """Motion by compiled code, which is compiled now where that was not done yet."""
+    backend = CompiledBackend()
+    compile_once(backend.calls())
+    return backend

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from slap_ros.core import Action, Domain
 from slap_ros.errors import (
     ControllerAbortedError,
+    ControllerTimeoutError,
     InvalidStateError,
     NoDetectionError,
 )
@@ -36,6 +37,7 @@ from slap_ros.worlds.panda import JOINTS
 REACH = Workspace((-0.9, -0.9, -0.4), (0.9, 0.9, 1.2))  # m: all that the arm reaches
 TOLERANCES = TrajectoryTolerances((0.2,) * JOINTS, (0.05,) * JOINTS, goal_time_s=1.0)
 STILL = (0.0,) * JOINTS
+GRIPPER_TIMEOUT_S = 5.0  # that the fingers may take, as long as the bridge waits
 
 
 @dataclass(frozen=True)
@@ -132,7 +134,10 @@ class ClosedLoopWorld:
         plant = self.plant
         plant.command_fingers(0.5 * gap, self._settings.finger_force)
         self._fingers.start(gap, plant.time_s)
+        until_s = plant.time_s + GRIPPER_TIMEOUT_S
         while self._fingers.check(plant.time_s, plant.gap, plant.gap_velocity) is None:
+            if plant.time_s > until_s:
+                raise ControllerTimeoutError(f"the fingers still move after {GRIPPER_TIMEOUT_S} s")
             self._pass_period()
 
     def _move(self, motion: JointMotion) -> None:
@@ -162,7 +167,7 @@ class ClosedLoopWorld:
                     return state
         if invalid:
             raise InvalidStateError(invalid)
-        raise NoDetectionError(f"not detected: {', '.join(self._robot.undetected(since_s))}")
+        raise NoDetectionError(f"not detected: {self._robot.what_is_missing(since_s)}")
 
     def _pass_period(self) -> bool:
         """Let a period pass; whether something was measured at its end."""

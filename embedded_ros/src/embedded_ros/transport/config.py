@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import os
-from xml.sax.saxutils import quoteattr
+from html import escape
 
 from .errors import RCLError
 
@@ -82,7 +82,7 @@ def configuration() -> str | None:
     # tags ignore each other.
     tag = f"<Tag>{os.getpid()}</Tag>" if reach == "OFF" else ""
     # PruneDelay: a peer that is not there yet must go on being asked for.
-    peer_elements = "".join(f'<Peer address={quoteattr(p)} PruneDelay="inf"/>' for p in peers)
+    peer_elements = "".join(f'<Peer address="{escape(p)}" PruneDelay="inf"/>' for p in peers)
     return (
         "<CycloneDDS><Domain><General>"
         f"<Interfaces>{interfaces}</Interfaces>"

@@ -9,8 +9,7 @@ In order of precedence:
 2. installed distributions' entry points in the group ``embedded_ros.interfaces``: the entry
    point's name is the interface package, its value an importable package with ``msg/``,
    ``srv/`` and ``action/`` folders;
-3. the text shipped in ``embedded_ros/interfaces``;
-4. rosbags' Jazzy type store, for all other common message types.
+3. the text shipped in ``embedded_ros/interfaces``, of the common packages of ROS 2 Jazzy.
 """
 
 from __future__ import annotations
@@ -28,7 +27,6 @@ from .derived import action_messages, action_services, service_messages
 from .errors import InterfaceError, UnknownInterfaceError
 from .model import PRIMITIVES, ActionSpec, MessageSpec, ServiceSpec
 from .parser import parse_action, parse_message, parse_service
-from .rosbags_store import RosbagsStore
 
 KINDS = ("msg", "srv", "action")
 
@@ -57,7 +55,6 @@ class Catalogue:
     """Every interface definition this process can use, parsed when first asked for."""
 
     def __init__(self) -> None:
-        self._store = RosbagsStore()
         self._messages: dict[str, MessageSpec] = {}
 
     @functools.cache  # noqa: B019 -- the one catalogue lives as long as the process
@@ -67,10 +64,7 @@ class Catalogue:
 
     def names(self, package: str, kind: str) -> list[str]:
         """The names of a package's interfaces of one kind, sorted."""
-        found = {name for p in self._packages(package) for name in p.files[kind]}
-        if kind == "msg":
-            found.update(self._store.names(package))
-        return sorted(found)
+        return sorted({name for p in self._packages(package) for name in p.files[kind]})
 
     def message(self, full_name: str) -> MessageSpec:
         """The definition of a message, or of a message derived from a service or action.
@@ -123,8 +117,6 @@ class Catalogue:
 
     def _read_message(self, package: str, name: str) -> MessageSpec:
         full_name = f"{package}/msg/{name}"
-        if self._file(package, "msg", name) is None and (stored := self._store.message(full_name)):
-            return stored
         text, source = self._text(package, "msg", name)
         message = parse_message(full_name, text, source)
         self._check_references(message, source)
