@@ -22,6 +22,7 @@ from slap_ros.api.proposers import Proposers
 from slap_ros.core import Domain
 from slap_ros.errors import InvalidParameterError
 from slap_ros.language.settings import LOCAL_SCHEME, read_settings
+from slap_ros.language.text_embedder import LocalEmbedder, ServerEmbedder
 from slap_ros.learning.setting_changes import changed, parse_changes
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.shortcuts.library_choice import LibraryChoice
@@ -136,17 +137,21 @@ class AcquisitionRequest:
 
         Raises:
             InvalidParameterError: Language settings cannot be read, or name no server.
-            LanguageUnavailableError: There is no key, or no client.
+            LanguageUnavailableError: There is no key, no client, or no such package with weights.
         """
         if self.encoder is None:
             return MetricSignatureEncoder()
+        work = WorkFolder(self.work_folder)
+        if self.encoder.startswith(LOCAL_SCHEME):
+            return EmbeddingEncoder(LocalEmbedder(self.encoder.removeprefix(LOCAL_SCHEME)), work)
         proposers = self.proposers
         settings = read_settings(proposers.language_settings, self.encoder, proposers.base_url)
         if settings.base_url.startswith(LOCAL_SCHEME):
             raise InvalidParameterError(
-                f"--encoder asks a server; {settings.base_url} is not one: give another --base-url"
+                f"--encoder asks a server; {settings.base_url} is not one: give another "
+                f"--base-url, or --encoder {LOCAL_SCHEME}PACKAGE"
             )
-        return EmbeddingEncoder(settings, WorkFolder(self.work_folder))
+        return EmbeddingEncoder(ServerEmbedder(settings), work)
 
     def shortcuts_over_kept(self) -> LibraryChoice | None:
         """The shortcuts after which skills are tried; None for no shortcuts.

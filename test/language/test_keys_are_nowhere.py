@@ -22,6 +22,7 @@ from slap_ros.cli import app
 from slap_ros.cli.console import exits
 from slap_ros.errors import LanguageUnavailableError, SlapError
 from slap_ros.language.client import OpenAIClient
+from slap_ros.language.text_embedder import ServerEmbedder
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.redaction import without_secrets
 from support.model_answers import SETTINGS, good_script
@@ -134,7 +135,7 @@ def test_the_client_of_embeddings_names_such_a_key_as_well(
     key, words = UNSENDABLE[name]
     monkeypatch.setenv("OPENAI_API_KEY", key)
     with pytest.raises(LanguageUnavailableError) as caught:
-        EmbeddingEncoder(replace(SETTINGS, base_url=NOWHERE), WorkFolder(kept))
+        EmbeddingEncoder(ServerEmbedder(replace(SETTINGS, base_url=NOWHERE)), WorkFolder(kept))
     told = "".join(traceback.format_exception(caught.value))
     assert words in told and KEY not in told
 
@@ -148,7 +149,9 @@ def test_what_a_server_of_embeddings_repeats_is_nowhere(
     caplog.set_level(logging.DEBUG)
     operator = PEGS.operators[0]
     with serving({"embeddings": [SAYING[name]]}) as server:
-        encoder = EmbeddingEncoder(replace(SETTINGS, base_url=server.url), WorkFolder(kept))
+        encoder = EmbeddingEncoder(
+            ServerEmbedder(replace(SETTINGS, base_url=server.url)), WorkFolder(kept)
+        )
         with pytest.raises(SlapError) as caught:
             encoder.encode(operator)
     assert server.asked("embeddings") > 0

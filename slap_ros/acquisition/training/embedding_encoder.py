@@ -8,8 +8,7 @@ from collections.abc import Iterable
 from hashlib import sha256
 from typing import Any
 
-from slap_ros.language.client import OpenAIClient
-from slap_ros.language.settings import LanguageSettings
+from slap_ros.language.text_embedder import TextEmbedder
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.relational import LiftedAtom, LiftedOperator
 from slap_ros.skills.skill_signature import SkillSignature
@@ -26,29 +25,26 @@ def operator_sentence(operator: LiftedOperator) -> str:
 
 
 class EmbeddingEncoder:
-    """Asks a server with an OpenAI-compatible ``/embeddings``.
+    """Embeds what operators say.
 
     It is a :class:`~slap_ros.acquisition.training.retrieval.SkillEncoder`: a vector is a key as
     well, its numbers by their position. Vectors are kept in the work folder, so that a
-    training that goes on begins with the same skills, whatever the server says by then.
+    training that goes on begins with the same skills, whatever a server says by then.
     """
 
-    def __init__(self, settings: LanguageSettings, work: WorkFolder) -> None:
-        """Prepare an encoder that has asked nothing yet.
+    def __init__(self, embedder: TextEmbedder, work: WorkFolder) -> None:
+        """Prepare an encoder that has embedded nothing yet.
 
         Args:
-            settings: Settings of the model and its server.
+            embedder: Model that gives texts their vectors.
             work: Work folder in which vectors are kept.
-
-        Raises:
-            LanguageUnavailableError: See :class:`~slap_ros.language.client.OpenAIClient`.
         """
-        self._client, self._settings, self._work = OpenAIClient(settings), settings, work
+        self._embedder, self._work = embedder, work
 
     @property
     def name(self) -> str:
-        """The name of the model and the address of its server."""
-        return f"{self._settings.model} at {self._settings.base_url}"
+        """The name of the model, and of its server if it has one."""
+        return self._embedder.name
 
     def encode(self, operator: LiftedOperator) -> SkillSignature:
         """The key of an operator.
@@ -62,13 +58,9 @@ class EmbeddingEncoder:
         digest = sha256(f"{self.name}\n{text}".encode()).hexdigest()[:16]
         return self._work.cached(
             f"embeddings/{digest}",
-            lambda: {"text": text, "vector": self._embed(text)},
+            lambda: {"text": text, "vector": self._embedder.embed(text)},
             _signature,
         )
-
-    def _embed(self, text: str) -> list[float]:
-        (vector,) = self._client.embed([text], self._settings.answer_seconds)
-        return vector
 
 
 def _signature(data: Any) -> SkillSignature:
