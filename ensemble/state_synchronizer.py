@@ -189,7 +189,7 @@ class StateSynchronizer:
 
     def _room_of(self, message: ObjectCentricState | AbstractState) -> Rooms:
         """Where a message waits: strangers' do so elsewhere, unless they are of this episode."""
-        if self.episode is not None and message.episode == self.episode.number:
+        if self._may_be_current(message):
             return self._current
         return self._expected if self._episodes.expects(message) else self._others
 
@@ -198,7 +198,20 @@ class StateSynchronizer:
         latest = self.latest
         if latest is None or latest.episode is not self.episode:
             return True
-        return message.episode != latest.episode.number or message.step > latest.step
+        return not self._may_be_current(message) or message.step > latest.step
+
+    def _may_be_current(self, message: ObjectCentricState | AbstractState) -> bool:
+        """Whether a message may be of this episode: its number, and at first its stamp.
+
+        A simulator that was started again counts episodes from 1, and its first messages may be
+        here before its task is opened.
+        """
+        episode = self.episode
+        return (
+            episode is not None
+            and message.episode == episode.number
+            and (message.step > 0 or stamp_ns(message.header) == episode.opened_ns)
+        )
 
     def _fits(self, message: ObjectCentricState) -> bool:
         """Whether a state can be one of the current episode, or is one of another."""

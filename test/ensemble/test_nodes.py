@@ -8,6 +8,8 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager, suppress
+from copy import deepcopy
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -17,7 +19,9 @@ from slap_msgs.srv import ListSkills, ResetTask
 
 from benchmarks.control_loop import state_command_state
 from ensemble.client import RunClient
-from ensemble.interfaces import COMMAND, LIST_SKILLS, RESET_TASK
+from ensemble.endpoints import advertise, subscribe
+from ensemble.interfaces import ATOMS, COMMAND, DOMAIN, LIST_SKILLS, RESET_TASK, TASK
+from ensemble.interfaces import STATE as STATE_TOPIC
 from ensemble.launcher import InProcessLauncher, ProcessLauncher
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.spinner import temporary_node
@@ -435,3 +439,31 @@ def test_states_of_an_episode_that_is_over_are_ignored(network):
         assert spinner.spin_until(lambda: synchronizer.latest.episode.number == 2, LIMIT)
         assert [o.episode.number for o in observations] == [1, 2]
         assert synchronizer.latest.step == 0
+
+
+def test_what_a_new_simulator_says_before_its_task_is_opened_is_kept(network):
+    """It counts from 1 again, so its first atoms are of an episode and a step that are known."""
+    topics = (DOMAIN, TASK, STATE_TOPIC, ATOMS)
+    only = {name: parameters()[name] for name in ("sim_node", "perception_node")}
+    with temporary_node(Listener) as (client, spinner):
+        said = {}
+        for topic in topics:
+            subscribe(client, topic, partial(said.setdefault, topic.name))
+        with InProcessLauncher(only, spinner.executor):
+            assert spinner.spin_until(lambda: len(said) == len(topics), LIMIT)
+    domain, task, state, atoms = (said[topic.name] for topic in topics)
+    with temporary_node(Listener) as (client, spinner):
+        synchronizer = StateSynchronizer(client, lambda _: None)
+        publish = {topic.name: advertise(client, topic).publish for topic in topics}
+        for message, topic in zip((domain, task, state, atoms), topics, strict=True):
+            publish[topic.name](message)
+        assert spinner.spin_until(lambda: synchronizer.latest is not None, LIMIT)
+        first = synchronizer.latest.episode
+        again = [deepcopy(message) for message in (task, state, atoms)]
+        for message in (*again, again[0].initial_state):
+            message.header.stamp.sec += 1
+        for message, topic in zip(again[:0:-1], (ATOMS, STATE_TOPIC), strict=True):
+            publish[topic.name](message)
+        spinner.spin_until(lambda: False, 0.3)
+        publish[TASK.name](again[0])
+        assert spinner.spin_until(lambda: synchronizer.latest.episode is not first, LIMIT)
