@@ -6,7 +6,9 @@ BIN := $(VENV)/bin
 TORCH := torch==2.13.0  # pinned: another version trains other policies from the same seed
 # pip would compile every test of every library, too, and on one processor.
 PIP_INSTALL := $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
-COMPILE := $(BIN)/python -m compileall -qq -j 0 -x '/tests?/' $(VENV)/lib || true  # some have files of other Pythons
+COMPILE_LIBRARIES := $(BIN)/python -m compileall -qq -j 0 -x '/tests?/' $(VENV)/lib || true  # some have files of other Pythons
+# No test should wait until motion planning is compiled. Half a second where it is.
+COMPILE_MOTION := $(BIN)/python -m slap_ros.motion.kernels
 TESTS_AT_ONCE := 4  # on two cores: many wait for nodes, networks and clocks
 METADATA := pyproject.toml setup.py setup.cfg embedded_ros/pyproject.toml
 # Images set it. Tests start hundreds of processes, and each would compile all that it imports.
@@ -27,12 +29,12 @@ $(VENV)/.installed: $(METADATA)
 	$(PYTHON) -m venv $(VENV) || \
 	  { echo "no venv module; on Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
 	$(PIP_INSTALL) -e ./embedded_ros -e '.[physics]'
-	$(COMPILE) & $(BIN)/python -m slap_ros.motion.kernels && wait $$!
+	$(COMPILE_LIBRARIES) & $(COMPILE_MOTION) && wait $$!
 	@touch $@
 
 $(VENV)/.tested: $(VENV)/.installed
 	$(PIP_INSTALL) '$(strip $(TORCH))' -e '.[test]'
-	$(COMPILE)
+	$(COMPILE_LIBRARIES)
 	@touch $@
 
 demo: install  ## Run the whole ensemble with and without a shortcut, record, replay, report
@@ -58,17 +60,15 @@ demo: install  ## Run the whole ensemble with and without a shortcut, record, re
 	echo "more: \`slap evaluate obstacle2d --preset paper\`: from the paper's start states"
 
 PYTEST := $(abspath $(BIN))/pytest -q --dist worksteal
-# No test should wait until motion planning is compiled. Half a second where it is.
-COMPILED := $(BIN)/python -m slap_ros.motion.kernels
 # Types are checked, and embedded_ros is tested, while other tests wait.
 BESIDE := $(MAKE) --no-print-directory --jobs 3 types embedded-tests
 
 test: $(VENV)/.tested style  ## Check style and types, and run all tests but the slow ones
-	$(COMPILED)
+	$(COMPILE_MOTION)
 	$(BESIDE) quick-tests
 
 test-all: $(VENV)/.tested style  ## The same with the slow tests, as CI does
-	$(COMPILED)
+	$(COMPILE_MOTION)
 	$(BESIDE) all-tests
 
 quick-tests:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from slap_ros.core import Domain, Task
 from slap_ros.errors import EpisodeChangedError
 from slap_ros.messages.decode import stamp_ns
-from slap_ros.messages.protocols import EpisodeFaultMessage, StateMessage
+from slap_ros.messages.protocols import AtomsMessage, EpisodeFaultMessage, StateMessage
 from slap_ros.relational import AtomSpace, State
 
 
@@ -32,17 +32,20 @@ class Episode:
     task: Task
     space: AtomSpace
 
-    def has(self, message: StateMessage) -> bool:
-        """Whether the message is a state of this episode, as far as it says.
+    def may_have(self, message: StateMessage | AtomsMessage) -> bool:
+        """Whether a state, or its atoms, may be of this episode: number, and at first the stamp.
 
         The initial state has the stamp of its task, by which the first states of two episodes of
         the same number are distinguished. Later states follow one another by their steps.
         """
-        return (
-            message.episode == self.number
-            and (message.step > 0 or stamp_ns(message.header) == self.opened_ns)
-            and [obj.name for obj in message.objects] == [o.name for o in self.space.layout.objects]
+        return message.episode == self.number and (
+            message.step > 0 or stamp_ns(message.header) == self.opened_ns
         )
+
+    def has(self, message: StateMessage) -> bool:
+        """Whether the message is a state of this episode, as far as it says: of its objects."""
+        names = [obj.name for obj in self.space.layout.objects]
+        return self.may_have(message) and [obj.name for obj in message.objects] == names
 
     def is_ended_by(self, fault: EpisodeFaultMessage) -> bool:
         """Whether a fault is this episode's."""

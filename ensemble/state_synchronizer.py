@@ -201,17 +201,12 @@ class StateSynchronizer:
         return not self._may_be_current(message) or message.step > latest.step
 
     def _may_be_current(self, message: ObjectCentricState | AbstractState) -> bool:
-        """Whether a message may be of this episode: its number, and at first its stamp.
+        """Whether a message may be of this episode.
 
         A simulator that was started again counts episodes from 1, and its first messages may be
         here before its task is opened.
         """
-        episode = self.episode
-        return (
-            episode is not None
-            and message.episode == episode.number
-            and (message.step > 0 or stamp_ns(message.header) == episode.opened_ns)
-        )
+        return self.episode is not None and self.episode.may_have(message)
 
     def _fits(self, message: ObjectCentricState) -> bool:
         """Whether a state can be one of the current episode, or is one of another."""

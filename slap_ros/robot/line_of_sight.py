@@ -4,10 +4,10 @@
 
 Across the line of sight, a tag is known to a fraction of a millimetre. How far away it is follows
 from its size in the picture, and is off by millimetres, or by centimetres where a finger covers an
-edge of it. A tag that is
-seen at a slant is narrow in the picture: it may seem to be anywhere within half a decimetre, or to
-face the other way. So slanted tags do not count, and distance is taken from elsewhere: from what an
-object stands on (``slap_ros.worlds.joint_space.settling``), or from the hand that holds it.
+edge of it. A tag that is seen at a slant is narrow in the picture: it may seem to be anywhere
+within half a decimetre, or to face the other way. So slanted tags do not count, and distance is
+taken from elsewhere: from what an object stands on (``slap_ros.worlds.joint_space.settling``), or
+from the hand that holds it.
 
 A tag of a few pixels looks almost the same where it is turned the other way in depth. A finger over
 one corner is enough for the wrong one of both to fit better. Where the object was says which it is,
