@@ -230,6 +230,7 @@ def test_what_was_checked_is_the_shortcuts_that_were_there(trained, tmp_path):
         assert not load_library(library, points).usable_over(other)
 
 
+@pytest.mark.slow
 def test_shortcuts_that_always_fail_leave_the_plans_of_the_skills(trained):
     """To the step, in each of several tasks; and the paper's search finds the same lengths."""
     domain = open_domain(DomainChoice("points", "line", str(trained.folder / "steady")))
@@ -379,6 +380,7 @@ def test_a_budget_below_a_round_is_refused_with_what_a_round_takes(tmp_path):
     assert not (tmp_path / "grown").exists()
 
 
+@pytest.mark.slow
 def test_an_evaluation_against_skills_names_them_and_both_digests(trained, tmp_path):
     skills, library = trained.folder / "steady", trained.folder / "library"
     given = ["--preset", "line", "--skills", skills, "--tasks", 2, "--seeds", 1]

@@ -192,6 +192,7 @@ def study(*arguments):
     return CliRunner().invoke(app, [str(argument) for argument in command])
 
 
+@pytest.mark.slow
 @pytest.mark.training
 def test_the_study_counts_the_steps_of_both_and_is_read_again(tmp_path):
     library = write_library(tmp_path / "known", PICKING)

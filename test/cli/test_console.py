@@ -96,7 +96,7 @@ def slap(*arguments, **options):
 @pytest.mark.parametrize("target", ["/dev/full", "closed"])
 def test_a_stdout_that_takes_nothing_is_an_error_and_no_traceback(target):
     shell = f">{target}" if target != "closed" else ">&-"
-    command = f"{sys.executable} -m ensemble.cli domains --json {shell}"
+    command = f"{sys.executable} -m ensemble.cli domains obstacle2d --json {shell}"
     run = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=200)
     assert run.returncode == ErrorCode.INPUT_OUTPUT, run.stderr
     assert "Traceback" not in run.stderr
