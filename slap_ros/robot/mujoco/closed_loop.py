@@ -181,6 +181,13 @@ class ClosedLoopWorld:
             JointReading(now_s, tuple(plant.joints), tuple(plant.joint_velocities), plant.gap)
         )
         if not self._arm.busy:  # what is detected on the way counts for nothing
-            for found in self._detector.detect():
-                self._robot.add_detection(found.frame, now_s, found.base, found.seen)
+            self._look(now_s)
         return True
+
+    def _look(self, now_s: float) -> None:
+        detected = self._detector.detect()
+        if detected is None:
+            return
+        for found in detected:
+            self._robot.add_detection(found.frame, now_s, found.base, found.seen)
+        self._robot.add_picture(now_s)

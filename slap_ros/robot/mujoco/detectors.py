@@ -43,8 +43,8 @@ class ObjectDetector(Protocol):
     config: SceneConfig  # how they are detected
     period_s: float  # time between two detections
 
-    def detect(self) -> Sequence[DetectedPose]:
-        """Find the frames that show objects at this moment."""
+    def detect(self) -> Sequence[DetectedPose] | None:
+        """Find the frames that show objects at this moment; None where nothing was looked at."""
         ...
 
     def close(self) -> None:
@@ -116,20 +116,20 @@ class TagCameraDetector:
         self._library = TagDetector({tag.tag: tag.size for tag in tags})
         self._rng = np.random.default_rng(settings.seed)
         self._pictured: np.ndarray | None = None
-        self._found: Sequence[DetectedPose] = ()
+        self._found: Sequence[DetectedPose] | None = None
 
-    def detect(self) -> Sequence[DetectedPose]:
-        """The tags in a picture of now."""
-        now = self.plant.positions
-        if self._pictured is None or np.abs(now - self._pictured).max() > UNMOVED:
+    def detect(self) -> Sequence[DetectedPose] | None:
+        """The tags in a picture of now; None where the picture is lost."""
+        now, before = self.plant.positions, self._pictured
+        if self._found is None or before is None or np.abs(now - before).max() > UNMOVED:
             self._pictured, self._found = now, self._search(now)
         return self._found
 
-    def _search(self, positions: np.ndarray) -> Sequence[DetectedPose]:
+    def _search(self, positions: np.ndarray) -> Sequence[DetectedPose] | None:
         settings = self._settings
         picture = settings.noise.taken(self._camera.picture(positions), self._rng)
         if picture is None:  # lost
-            return ()
+            return None
         height, width, channels = picture.shape
         grey = grey_values(RGB8, height, width, width * channels, picture.tobytes())
         found = self._library.detect(grey, settings.camera)
