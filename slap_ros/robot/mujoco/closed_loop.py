@@ -61,6 +61,12 @@ class ClosedLoopSettings:
     detection_timeout_s: float = 2.0
 
 
+def camera_settings() -> ClosedLoopSettings:
+    """Settings behind a camera, whose pictures come seldom, and from which an arm hides blocks."""
+    tracking = TrackingSettings(hidden_after=5)
+    return ClosedLoopSettings(tracking=tracking, settle_time_s=4.0, detection_timeout_s=8.0)
+
+
 class ClosedLoopWorld:
     """A world whose states are measured on a plant of its own.
 

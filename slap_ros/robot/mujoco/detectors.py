@@ -20,11 +20,11 @@ from slap_ros.robot.scene_config import DETECTED, SceneConfig, sampled_scene_con
 from slap_ros.robot.tagged_scene import placed_tags, tagged_scene
 from slap_ros.vision.image_encoding import RGB8, grey_values
 from slap_ros.vision.image_noise import ImageNoise
-from slap_ros.vision.pinhole_camera import PinholeCamera
+from slap_ros.vision.pinhole_camera import PinholeCamera, looking_at
 from slap_ros.vision.tag_detection import TagDetector
 from slap_ros.vision.tags import tag_frame
 
-UNMOVED = 1e-5  # m and rad: a picture of what moved by less would be the same
+UNMOVED = 4e-4  # m and rad: less than the error of a detection, so that a new picture says no more
 PICTURE_S = 0.2  # s, between two pictures
 
 
@@ -89,6 +89,12 @@ class CameraSettings:
     pose: Pose
     noise: ImageNoise = field(default_factory=lambda: ImageNoise(2.0))
     seed: int = 0
+
+
+def camera_beside() -> CameraSettings:
+    """The camera of the nodes, across the table and above the blocks, with half of its pixels."""
+    eye, target = (1.05, -0.45, 0.75), (0.5, -0.02, 0.15)
+    return CameraSettings(PinholeCamera.centred(960, 540, 900.0), looking_at(eye, target))
 
 
 class TagCameraDetector:
