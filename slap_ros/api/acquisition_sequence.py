@@ -179,10 +179,10 @@ def acquire_sequence(
             library_folder=folder / "library",
             work_folder=folder / "training",
         )
-        before = library.digest
-        library, of_goal = _one_goal(acquisition, jobs, ray, watch)
-        known = _tried(request, number, folder, known if library.digest == before else {})
-        steps.append(of_goal.step(known))
+        before = library if not request.scratch else SkillLibrary(base.domain.name)
+        library, measured = _one_goal(acquisition, jobs, ray, watch)
+        known = _tried(request, number, folder, known if library.digest == before.digest else {})
+        steps.append(_step(goal, before, library.record, measured, known))
     sequence = {"scratch": request.scratch, "goals": [step.as_json() for step in steps]}
     record = {**library.record, "sequence": sequence}
     save_skill_library(base.library_folder, replace(library, record=record))
@@ -205,54 +205,47 @@ def _library_of(request: SequenceRequest, number: int) -> Path:
     return request.acquisition.work_folder / name / "library"
 
 
-@dataclass(frozen=True)
-class _Acquired:
-    """What it took to acquire what a goal needs.
+def _step(
+    goal: str,
+    before: SkillLibrary,
+    record: Mapping[str, Any],
+    measured: CurveCallback,
+    tries: _Tries,
+) -> SequenceStep:
+    """What came of a goal.
 
     Args:
         goal: Name of the goal, or its atoms.
-        library: Library after it.
+        before: Library that was carried on.
+        record: Record of the library after the goal.
         measured: Measurements of the acquisition.
+        tries: What came of the tasks of all goals so far with that library.
     """
-
-    goal: str
-    library: SkillLibrary
-    measured: CurveCallback
-
-    def step(self, tries: _Tries) -> SequenceStep:
-        """What came of the goal.
-
-        Args:
-            tries: What came of the tasks of all goals so far with the library.
-        """
-        record, curves = self.library.record, self.measured.curves
-        solved = {goal: fmean(one == 1.0 for one in tasks) for goal, tasks in tries.items()}
-        judged = [*self.measured.solved.points, Point(record["steps"], solved[self.goal])]
-        steps, reached = steps_to(judged, LEVEL, IN_A_ROW)
-        return SequenceStep(
-            self.goal,
-            record["steps"],
-            steps,
-            reached,
-            {name: points[-1].steps for name, points in curves.items() if name != PLAN},
-            {name: began for name in curves if (began := self._began_with(name)) is not None},
-            record["ended"],
-            {goal: fmean(tasks) for goal, tasks in tries.items()},
-            solved,
-        )
-
-    def _began_with(self, operator: str) -> Retrieved | None:
-        """The known skill that the skill of an operator began with, if it did."""
-        for skill in self.library.skills:
-            began = skill.record.get("began_with") or {}
-            if skill.operator.name == operator and "skill" in began:
-                return Retrieved(began["skill"], began["success"])
-        return None
+    solved = {name: fmean(one == 1.0 for one in tasks) for name, tasks in tries.items()}
+    judged = [*measured.solved.points, Point(record["steps"], solved[goal])]
+    steps, reached = steps_to(judged, LEVEL, IN_A_ROW)
+    known = {skill.operator.name: skill.folder_name for skill in before.skills}
+    learned = {name: points for name, points in measured.curves.items() if name != PLAN}
+    return SequenceStep(
+        goal,
+        record["steps"],
+        steps,
+        reached,
+        {name: points[-1].steps for name, points in learned.items()},
+        {
+            name: Retrieved(known[name], points[0].success)
+            for name, points in learned.items()
+            if name in known
+        },
+        record["ended"],
+        {name: fmean(tasks) for name, tasks in tries.items()},
+        solved,
+    )
 
 
 def _one_goal(
     acquisition: AcquisitionRequest, jobs: int | None, ray: str | None, watch: AcquisitionWatch
-) -> tuple[SkillLibrary, _Acquired]:
+) -> tuple[SkillLibrary, CurveCallback]:
     """Acquire what one goal needs, and take note of what that took."""
     curves: list[CurveCallback] = []
     segment_steps = acquisition.chosen_settings().segment_steps(horizon_of(acquisition.domain))
@@ -264,7 +257,7 @@ def _one_goal(
             yield curves[-1]
 
     library = carry_out(acquisition, jobs, ray, replace(watch, curriculum=watched))
-    return library, _Acquired(acquisition.goal_or_first, library, curves[-1])
+    return library, curves[-1]
 
 
 def _tried(
