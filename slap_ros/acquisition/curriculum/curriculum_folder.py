@@ -13,6 +13,8 @@
         rounds.json            how a round of training went, per skill
       Pick/                    the training of a skill; see skill_training
       Pick-1/                  the same from scratch, after a dead end
+      compared.json            known skills beside what was learned from them
+      known/                   those known skills of other libraries that did as well
       vacuity.json             what constant and random actions are worth
 """
 
@@ -22,6 +24,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from slap_ros.acquisition.curriculum.known_or_learned import KnownOrLearned
 from slap_ros.acquisition.curriculum.rollouts import PlanRollout
 from slap_ros.acquisition.training.skill_training import Round
 from slap_ros.learning.work_folder import WorkFolder
@@ -94,6 +97,19 @@ class CurriculumFolder:
             lambda data: [Round.from_json(one) for one in data],
         )
 
+    def compared(self, compute: Compute) -> list[KnownOrLearned]:
+        """The known skills that others began with, beside what was learned from them.
+
+        Args:
+            compute: Function that tries both.
+
+        Raises:
+            InvalidParameterError: What is in the folder is damaged.
+        """
+        return self._work.cached(
+            "compared", compute, lambda data: [KnownOrLearned(**one) for one in data]
+        )
+
     def vacuity(self, compute: Compute) -> list[Any]:
         """The vacuity of each skill, how well blind policies do, as JSON, in order of the skills.
 
@@ -110,6 +126,10 @@ class CurriculumFolder:
             attempt: Number of times that the skill was learned from scratch before.
         """
         return self._path / (f"{operator}-{attempt}" if attempt else operator)
+
+    def known_skill(self, operator: LiftedOperator) -> Path:
+        """The folder of a known skill that does as well as what was learned from it."""
+        return self._path / "known" / skill_folder_name(operator)
 
     def skill(self, operator: LiftedOperator, attempt: int) -> Path:
         """The folder of the best policy of a training, as in a library.
