@@ -15,6 +15,7 @@ from statistics import fmean
 from typing import Any, Protocol, TypeVar
 
 from slap_ros.errors import UnsolvableError
+from slap_ros.learning.finished_jobs import FinishedJobs, cached_jobs
 from slap_ros.learning.progress_callback import ProgressCallback
 from slap_ros.learning.task_distribution import TaskDistribution
 from slap_ros.learning.task_range import TaskRange
@@ -295,7 +296,8 @@ class Training:
         self._work.require_same({"place": self.distribution.as_json(), **self.settings.as_json()})
 
     def _explore(self) -> list[ExplorationResult]:
-        return self._work.cached(
+        return cached_jobs(
+            self._work,
             "explored",
             self._explore_what_can_be,
             lambda data: [ExplorationResult.from_json(result) for result in data],
@@ -307,10 +309,10 @@ class Training:
         jobs.STARTS.batch(0, self.settings.starts)
         jobs.VALIDATION.batch(0, self.settings.validation)
 
-    def _explore_what_can_be(self) -> list[Any]:
+    def _explore_what_can_be(self, finished: FinishedJobs) -> list[Any]:
         tasks = self.settings.exploration.tasks
         work = [(self._any_goal, i, self.settings.exploration) for i in range(tasks)]
-        found = self._run("exploring tasks", jobs.try_to_explore, work)
+        found = self._run("exploring tasks", jobs.try_to_explore, work, finished)
         self._leave_out(jobs.EXPLORATION, found)
         return [result for result in found if not isinstance(result, str)]
 
@@ -359,9 +361,10 @@ class Training:
             )
             for i in range(self.settings.starts)
         ]
-        return self._work.cached(
+        return cached_jobs(
+            self._work,
             f"{name}/starts",
-            lambda: self._run("collecting starts", jobs.start, work),
+            lambda finished: self._run("collecting starts", jobs.start, work, finished),
             lambda data: tuple(StartRecord.from_json(one) for one in data if one is not None),
         )
 
@@ -422,15 +425,22 @@ class Training:
         """Steps of a plan for each of these validation tasks, or why there is none."""
         work = [(self._any_goal, i, shortcuts, self.settings.sampling) for i in tasks]
         name = "+".join(["plans", *(shortcut.name for shortcut in shortcuts)])
-        return self._work.cached(
+        return cached_jobs(
+            self._work,
             name,
-            lambda: self._run("planning", jobs.plan_length, work),
+            lambda finished: self._run("planning", jobs.plan_length, work, finished),
             lambda data: _decode_lengths(data, len(work)),
         )
 
-    def _run(self, what: str, function: Any, work: Sequence[tuple[Any, ...]]) -> list[Any]:
+    def _run(
+        self,
+        what: str,
+        function: Any,
+        work: Sequence[tuple[Any, ...]],
+        finished: FinishedJobs,
+    ) -> list[Any]:
         """The results of a step's jobs, in their order."""
-        return run_in_order(self.workers, function, work, what, self.callback)
+        return run_in_order(self.workers, function, work, what, self.callback, finished)
 
     def _record(
         self, explored: Sequence[ExplorationResult], baseline: float, length: float
