@@ -182,12 +182,13 @@ class Training:
     callback: TrainingCallback
     _shortcuts: list[Shortcut] = field(default_factory=list, init=False)
     _validation: list[int] = field(default_factory=list, init=False)  # tasks that have a plan
+    _spent: int = field(default=0, init=False)  # environment steps of exploring and learning
 
     def __post_init__(self) -> None:
         self._work = WorkFolder(self.folder)
 
     def run(self) -> ShortcutLibrary:
-        """Train until the budget is spent, or go on where an earlier run ended.
+        """Train until nothing else is worth learning, or go on where an earlier run ended.
 
         Raises:
             ChildProcessError: A process that stepped environments has ended.
@@ -199,6 +200,7 @@ class Training:
         self._require_same_settings()
         length = baseline = self._validate_without()
         explored = self._explore()
+        self._spent = sum(result.environment_steps for result in explored)
         ranked = rank(explored)
         self.callback.on_ranked(ranked)
         operator_steps = mean_steps(explored)
@@ -221,6 +223,8 @@ class Training:
         """
         kept: list[CandidateGroup] = []
         for _ in range(self.settings.shortcuts):
+            if not self._affords(1):
+                break
             group = self._most_promising(ranked, kept)
             if group is None:
                 break
@@ -229,6 +233,11 @@ class Training:
             if length < before:
                 kept.append(group)
         return length
+
+    def _affords(self, shortcuts: int) -> bool:
+        """Whether so many shortcuts can still be learned within the budget."""
+        needed = self._spent + shortcuts * self.settings.most_steps
+        return not self.settings.budget or needed <= self.settings.budget
 
     def _most_promising(
         self, groups: Sequence[CandidateGroup], kept: Sequence[CandidateGroup]
@@ -264,7 +273,9 @@ class Training:
         starts = self._starts(group, operator_steps)
         if not starts:  # it can begin in no task
             return length
-        return self._judge(with_origin(self._learn(group.signature, starts), group), length)
+        learned = self._learn(group.signature, starts)
+        self._spent += int(learned.record.get("environment_steps", 0))
+        return self._judge(with_origin(learned, group), length)
 
     def _judge(self, shortcut: Shortcut, length: float) -> float:
         """Keep a shortcut if it shortens plans.
@@ -453,6 +464,7 @@ class Training:
             "environment_steps": {
                 "exploring": sum(result.environment_steps for result in explored),
                 "learning": sum(steps),
+                **({"spent": self._spent} if self.settings.budget else {}),
             },
             "settings": self.settings.as_json(),
             "versions": dict(versions()),
