@@ -140,9 +140,9 @@ class GrowthRequest:
             training = self.training
             raise InvalidParameterError(
                 f"{self.steps} environment steps are too few for a round: skills take at least "
-                f"{self.least_skill_steps}, exploration takes {training.exploration.usual_steps}, "
-                f"and a shortcut takes {training.most_steps}; give --steps {self.least_steps} or "
-                "more"
+                f"{self.least_skill_steps}, random rollouts of exploration take "
+                f"{training.exploration.usual_steps}, and a shortcut takes {training.most_steps}; "
+                f"give --steps {self.least_steps} or more"
             )
 
     @property

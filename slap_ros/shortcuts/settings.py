@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from math import ceil
 from typing import Any
 
 from slap_ros.core import Domain, SettingValue
@@ -166,8 +167,15 @@ class TrainingSettings:
 
     @property
     def most_steps(self) -> int:
-        """Environment steps that a shortcut takes if its first stage is learned in all attempts."""
-        return self.total_steps + (self.attempts - 1) * self.stages[0].total_steps
+        """Environment steps that a shortcut takes if its first stage is learned in all attempts.
+
+        A stage ends with the rollout in which its steps are reached.
+        """
+        each = [
+            ceil(stage.total_steps / stage.rollout_steps) * stage.rollout_steps
+            for stage in self.stages
+        ]
+        return sum(each) + (self.attempts - 1) * each[0]
 
     def with_total_steps(self, steps: int) -> TrainingSettings:
         """As many environment steps in all, shared among the stages as they are now.

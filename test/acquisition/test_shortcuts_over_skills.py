@@ -44,14 +44,10 @@ from slap_ros.skills.domain_choice import DomainChoice, open_domain
 from slap_ros.studies.comparison import PlanningSetup
 from slap_ros.studies.slap.planning_time import plan_once
 from support.points import REWARDS
+from support.points_training import SMALL
 from support.steady_skills import PICKING, PUTTING, towards, write_library
 
 pytestmark = pytest.mark.usefixtures("points_installed")
-SMALL = [
-    "polish=none", "ppo.total_steps=6144", "starts=24", "validation=3", "shortcuts=1",
-    "exploration.tasks=3", "exploration.nodes=1", "exploration.rollouts=128",
-    "exploration.action_repeat=3", "exploration.length=20",
-]  # fmt: skip
 CHANGES = [word for change in SMALL for word in ("--set", change)]
 
 
@@ -337,8 +333,25 @@ def test_what_grows_is_what_the_other_commands_make_interrupted_or_not(trained, 
     assert sum(one.steps for one in grown.rounds) <= request.steps
     before = contents(folder)
     assert grow_rounds(request) == grown and contents(folder) == before
+    told = events_of_growth(folder, request)
+    assert contents(folder) == before
+    assert [one["event"] for one in told] == ["round", "round", "grown"]
+    assert told[0]["shortcuts"] == [tried.name] and told[0]["length"] == tried.after
+    assert Path(told[-1]["shortcut_library"]) == folder / "shortcuts"
+    assert told[-1]["steps"] == told[0]["steps"] + told[1]["steps"] and told[-1]["best"] == 1
     with pytest.raises(InvalidParameterError, match="has a training with other settings"):
         grow_rounds(replace(request, seed=1))
+
+
+def events_of_growth(folder, request):
+    """What `slap grow` says to another process."""
+    answer = slap(
+        "grow", "points", "--preset", "line", "--output", folder, "--keep", request.keep,
+        "--set-skills", "rollouts=2", "--set-skills", "validation=2", "--settings", "ours",
+        *CHANGES, "--steps", request.steps, "--jobs", 1, "--events",
+    )  # fmt: skip
+    assert answer.exit_code == 0, answer.output
+    return list(map(json.loads, answer.stdout.splitlines()))
 
 
 class EndedAfterRoundError(Exception):
@@ -445,7 +458,7 @@ def test_a_budget_below_a_round_is_refused_with_what_a_round_takes(tmp_path):
     answer = slap(*asked, "--settings", "ours", "--steps", 6000)
     assert answer.exit_code == ErrorCode.INVALID_PARAMETER
     said = " ".join(answer.stderr.split())
-    assert "too few for a round" in said and "exploration takes 7680, and a shortcut takes" in said
+    assert "too few for a round" in said and "of exploration take 7680, and a shortcut" in said
     assert "a shortcut takes 6144; give --steps" in said
     assert not (tmp_path / "grown").exists()
 
