@@ -131,7 +131,7 @@ class TrainerGoal(ABC):
         )
 
     def tell(self, **changed: Any) -> None:
-        """Publish feedback.
+        """Publish feedback in which some fields have changed.
 
         Args:
             changed: Values of the fields that have changed.
