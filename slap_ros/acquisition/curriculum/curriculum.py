@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from statistics import fmean
 from typing import Any
@@ -55,6 +56,7 @@ from slap_ros.acquisition.training.warm_start import (
     WarmStarts,
 )
 from slap_ros.errors import UnsolvableError
+from slap_ros.learning.finished_jobs import FinishedJobs
 from slap_ros.learning.stored_keys import stored
 from slap_ros.learning.workers import Workers, run_in_order
 from slap_ros.skills.skill_library import AcquiredSkill, SkillLibrary, load_skill, save_skill
@@ -171,20 +173,25 @@ class Curriculum:
     ) -> list[PlanRollout]:
         """Carry out plans with skills, by the folder of each."""
         work = [(self.source, index, skills) for index in tasks]
-        return self._results.rollouts(iteration, name, lambda: self._carry_out(work))
+        return self._results.rollouts(iteration, name, partial(self._carry_out, work))
 
-    def _carry_out(self, work: Sequence[tuple[TaskSource, int, dict[str, str]]]) -> list[Any]:
+    def _carry_out(
+        self, work: Sequence[tuple[TaskSource, int, dict[str, str]]], finished: FinishedJobs
+    ) -> list[Any]:
         """Carry out plans, and what a search tries after shortcuts, if there are any.
 
         Args:
             work: Arguments of :func:`~slap_ros.acquisition.curriculum.jobs.carry_out`, one tuple
                 for each task.
+            finished: Tasks that are done already.
         """
-        plans = self._run("carrying out plans", jobs.carry_out, work)
+        plans = self._run("carrying out plans", jobs.carry_out, work, finished)
         if self.shortcuts is None:
             return plans
         after = [(*one, self.shortcuts) for one in work]
-        tried = self._run("trying skills after shortcuts", jobs.try_after_shortcuts, after)
+        tried = self._run(
+            "trying skills after shortcuts", jobs.try_after_shortcuts, after, finished
+        )
         return [*plans, *(rollout for task in tried for rollout in task)]
 
     def _skill(self, name: str, state: CurriculumState) -> Path:
@@ -235,7 +242,7 @@ class Curriculum:
         if not work:
             return chosen
         found = self._results.known(
-            iteration, lambda: self._run("trying known skills", jobs.try_known, work)
+            iteration, partial(self._run, "trying known skills", jobs.try_known, work)
         )
         for (_, name, starts, _), successes in zip(work, found, strict=True):
             tried = tuple(map(TriedStart, starts, successes))
@@ -361,7 +368,7 @@ class Curriculum:
         begun = [name for name in names if starts[name]]
         work = [(self.source, name, starts[name], self.settings.judged) for name in begun]
         found = self._results.vacuity(
-            lambda: self._run("trying constant actions", jobs.vacuity, work)
+            partial(self._run, "trying constant actions", jobs.vacuity, work)
         )
         return dict.fromkeys(names) | dict(zip(begun, found, strict=True))
 
@@ -393,9 +400,21 @@ class Curriculum:
         return data
 
     def _run(
-        self, what: str, function: Callable[..., Any], work: Sequence[tuple[Any, ...]]
+        self,
+        what: str,
+        function: Callable[..., Any],
+        work: Sequence[tuple[Any, ...]],
+        finished: FinishedJobs | None = None,
     ) -> list[Any]:
-        return run_in_order(self.workers, function, work, what, self.callback)
+        """The results of a step's jobs, in their order.
+
+        Args:
+            what: Name of the step, in words.
+            function: Function of a job.
+            work: Arguments of the function, one tuple for each job.
+            finished: Jobs that have ended already; None where each keeps what it has done itself.
+        """
+        return run_in_order(self.workers, function, work, what, self.callback, finished)
 
 
 def require_plans(rollouts: Sequence[PlanRollout], source: TaskSource) -> None:

@@ -16,6 +16,7 @@
       compared.json            known skills beside what was learned from them
       known/                   those known skills of other libraries that did as well
       vacuity.json             what constant and random actions are worth
+      .vacuity.jsonl           jobs of a result that is under way, as they end
 """
 
 from __future__ import annotations
@@ -27,11 +28,13 @@ from typing import Any
 from slap_ros.acquisition.curriculum.known_or_learned import KnownOrLearned
 from slap_ros.acquisition.curriculum.rollouts import PlanRollout
 from slap_ros.acquisition.training.skill_training import Round
+from slap_ros.learning.finished_jobs import FinishedJobs, cached_jobs
 from slap_ros.learning.work_folder import WorkFolder
 from slap_ros.relational import LiftedOperator
 from slap_ros.skills.skill_library import skill_folder_name
 
 Compute = Callable[[], list[Any]]  # computes a result as JSON, where the folder has none
+ComputeByJobs = Callable[[FinishedJobs], list[Any]]  # the same, after the jobs that have ended
 
 
 class CurriculumFolder:
@@ -52,7 +55,7 @@ class CurriculumFolder:
         """
         self._work.require_same(curriculum)
 
-    def rollouts(self, iteration: int, name: str, compute: Compute) -> list[PlanRollout]:
+    def rollouts(self, iteration: int, name: str, compute: ComputeByJobs) -> list[PlanRollout]:
         """The plans that were carried out in an iteration.
 
         Args:
@@ -63,13 +66,14 @@ class CurriculumFolder:
         Raises:
             InvalidParameterError: What is in the folder is damaged.
         """
-        return self._work.cached(
+        return cached_jobs(
+            self._work,
             f"iteration{iteration}/{name}",
             compute,
             lambda data: [PlanRollout.from_json(one) for one in data],
         )
 
-    def known(self, iteration: int, compute: Compute) -> list[list[float]]:
+    def known(self, iteration: int, compute: ComputeByJobs) -> list[list[float]]:
         """The success rates of known skills in place of each new one.
 
         Args:
@@ -79,7 +83,8 @@ class CurriculumFolder:
         Raises:
             InvalidParameterError: What is in the folder is damaged.
         """
-        return self._work.cached(
+        return cached_jobs(
+            self._work,
             f"iteration{iteration}/known",
             compute,
             lambda data: [[float(success) for success in one] for one in data],
@@ -110,13 +115,13 @@ class CurriculumFolder:
             "compared", compute, lambda data: [KnownOrLearned(**one) for one in data]
         )
 
-    def vacuity(self, compute: Compute) -> list[Any]:
+    def vacuity(self, compute: ComputeByJobs) -> list[Any]:
         """The vacuity of each skill, how well blind policies do, as JSON, in order of the skills.
 
         Raises:
             InvalidParameterError: What is in the folder is damaged.
         """
-        return self._work.cached("vacuity", compute, list)
+        return cached_jobs(self._work, "vacuity", compute, list)
 
     def training(self, operator: str, attempt: int) -> Path:
         """The folder in which the skill of an operator is trained; see ``skill_training``.
