@@ -72,12 +72,12 @@ class SequenceRequest:
 
 
 @dataclass(frozen=True)
-class Retrieved:
+class KnownStart:
     """A known skill that another one began with.
 
     Args:
         skill: Name and digest of the known skill.
-        success: Its success rate before anything was learned.
+        success: Success rate of the known skill before anything was learned.
     """
 
     skill: str
@@ -92,7 +92,7 @@ class SequenceStep:
         goal: Name of the goal, or its atoms.
         steps: Environment steps learned for it, all skills together.
         steps_to_level: Environment steps after which ``IN_A_ROW`` judgements in a row first had
-            ``LEVEL`` of the tasks solved; see :class:`~slap_ros.api.learning_curves.SolvedTasks`.
+            ``LEVEL`` of the tasks solved; see :class:`~slap_ros.api.learning_curves.SolvedShares`.
         reached: Whether they ever had; else ``steps_to_level`` are all steps.
         learned: Environment steps of each skill that was learned further, by operator.
         retrieved: Known skill that each of these began with, and its success before, by operator.
@@ -106,7 +106,7 @@ class SequenceStep:
     steps_to_level: int
     reached: bool
     learned: Mapping[str, int]
-    retrieved: Mapping[str, Retrieved]
+    retrieved: Mapping[str, KnownStart]
     ended: str
     tried: Mapping[str, float] = field(default_factory=dict)
     solved: Mapping[str, float] = field(default_factory=dict)
@@ -128,7 +128,7 @@ class SequenceStep:
             int(data["steps_to_level"]),
             bool(data["reached"]),
             {str(name): int(steps) for name, steps in dict(data["learned"]).items()},
-            {str(name): Retrieved(**one) for name, one in dict(data["retrieved"]).items()},
+            {str(name): KnownStart(**one) for name, one in dict(data["retrieved"]).items()},
             str(data["ended"]),
             _numbers(data["tried"]),
             _numbers(data["solved"]),
@@ -233,7 +233,7 @@ def _step(
         reached,
         {name: points[-1].steps for name, points in learned.items()},
         {
-            name: Retrieved(known[name], points[0].success)
+            name: KnownStart(known[name], points[0].success)
             for name, points in learned.items()
             if name in known
         },

@@ -46,7 +46,7 @@ def steps_to(points: Sequence[Point], level: float, in_a_row: int = 1) -> tuple[
 
 
 @dataclass
-class SolvedTasks:
+class SolvedShares:
     """Judgements of whole tasks while skills are acquired: the share whose plans succeed.
 
     Between rounds of training, whole plans are carried out. Within a round, a skill is judged from
@@ -106,13 +106,13 @@ class CurveCallback:
         inner: Callback that receives the events as well.
         segment_steps: Environment steps between two judgements of a skill.
         curves: Measurements by name, in the order in which they were made.
-        solved: Judgements of whole tasks: see :class:`SolvedTasks`.
+        solved: Judgements of whole tasks: see :class:`SolvedShares`.
     """
 
     inner: CurriculumCallback
     segment_steps: int
     curves: dict[str, list[Point]] = field(default_factory=dict)
-    solved: SolvedTasks = field(default_factory=SolvedTasks)
+    solved: SolvedShares = field(default_factory=SolvedShares)
     _learned: int = 0
 
     def on_progress(self, what: str, done: int, total: int) -> None:

@@ -10,6 +10,7 @@ for each. An interrupted command goes on after the jobs that have ended, to the 
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -69,8 +70,7 @@ class FinishedJobs:
         content = read_bytes(self.path)
         whole = content[: content.rfind(b"\n") + 1]
         if whole != content:
-            with self.path.open("r+b") as file:
-                file.truncate(len(whole))
+            os.truncate(self.path, len(whole))
         return whole.splitlines()
 
 
