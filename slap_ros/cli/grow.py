@@ -69,7 +69,10 @@ class GrowOptions:
     ] = NEAR
     set: Annotated[list[str] | None, setting_changes("exploration.rollouts=16")] = None
     steps: Annotated[
-        int, typer.Option(min=1, help="Environment steps of training, all rounds together.")
+        int,
+        typer.Option(
+            min=1, help="Environment steps of learning and exploring, all rounds together."
+        ),
     ] = STEPS
     jobs: Jobs = 2
     events: Annotated[
