@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from slap_ros.bags.evaluate import read_runs
+from slap_ros.bags.reader import read_bag
 from slap_ros.bags.recording import RecordedEpisode, Recording
 from slap_ros.bags.taken_commands import taken_commands
 from slap_ros.core import Action, Domain
@@ -62,10 +62,12 @@ class PushedRecording:
     Args:
         domain: Domain that was recorded.
         pushes: Pushes in the bag, in the order of time.
+        damage: What cannot be read of the bag, and why; None where all of it can be.
     """
 
     domain: Domain
     pushes: tuple[RecordedPush, ...]
+    damage: str | None = None
 
 
 def read_pushes(path: Path, namespace: str | None = None) -> PushedRecording:
@@ -81,10 +83,8 @@ def read_pushes(path: Path, namespace: str | None = None) -> PushedRecording:
         InvalidParameterError: There is no such ensemble, its things have no friction that could be
             set, or hardly anything was pushed.
     """
-    contents = read_runs(path, namespace)
-    if len(contents.ensembles) > 1:
-        raise InvalidParameterError(f"{path} has several ensembles: choose one with --namespace")
-    recording = contents.ensembles[0].recording
+    bag = read_bag(path)
+    recording = Recording.of(bag, namespace)
     domain = recording.domain()
     if domain is None:
         raise DamagedBagError(f"{path} does not name the domain, so there is no model to calibrate")
@@ -93,7 +93,7 @@ def read_pushes(path: Path, namespace: str | None = None) -> PushedRecording:
     pushes = [push for states, actions in episodes for push in find_pushes(states, actions)]
     if len(pushes) < FEWEST:
         raise InvalidParameterError(_too_few(path, domain, recording, len(pushes)))
-    return PushedRecording(domain, tuple(pushes))
+    return PushedRecording(domain, tuple(pushes), bag.damage)
 
 
 def _require_friction(domain: Domain, path: Path) -> None:

@@ -13,7 +13,7 @@ import typer
 from slap_ros.calibration.friction import IdentifiedFriction, identify_friction
 from slap_ros.calibration.pushes import read_pushes
 from slap_ros.calibration.settings import calibrated_preset, parameter_file
-from slap_ros.cli.console import console, print_json
+from slap_ros.cli.console import console, print_json, warn
 from slap_ros.cli.options import Json
 from slap_ros.files import require_writable, write_whole
 
@@ -38,6 +38,8 @@ def calibrate(
     if output is not None:
         require_writable(output)
     recorded = read_pushes(bag, namespace)
+    if recorded.damage is not None:
+        warn(f"{bag} is damaged: {recorded.damage}")
     found = identify_friction(recorded.domain, recorded.pushes)
     preset = calibrated_preset(recorded.domain, found)
     if output is not None:
