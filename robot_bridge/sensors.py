@@ -25,6 +25,7 @@ from slap_ros.robot.joint_reading import JointLists, JointReading, gap_between, 
 from slap_ros.robot.limits import arm_limits
 from slap_ros.robot.robot_world import RobotWorld
 from slap_ros.robot.tracking import measured_pose
+from slap_ros.vision.tags import SEARCHED
 
 AHEAD = 0.05  # s, by which clocks of machines may differ
 QUIET = 10.0  # s between two log lines about joint states: a driver sends hundreds a second
@@ -103,6 +104,9 @@ class Sensors:
                 continue  # not seen from the robot
             stamp_s = self._stamp_s(item.header)
             if stamp_s is None:
+                continue
+            if item.child_frame_id == SEARCHED:
+                self._world.add_picture(stamp_s)
                 continue
             position, quaternion = _parts(item)
             try:

@@ -20,7 +20,8 @@ Subscribers:
 
 Publishers:
     tf (tf2_msgs/TFMessage): tags, as frames tag36h11:ID, each a child of the picture's frame. x is
-        to the right, y upwards, z out of the tag. Stamps are the picture's.
+        to the right, y upwards, z out of the tag. Stamps are the picture's. The frame
+        searched_picture comes with each picture, also with one that shows no tag.
     diagnostics (diagnostic_msgs/DiagnosticArray): pictures, tags found, what was refused; 1 Hz.
 """
 
@@ -48,13 +49,14 @@ from ensemble.parameters import read_parameters
 from ensemble.steady_time import create_timer
 from robot_bridge.transforms import transform
 from slap_ros.errors import InvalidMeasurementError, InvalidParameterError
+from slap_ros.geometry.pose import IDENTITY
 from slap_ros.robot.scene_config import read_scene_config
 from slap_ros.robot.tagged_scene import placed_tags
 from slap_ros.skills.domain_choice import open_domain
 from slap_ros.vision.image_encoding import decompressed, grey_values
 from slap_ros.vision.pinhole_camera import PinholeCamera
 from slap_ros.vision.tag_detection import TagDetection, TagDetector
-from slap_ros.vision.tags import tag_frame
+from slap_ros.vision.tags import SEARCHED, tag_frame
 
 LOOK = 0.01  # s, between two looks at whether a picture is searched
 QUIET = 10.0  # s between two log lines about pictures that cannot be used
@@ -154,10 +156,10 @@ class TagDetectorNode(Node):
         self._counts["pictures"] += 1
         self._counts["tags"] += len(tags)
         items = [transform(tag.pose, tag_frame(tag.tag)) for tag in tags]
+        items.append(transform(IDENTITY, SEARCHED))
         for item in items:
             item.header = header
-        if items:
-            self._frames.publish(TFMessage(transforms=items))
+        self._frames.publish(TFMessage(transforms=items))
 
     def _refuse(self, error: Exception) -> None:
         self._counts["refused"] += 1

@@ -5,16 +5,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import partial
 
-from slap_ros.errors import InvalidParameterError, UnsolvableError
+from slap_ros.errors import InvalidParameterError, PlanningLimitError, UnsolvableError
 from slap_ros.planning.abstract_graph import (
     MAX_NODES,
     AbstractGraph,
     add_beyond,
     build_abstract_graph,
 )
-from slap_ros.planning.lazy_search import search_lazily
+from slap_ros.planning.lazy_search import SearchLimits, search_lazily
 from slap_ros.planning.model import Model
 from slap_ros.planning.plan import PlanningResult
 from slap_ros.planning.problem import Problem
@@ -25,6 +27,11 @@ from slap_ros.planning.unforeseen import UnforeseenSearch
 from slap_ros.relational import State
 
 Search = Callable[[AbstractGraph, State, Model], SearchOutcome]
+
+# The last resort, where nothing else has a plan: a tower beside a target is taken down first.
+DEEPEST = 6  # layers after the first with a goal state
+MOST_DEEP_NODES = 5_000  # abstract states of it
+MOST_DEEP_ROLLOUTS = 100  # of options that the model tries
 
 
 @dataclass(frozen=True)
@@ -41,7 +48,8 @@ class GraphPlanner:
     taken, though a deeper one might have a shorter plan.
 
     Where skills fail on every path, see :mod:`slap_ros.planning.recovery`; where no operators lead
-    to the goal, :mod:`slap_ros.planning.unforeseen`.
+    to the goal, :mod:`slap_ros.planning.unforeseen`. Where that has no plan either, the graph is
+    deepened much further, within a limited effort.
 
     Args:
         problem: The model, and the ground operators with their options.
@@ -49,12 +57,14 @@ class GraphPlanner:
         max_extra_depth: Layers, one per operator, by which the graph may be deepened, and operators
             of a detour.
         shortcuts: Where shortcut edges come from.
+        max_nodes: Abstract states of a graph after which to give up.
     """
 
     problem: Problem
     search: Search = search_lazily
     max_extra_depth: int = 2
     shortcuts: ShortcutSource | None = None
+    max_nodes: int = MAX_NODES
 
     def __post_init__(self) -> None:
         if self.max_extra_depth < 0:
@@ -74,7 +84,9 @@ class GraphPlanner:
         if plan is None:
             recovery = Recovery(self.problem, graph, state, goal, outcome.failed)
             if self.problem.exact:
-                plan = recovery.past_side_effect(self.search_to)
+                if (plan := recovery.past_side_effect(self.search_to)) is None:
+                    graph, outcome = self._search_deeper(state, goal, graph, outcome)
+                    plan = outcome.plan
             elif (plan := recovery.detour(self.max_extra_depth)) is None:
                 plan, remark = recovery.despite_failures(), outcome.reason
             if plan is None:
@@ -84,6 +96,26 @@ class GraphPlanner:
         at_least = outcome.at_least or 0
         return PlanningResult(plan, *sizes, rolled_out, remark, graph, at_least=at_least)
 
+    def _search_deeper(
+        self, state: State, goal: int, graph: AbstractGraph, outcome: SearchOutcome
+    ) -> tuple[AbstractGraph, SearchOutcome]:
+        """What a much deeper search comes to; graph and outcome as before without a plan."""
+        with suppress(PlanningLimitError):
+            deeper, found = self.deepened().search_to(state, goal)
+            if found.plan is not None:
+                return deeper, found
+        return graph, outcome
+
+    def deepened(self) -> GraphPlanner:
+        """The same with a graph that may be much deeper, and a limited effort."""
+        limits = SearchLimits(rollouts=self.problem.model.executed + MOST_DEEP_ROLLOUTS)
+        return replace(
+            self,
+            search=partial(search_lazily, limits=limits),
+            max_extra_depth=max(DEEPEST, self.max_extra_depth),
+            max_nodes=min(MOST_DEEP_NODES, self.max_nodes),
+        )
+
     def past_unforeseen(self, state: State, goal: int) -> PlanningResult | None:
         """A plan from where no operators lead to the goal; None if none is found.
 
@@ -92,13 +124,16 @@ class GraphPlanner:
             goal: Mask of atoms that must hold.
         """
         before = self.problem.model.executed
-        search = UnforeseenSearch(self.problem, goal, self.search_to)
-        found = search.plan(state) if self.problem.exact else None
-        if found is None:
+        if not self.problem.exact:
             return None
-        plan, graph = found
-        rolled_out = self.problem.model.executed - before
-        return PlanningResult(plan, len(graph.nodes), len(graph.edges), rolled_out, graph=graph)
+        for planner in (self, self.deepened()):
+            found = UnforeseenSearch(self.problem, goal, planner.search_to).plan(state)
+            if found is not None:
+                plan, graph = found
+                sizes = len(graph.nodes), len(graph.edges)
+                rolled_out = self.problem.model.executed - before
+                return PlanningResult(plan, *sizes, rolled_out, graph=graph)
+        return None
 
     def search_to(self, state: State, goal: int) -> tuple[AbstractGraph, SearchOutcome]:
         """Search the shallowest graph in which there is a plan, else the deepest one.
@@ -115,7 +150,7 @@ class GraphPlanner:
         """
         start = self.problem.model.space.abstract(state)
         for extra_depth in range(self.max_extra_depth + 1):
-            graph = self.graph(start, goal, extra_depth)
+            graph = self.graph(start, goal, extra_depth, self.max_nodes)
             self.add_shortcuts(graph)
             outcome = self.search(graph, state, self.problem.model)
             if outcome.plan is not None:

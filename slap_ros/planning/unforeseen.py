@@ -25,8 +25,7 @@ from slap_ros.planning.problem import Problem
 from slap_ros.planning.recovery import SearchTo
 from slap_ros.relational import State, Target
 
-MOST_ROLLOUTS = 24  # of options that are tried
-MOST_OPTIONS = 2  # one after the other: what is held is put down before
+MOST_ROLLOUTS = 80  # of options that are tried
 
 
 @dataclass(frozen=True)
@@ -66,15 +65,19 @@ class UnforeseenSearch:
         return None
 
     def _tried(self, state: State) -> Iterator[tuple[State, tuple[PlanEdge, ...], Option, Rollout]]:
-        """Options as they end in the model, each with the state that it starts in and the way."""
+        """Options as they end in the model, each with the state that it starts in and the way.
+
+        One that has moved the robot is not tried again from another state.
+        """
         model = self.problem.model
         left, seen = MOST_ROLLOUTS, {model.space.abstract(state)}
+        moved: set[Option] = set()
         queue: deque[tuple[State, tuple[PlanEdge, ...]]] = deque([(state, ())])
         while queue:
             here, before = queue.popleft()
             abstract = model.space.abstract(here)
             for ground, option in self.problem.operators:
-                if not ground.applicable(abstract):
+                if option in moved or not ground.applicable(abstract):
                     continue
                 if not left:
                     return
@@ -82,11 +85,12 @@ class UnforeseenSearch:
                 target = option.target(ground.apply(abstract))
                 rollout = model.roll_out(option, here, target)
                 yield here, before, option, rollout
+                if rollout.steps:
+                    moved.add(option)
                 if rollout.reached and rollout.abstract not in seen:
                     seen.add(rollout.abstract)
-                    if len(before) + 1 < MOST_OPTIONS:
-                        edge = PlanEdge(option, target, rollout.steps)
-                        queue.append((rollout.final, (*before, edge)))
+                    edge = PlanEdge(option, target, rollout.steps)
+                    queue.append((rollout.final, (*before, edge)))
 
     def _may_lead_on(self, abstract: int) -> bool:
         """Whether each atom of the goal can be reached, as far as operators say."""

@@ -21,12 +21,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from slap_ros.geometry.pose import Pose, Quaternion, Vector, multiply, rotate
-from slap_ros.worlds.settling import levelled
+from slap_ros.worlds.settling import DISTANCE_ERROR, levelled
 
 SLANTED = 0.4  # cosine of the angle between a tag's normal and the line of sight, about 66 degrees
 HALF_TURN: Quaternion = (0.0, 0.0, 1.0, 0.0)  # about a tag's normal
 LIKE_BEFORE = 0.5  # rad, by which what has not rolled over may have turned since it was seen
-DISTANCE_ERROR = 0.06  # m, by which a tag may seem nearer or further away than it is
 
 
 def is_slanted(seen: Pose) -> bool:

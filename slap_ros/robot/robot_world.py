@@ -11,9 +11,11 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -61,6 +63,13 @@ FARTHEST = 10.0  # m, from the base; what is detected further away is in another
 PRESSED = 0.002  # m, by which what is held may be told to be inside a table: it cannot be
 HIGHEST = 0.03  # m, by which it is raised for that
 DRIFT = 0.02  # rad, of a joint of an arm that is taken to stand
+
+
+class Doubt(NamedTuple):
+    """What is not taken for true where all together cannot be."""
+
+    predicted: bool = False  # where the model has moved what is hidden
+    seen: Object | None = None  # an object whose detections are not believed
 
 
 class GripperAction(Enum):
@@ -117,7 +126,7 @@ class RobotWorld:
             for obj, frames in self.scene_config.detected.items()
             for how in frames
         }
-        self._pictures: deque[float] = deque(maxlen=LONGEST)  # stamps of detections, each once
+        self._pictures: deque[float] = deque(maxlen=LONGEST)  # stamps, each once
         self._reading: JointReading | None = None
         self._grasp: Grasp | None = None
         self._candidate: Grasp | None = None  # what the gripper is to close around
@@ -157,6 +166,14 @@ class RobotWorld:
         elif not is_slanted(found):
             pose = self._likelier(obj, Ways.of(base, found, how.offset))
             self._tracks[obj].add(Detection(stamp_s, pose, frame, base.position))
+        self.add_picture(stamp_s)
+
+    def add_picture(self, stamp_s: float) -> None:
+        """Take that a picture was searched: what none of several shows is hidden.
+
+        Args:
+            stamp_s: Time at which it was taken, s.
+        """
         if not self._pictures or stamp_s > self._pictures[-1]:
             self._pictures.append(stamp_s)
 
@@ -228,24 +245,48 @@ class RobotWorld:
         Raises:
             InvalidStateError: What is measured cannot be; better measurements may follow.
         """
-        predicted = self._predicted
         try:
             return self._attempt(since_s, moving)
-        except InvalidStateError:
-            if predicted is None:
-                raise
-            self._predicted = None  # what is seen leaves no room for it: hidden ones have stayed
-        try:
-            return self._attempt(since_s, moving)
-        except InvalidStateError:
-            self._predicted = predicted  # for better measurements
-            raise
+        except InvalidStateError as error:
+            doubts = list(self._doubts(since_s, moving))
+            return self._in_doubt(since_s, moving, doubts, error)
 
-    def _attempt(self, since_s: float, moving: bool) -> State | None:
+    def _in_doubt(
+        self, since_s: float, moving: bool, doubts: Sequence[Doubt], error: InvalidStateError
+    ) -> State | None:
+        """The first state that can be; raises ``error`` where there is none."""
+        predicted = self._predicted
+        for doubt in doubts:
+            self._predicted = None if doubt.predicted else predicted
+            with suppress(InvalidStateError):
+                return self._attempt(since_s, moving, doubt.seen)
+        self._predicted = predicted  # for better measurements
+        raise error
+
+    def _doubts(self, since_s: float, moving: bool) -> Iterator[Doubt]:
+        """What may be wrong with what is known, the likeliest first.
+
+        What is seen leaves no room for what the model has moved: hidden ones have stayed. Or
+        something is seen where it cannot be, however long one waits: its tags are covered. That is
+        rather what seems to have moved far.
+        """
+        if self._predicted is not None:
+            yield Doubt(predicted=True)
+        if not (moving and self.tracking.hidden_after):
+            return
+        moved = {obj: self._tracks[obj].strayed(since_s) for obj in self._tracks}
+        for obj in sorted(moved, key=lambda obj: -moved[obj]):
+            if moved[obj] > 0.0:
+                yield Doubt(seen=obj)
+                if self._predicted is not None:
+                    yield Doubt(predicted=True, seen=obj)
+
+    def _attempt(self, since_s: float, moving: bool, covered: Object | None = None) -> State | None:
         reading = self._reading
         if reading is None or reading.stamp_s <= since_s or not reading.at_rest:
             return None
-        estimates = self._estimates(reading, since_s)
+        hidden = {o for o, t in self._tracks.items() if o == covered or self._is_hidden(t, since_s)}
+        estimates = self._estimates(reading, since_s, hidden)
         held = self._grasp.obj if self._grasp is not None else None
         known = {o: s for o, s in estimates.items() if s is not None and o != held}
         if len(known) < len(self._tracks) - (held is not None):
@@ -255,7 +296,7 @@ class RobotWorld:
         if self._grasp is not None:
             self._grasp = grasp_as_seen(self._grasp, reading, estimates.get(self._grasp.obj))
         state = self._assembler.assemble(reading, known, self._grasp)
-        if aside := self._pushed_aside(state, known, since_s):
+        if aside := self._pushed_aside(state, known, hidden & known.keys()):
             known |= aside
             state = self._assembler.assemble(reading, known, self._grasp)
         self._model.reset(state)
@@ -266,25 +307,22 @@ class RobotWorld:
         return state
 
     def _pushed_aside(
-        self, state: State, known: Mapping[Object, PoseEstimate], since_s: float
+        self, state: State, known: Mapping[Object, PoseEstimate], hidden: Collection[Object]
     ) -> dict[Object, PoseEstimate]:
-        hidden = [obj for obj in known if self._is_hidden(self._tracks[obj], since_s)]
         free = zip(self._bodies, self._model.scene.free, strict=True)
         bodies = {obj: body for obj, body in free if obj in known}
         moved = pushed_aside(state, bodies, hidden) if hidden else {}
         return {obj: still(pose, known[obj].weight) for obj, pose in moved.items()}
 
     def _estimates(
-        self, reading: JointReading, since_s: float
+        self, reading: JointReading, since_s: float, hidden: Collection[Object]
     ) -> dict[Object, PoseEstimate | None]:
         """What is known of each object; the hand is empty from now on if it lost what it held."""
         grasp = self._grasp
         if grasp is not None and grasp.obj in self._tracks:
             self._tracks[grasp.obj].expect(expected_pose(grasp, reading))
         estimates = {
-            obj: self._hidden(obj, track)
-            if self._is_hidden(track, since_s)
-            else track.estimate(since_s)
+            obj: self._hidden(obj, track) if obj in hidden else track.estimate(since_s)
             for obj, track in self._tracks.items()
         }
         if grasp is not None and is_lost(grasp, reading, estimates.get(grasp.obj)):
@@ -292,8 +330,14 @@ class RobotWorld:
         return estimates
 
     def _is_hidden(self, track: Track, since_s: float) -> bool:
-        """Whether pictures since then, and since it was seen last, show others but not this one."""
+        """Whether pictures since then, and since it was seen last, do not show it.
+
+        Where none of the last pictures shows anything, something covers the camera.
+        """
         enough, unseen_s = self.tracking.hidden_after, max(since_s, track.newest_s)
+        newest_s = max(one.newest_s for one in self._tracks.values())
+        if not self._pictures or newest_s < self._pictures[0]:
+            return False
         return 0 < enough <= sum(stamp_s > unseen_s for stamp_s in self._pictures)
 
     def _hidden(self, obj: Object, track: Track) -> PoseEstimate | None:

@@ -142,6 +142,13 @@ class Track:
         """Take a pose as well known: few detections that agree with it confirm it to the bit."""
         self._known = still(pose, self._settings.initial_detections)
 
+    def strayed(self, since_s: float) -> float:
+        """How far from its last place at rest it is seen since a time, m; 0 where either lacks."""
+        seen, last = self.estimate(since_s), self.last_at_rest
+        if seen is None or last is None:
+            return 0.0
+        return math.dist(seen.pose.position, last.pose.position)
+
     def forget(self) -> None:
         """Drop the pose at rest: the object was moved on purpose."""
         self._known = self.last_at_rest = None

@@ -23,6 +23,7 @@ from slap_ros.studies.lg_sail import (
 )
 from slap_ros.studies.slap import (
     ablation,
+    camera,
     dynamics,
     generalisation,
     goals,
@@ -56,6 +57,7 @@ STUDIES: Mapping[str, Study[Any]] = {
         perturbed.STUDY,
         planning_time.STUDY,
         transfer.STUDY,
+        camera.STUDY,
         demonstrations.STUDY,
         vacuity.STUDY,
         acquisition.STUDY,

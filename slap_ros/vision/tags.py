@@ -21,6 +21,8 @@ CELLS = 8  # along the black square's edge
 MARGIN = 1  # cells, white, on each side
 SHARE_OF_FACE = CELLS / (CELLS + 2 * MARGIN)  # of a face's edge: the largest tag on it
 
+SEARCHED = "searched_picture"  # frame whose stamps are those of pictures that were searched
+
 FRAME = re.compile(r"tag([0-9A-Za-z]+h[0-9]+):([0-9]{1,6})", re.ASCII)
 
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: The slap_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Joint states spoilt at random: what the world is told is where the arm is, or nothing."""
+"""What the world is told: of spoilt joint states where the arm is, or nothing; and of pictures."""
 
 import math
 import random
@@ -9,6 +9,7 @@ import pytest
 import rclpy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
+from tf2_msgs.msg import TFMessage
 
 from ensemble.steady_time import JumpFreeClock
 from slap_ros.domains import get_domain
@@ -16,8 +17,11 @@ from slap_ros.robot.limits import PANDA, Workspace
 
 pytest.importorskip("pybullet")
 from robot_bridge.sensors import Sensors
+from robot_bridge.transforms import transform
+from slap_ros.geometry.pose import IDENTITY
 from slap_ros.robot.robot_world import RobotWorld
 from slap_ros.robot.scene_config import sampled_scene_config
+from slap_ros.vision.tags import SEARCHED
 
 pytestmark = pytest.mark.timeout(3600)  # for as many cases as somebody may ask for
 ARM = [f"panda_joint{i + 1}" for i in range(7)]
@@ -110,3 +114,14 @@ def test_no_joint_state_is_taken_for_another(sensors, request):
             assert sensors._world.joint_distance(list(TRUE.values())[:7]) == 0.0
         assert sensors.gap is None or sensors.gap == pytest.approx(0.06)
     assert taken > 50 and refused > 50
+
+
+def test_a_picture_that_shows_nothing_was_searched_if_the_robot_knows_the_camera(sensors):
+    pictures = []
+    for camera in ("somewhere_else", "panda_link0"):
+        item = transform(IDENTITY, SEARCHED)
+        item.header = Header(stamp=sensors._node.get_clock().now().to_msg(), frame_id=camera)
+        sensors._on_frames(TFMessage(transforms=[item]))
+        pictures.append(len(sensors._world._pictures))
+    assert pictures == [0, 1]
+    assert not sensors.counts["detections"]

@@ -11,6 +11,8 @@ from slap_ros.planning.planner import make_planner
 
 DOMAIN = get_domain("obstacle_tower", "fair:obstacles=0,distractors=0")
 TASK = DOMAIN.task(0)
+WITH_TOWER = get_domain("obstacle_tower", "fair:obstacles=3,distractors=0")
+TOWER = WITH_TOWER.task(0)
 
 
 def half_on_target(beside):
@@ -39,6 +41,39 @@ def test_a_block_half_on_the_target_is_picked_up_and_put_down_again(planner):
     assert episode.success
     assert episode.replans == 0
     assert [edge.option for edge in episode.edges] == ["Pick", "PlaceInTarget"]
+
+
+def pushed_towers():
+    """A tower of three that was pushed off its target, but not far, with the way that it went."""
+    state = TOWER.initial_state
+    named = state.layout.object
+    x, y = (float(state.get(named("target"), axis)) for axis in ("x", "y"))
+    for dx, dy in ((0.05, 0.03), (0.055, 0.0), (0.0, 0.055)):
+        moved = {(named(f"block{i}"), "x"): x + dx for i in (2, 3, 4)}
+        moved |= {(named(f"block{i}"), "y"): y + dy for i in (2, 3, 4)}
+        yield state.replace(moved)
+
+
+@pytest.mark.parametrize("planner", ["lazy", "anytime"])
+def test_a_tower_that_leaves_no_room_at_the_target_is_taken_down(planner):
+    """It stands half on the target, where no operator makes room; or so near that no hand fits."""
+    rooms = set()
+    for state in pushed_towers():
+        space = WITH_TOWER.atom_space(state)
+        room = space.bit(space.atom("NothingOn", ("target",)))
+        rooms.add(bool(space.abstract(state) & room))
+        episode = Executor(
+            WITH_TOWER,
+            make_planner(planner, WITH_TOWER, state),
+            WITH_TOWER.make_world(state),
+            space,
+            space.mask(TOWER.goal),
+            TOWER.step_limit,
+        ).run()
+        assert episode.success, episode.error
+        assert episode.replans == 0
+        assert episode.edges[0].option == "Unstack"
+    assert rooms == {False, True}
 
 
 def test_what_no_skill_can_do_stays_unsolvable():

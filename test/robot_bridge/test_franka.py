@@ -11,6 +11,7 @@ import sys
 import threading
 from contextlib import contextmanager
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from typer.testing import CliRunner
 from ensemble.cli.application import app
 from ensemble.nodes import RunSettings, node_parameters
 from ensemble.robot_parameters import parse_franka
+from robot_bridge.franka.objects import ModelledObjects
 from slap_ros.api.execution import execute
 from slap_ros.api.planning import plan
 from slap_ros.core import task_with_goal
@@ -35,10 +37,12 @@ from slap_ros.errors import (
     RobotVersionError,
 )
 from slap_ros.robot.blending import ORDERS, blend
-from slap_ros.robot.franka.arm import ArmProbe, FrankaArm, FrankaSettings
+from slap_ros.robot.franka.arm import ArmProbe, ArmReading, FrankaArm, FrankaSettings
 from slap_ros.robot.franka.limits import FRANKA
 from slap_ros.robot.franka.simulation import SimulatedFr3
 from slap_ros.skills.domain_choice import DomainChoice
+from slap_ros.worlds.features import JOINT_FEATURES
+from slap_ros.worlds.joint_space.features import ROBOT
 from slap_ros.worlds.panda import HOME
 
 LIMIT = 60.0  # s, far more than anything here takes
@@ -230,13 +234,39 @@ def test_the_doctor_names_what_keeps_it_from_a_robot(simulation):
 
 
 @pytest.fixture(scope="module")
-def bag(tmp_path_factory):
+def run():
     """A block of the tower is grasped."""
     domain = get_domain("obstacle_tower")
     task = task_with_goal(domain, 1, 0, "(Holding robot block4)")
-    run = execute(domain, task, plan(domain, task, None))
-    assert run.success
+    found = execute(domain, task, plan(domain, task, None))
+    assert found.success
+    return found
+
+
+@pytest.fixture(scope="module")
+def bag(run, tmp_path_factory):
     return run.bag(tmp_path_factory.mktemp("franka") / "bag")
+
+
+def test_modelled_objects_are_not_pushed_by_an_arm_that_is_looked_at_late(run):
+    """The whole way to a block is read before a control period of the model has passed."""
+
+    def reading(state):
+        (robot,) = state.layout.of_type(ROBOT)
+        joints = tuple(float(state.get(robot, f.name)) for f in JOINT_FEATURES)
+        return ArmReading(0.0, 0.0, joints, (0.0,) * 7, 0.08, False)
+
+    first, *way, grasped = run.states
+    arm = SimpleNamespace(reading=reading(first), on_reading=None)
+    objects = ModelledObjects(run.domain, first, arm)
+    before = objects.poses()
+    for state in way:
+        arm.reading = reading(state)
+        arm.on_reading(arm.reading)
+    (robot,) = grasped.layout.of_type(ROBOT)
+    assert objects.grip(0.0) == pytest.approx(2.0 * grasped.get(robot, "finger"), abs=1e-4)
+    for name, pose in objects.poses().items():
+        np.testing.assert_allclose(pose.position, before[name].position, atol=1e-6)
 
 
 def replayed(bag, *options):

@@ -17,7 +17,7 @@ from ensemble.robot_parameters import parse_mujoco_robot
 from ensemble.spinner import temporary_node
 from slap_ros.errors import InvalidParameterError
 from slap_ros.skills.domain_choice import DomainChoice
-from slap_ros.vision.tags import tag_of_frame
+from slap_ros.vision.tags import SEARCHED, tag_of_frame
 
 pytest.importorskip("mujoco")
 pytest.importorskip("pupil_apriltags")
@@ -57,10 +57,11 @@ def test_the_detector_broadcasts_what_the_camera_sees(network, tmp_path):
             lambda m: static.update({i.child_frame_id: i.header.frame_id for i in m.transforms}),
             TF_STATIC.qos,
         )
-        assert spinner.spin_until(lambda: seen and static, LIMIT)
+        assert spinner.spin_until(lambda: len(seen) > 1 and static, LIMIT)
     assert static == {OPTICAL_FRAME: "panda_link0"}
     assert not [frame for frame in seen if frame.startswith("detected_")]
     blocks = set()
+    assert seen.pop(SEARCHED).header.frame_id == OPTICAL_FRAME
     for frame, item in seen.items():
         tag = tower.tags[tag_of_frame(frame)]
         assert item.header.frame_id == OPTICAL_FRAME
@@ -104,7 +105,11 @@ def test_pictures_that_cannot_be_used_are_refused_and_the_next_is_searched(netwo
             assert spinner.spin_until(lambda n=number: finder._counts["refused"] == n, LIMIT)
         pictures.publish(good)
         assert spinner.spin_until(lambda: seen, LIMIT)
+        good.data = bytes(len(good.data))  # what is black shows no tag, and was searched
+        pictures.publish(good)
+        assert spinner.spin_until(lambda: len(seen) == 2, LIMIT)
     assert {item.header.frame_id for item in seen[0].transforms} == {"eye"}
+    assert [item.child_frame_id for item in seen[1].transforms] == [SEARCHED]
 
 
 def test_options_of_the_camera_have_types():

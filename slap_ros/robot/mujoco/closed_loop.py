@@ -61,6 +61,12 @@ class ClosedLoopSettings:
     detection_timeout_s: float = 2.0
 
 
+def camera_settings() -> ClosedLoopSettings:
+    """Settings behind a camera, whose pictures come seldom, and from which an arm hides blocks."""
+    tracking = TrackingSettings(hidden_after=5)
+    return ClosedLoopSettings(tracking=tracking, settle_time_s=4.0, detection_timeout_s=8.0)
+
+
 class ClosedLoopWorld:
     """A world whose states are measured on a plant of its own.
 
@@ -181,6 +187,13 @@ class ClosedLoopWorld:
             JointReading(now_s, tuple(plant.joints), tuple(plant.joint_velocities), plant.gap)
         )
         if not self._arm.busy:  # what is detected on the way counts for nothing
-            for found in self._detector.detect():
-                self._robot.add_detection(found.frame, now_s, found.base, found.seen)
+            self._look(now_s)
         return True
+
+    def _look(self, now_s: float) -> None:
+        detected = self._detector.detect()
+        if detected is None:
+            return
+        for found in detected:
+            self._robot.add_detection(found.frame, now_s, found.base, found.seen)
+        self._robot.add_picture(now_s)

@@ -20,11 +20,11 @@ from slap_ros.robot.scene_config import DETECTED, SceneConfig, sampled_scene_con
 from slap_ros.robot.tagged_scene import placed_tags, tagged_scene
 from slap_ros.vision.image_encoding import RGB8, grey_values
 from slap_ros.vision.image_noise import ImageNoise
-from slap_ros.vision.pinhole_camera import PinholeCamera
+from slap_ros.vision.pinhole_camera import PinholeCamera, looking_at
 from slap_ros.vision.tag_detection import TagDetector
 from slap_ros.vision.tags import tag_frame
 
-UNMOVED = 1e-5  # m and rad: a picture of what moved by less would be the same
+UNMOVED = 4e-4  # m and rad: less than the error of a detection, so that a new picture says no more
 PICTURE_S = 0.2  # s, between two pictures
 
 
@@ -43,8 +43,8 @@ class ObjectDetector(Protocol):
     config: SceneConfig  # how they are detected
     period_s: float  # time between two detections
 
-    def detect(self) -> Sequence[DetectedPose]:
-        """Find the frames that show objects at this moment."""
+    def detect(self) -> Sequence[DetectedPose] | None:
+        """Find the frames that show objects at this moment; None where nothing was looked at."""
         ...
 
     def close(self) -> None:
@@ -91,6 +91,12 @@ class CameraSettings:
     seed: int = 0
 
 
+def camera_beside() -> CameraSettings:
+    """The camera of the nodes, across the table and above the blocks, with half of its pixels."""
+    eye, target = (1.05, -0.45, 0.75), (0.5, -0.02, 0.15)
+    return CameraSettings(PinholeCamera.centred(960, 540, 900.0), looking_at(eye, target))
+
+
 class TagCameraDetector:
     """Finds the tags of objects in rendered pictures; knows nothing else of where they are.
 
@@ -116,20 +122,20 @@ class TagCameraDetector:
         self._library = TagDetector({tag.tag: tag.size for tag in tags})
         self._rng = np.random.default_rng(settings.seed)
         self._pictured: np.ndarray | None = None
-        self._found: Sequence[DetectedPose] = ()
+        self._found: Sequence[DetectedPose] | None = None
 
-    def detect(self) -> Sequence[DetectedPose]:
-        """The tags in a picture of now."""
-        now = self.plant.positions
-        if self._pictured is None or np.abs(now - self._pictured).max() > UNMOVED:
+    def detect(self) -> Sequence[DetectedPose] | None:
+        """The tags in a picture of now; None where the picture is lost."""
+        now, before = self.plant.positions, self._pictured
+        if self._found is None or before is None or np.abs(now - before).max() > UNMOVED:
             self._pictured, self._found = now, self._search(now)
         return self._found
 
-    def _search(self, positions: np.ndarray) -> Sequence[DetectedPose]:
+    def _search(self, positions: np.ndarray) -> Sequence[DetectedPose] | None:
         settings = self._settings
         picture = settings.noise.taken(self._camera.picture(positions), self._rng)
         if picture is None:  # lost
-            return ()
+            return None
         height, width, channels = picture.shape
         grey = grey_values(RGB8, height, width, width * channels, picture.tobytes())
         found = self._library.detect(grey, settings.camera)

@@ -8,16 +8,19 @@ Nothing is trained again, and the planner's model stays as it is.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from slap_ros.api.left_out import Tell
+from slap_ros.core import Domain
 from slap_ros.errors import ErrorCode, SlapError
 from slap_ros.evaluation.experiment import Trial
 from slap_ros.evaluation.summary import Summary
+from slap_ros.perception import ExactPerceiver
 from slap_ros.planning.execution import EpisodeResult, Executor
 from slap_ros.planning.options import OptionResult
+from slap_ros.relational import State
 from slap_ros.robot.mujoco.installed import require_mujoco
 from slap_ros.studies.comparison import (
     ApproachResult,
@@ -34,7 +37,18 @@ from slap_ros.studies.study import PreparedStudy, Study, format_steps
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from slap_ros.robot.mujoco.closed_loop import ClosedLoopWorld
+
 OWN, OTHER = "planner's physics", "MuJoCo"
+COLUMNS = (
+    "physics",
+    "approach",
+    "success",
+    "length [steps]",
+    "relative length",
+    "replans",
+    "not solved",
+)
 DOT = 14  # area of a dot in the picture, points squared
 MEASURED = """\
 Pure planning and SLAP solve the same tasks twice: in the physics that the planner plans in, and
@@ -86,26 +100,35 @@ def study(comparison: Comparison) -> StudyReport:
     """
     results = (
         PhysicsResult(OWN, comparison.measure()),
-        PhysicsResult(OTHER, _in_mujoco(comparison)),
+        PhysicsResult(OTHER, measured_by(solve_in_mujoco, "in MuJoCo", comparison)),
     )
-    columns = ["physics", "approach", "success", "length [steps]", "relative length", "replans"]
     return StudyReport(
         study="transfer",
         source="",
         title=f"Another physics: {comparison.domain.name}",
         measured=MEASURED,
-        table=MarkdownTable(
-            [*columns, "not solved"], [row for result in results for row in result.rows()]
-        ),
+        table=MarkdownTable(COLUMNS, [row for result in results for row in result.rows()]),
         found={result.physics: [one.as_json() for one in result.measured] for result in results},
         draw=lambda figure: draw(figure, results),
         size=(5.2, 3.4),
     )
 
 
-def _in_mujoco(comparison: Comparison) -> tuple[ApproachResult, ...]:
+def measured_by(
+    solve: Callable[[PlanningSetup, int, int], Trial], what: str, comparison: Comparison
+) -> tuple[ApproachResult, ...]:
+    """Solve every task with every approach, in a world that is not the planner's.
+
+    Args:
+        solve: Function that solves a task of a seed and an index.
+        what: Name of that, of which there is no other in the study.
+        comparison: Approaches, and the tasks that they solve.
+
+    Returns:
+        What came of each approach.
+    """
     jobs = named_tasks(comparison.experiment)
-    found = comparison.attempt("in MuJoCo", solve_in_mujoco, Trial.from_json, jobs)
+    found = comparison.attempt(what, solve, Trial.from_json, jobs)
     yardstick = found[comparison.approaches[0].name]
     return tuple(
         ApproachResult(Summary.of(comparison.experiment, name, trials, yardstick), trials)
@@ -126,19 +149,45 @@ def solve_in_mujoco(setup: PlanningSetup, seed: int, index: int) -> Trial:
     """
     from slap_ros.robot.mujoco.closed_loop import ClosedLoopWorld  # needs an extra
 
+    return solve_on_robot(setup, seed, index, ClosedLoopWorld)
+
+
+def solve_on_robot(
+    setup: PlanningSetup, seed: int, index: int, make: Callable[[Domain, State], ClosedLoopWorld]
+) -> Trial:
+    """Plan for what is measured on a robot, and execute the plan there.
+
+    Args:
+        setup: Choice of domain, planner and approach.
+        seed: Seed of the task.
+        index: Index of the task among those of its seed.
+        make: Makes the robot's world, of a domain and the state that it begins in.
+
+    Returns:
+        What came of it.
+    """
     domain = setup.make_domain()
     task = domain.task(seed, index)
     space = domain.atom_space(task.initial_state)
-    world = ClosedLoopWorld(domain, task.initial_state)
-    planner = setup.make_planner(domain, task.initial_state)
-    goal = space.mask(task.goal)
     try:
-        episode = Executor(domain, planner, world, space, goal, task.step_limit).run()
+        world = make(domain, task.initial_state)
+    except SlapError as error:  # nothing was measured
+        return Trial.of(seed, index, _ended_by(error))
+    goal, perceiver = space.mask(task.goal), ExactPerceiver(space, changing=True)
+    try:
+        planner = setup.make_planner(domain, task.initial_state)
+        episode = Executor(
+            domain, planner, world, space, goal, task.step_limit, perceiver=perceiver
+        ).run()
     except SlapError as error:  # a fault, after which the robot holds
-        episode = EpisodeResult(error=OptionResult(error.code, str(error)))
+        episode = _ended_by(error)
     finally:
         world.close()
     return Trial.of(seed, index, episode)
+
+
+def _ended_by(error: SlapError) -> EpisodeResult:
+    return EpisodeResult(error=OptionResult(error.code, str(error)))
 
 
 def _ratio(relative: float | None) -> str:
@@ -175,10 +224,15 @@ def draw(figure: Figure, results: Sequence[PhysicsResult]) -> None:
 
 
 def _summary(found: Data) -> str:
-    return "; ".join(f"{physics}: {_words(found[physics])}" for physics in (OWN, OTHER))
+    return "; ".join(f"{physics}: {words(found[physics])}" for physics in (OWN, OTHER))
 
 
-def _words(approaches: Sequence[Mapping[str, Data]]) -> str:
+def words(approaches: Sequence[Mapping[str, Data]]) -> str:
+    """Success and length of pure planning and of SLAP, in a few words.
+
+    Args:
+        approaches: What the report's JSON has of each approach.
+    """
     pure, slap = approaches[0], approaches[-1]
     steps = f"{format_steps(pure['plan_length'])} → {format_steps(slap['plan_length'])} steps"
     return f"{pure['success_rate']:.0%} → {slap['success_rate']:.0%}, {steps}"
