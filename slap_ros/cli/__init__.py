@@ -68,6 +68,11 @@ COMMANDS = (
         "Write a scene file with AprilTags on every object, and a PDF of these tags to print.",
     ),
     CommandEntry(
+        "calibrate",
+        "slap_ros.cli.calibrate:calibrate",
+        "Identify friction from recorded pushes, so that the planner's model pushes alike.",
+    ),
+    CommandEntry(
         "domains",
         "slap_ros.cli.domains:domains",
         "List the installed domains, or the predicates, metrics, goals and operators of one.",
