@@ -21,8 +21,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from slap_ros.geometry.pose import Pose, Quaternion, Vector, multiply, rotate
-from slap_ros.worlds.joint_space.seen_supports import DISTANCE_ERROR
-from slap_ros.worlds.settling import levelled
+from slap_ros.worlds.settling import DISTANCE_ERROR, levelled
 
 SLANTED = 0.4  # cosine of the angle between a tag's normal and the line of sight, about 66 degrees
 HALF_TURN: Quaternion = (0.0, 0.0, 1.0, 0.0)  # about a tag's normal

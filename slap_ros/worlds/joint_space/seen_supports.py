@@ -16,10 +16,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from slap_ros.geometry.oriented_box import OrientedBox
 from slap_ros.geometry.pose import Pose, Vector
 from slap_ros.worlds.joint_space.scene import Body
-from slap_ros.worlds.settling import FLOATING, levelled
+from slap_ros.worlds.settling import DISTANCE_ERROR, FLOATING, levelled
 
 SEEN_FLOATING = 0.024  # m, the same as FLOATING for what a camera sees; less than half a block
-DISTANCE_ERROR = 0.08  # m, by which a tag may seem further away than it is
 LESS_LIKELY = 2.0  # times as much as too far away is what a camera sees too near
 STEEP = 0.3  # sine of the least angle of a line of sight with the table that says where things are
 APART = 0.005  # m, by which neither of two bodies reaches into the other, nor stands off it
