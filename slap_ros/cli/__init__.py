@@ -91,7 +91,7 @@ COMMANDS = (
     CommandEntry(
         "baseline",
         "slap_ros.cli.baseline:app",
-        "Train the learners that SLAP is compared with: PPO, SAC with hindsight, and more.",
+        "Train learners of whole tasks for comparison: PPO, SAC, SAC with hindsight, and more.",
     ),
     CommandEntry(
         "study",
